@@ -23,8 +23,6 @@ from .errors import InputError
 from .inputs import file_path, flag, shown
 from .writing import check_writable
 
-__all__ = ["Checkpoint", "Kind", "checkpoint_path", "open_checkpoint"]
-
 ACCEPTED = "a checkpoint of this run"
 HEADER = -1  # its number
 PAGE = 16_384  # [bytes]; holds seven chunks of a workspace, where a page of the usual 4096 holds one

@@ -11,8 +11,6 @@ import numpy as np
 from .errors import InputError
 from .inputs import printable, shown
 
-__all__ = ["ANGLES", "LENGTHS", "TIMES", "read_columns", "unit_factor"]
-
 LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "km": 1e3, "in": 0.0254}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}

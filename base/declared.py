@@ -22,8 +22,6 @@ from .inputs import printable
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["check_hdf5", "check_zarr"]
-
 ALWAYS_ACCEPTED = 100_000_000  # [bytes], whatever the size of the file
 EXPANSION = 20  # larger contents may be so many times larger than their file: workspaces of less than 100 MB may be 70
 MOST_BLOCKS = 20_000  # chunks of an array without data; each takes time also if it is not stored

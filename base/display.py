@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike
 from .inputs import printable
 from .text import quantity, quantity_row
 
-__all__ = ["BLUE", "GREY", "ORANGE", "Curve", "Displayed", "Fact", "brief", "picture", "record", "tensions_over_time"]
-
 Fact = tuple[str, str]  # its name, and the fact with its unit
 Curve = tuple[ArrayLike, ArrayLike, str]  # (n,) and (n,), broken at nan, and its colour
 

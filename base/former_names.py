@@ -11,8 +11,6 @@ from types import ModuleType
 from typing import Any
 from warnings import warn
 
-__all__ = ["install", "moved_name", "renamed"]
-
 PACKAGE = __name__.split(".")[0]
 NOW = {
     "calibration": "estimation.calibration",

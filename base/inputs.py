@@ -12,23 +12,6 @@ from numpy.typing import NDArray
 
 from .errors import InputError
 
-__all__ = [
-    "check_ending",
-    "file_path",
-    "finite_array",
-    "flag",
-    "leading",
-    "number",
-    "one_of",
-    "printable",
-    "real_array",
-    "repeated",
-    "required",
-    "shown",
-    "whole_number",
-    "with_fields",
-]
-
 Kind = TypeVar("Kind")
 
 _LONGEST = 60  # letters of a value in a message

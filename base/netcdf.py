@@ -22,8 +22,6 @@ from .writing import whole_file
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Contents", "Variable", "check_units", "load_netcdf", "numbers_of", "save_netcdf"]
-
 _alone = threading.Lock()
 LARGEST = 4_000_000_000  # [bytes]; an hour of a flight with a sample each millisecond
 # Of motions and their tensions, of the platform and of carriers.

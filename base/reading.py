@@ -9,8 +9,6 @@ from pathlib import Path
 from .errors import InputError
 from .inputs import printable
 
-__all__ = ["LARGEST_FILE", "check_file", "files_read", "read_bytes"]
-
 LARGEST_FILE = 1_000_000  # [bytes]; the largest robot of the library has a few kB
 BLOCK = 2**20  # [bytes]
 files_read: deque[Path] = deque(maxlen=1000)  # the last ones: a command must not overwrite what it reads

@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterable
 from typing import SupportsFloat, SupportsIndex
 
-__all__ = ["column", "quantity", "quantity_range", "quantity_row"]
-
 Number = SupportsFloat | SupportsIndex | None
 
 DIGITS = 4

@@ -1,20 +1,5 @@
 """The numbers by which results are judged, in one place. All are relative and have no unit."""
 
-__all__ = [
-    "AT_LIMIT",
-    "CANCELLED",
-    "DECISIVE",
-    "DOUBTFUL",
-    "FEASIBILITY",
-    "NEGLIGIBLE",
-    "OPTIMALITY",
-    "ORTHOGONAL",
-    "RANK",
-    "ROUNDING",
-    "SLACK",
-    "WEIGHTS_APART",
-]
-
 # Wrench error that is accepted, relative to what the problem requires (see `TensionProblem.tolerance`). Tensions
 # are called optimal only below it and a certificate is believed only above it, so the two answers cannot both be given.
 FEASIBILITY = 1e-9

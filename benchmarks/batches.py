@@ -17,15 +17,7 @@ from scipy.optimize import least_squares
 
 from ..base import processors
 from ..models import Dynamics, Robot, load, points, pose_from_lengths
-from ..workspace import (
-    Condition,
-    Lengths,
-    Margin,
-    Places,
-    StaticEquilibrium,
-    WrenchClosure,
-    WrenchFeasible,
-)
+from ..workspace import Condition, Lengths, Margin, Places, StaticEquilibrium, WrenchClosure, WrenchFeasible
 from .harness import head, machine, row, timed
 
 ROBOTS = ("wang-flying", "nist-robocrane", "ipanema-1", "ipanema-2", "cogiro", "caroca-pulleys")

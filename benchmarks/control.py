@@ -25,8 +25,6 @@ from .control_programs import BLOCK, FAILED, Row, measure
 from .control_tasks import STANDARD, TASKS, Task, record
 from .harness import machine, table
 
-__all__ = ["Error", "Report", "Step", "markdown", "run"]
-
 Progress = Callable[[str, int, int], None]
 
 TIMED = ("casadi", "daqp", "osqp", "numpy")

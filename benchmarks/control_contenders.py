@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from ..solvers import Horizon
 
-__all__ = ["CONTENDERS", "FIELDS", "REFERENCE", "TOWLINE", "Contender", "Program", "condense", "exact"]
-
 Array = NDArray[np.float64]
 REFERENCE, TOWLINE = "condensed, daqp.solve", "towline Horizon, as flown"
 FAR = 1e4  # in place of infinite bounds, for solvers that need numbers

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from .control_contenders import REFERENCE, TOWLINE, Contender, Program, condense, exact
 from .harness import alternating, ratio
 
-__all__ = ["BLOCK", "FAILED", "Row", "measure"]
-
 Array = NDArray[np.float64]
 
 FAILED = 1e-3  # controls this far off are a failure, in units of their range

@@ -15,8 +15,6 @@ from ..simulation import simulate
 from ..solvers import Horizon
 from .control_contenders import FIELDS, Program
 
-__all__ = ["STANDARD", "TASKS", "Task", "record"]
-
 STANDARD = "computed torque"
 
 

@@ -13,8 +13,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-__all__ = ["alternating", "head", "machine", "ratio", "row", "table", "timed"]
-
 T = TypeVar("T")
 Times = float | Sequence[float]  # of a turn
 

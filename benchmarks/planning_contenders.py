@@ -31,8 +31,6 @@ from ..ocp.tasks.deviation import Deviation
 from ..ocp.tasks.lay_out import lay_out
 from ..studies.flying.circle import HOVER, tasks
 
-__all__ = ["CONTENDERS", "Run", "circle"]
-
 ROBOT = "wang-flying"
 MOST = 3.0  # acceleration of the base [m/s^2]
 OFFSET, JERK = 10.0, 10.0  # base away from the hovering point [m], and its jerk [m/s^3], that cost as much as 1 m/s^2
@@ -255,8 +253,4 @@ def _options(ipopt: dict[str, Any]) -> dict[str, Any]:
     return {"print_time": False, "error_on_fail": True, "ipopt": ipopt}
 
 
-CONTENDERS: dict[str, Callable[[int], Run]] = {
-    "towline": towline,
-    "CasADi, mapped": mapped,
-    "rockit": rockit,
-}
+CONTENDERS: dict[str, Callable[[int], Run]] = {"towline": towline, "CasADi, mapped": mapped, "rockit": rockit}

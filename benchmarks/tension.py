@@ -26,8 +26,6 @@ from .harness import alternating, machine, ratio, table
 from .tension_contenders import REFERENCE, Contender, contenders
 from .tension_tasks import KINDS, Task, make_task
 
-__all__ = ["FAILED", "Report", "Row", "run", "write"]
-
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 

@@ -21,8 +21,6 @@ from ..core import solve_packed
 from ..solvers import TensionProblem, methods, solve, solve_batch
 from .tension_tasks import KINDS, STIFFNESS, Task
 
-__all__ = ["REFERENCE", "Contender", "contenders"]
-
 Array = NDArray[np.float64]
 Single = Callable[[int], Array | None]
 Batch = Callable[[], tuple[Array, NDArray[np.bool_]]]

@@ -16,8 +16,6 @@ from ..base.errors import SolverError
 from ..solvers import TensionProblem
 from .qp_solver import as_qp, multipliers
 
-__all__ = ["KINDS", "STIFFNESS", "Task", "make_task"]
-
 Array = NDArray[np.float64]
 
 KINDS = ("feasible", "infeasible", "rank-deficient", "soft")
@@ -107,10 +105,7 @@ def _optimum(qp: dict[str, Any]) -> Array:
     x[inside] = wish + root * np.linalg.lstsq(A[:, inside] * root, left, rcond=1e-11)[0]
     y, z = multipliers(weights * x + q, A, b, x, lower, upper)
     wrong = max(
-        np.abs(A @ x - b).max(),
-        np.abs(weights * x + q + y @ A + z).max(),
-        (lower - x).max(),
-        (x - upper).max(),
+        np.abs(A @ x - b).max(), np.abs(weights * x + q + y @ A + z).max(), (lower - x).max(), (x - upper).max()
     )
     if not wrong < 1e-10:
         raise SolverError(f"the reference of the benchmark must be exact to 1e-10, got an error of {wrong:.1e}")

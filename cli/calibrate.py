@@ -15,50 +15,56 @@ from .outputs import check_outputs
 SIGMA_KEYS = "lengths, position, rotation"
 
 
+LogArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="LOG",
+        help="Lengths, and poses, tensions and times where known: NetCDF, or CSV with a header such as "
+        "'t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
+    ),
+]
+FreeOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAMES",
+        help="What to find, separated by commas: anchors, attachments, offsets, scales, radii, clock; or auto. "
+        "Default: anchors, offsets, and clock if the log has times and poses of a motion.",
+    ),
+]
+PriorOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME=SIGMA,...",
+        help="Standard deviations about the file's values [m], of scales [1], of the clock [s], as "
+        "'anchors=0.02,offsets=0.05'; default: what the log does not determine changes least.",
+    ),
+]
+SigmaOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SIGMA|NAME=SIGMA,...",
+        help="Standard deviation of the lengths [m], or of lengths [m], position [m] and rotation [rad], as "
+        "'lengths=0.001,position=0.0005'; default: the log's, or 1 mm and exact poses.",
+    ),
+]
+OutliersOption = Annotated[
+    bool, typer.Option("--outliers/--no-outliers", help="Look for wrong readings and slipped winches.")
+]
+OutOption = Annotated[Path | None, typer.Option(metavar="FILE.yaml", help="Default: ROBOT-calibrated.yaml here.")]
+FiguresOption = Annotated[
+    Path | None, typer.Option(metavar="FOLDER", help="Folder to draw in: residuals, anchors, observability.")
+]
+
+
 def calibrate(
     robot: RobotArgument,
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG",
-            help="Lengths, and poses, tensions and times where known: NetCDF, or CSV with a header such as "
-            "'t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
-        ),
-    ],
-    free: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="What to find, separated by commas: anchors, attachments, offsets, scales, radii, clock; or auto. "
-            "Default: anchors, offsets, and clock if the log has times and poses of a motion.",
-        ),
-    ] = None,
-    prior: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME=SIGMA,...",
-            help="Standard deviations about the file's values [m], of scales [1], of the clock [s], as "
-            "'anchors=0.02,offsets=0.05'; default: what the log does not determine changes least.",
-        ),
-    ] = None,
-    sigma: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SIGMA|NAME=SIGMA,...",
-            help="Standard deviation of the lengths [m], or of lengths [m], position [m] and rotation [rad], as "
-            "'lengths=0.001,position=0.0005'; default: the log's, or 1 mm and exact poses.",
-        ),
-    ] = None,
-    outliers: Annotated[
-        bool, typer.Option("--outliers/--no-outliers", help="Look for wrong readings and slipped winches.")
-    ] = True,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE.yaml", help="Default: ROBOT-calibrated.yaml here.")
-    ] = None,
-    figures: Annotated[
-        Path | None,
-        typer.Option("--figures", metavar="FOLDER", help="Folder to draw in: residuals, anchors, observability."),
-    ] = None,
+    log: LogArgument,
+    free: FreeOption = None,
+    prior: PriorOption = None,
+    sigma: SigmaOption = None,
+    outliers: OutliersOption = True,
+    out: OutOption = None,
+    figures: FiguresOption = None,
     form: FormatOption = "png",
     as_json: JsonOption = False,
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -68,11 +69,16 @@ SpeedOption = Annotated[float, typer.Option(help="With --animate: speed of the f
 FpsOption = Annotated[float, typer.Option(help="With --animate: frames per second of the film.")]
 
 
-def check_unused(speed: float, fps: float) -> None:
-    """Raise InputError if options of a film are given but no film is written."""
+def check_animation(animate: Path | None, speed: float, fps: float) -> None:
+    """Raise InputError if the film cannot be written, or if its options are given but no film is."""
+    if animate is not None:
+        from ..figures.animation import check_film
+
+        return check_film(animate, speed, fps)
     for name, value, default in (("--speed", speed, SPEED), ("--fps", fps, FPS)):
         if value != default:
             raise InputError(f"{name} must be left out without --animate, got {value:g}")
+    return None
 
 
 def print_json(value: dict[str, Any]) -> None:

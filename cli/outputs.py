@@ -7,8 +7,6 @@ from pathlib import Path
 
 from ..base.errors import InputError
 
-__all__ = ["check_outputs"]
-
 
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None] | None = None) -> None:
     """Check that the outputs of a command can be written, and are neither inputs nor the same file twice.

@@ -17,12 +17,12 @@ from .options import (
     JsonOption,
     RobotArgument,
     SpeedOption,
-    check_unused,
+    check_animation,
     print_json,
     print_written,
 )
 from .outputs import check_outputs
-from .resuming import checkpoint_option, resume_option, scheduler_option
+from .resuming import check_unused, checkpoint_option, resume_option, scheduler_option
 from .sweep import Sweeping, sweep
 from .watching import watching
 
@@ -35,68 +35,75 @@ def _print_schema(requested: bool) -> None:
         raise typer.Exit
 
 
+TaskArgument = Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")]
+OutOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files. An "
+        "existing file is overwritten."
+    ),
+]
+FiguresOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder to draw in: path, views, tensions and, where they apply, carriers (base.png), limits and the "
+        "solver's convergence."
+    ),
+]
+ReportOption = Annotated[
+    Path | None, typer.Option(help="HTML file to write: the report with its figures, to open anywhere.")
+]
+AnimateOption = Annotated[Path | None, typer.Option(help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")]
+RobustOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SHARE",
+        help="Share of the robots of the robot file's uncertainty, such as 0.95, whose tensions must stay inside "
+        "their limits; default: that of the task.",
+    ),
+]
+VaryOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=VALUES",
+        help="Plan for each of some values of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
+        "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
+        "robot.platform.mass. Repeat the option to plan all combinations. Writes one table instead of one plan: "
+        "--out names its NetCDF file, with a CSV file beside it (default: ROBOT-TASK-sweep.nc); --figures draws "
+        "sweep.png: where plans are feasible, cost and margin. The exit code is 1 if no plan is feasible.",
+    ),
+]
+WorkersOption = Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")]
+SchedulerOption = Annotated[str | None, scheduler_option("With --vary: ")]
+CheckpointOption = Annotated[Path | None, checkpoint_option("With --vary: ")]
+ResumeOption = Annotated[Path | None, resume_option("With --vary: ")]
+KeepOption = Annotated[
+    Path | None, typer.Option(metavar="FOLDER", help="With --vary: folder in which to save every plan (NetCDF).")
+]
+SchemaOption = Annotated[
+    bool, typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files.")
+]
+
+
 def plan(
     robot: RobotArgument,
-    task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files. An "
-            "existing file is overwritten.",
-        ),
-    ] = None,
-    figures: Annotated[
-        Path | None,
-        typer.Option(
-            "--figures",
-            help="Folder to draw in: path, views, tensions and, where they apply, carriers (base.png), limits and the "
-            "solver's convergence.",
-        ),
-    ] = None,
+    task: TaskArgument,
+    out: OutOption = None,
+    figures: FiguresOption = None,
     form: FormatOption = "png",
-    report: Annotated[
-        Path | None, typer.Option("--report", help="HTML file to write: the report with its figures, to open anywhere.")
-    ] = None,
-    animate: Annotated[
-        Path | None, typer.Option("--animate", help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")
-    ] = None,
+    report: ReportOption = None,
+    animate: AnimateOption = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
-    robust: Annotated[
-        float | None,
-        typer.Option(
-            "--robust",
-            metavar="SHARE",
-            help="Share of the robots of the robot file's uncertainty, such as 0.95, whose tensions must stay inside "
-            "their limits; default: that of the task.",
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--vary",
-            metavar="KEY=VALUES",
-            help="Plan for each of some values of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
-            "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
-            "robot.platform.mass. Repeat the option to plan all combinations. Writes one table instead of one plan: "
-            "--out names its NetCDF file, with a CSV file beside it (default: ROBOT-TASK-sweep.nc); --figures draws "
-            "sweep.png: where plans are feasible, cost and margin. The exit code is 1 if no plan is feasible.",
-        ),
-    ] = None,
-    workers: Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")] = 1,
-    scheduler: Annotated[str | None, scheduler_option("With --vary: ")] = None,
-    checkpoint: Annotated[Path | None, checkpoint_option("With --vary: ")] = None,
-    resume: Annotated[Path | None, resume_option("With --vary: ")] = None,
-    keep: Annotated[
-        Path | None,
-        typer.Option("--keep", metavar="FOLDER", help="With --vary: folder in which to save every plan (NetCDF)."),
-    ] = None,
+    robust: RobustOption = None,
+    vary: VaryOption = None,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
+    checkpoint: CheckpointOption = None,
+    resume: ResumeOption = None,
+    keep: KeepOption = None,
     as_json: JsonOption = False,
-    schema: Annotated[
-        bool,
-        typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files."),
-    ] = False,
+    schema: SchemaOption = False,
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or report why none exists.
 
@@ -105,8 +112,7 @@ def plan(
     from ..figures.style import FORMATS
 
     one_of("--format", form, FORMATS)
-    if animate is None:
-        check_unused(speed, fps)
+    check_animation(animate, speed, fps)
     if vary:
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:
@@ -114,23 +120,16 @@ def plan(
                 raise InputError(f"{name} must be left out with --vary, got {shown(str(value))}; {instead}")
         sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep, form), out, figures, as_json)
         return
-    own = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
-    for name, given in {**own, "--resume": resume, "--keep": keep}.items():
-        if given:
-            raise InputError(f"{name} must be left out without --vary: it is an option of many plans")
+    many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
+    check_unused({**many, "--resume": resume, "--keep": keep}, "--vary", "plans")
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task
 
     loaded, read = load(robot), read_task(task)
-    target = out if out is not None else Path(f"{loaded.name}-{read.name}.nc")
-    check_ending("--out", target, ".nc")
+    target = check_ending("--out", out or Path(f"{loaded.name}-{read.name}.nc"), ".nc")
     if report is not None:
         check_ending("--report", report, ".html", ".htm")
-    if animate is not None:
-        from ..figures.animation import check_film
-
-        check_film(animate, speed, fps)
     drawn = figures and figures / f"path.{form}"
     check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": drawn})
     with watching(f"planning {read.name}", quiet=as_json) as watch:

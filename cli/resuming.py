@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,6 @@ import typer
 
 from ..base.errors import InputError
 from .stopping import add_to_message
-
-__all__ = ["checkpoint_of", "checkpoint_option", "resumable", "resume_option", "scheduler_option"]
 
 
 def scheduler_option(when: str = "") -> Any:
@@ -37,6 +35,13 @@ def resume_option(when: str = "") -> Any:
 
 def _sentence(text: str) -> str:
     return text[0].upper() + text[1:]
+
+
+def check_unused(options: Mapping[str, object], without: str, many: str) -> None:
+    """Raise InputError if an option is given, by its value, that is of `many` things and needs the option `without`."""
+    for name, given in options.items():
+        if given:
+            raise InputError(f"{name} must be left out without {without}: it is an option of many {many}")
 
 
 def checkpoint_of(checkpoint: Path | None, resume: Path | None) -> Path | None:

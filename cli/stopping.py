@@ -18,8 +18,6 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-__all__ = ["add_to_message", "end", "end_at_once", "ignore", "listen", "requested", "unlisten"]
-
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 GRACE = 0.3  # [s] to leave what is running, and to remove what it has begun to write
 SHOW_CURSOR = "\x1b[?25h"  # a progress display hides it
@@ -80,9 +78,9 @@ def end() -> NoReturn:
     """End the process with one line and the exit code of the signal; threads that still compute end with it."""
     while not _once.acquire(timeout=GRACE):  # never released: one line, whoever comes first
         pass
-    execution = sys.modules.get("towline.base.execution")  # no process was started where it was never loaded
-    if execution is not None:
-        execution.end_processes()
+    processes = sys.modules.get("towline.base.processes")  # no process was started where it was never loaded
+    if processes is not None:
+        processes.end_processes()
     with suppress(OSError, ValueError):
         if sys.stderr.isatty():
             sys.stderr.write(SHOW_CURSOR)

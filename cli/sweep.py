@@ -16,8 +16,6 @@ from .resuming import checkpoint_of, resumable
 from .stopping import add_to_message
 from .watching import counting
 
-__all__ = ["Sweeping", "sweep"]
-
 
 @dataclass(frozen=True)
 class Sweeping:

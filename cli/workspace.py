@@ -28,91 +28,101 @@ _FILES = (Path(__file__).parent.parent / "workspace" / "conditions").glob("[a-z]
 CONDITIONS = ", ".join(sorted(["all", "any", *(file.stem.replace("_", "-") for file in _FILES)]))
 
 
+ConditionOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Condition that a pose must fulfil: its kind, or JSON with the kind and its keys, such as "
+        f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
+        "Default: static-equilibrium."
+    ),
+]
+DefineOption = Annotated[
+    list[Path] | None,
+    typer.Option(metavar="FILE.py", help="Python file with conditions of your own, to use by their kinds."),
+]
+RobustOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SHARE",
+        help="Share of the robots of the robot file's uncertainty, such as 0.95, for which the conditions about "
+        "tension limits must hold, at all accepted poses at once. Default: the robot counts as exact.",
+    ),
+]
+BoxOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors."
+    ),
+]
+AttitudeOption = Annotated[
+    str | None,
+    typer.Option(
+        help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: that of home."
+    ),
+]
+CarriersOption = Annotated[
+    str, typer.Option(help="Where the carriers are: home, or reach (mobile carriers anywhere in their reach boxes).")
+]
+LengthsOption = Annotated[
+    str | None,
+    typer.Option(
+        help="Range 'min max' of the lengths of three cables [m]; the positions follow from them. Instead of --box."
+    ),
+]
+SamplesOption = Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")]
+MethodOption = Annotated[str, typer.Option(help="How to sample: random, sobol, grid or adaptive.")]
+SeedOption = Annotated[int, typer.Option(help="Seed of the random numbers.")]
+SizeOption = Annotated[
+    float | None,
+    typer.Option(help="Edge of the smallest cells of the method adaptive [m]. Default: as small as the samples allow."),
+]
+WorkersOption = Annotated[int, typer.Option(help="Number of processes on this machine.")]
+SchedulerOption = Annotated[str | None, scheduler_option()]
+CheckpointOption = Annotated[Path | None, checkpoint_option()]
+ResumeOption = Annotated[Path | None, resume_option()]
+KeepOption = Annotated[str, typer.Option(help="Samples to keep in the file, at most a million: accepted, all or none.")]
+OutOption = Annotated[
+    Path | None,
+    typer.Option(
+        help="NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: "
+        "ROBOT-workspace.nc in this folder, from the robot's `name`."
+    ),
+]
+FigureOption = Annotated[
+    Path | None, typer.Option(help="Picture of the reached positions to write: .png, .pdf or .svg.")
+]
+MeshOption = Annotated[
+    Path | None, typer.Option(help="STL file for the boundary, at one attitude and with carriers at home (extra mesh).")
+]
+
+
 def workspace(
     robot: RobotArgument,
-    condition: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Condition that a pose must fulfil: its kind, or JSON with the kind and its keys, such as "
-            f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
-            "Default: static-equilibrium."
-        ),
-    ] = None,
-    define: Annotated[
-        list[Path] | None,
-        typer.Option(metavar="FILE.py", help="Python file with conditions of your own, to use by their kinds."),
-    ] = None,
-    robust: Annotated[
-        float | None,
-        typer.Option(
-            "--robust",
-            metavar="SHARE",
-            help="Share of the robots of the robot file's uncertainty, such as 0.95, for which the conditions about "
-            "tension limits must hold, at all accepted poses at once. Default: the robot counts as exact.",
-        ),
-    ] = None,
-    box: Annotated[
-        str | None,
-        typer.Option(
-            help="Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors."
-        ),
-    ] = None,
-    attitude: Annotated[
-        str | None,
-        typer.Option(
-            help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: that of home."
-        ),
-    ] = None,
-    carriers: Annotated[
-        str,
-        typer.Option(help="Where the carriers are: home, or reach (mobile carriers anywhere in their reach boxes)."),
-    ] = "home",
-    lengths: Annotated[
-        str | None,
-        typer.Option(
-            help="Range 'min max' of the lengths of three cables [m]; the positions follow from them. Instead of --box."
-        ),
-    ] = None,
-    samples: Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")] = 60_000,
-    method: Annotated[str, typer.Option(help="How to sample: random, sobol, grid or adaptive.")] = "random",
-    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
-    size: Annotated[
-        float | None,
-        typer.Option(
-            help="Edge of the smallest cells of the method adaptive [m]. Default: as small as the samples allow."
-        ),
-    ] = None,
-    workers: Annotated[int, typer.Option(help="Number of processes on this machine.")] = 1,
-    scheduler: Annotated[str | None, scheduler_option()] = None,
-    checkpoint: Annotated[Path | None, checkpoint_option()] = None,
-    resume: Annotated[Path | None, resume_option()] = None,
-    keep: Annotated[
-        str, typer.Option(help="Samples to keep in the file, at most a million: accepted, all or none.")
-    ] = "accepted",
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            help="NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: "
-            "ROBOT-workspace.nc in this folder, from the robot's `name`.",
-        ),
-    ] = None,
-    figure: Annotated[
-        Path | None, typer.Option("--figure", help="Picture of the reached positions to write: .png, .pdf or .svg.")
-    ] = None,
-    mesh: Annotated[
-        Path | None,
-        typer.Option(
-            "--mesh", help="STL file for the boundary, at one attitude and with carriers at home (extra mesh)."
-        ),
-    ] = None,
+    condition: ConditionOption = None,
+    define: DefineOption = None,
+    robust: RobustOption = None,
+    box: BoxOption = None,
+    attitude: AttitudeOption = None,
+    carriers: CarriersOption = "home",
+    lengths: LengthsOption = None,
+    samples: SamplesOption = 60_000,
+    method: MethodOption = "random",
+    seed: SeedOption = 0,
+    size: SizeOption = None,
+    workers: WorkersOption = 1,
+    scheduler: SchedulerOption = None,
+    checkpoint: CheckpointOption = None,
+    resume: ResumeOption = None,
+    keep: KeepOption = "accepted",
+    out: OutOption = None,
+    figure: FigureOption = None,
+    mesh: MeshOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Sample which poses of a robot's platform fulfil a condition; the exit code is 1 if none does."""
-    from ..figures import style
-    from ..figures.workspace import reached
+    from ..base.execution import Execution
     from ..models import load
-    from ..workspace import sample, save
+    from ..workspace import sample
     from ..workspace.condition import for_robots
 
     for file in define or []:
@@ -120,43 +130,18 @@ def workspace(
     loaded = load(robot)
     required = for_robots(_condition(condition), robust)
     region = _region(box, attitude, carriers, lengths)
-    target = out if out is not None else Path(f"{loaded.name}-workspace.nc")
-    check_ending("--out", target, ".nc", ".zarr")
-    if mesh is not None:
-        check_ending("--mesh", mesh, ".stl")
+    target = out or Path(f"{loaded.name}-workspace.nc")
     stored = checkpoint_of(checkpoint, resume)
+    _check_files(target, figure, mesh, stored, define or [])
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
         raise InputError(f"--mesh must be of a region in which only positions vary, got {mesh} of another")
-    if target.suffix == ".zarr" and target.exists():
-        raise InputError(f"--out must be a new .zarr folder or a NetCDF file, got {target}, which exists")
-    outputs = {"the checkpoint": stored, "--out": target, "--figure": figure, "--mesh": mesh}
-    check_outputs(outputs, {f"--define {file}": file for file in define or []})
-    if figure is not None:
-        style.check_picture(figure)
     # Before the samples, so that an error in it is reported before hours of work.
     surface = None if mesh is None else _boundary(loaded, required, region)
     with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as show:
-        result = sample(
-            loaded,
-            required,
-            region,
-            _count(samples),
-            method,
-            seed,
-            size=size,
-            workers=workers,
-            scheduler=scheduler,
-            checkpoint=stored,
-            resume=resume is not None,
-            progress=resumable(show, stored, "samples"),
-            keep=keep,
-        )
+        where = Execution(workers, scheduler, stored, resume is not None, resumable(show, stored, "samples"))
+        result = sample(loaded, required, region, _count(samples), method, seed, size=size, keep=keep, execution=where)
     add_to_message("")
-    written = [save(result, target)]
-    if figure is not None:
-        written.append(style.save(reached(result), figure))
-    if mesh is not None and surface is not None:
-        written.append(surface.save(mesh))
+    written = _write(result, target, figure, mesh, surface)
     summary = _summary(result)
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
     if as_json:
@@ -166,6 +151,39 @@ def workspace(
         print_written(written)
     if not summary["accepted"]:
         raise typer.Exit(1)
+
+
+def _check_files(
+    target: Path, figure: Path | None, mesh: Path | None, checkpoint: Path | None, read: list[Path]
+) -> None:
+    """Check that all files can be written, of the kinds that there are, and none is read."""
+    from ..figures import style
+
+    check_ending("--out", target, ".nc", ".zarr")
+    if mesh is not None:
+        check_ending("--mesh", mesh, ".stl")
+    if target.suffix == ".zarr" and target.exists():
+        raise InputError(f"--out must be a new .zarr folder or a NetCDF file, got {target}, which exists")
+    outputs = {"the checkpoint": checkpoint, "--out": target, "--figure": figure, "--mesh": mesh}
+    check_outputs(outputs, {f"--define {file}": file for file in read})
+    if figure is not None:
+        style.check_picture(figure)
+
+
+def _write(
+    result: xr.Dataset, target: Path, figure: Path | None, mesh: Path | None, surface: Mesh | None
+) -> list[Path]:
+    """Write the samples, their picture and the boundary, and return the files."""
+    from ..figures import style
+    from ..figures.workspace import reached
+    from ..workspace import save
+
+    written = [save(result, target)]
+    if figure is not None:
+        written.append(style.save(reached(result), figure))
+    if mesh is not None and surface is not None:
+        written.append(surface.save(mesh))
+    return written
 
 
 def _boundary(robot: Robot, condition: Condition, data: dict[str, Any]) -> Mesh:

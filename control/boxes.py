@@ -6,8 +6,6 @@ import numpy as np
 
 from ..models.robot import Robot
 
-__all__ = ["boxes", "stay_inside"]
-
 
 def boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the least and largest coordinates of the places that carriers may reach, (c, 3) each [m]; None if any."""

@@ -16,8 +16,6 @@ from ..models.robot import Robot
 from .command_delay import Pending
 from .records import MOST_TETHERS, TETHER
 
-__all__ = ["Flown", "Freed", "Moved", "Tethered"]
-
 SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are taken to be there
 
 

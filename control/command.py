@@ -8,8 +8,6 @@ import numpy as np
 
 from ..base.display import record
 
-__all__ = ["ANSWERS", "HOLD", "OTHERWISE", "PLANNED", "SHIFTED", "SOFT", "Command"]
-
 ANSWERS = ("as planned", "shifted plan", "soft wrench", "hold", "not as modelled")
 PLANNED, SHIFTED, SOFT, HOLD, OTHERWISE = range(5)
 NOWHERE, NOTHING = np.full(6, np.nan), np.array(np.nan)

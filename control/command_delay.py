@@ -6,8 +6,6 @@ from collections import deque
 
 import numpy as np
 
-__all__ = ["Pending"]
-
 
 class Pending:
     """Remember commands for `kept` [s]."""

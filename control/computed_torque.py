@@ -31,8 +31,6 @@ from .state import State
 from .tension_loop import TensionLoop
 from .turning import Turning
 
-__all__ = ["SOMETHING", "ComputedTorque"]
-
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
 SHORTEST_LAG = 0.005  # [s]
 ROUNDING = 1e-9  # [s]

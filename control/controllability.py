@@ -8,8 +8,6 @@ from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 from ..statics.distribution import tensions
 
-__all__ = ["uncontrolled"]
-
 STEP = 1e-6  # [m, rad], of a difference quotient
 NONE = 1e-6  # of the largest singular value
 

@@ -9,8 +9,6 @@ from .command import Command
 from .reference import Reference
 from .state import State
 
-__all__ = ["Controller"]
-
 
 class Controller(ABC):
     """One step: a time, a measured state and a reference in, a command out. docs/adding-a-controller.md has an example.

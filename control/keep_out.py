@@ -16,8 +16,6 @@ from ..models.points import placed
 from ..models.robot import Robot
 from ..models.shapes import Block, Capsule, Shape, Sphere
 
-__all__ = ["Surroundings"]
-
 STEP = 1e-6  # [rad], of a difference quotient
 FAR = 4.0  # of the robot's length: a row whose limit is further away is left out, one that is exceeded never
 NOT_THERE = 1e-3  # [m]: a point that is nearer to the middle of a body is pushed up

@@ -15,8 +15,6 @@ from .controller import Controller
 from .reference import Reference
 from .state import State
 
-__all__ = ["OpenLoop"]
-
 
 class OpenLoop(Controller):
     """Order the planned tensions and the planned motion of the carriers: what a controller has to be better than.

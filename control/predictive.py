@@ -32,8 +32,6 @@ from .state import State
 from .watch import LATE, UNSTABLE, HandOver, Watch
 from .weights import CORRECTING, PATIENT, STILL, tensions_of, terminal, weights
 
-__all__ = ["Predictive"]
-
 TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
 NEARLY = 0.1  # residuals of an iterate with which the next step begins, though it is not used
@@ -137,8 +135,8 @@ class Predictive(ComputedTorque):
         far = far - reacts
         usual = CORRECTING if correct else PATIENT if far.any() else STILL
         self._bandwidth = positive("bandwidth", usual.bandwidth if bandwidth is None else bandwidth, 6)
-        returning = usual.carrier_bandwidth if carrier_bandwidth is None else carrier_bandwidth
-        returning = number("carrier_bandwidth", returning, 1e-3, 1e3)
+        carrier_bandwidth = usual.carrier_bandwidth if carrier_bandwidth is None else carrier_bandwidth
+        returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
         count = whole_number("stages", stages, 1, 200)
         self._steps = np.full(count, number("stage", usual.stage if stage is None else stage, 1e-4, 10.0))
@@ -150,44 +148,49 @@ class Predictive(ComputedTorque):
         super().__init__(the_robot, observer=observer, reach=reach, **loops)
         set_reach(self._settings, reacts)
         self._followed = np.flatnonzero(flies & ~far.any(axis=1))
-        # What is under way for longer than half of the stages would leave nothing to decide.
-        delay = min(2.0 / self._attitude, self._times[-1] / 2), self._steps[0]
-        if the_robot.fixed_lengths is None:
-            late = Flown(far, self._strongest, *delay) if (far.any(axis=1) & flies).any() else None
-            self._moved: Moved = late or Freed(far, self._strongest, self._boxes)
-            reaches = far[far > 0]
-        else:
-            self._moved = Tethered(self.robot, *delay)
-            least = LEAST_REACH * float(the_robot.fixed_lengths.mean())
-            reaches = np.full(self._moved.count, max(far.max(), least))
-        m, f = self.robot.m, self._moved.count
-        self._sizes = count, 12 + 2 * f, m + f
+        # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
+        self._has_winches = the_robot.fixed_lengths is None
+        self._moved, reaches = self._mobility(far, flies)
+        self._sizes = count, 12 + 2 * self._moved.count, self.robot.m + self._moved.count
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
-        unknown = np.zeros(self.robot.m) if the_robot.fixed_lengths is None else self._statics
         # How far rates let tensions go until the end of each stage.
         self._room = self._limits.rate * self._times[1:, None]
-        self._preview = Preview(self._steps, self._moved, unknown)
+        self._preview = Preview(self._steps, self._moved, 0 * self._statics if self._has_winches else self._statics)
+        self._surroundings = Surroundings(self.robot, tube, keep_out)
+        self._horizon = self._program(reaches, returning)
+        scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
+        usual = self.robot.force_scale / self.robot.platform.mass
+        self._watch = Watch(scale, usual, None if correct else self._ripple())
+        self._from_the_start: HandOver | None = None
+        self.reset()
+        if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
+            self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
+            warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
+
+    def _mobility(self, far: np.ndarray, flies: np.ndarray) -> tuple[Moved, np.ndarray]:
+        """Return how carriers move that may go as `far`, (c, 3) [m], and how far the coordinates of that may, (f,)."""
+        # What is under way for longer than half of the stages would leave nothing to decide.
+        delay = min(2.0 / self._attitude, self._times[-1] / 2), self._steps[0]
+        if self.robot.fixed_lengths is None:
+            late = Flown(far, self._strongest, *delay) if (far.any(axis=1) & flies).any() else None
+            return late or Freed(far, self._strongest, self._boxes), far[far > 0]
+        moved = Tethered(self.robot, *delay)
+        least = LEAST_REACH * float(self.robot.fixed_lengths.mean())
+        return moved, np.full(moved.count, max(far.max(), least))
+
+    def _program(self, reaches: np.ndarray, returning: float) -> Horizon:
+        """Return the program of every step, with the costs that all share."""
+        count, m, f = self._sizes[0], self.robot.m, self._moved.count
         A, B = self._at_home()
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
         self._weights = weights(self.robot, self._bandwidth, reaches, returning, self._steps[0], moves)
         self._efforts = np.concatenate([np.ones(m), (self._weights.states[12 : 12 + f]) / self._steps[0]])
         self._end = terminal(A, B, self._weights)
         self._penalty = FIRM * self.robot.length * float(np.diag(self._end)[:3].max())
-        # What all problems share.
-        self._surroundings = Surroundings(self.robot, tube, keep_out)
-        h = self._horizon = Horizon(*self._sizes, self._surroundings.rows)
+        h = Horizon(*self._sizes, self._surroundings.rows)
         h.tolerance, h.iterations_max = TOLERANCE, ITERATIONS
         h.Q[:count], h.Q[count], h.R[:] = np.diag(self._weights.states), self._end, np.diag(self._weights.controls)
-        scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
-        usual = self.robot.force_scale / self.robot.platform.mass
-        self._watch = Watch(scale, usual, None if correct else self._ripple())
-        # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
-        self._has_winches, self._none = the_robot.fixed_lengths is None, np.zeros(self.robot.m)
-        self._from_the_start: HandOver | None = None
-        self.reset()
-        if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
-            self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
-            warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
+        return h
 
     def _at_home(self) -> tuple[np.ndarray, np.ndarray]:
         """Return A and B of a stage at rest at home, (n, n) and (n, u)."""
@@ -221,8 +224,7 @@ class Predictive(ComputedTorque):
         self._watch.reset()
         self.handed_over = self._from_the_start
         count, n, u = self._sizes
-        self._guess = np.zeros((count + 1, n)), np.zeros((count, u))
-        self._solved = np.nan  # when it was [s]
+        self._guess, self._solved = (np.zeros((count + 1, n)), np.zeros((count, u))), np.nan  # and when it was [s]
         self._is_near = False  # whether the next solution may start from the last
         self._moved.reset()
         self._preview.reset()
@@ -287,7 +289,8 @@ class Predictive(ComputedTorque):
         if not np.isfinite(self._problems.w).all():
             self._watch.interrupt()
             return
-        otherwise = self._cables["known"][0] - self._cables["last"][0] if self._has_winches else self._none
+        known, last = self._cables["known"][0], self._cables["last"][0]
+        otherwise = known - last if self._has_winches else np.zeros_like(last)
         self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
         if self.handed_over is not None and self._beside._settings["reacts"]:
             carriers = np.stack(reference[3:6], axis=1)
@@ -357,8 +360,7 @@ class Predictive(ComputedTorque):
         gained += h.B[0, 6:12, :m] @ (pulls[0] - planned[0, :m])
         by_tensions = h.B[0, 6:12, :m] / self._steps[0]
         self._watch.explain(time, gained / self._steps[0], by_tensions, self._solved == time)
-        late = len(under_way)
-        more = np.clip(controls[late, m:] - planned[late, m:], -self._strongest, self._strongest)
+        more = (controls[:, m:] - planned[:-1, m:])[len(under_way)].clip(-self._strongest, self._strongest)
         self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
         return pulls
 
@@ -366,8 +368,7 @@ class Predictive(ComputedTorque):
         self, time: float, start: np.ndarray, wanted: np.ndarray, planned: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return states and controls about which the dynamics are linear: those of the last solution, or a decay."""
-        late = (time - self._solved) / self._steps[0]
-        count = len(self._steps)
+        late, count = (time - self._solved) / self._steps[0], len(self._steps)
         if time - self._solved <= self._times[-1]:  # as where a command is taken from it
             first = np.minimum(np.arange(count + 1) + int(late), count)
             second, share = np.minimum(first + 1, count), late - int(late)
@@ -384,8 +385,7 @@ class Predictive(ComputedTorque):
 
     def _write_bounds(self, controls: np.ndarray, planned: np.ndarray) -> None:
         """Write limits of tensions, as far as their rates let them go, and of the carriers' accelerations."""
-        h, m = self._horizon, self.robot.m
-        low, high, _ = self._limits
+        h, m, (low, high, _) = self._horizon, self.robot.m, self._limits
         h.u_min[:, :m], h.u_max[:, :m] = low, high
         if isfinite(self._solved):
             last = self._cables["last"][0]

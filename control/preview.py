@@ -11,8 +11,6 @@ from ..base.inputs import number, shown
 from .carrier_references import Moved
 from .reference import Reference
 
-__all__ = ["Preview", "rows_at", "turns"]
-
 ROUNDING = 1e-9  # of a period
 CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was announced
 

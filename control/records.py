@@ -10,8 +10,6 @@ import numpy as np
 from ..core import MOST_CABLES, MOST_CARRIERS
 from ..models.record import MOST_ACTUATORS
 
-__all__ = ["CABLE", "CARRIER", "CONTROLLER", "MOST_TETHERS", "PLATFORM", "TETHER"]
-
 MOST_TETHERS = 3  # cables of fixed length that hold a carrier
 
 _LIMITS = np.dtype([(name, "f8") for name in ("low", "high", "rate")])

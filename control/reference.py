@@ -8,8 +8,6 @@ import numpy as np
 
 from ..base.display import record
 
-__all__ = ["Reference"]
-
 
 class Reference(NamedTuple):
     """A reference at one time. Its arrays may be without the leading dimension of a batch if it is the same for all.

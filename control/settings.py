@@ -12,8 +12,6 @@ from ..models.batch import as_array
 from ..models.robot import Robot
 from .records import CONTROLLER
 
-__all__ = ["Limits", "limits_of", "positive", "reach_of", "set_reach", "settings_of"]
-
 SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from their commands, see core/control/heard.c
 
 

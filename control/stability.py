@@ -11,8 +11,6 @@ from .controller import Controller
 from .reference import Reference
 from .state import State
 
-__all__ = ["grows"]
-
 PERIOD = 2e-3  # [s] between steps
 LEAST, SLOW, MOST = 400, 4.0, 1500  # steps, time constants of the errors, and steps again
 FAR = 0.3  # of the robot's length: errors that have grown

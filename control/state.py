@@ -8,8 +8,6 @@ import numpy as np
 
 from ..base.display import record
 
-__all__ = ["State"]
-
 
 class State(NamedTuple):
     """A measured state. All arrays of a batch have the same leading dimension, or none for one robot.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["TensionLoop"]
-
 
 class TensionLoop:
     """Add the integral of wanted less measured tensions to wanted ones, for winches that give others.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["Turning"]
-
 LATE = 1.5  # over the bandwidth: a lag of 2 is where the loop gets unstable
 WINDOW = 0.05  # [s], in which orders and rates are compared
 FASTEST = 1e4  # [rad/s]: nothing turns faster

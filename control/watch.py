@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["LATE", "UNSTABLE", "HandOver", "Watch"]
-
 BOUND = 0.1  # of the usual acceleration: the mean that is not predicted and permitted
 UNSTABLE = "small errors at home grow with predictions, whose model has no carriers that turn before they accelerate"
 LATE = "carriers turn nearly as late after their orders as makes their attitude loop unstable"

@@ -9,8 +9,6 @@ import numpy as np
 from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
 
-__all__ = ["CORRECTING", "PATIENT", "STILL", "Usual", "Weights", "tensions_of", "terminal", "weights"]
-
 
 class Usual(NamedTuple):
     """The defaults of robots of one kind: bandwidths [rad/s], and how long a stage lasts [s]."""
@@ -48,12 +46,7 @@ class Weights(NamedTuple):
 
 
 def weights(
-    robot: Robot,
-    bandwidth: np.ndarray,
-    reach: np.ndarray,
-    carrier_bandwidth: float,
-    duration: float,
-    moved: np.ndarray,
+    robot: Robot, bandwidth: np.ndarray, reach: np.ndarray, carrier_bandwidth: float, duration: float, moved: np.ndarray
 ) -> Weights:
     """Return the weights with which errors decay with the bandwidth, as far as tensions keep from their limits.
 

@@ -17,15 +17,7 @@ def lines(
 ) -> None: ...
 def required_wrench(robot: Any, poses: Any, velocities: Any, accelerations: Any, wind: Any, w: Any) -> None: ...
 def pose_from_lengths(
-    robot: Any,
-    carriers: Any,
-    lengths: Any,
-    weights: Any,
-    free: Any,
-    damping: Any,
-    poses: Any,
-    errors: Any,
-    steps: Any,
+    robot: Any, carriers: Any, lengths: Any, weights: Any, free: Any, damping: Any, poses: Any, errors: Any, steps: Any
 ) -> None: ...
 def pose_covariance(robot: Any, carriers: Any, weights: Any, poses: Any, covariances: Any) -> None: ...
 def ends(robot: Any, poses: Any, carriers: Any, anchors: Any, attachments: Any) -> None: ...

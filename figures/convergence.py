@@ -41,12 +41,7 @@ def convergence(iterates: Sequence[Iterate]) -> Figure:
     starts = np.cumsum([0, *(len(part) for part in parts)])
     for index, (part, start) in enumerate(zip(parts, starts, strict=False)):
         at = start + np.arange(len(part))
-        look = {
-            **style.look(index),
-            "marker": ".",
-            "markersize": 3,
-            "label": f"run {index + 1}",
-        }
+        look = {**style.look(index), "marker": ".", "markersize": 3, "label": f"run {index + 1}"}
         above.plot(at, np.maximum(part[:, 2], FLOOR), **look)
         below.plot(at, part[:, 1], **look)
     for ax in (above, below):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["drawn_ends"]
-
 LEFT = 0.25  # of its length that is drawn of a cable that has been cut
 
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from .animation import Scene
 
-__all__ = ["Drawn", "Filmed"]
-
 
 class Drawn:
     """The base of results with figures: `plot` saves those that `figures` draws."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["extent", "faces", "outline"]
-
 FLAT = 1e-6  # of the largest singular value: thinner bodies are drawn as a plane or a line
 SAME_PLANE = 1e-6  # difference of unit normals, and of distances relative to the size of the body
 

@@ -12,8 +12,6 @@ from ..base.netcdf import Variable, numbers_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["outline_variables", "outlines_from"]
-
 
 def outline_variables(regions: Sequence[Sequence[np.ndarray]]) -> dict[str, Variable]:
     """Return the lines (n, 3) in {G} [m] of each region as variables; none without regions."""

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ABOVE", "FRONT", "SIDE", "View", "views_of"]
-
 AIR = 0.05  # of an extent, beyond its ends
 FLAT = 0.22  # of the largest extent: thinner objects have panels so thick
 BESIDE, BETWEEN, ROW = 0.55, 0.45, 0.55  # inches: labels left of panels, between two, and below and above one

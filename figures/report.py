@@ -14,8 +14,6 @@ from ..base.inputs import file_path
 from ..base.writing import whole_file
 from .drawing import Drawing
 
-__all__ = ["Part", "Report", "Reported", "Section", "Table"]
-
 # The colour of each status in `style.colour`; distinct with any kind of colour vision, and the word stands beside it.
 COLOURS = {"feasible": 0, "passed": 0, "infeasible": 1, "failed": 1}
 OTHER = 5

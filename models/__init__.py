@@ -16,14 +16,7 @@ if TYPE_CHECKING:
     from .robot import Robot
     from .uncertainty import Uncertainty
 
-__all__ = [
-    "Dynamics",
-    "RelativeDynamics",
-    "Robot",
-    "Uncertainty",
-    "available",
-    "load",
-]
+__all__ = ["Dynamics", "RelativeDynamics", "Robot", "Uncertainty", "available", "load"]
 
 _HOME = {
     "Dynamics": "dynamics",

@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike
 
-__all__ = ["Array", "Symbol", "one_array", "several_arrays"]
-
 Symbol = TypeVar("Symbol", "ca.SX", "ca.MX")
 Array: TypeAlias = Any  # an array with leading batch dimensions, or a CasADi expression
 Others = ParamSpec("Others")

@@ -7,16 +7,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from .part import (
-    Finite,
-    Name,
-    NonNegative,
-    Part,
-    Positive,
-    Vector3,
-)
-
-__all__ = ["Cable", "Encoder", "Pulley", "Winch"]
+from .part import Finite, Name, NonNegative, Part, Positive, Vector3
 
 
 class Pulley(Part):

@@ -9,8 +9,6 @@ from .part import Box, Inertia
 if TYPE_CHECKING:
     from .rotation import Matrix
 
-__all__ = ["Actuator", "Drawing", "Effort", "MotionLimits", "RigidBody"]
-
 
 class MotionLimits(NamedTuple):
     """The limits of a carrier's own motion; default: no limit."""

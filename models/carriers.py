@@ -17,18 +17,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from ..base.errors import InputError
 from .carrier_answers import Actuator, Drawing, Effort, MotionLimits, RigidBody
-from .part import (
-    AT_ORIGIN,
-    BodyInertia,
-    Box,
-    Finite,
-    Name,
-    NonNegative,
-    Part,
-    Pose,
-    Positive,
-    inertia_matrix,
-)
+from .part import AT_ORIGIN, BodyInertia, Box, Finite, Name, NonNegative, Part, Pose, Positive, inertia_matrix
 from .schema import json_schema
 
 if TYPE_CHECKING:

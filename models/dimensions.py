@@ -8,8 +8,6 @@ from ..base.netcdf import Variable
 from .part import COORDINATES
 from .robot import Robot
 
-__all__ = ["dimensions"]
-
 
 def dimensions(robot: Robot, times: np.ndarray) -> dict[str, Variable]:
     """Return time (n,) [s], coordinate, carrier with its kind and whether it moves, and cable, from 1."""

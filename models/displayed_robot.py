@@ -13,8 +13,6 @@ from ..base.inputs import printable
 from ..base.text import quantity, quantity_range, quantity_row
 from .part import Part
 
-__all__ = ["DisplayedRobot"]
-
 PLANES = {"x": [[0, 0], [1, 0], [0, 1]], "y": [[1, 0], [0, 0], [0, 1]], "z": [[1, 0], [0, 1], [0, 0]]}  # without it
 OBLIQUE = [[0.9, -0.25], [-0.45, -0.45], [0.0, 0.95]]  # (3, 2), from above
 

@@ -9,8 +9,6 @@ import numpy as np
 from .cable import Cable
 from .carriers import Carrier, Drive
 
-__all__ = ["lengths_to_keep", "usual_drive"]
-
 
 def usual_drive(carriers: Iterable[Carrier], cables: Iterable[Cable]) -> Drive:
     """Return the drive of a robot whose file has none, from its cables and the carriers that hold these.

@@ -18,8 +18,6 @@ from .motion import Motion
 from .record import record_of
 from .robot import Robot
 
-__all__ = ["Mechanics"]
-
 ROWS_WORTH_A_THREAD = 50_000  # some milliseconds
 
 _LENGTHS, _A, _J = range(3)  # among the results of `core.lines`

@@ -10,8 +10,6 @@ import numpy as np
 from ..base.display import record
 from .arrays import Array
 
-__all__ = ["Motion"]
-
 
 class Motion(NamedTuple):
     """Coordinates (x, y, z, roll, pitch, yaw) of platform and carriers and their first two time derivatives.

@@ -16,8 +16,6 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from .cable import Cable
 
-__all__ = ["Parameter", "locate", "located"]
-
 FORMS = "cables[i].anchor.x, cables[i].attachment.x (or .y, .z) or cables[i].pulley.radius"
 _NAME = re.compile(r"cables\[(0|[1-9][0-9]{0,5})\]\.(?:(anchor|attachment)\.([xyz])|pulley\.radius)")
 

@@ -10,10 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-__all__ = ["anchors", "angles", "attachments", "default_home", "in_frame", "placed", "rotations"]
 
-
-class WithPoints(Protocol):
+class _WithPoints(Protocol):
     """Robots as far as points need them: anchors in the carriers' frames, attachments in that of the platform."""
 
     @property
@@ -55,7 +53,7 @@ def in_frame(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.einsum("...ij,...i->...j", rotations(pose[..., 3:]), points - pose[..., :3])
 
 
-def anchors(robot: WithPoints, carrier_pose: np.ndarray) -> np.ndarray:
+def anchors(robot: _WithPoints, carrier_pose: np.ndarray) -> np.ndarray:
     """Place the anchors of a robot into {G}, with its carriers at `carrier_pose` (..., c, 6), (..., m, 3) [m]."""
     owner, points = robot.carrier_of_cable, robot.anchors
     if not points.any():
@@ -67,7 +65,7 @@ def anchors(robot: WithPoints, carrier_pose: np.ndarray) -> np.ndarray:
     return result
 
 
-def attachments(robot: WithPoints, pose: np.ndarray) -> np.ndarray:
+def attachments(robot: _WithPoints, pose: np.ndarray) -> np.ndarray:
     """Place the attachments of a robot into {G}, with its platform at `pose` (..., 6), (..., m, 3) [m]."""
     return placed(pose, robot.attachments)
 

@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["MOST_FACES", "Polyhedron", "convex_hull", "polyhedron"]
-
 MOST_FACES = 200  # what a distance costs grows with them
 FLAT = 1e-9  # of the largest extent: thinner bodies have no inside
 SAME_PLANE = 1e-6  # difference of unit normals, and of distances relative to the size: files have 7 digits

@@ -6,8 +6,6 @@ import numpy as np
 
 from .cable import Cable
 
-__all__ = ["check_pulleys"]
-
 
 def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cables: tuple[Cable, ...]) -> None:
     """Refuse an attachment on the swivel axis of its pulley, or inside the sheave.

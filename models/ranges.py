@@ -8,8 +8,6 @@ from pydantic import Field, model_validator
 
 from .part import Finite, Part, Positive
 
-__all__ = ["PositiveRange", "Range"]
-
 
 class Range(Part):
     """The numbers from min to max, both included."""

@@ -13,8 +13,6 @@ from .carriers import Carrier
 from .part import COORDINATES, inertia_matrix
 from .robot import Robot
 
-__all__ = ["FREE", "IMPOSED", "LAGGED", "RECORD", "RESTS", "fits", "record_of"]
-
 RESTS, FREE, LAGGED, IMPOSED = range(4)  # `towline_motion`
 MOST_ACTUATORS = 6
 

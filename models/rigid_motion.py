@@ -22,8 +22,6 @@ from .rotation import (
     rotation,
 )
 
-__all__ = ["acceleration", "required_wrench"]
-
 
 def acceleration(
     mass: float,

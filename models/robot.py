@@ -22,13 +22,7 @@ from .cable import Cable
 from .carriers import AnyCarrier, Drive
 from .displayed_robot import DisplayedRobot
 from .drive import lengths_to_keep, usual_drive
-from .part import (
-    COORDINATES,
-    LARGEST,
-    Name,
-    Vector3,
-    inertia_matrix,
-)
+from .part import COORDINATES, LARGEST, Name, Vector3, inertia_matrix
 from .platform import Platform
 from .pulleys import check_pulleys
 from .uncertainty import Uncertainty

@@ -7,8 +7,6 @@ import numpy as np
 from .points import placed
 from .robot import Robot
 
-__all__ = ["rotor_discs"]
-
 ROUND = np.linspace(0.0, 2 * np.pi, 33)
 
 

@@ -7,8 +7,6 @@ from typing import Any
 
 from pydantic import BaseModel
 
-__all__ = ["json_schema"]
-
 
 @cache
 def json_schema(model: type[BaseModel]) -> dict[str, Any]:

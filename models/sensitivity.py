@@ -10,8 +10,6 @@ from .mechanics import Mechanics
 from .parameters import locate
 from .robot import Robot
 
-__all__ = ["derivatives"]
-
 _COLUMNS = {"anchor": 0, "attachment": 3, "radius": 6}  # of `Mechanics.columns_by_geometry`
 
 

@@ -15,8 +15,6 @@ from .points import placed, rotations
 from .polyhedron import Polyhedron, convex_hull, polyhedron
 from .stl import read_stl
 
-__all__ = ["Block", "Capsule", "ConvexMesh", "Shape", "Sphere"]
-
 DENT = 1e-5  # of its size by which a convex surface may be inside its hull: files have 7 digits
 
 

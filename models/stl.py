@@ -12,8 +12,6 @@ from ..base.inputs import printable
 from ..base.reading import read_bytes
 from .part import LARGEST
 
-__all__ = ["HEADER", "RECORD", "read_stl"]
-
 LARGEST_FILE = 50_000_000  # [bytes], a million triangles
 HEADER = 84  # bytes of a binary file before its triangles
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

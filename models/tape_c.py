@@ -12,8 +12,6 @@ import casadi as ca
 
 from . import tape
 
-__all__ = ["literal", "operations", "to_c_function"]
-
 _UNARY = (
     *("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "asin", "acos", "atan"),
     *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "fabs", "floor", "ceil"),

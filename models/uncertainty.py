@@ -10,8 +10,6 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from .parameters import locate
 from .part import Finite, Part
 
-__all__ = ["Uncertainty"]
-
 ROUNDING = 1e-9  # of the largest number of the covariance, in its symmetry and in its eigenvalues
 
 

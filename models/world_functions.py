@@ -14,8 +14,6 @@ from .motion import Motion
 from .robot import Robot
 from .rotation import Matrix
 
-__all__ = ["WorldFunctions"]
-
 PUBLISHED = ("wrench_matrix", "cable_lengths", "required_wrench", "acceleration")
 
 

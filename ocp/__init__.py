@@ -11,17 +11,7 @@ from .tasks.status import MotionStatus
 from .tasks.task import Task, read_task
 from .timing.time_along import time_along
 
-__all__ = [
-    "MotionStatus",
-    "Plan",
-    "Planner",
-    "Sweep",
-    "Task",
-    "plan",
-    "read_task",
-    "sweep",
-    "time_along",
-]
+__all__ = ["MotionStatus", "Plan", "Planner", "Sweep", "Task", "plan", "read_task", "sweep", "time_along"]
 
 
 if not TYPE_CHECKING:  # a type checker would accept any name

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from ..figures.animation import Scene
 
-__all__ = ["Plan"]
-
 
 @dataclass(frozen=True, eq=False)
 class Plan(PlanData, Filmed, Reported):

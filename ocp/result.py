@@ -30,8 +30,6 @@ if TYPE_CHECKING:
     from .audits.robust_margin import RobustMargin
     from .timing.fastest_law import FastestLaw
 
-__all__ = ["PlanData", "Relaxed"]
-
 DRAWN_AT = 200  # times at which drawn robots are checked
 MOST_WARNED = 100_000  # times that are looked at for warnings, or less than twice as many
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from ..base.inputs import leading
 from ..models import points
+from ..models.batch import as_array
 from . import layout
-
-__all__ = ["SETTINGS", "place"]
 
 SETTINGS = np.dtype(  # `towline_plant` of core/plant/plant.h
     [
@@ -40,3 +42,34 @@ def place(block: np.ndarray, pose: np.ndarray, velocity: np.ndarray, com: np.nda
         "...ij,...j->...i", R, np.cross(rate, com)
     )
     block[..., layout.RATE :] = rate
+
+
+def given_or(name: str, value: Any, default: np.ndarray) -> np.ndarray:
+    """Return an argument as an array of numbers with the shape of its default behind those of a batch."""
+    return default if value is None else as_array(name, value, default.shape)
+
+
+def leading_of(vectors: dict[str, np.ndarray], tables: dict[str, np.ndarray]) -> tuple[int, ...]:
+    """Return the dimensions of the batch of vectors (..., n) and tables (..., c, n)."""
+    shapes = {name: value.shape[:-1] for name, value in vectors.items()}
+    return leading(shapes | {name: value.shape[:-2] for name, value in tables.items()})
+
+
+def command_rows(
+    batch: tuple[int, ...], parts: dict[str, np.ndarray], of_carriers: dict[str, np.ndarray], air: bool
+) -> np.ndarray:
+    """Return commands as rows, (..., k), of what `Plant.command` takes by these names; without `air` wind is none."""
+    cables, actuation = parts["cables"], of_carriers["actuation"]
+    m, (count, actuators) = cables.shape[-1], actuation.shape[-2:]
+    row = np.zeros((*batch, layout.COMMANDS + m + layout.CARRIER * count))
+    row[..., layout.AIR] = float(air)
+    row[..., layout.WIND : layout.WRENCH] = parts["wind"]
+    row[..., layout.WRENCH : layout.COMMANDS] = parts["wrench"]
+    row[..., layout.COMMANDS : layout.COMMANDS + m] = cables
+    for index in range(count):
+        first = layout.COMMANDS + m + layout.CARRIER * index
+        row[..., first : first + actuators] = actuation[..., index, :]
+        for order, name in enumerate(("pose", "velocity", "acceleration")):
+            at = first + layout.REFERENCE_POSE + 6 * order
+            row[..., at : at + 6] = of_carriers[f"carrier_{name}"][..., index, :]
+    return row

@@ -7,8 +7,6 @@ import numpy as np
 from ..core import run_plant
 from .plant import Plant
 
-__all__ = ["Periods"]
-
 
 class Periods:
     """Run many flights of a plant side by side."""

@@ -20,18 +20,11 @@ from ..models.files import as_robot
 from ..models.record import FREE, IMPOSED, RESTS, record_of
 from ..models.robot import Robot
 from . import layout
-from .packing import SETTINGS, place
+from .packing import SETTINGS, command_rows, given_or, leading_of, place
 from .reading import Reading
 from .samples import complete
 
-__all__ = ["History", "Plant"]
-
-DRIVES = {
-    "lengths": layout.LENGTHS,
-    "rates": layout.RATES,
-    "forces": layout.FORCES,
-    "tensions": layout.TENSIONS,
-}
+DRIVES = {"lengths": layout.LENGTHS, "rates": layout.RATES, "forces": layout.FORCES, "tensions": layout.TENSIONS}
 SHORTEST_STEP, LONGEST_STEP = 1e-12, 1e3  # [s]
 STEPS_WORTH_A_THREAD = 20_000  # some 20 milliseconds
 
@@ -89,13 +82,14 @@ class Plant:
         How many numbers a state has, n.
     record
         The robot as the numeric core reads it, with the plant's stiffness and damping; it cannot be written to.
+    settings
+        Drive, contacts and bandwidths as the numeric core reads them, of `packing.SETTINGS`.
 
     Raises
     ------
     InputError
         If an argument has a wrong value, forces are commanded of cables without winches, or the robot has more cables
-        or carriers than the numeric core has room for. Every method raises it, in
-        one line, for an argument of a wrong shape or value.
+        or carriers than the numeric core has room for. Every method raises it for a wrong shape or value.
     """
 
     def __init__(
@@ -126,7 +120,7 @@ class Plant:
         self.record = record_of(self.robot).copy()
         self.record["cable"]["stiffness"][: self.robot.m], self.record["cable"]["damping"][: self.robot.m] = EA, C
         self.record.flags.writeable = False
-        self._settings = np.array(
+        self.settings = np.array(
             (
                 DRIVES[drive],
                 contacts == "located",
@@ -174,30 +168,19 @@ class Plant:
             If both tensions and lengths are given, or an argument has a wrong shape or value.
         """
         robot, count = self.robot, len(self.robot.carriers)
-        poses = as_array("pose", robot.home if pose is None else pose, (6,))
-        velocities = as_array("velocity", np.zeros(6) if velocity is None else velocity, (6,))
-        carriers = as_array("carrier_pose", robot.carrier_home if carrier_pose is None else carrier_pose, (count, 6))
-        moving = as_array(
-            "carrier_velocity", np.zeros((count, 6)) if carrier_velocity is None else carrier_velocity, (count, 6)
-        )
         if tensions is not None and lengths is not None:
             raise InputError("lengths must be None where tensions are given, got both")
-        pulls = as_array("tensions", np.zeros(robot.m) if tensions is None else tensions, (robot.m,))
-        own = np.zeros(robot.m) if lengths is None else as_array("lengths", lengths, (robot.m,))
+        poses, velocities = given_or("pose", pose, robot.home), given_or("velocity", velocity, np.zeros(6))
+        carriers = given_or("carrier_pose", carrier_pose, robot.carrier_home)
+        moving = given_or("carrier_velocity", carrier_velocity, np.zeros((count, 6)))
+        pulls, own = given_or("tensions", tensions, np.zeros(robot.m)), given_or("lengths", lengths, np.zeros(robot.m))
         if lengths is not None and not (own >= layout.SHORTEST).all():
             raise InputError(f"lengths must be numbers >= {layout.SHORTEST:g} m, got {own.min():g} m")
         if (pulls < 0).any():
             raise InputError(f"tensions must be numbers >= 0 N, got {pulls.min():g} N")
-        batch = leading(
-            {
-                "pose": poses.shape[:-1],
-                "velocity": velocities.shape[:-1],
-                "carrier_pose": carriers.shape[:-2],
-                "carrier_velocity": moving.shape[:-2],
-                "tensions": pulls.shape[:-1],
-                "lengths": own.shape[:-1],
-            }
-        )
+        of_body = {"pose": poses, "velocity": velocities, "tensions": pulls, "lengths": own}
+        of_carriers = {"carrier_pose": carriers, "carrier_velocity": moving}
+        batch = leading_of(of_body, of_carriers)
         bodies = np.zeros((*batch, 1 + count, layout.BODY))
         place(bodies[..., 0, :], poses, velocities, np.array(robot.platform.com))
         place(bodies[..., 1:, :], carriers, moving, np.zeros(3))
@@ -257,38 +240,20 @@ class Plant:
         home = robot.carrier_home
         parts = {
             "cables": as_array("cables", cables, (robot.m,)),
-            "wind": as_array("wind", np.zeros(3) if wind is None else wind, (3,)),
-            "wrench": as_array("wrench", np.zeros(6) if wrench is None else wrench, (6,)),
+            "wind": given_or("wind", wind, np.zeros(3)),
+            "wrench": given_or("wrench", wrench, np.zeros(6)),
         }
+        derivative = np.full(home.shape, 0.0 if carrier_pose is None else np.nan)  # which `complete` replaces
         of_carriers = {
-            "actuation": as_array(
-                "actuation", np.zeros((count, actuators)) if actuation is None else actuation, (count, actuators)
-            ),
-            "carrier_pose": as_array("carrier_pose", home if carrier_pose is None else carrier_pose, home.shape),
+            "actuation": given_or("actuation", actuation, np.zeros((count, actuators))),
+            "carrier_pose": given_or("carrier_pose", carrier_pose, home),
+            "carrier_velocity": given_or("carrier_velocity", carrier_velocity, derivative),
+            "carrier_acceleration": given_or("carrier_acceleration", carrier_acceleration, derivative),
         }
-        for name, value in (("velocity", carrier_velocity), ("acceleration", carrier_acceleration)):
-            of_carriers[f"carrier_{name}"] = (
-                np.full(home.shape, 0.0 if carrier_pose is None else np.nan)  # which `complete` replaces
-                if value is None
-                else as_array(f"carrier_{name}", value, home.shape)
-            )
         if self.drive == "lengths" and not (parts["cables"] >= layout.SHORTEST).all():
             least = parts["cables"].min()
             raise InputError(f"cables must be lengths >= {layout.SHORTEST:g} m, got {least:g} m")
-        shapes = {name: value.shape[:-1] for name, value in parts.items()}
-        batch = leading(shapes | {name: value.shape[:-2] for name, value in of_carriers.items()})
-        row = np.zeros((*batch, self._command_size))
-        row[..., layout.AIR] = float(wind is not None)
-        row[..., layout.WIND : layout.WRENCH] = parts["wind"]
-        row[..., layout.WRENCH : layout.COMMANDS] = parts["wrench"]
-        row[..., layout.COMMANDS : layout.COMMANDS + robot.m] = parts["cables"]
-        for index in range(count):
-            first = layout.COMMANDS + robot.m + layout.CARRIER * index
-            row[..., first : first + actuators] = of_carriers["actuation"][..., index, :]
-            for order, name in enumerate(("pose", "velocity", "acceleration")):
-                at = first + layout.REFERENCE_POSE + 6 * order
-                row[..., at : at + 6] = of_carriers[f"carrier_{name}"][..., index, :]
-        return row
+        return command_rows(leading_of(parts, of_carriers), parts, of_carriers, wind is not None)
 
     def step(self, state: np.ndarray, command: np.ndarray, dt: float, after: np.ndarray | None = None) -> np.ndarray:
         """Return the state [m, rad, s] after `dt` [s] under one command, (..., n).
@@ -325,7 +290,7 @@ class Plant:
             return None
         history, tensions = np.empty((1, 2, self.size)), np.empty((1, 2, self.robot.m))
         given = np.ascontiguousarray(state), np.ascontiguousarray(rows)
-        run_plant(self.record, self._settings, given[0], given[1], history, tensions, 1, dt, 1, 1)
+        run_plant(self.record, self.settings, given[0], given[1], history, tensions, 1, dt, 1, 1)
         return history[0, 1] if math.isfinite(np.vdot(history, history)) else None
 
     def run(
@@ -368,14 +333,7 @@ class Plant:
         return self._run(state, rows, rows.shape[-2], dt, substeps, keep, threads)
 
     def _run(
-        self,
-        state: np.ndarray,
-        rows: np.ndarray,
-        steps: int,
-        dt: float,
-        substeps: int,
-        keep: int,
-        threads: int | None,
+        self, state: np.ndarray, rows: np.ndarray, steps: int, dt: float, substeps: int, keep: int, threads: int | None
     ) -> History:
         """Simulate the first `steps` commands."""
         substeps, keep = whole_number("substeps", substeps, 1, 10**6), whole_number("keep", keep, 1, 10**9)
@@ -395,12 +353,10 @@ class Plant:
         def run_rows(begin: int, end: int) -> None:
             some = slice(begin, end)
             given = states[some], rows[some], history[some], tensions[some]
-            run_plant(self.record, self._settings, *given, steps, period, substeps, keep)
+            run_plant(self.record, self.settings, *given, steps, period, substeps, keep)
 
-        if threads is None:
-            threads = min(processors.available(), count * steps * substeps // STEPS_WORTH_A_THREAD)
-        else:
-            threads = whole_number("threads", threads, 1, 10**4)
+        worth = count * steps * substeps // STEPS_WORTH_A_THREAD
+        threads = min(processors.available(), worth) if threads is None else whole_number("threads", threads, 1, 10**4)
         threads = max(1, min(threads, count))
         if threads == 1:
             run_rows(0, count)
@@ -415,11 +371,6 @@ class Plant:
             )
         times = period * keep * np.arange(kept)
         return History(times, history.reshape(*batch, kept, -1), tensions.reshape(*batch, kept, -1))
-
-    @property
-    def settings(self) -> np.ndarray:
-        """Return drive, contacts and bandwidths as the numeric core reads them, of `packing.SETTINGS`."""
-        return self._settings
 
     def read(self, states: np.ndarray) -> Reading:
         """Return what `states`, (..., n), are: poses [m, rad], velocities, lengths."""

@@ -10,8 +10,6 @@ from ..models import points
 from ..models.robot import Robot
 from . import layout
 
-__all__ = ["Reading"]
-
 
 def _rotation_of_products() -> np.ndarray:
     """Return what makes the entries of R, (16, 9), of the products of two entries of a unit quaternion (w, x, y, z)."""

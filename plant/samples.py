@@ -6,8 +6,6 @@ import numpy as np
 
 from . import layout
 
-__all__ = ["complete"]
-
 
 def complete(rows: np.ndarray, cables: int, carriers: int, period: float) -> np.ndarray:
     """Return commands, (..., K, k), without the nan of velocities and accelerations that were not given.

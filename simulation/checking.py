@@ -11,8 +11,6 @@ from ..base.inputs import shown
 from ..control import ANSWERS, Command
 from ..models.robot import Robot
 
-__all__ = ["check_command"]
-
 
 def check_command(command: Any, robot: Robot, flights: int, time: float) -> None:
     """Check a command of all flights, or of the only one.

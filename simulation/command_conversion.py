@@ -12,8 +12,6 @@ from ..core import winch_lengths
 from ..plant import Plant, layout
 from .experiment import Experiment, Wind
 
-__all__ = ["Orders"]
-
 FASTEST = 1e3  # [m/s], of the air
 
 

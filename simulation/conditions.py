@@ -14,8 +14,6 @@ from ..models.parsing import validate
 from ..plant.plant import DRIVES
 from .noise import Noise
 
-__all__ = ["Conditions"]
-
 
 @dataclass(frozen=True)
 class Conditions(Displayed):

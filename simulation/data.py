@@ -16,8 +16,6 @@ from ..models.robot import Robot
 from .experiment import Experiment
 from .record import Record
 
-__all__ = ["TENSION_TOLERANCE", "SimulationData"]
-
 TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max
 
 

@@ -9,8 +9,6 @@ import numpy as np
 from ..base.text import quantity
 from .data import SimulationData
 
-__all__ = ["Event", "events", "sentence"]
-
 
 class Event(NamedTuple):
     """Something that happened at a time [s].

@@ -12,8 +12,6 @@ from ..control import Reference
 from .faults import Fault
 from .noise import Noise
 
-__all__ = ["Experiment", "Wind"]
-
 
 class Wind(Protocol):
     """A wind over time."""

@@ -10,8 +10,6 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from ..models.robot import Robot
 
-__all__ = ["Fault", "read_faults"]
-
 ACCEPTED = "'cut CABLE at SECONDS', 'stick CABLE at SECONDS', 'lose CARRIER at SECONDS' or 'miss DURATION at SECONDS'"
 _FORM = re.compile(r"(cut|stick|lose|miss)\s+(\S+)\s+at\s+(\S+)")
 

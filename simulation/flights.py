@@ -27,9 +27,6 @@ from .run_statistics import Extremes
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["FIGURES", "copies", "flights", "fly_block", "passed", "report", "save", "summary"]
-
-
 # What is kept of a flight: the periods that it lasted, errors [m], tensions [N], by how much they exceed t_max in
 # proportion to the cable's range, the periods that begin with a slack cable, and those answered in each way.
 FIGURES = np.dtype(
@@ -98,10 +95,7 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
         "slack_s": over(of["slack"] * period, "s", "how long a cable was slack that should pull"),
         "answered": Variable(("seed", "answer"), of["answered"], {"long_name": "steps answered in each way"}),
     }
-    coordinates = {
-        "seed": Variable(("seed",), np.array(seeds)),
-        "answer": Variable(("answer",), np.array(ANSWERS)),
-    }
+    coordinates = {"seed": Variable(("seed",), np.array(seeds)), "answer": Variable(("answer",), np.array(ANSWERS))}
     attributes = {"title": f"towline flights of {robot.name}", "robot": to_yaml(robot), "tolerance_m": tolerance}
     return Contents(variables, coordinates, attributes).dataset()
 

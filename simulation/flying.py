@@ -20,8 +20,6 @@ from .experiment import Experiment
 from .noise import Noise
 from .recorder import Period, Recorder
 
-__all__ = ["fly"]
-
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
 FEW = 1000  # numbers that BLAS adds with one thread
 DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
@@ -98,11 +96,7 @@ def _stacked(commands: list[Command]) -> Command:
 
 
 def fly(
-    plant: Plant,
-    controllers: Sequence[Controller],
-    conditions: Experiment,
-    seeds: Sequence[int],
-    recorder: Recorder,
+    plant: Plant, controllers: Sequence[Controller], conditions: Experiment, seeds: Sequence[int], recorder: Recorder
 ) -> tuple[np.ndarray, list[float]]:
     """Fly one flight for each seed, from the reference's beginning on, with a controller each or one for all.
 
@@ -117,8 +111,8 @@ def fly(
     InputError
         If the controller returns what no plant can follow.
     """
-    robot, flights, period = plant.robot, len(seeds), conditions.period
-    first, m = conditions.references[0], plant.robot.m
+    robot, m, flights, period = plant.robot, plant.robot.m, len(seeds), conditions.period
+    first = conditions.references[0]
     motion = (first.pose, first.velocity, first.carrier_pose, first.carrier_velocity)
     start = np.zeros(m) if first.tensions is None else np.maximum(first.tensions, 0.0)
     states = np.tile(plant.start(*motion, tensions=start), (flights, 1))
@@ -129,8 +123,7 @@ def fly(
     orders = Orders(plant, conditions, seeds)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
     periods = Periods(plant, period, conditions.substeps)
-    faults, silent_until, command = list(conditions.faults), -1.0, None
-    expected: list[tuple[int, ...]] | None = None
+    faults, silent_until, command, expected = list(conditions.faults), -1.0, None, None
     for k, reference in enumerate(conditions.references):
         time = k * period
         while faults and faults[0].at <= time + 1e-9 * period:

@@ -11,8 +11,6 @@ from typing import Any
 from pydantic import BaseModel
 from typing_extensions import override
 
-__all__ = ["identity"]
-
 
 class _Pickler(pickle.Pickler):
     """Pickle to bytes that are the same in each process, which are never read again."""

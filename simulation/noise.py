@@ -7,8 +7,6 @@ from pydantic import Field
 
 from ..models.part import Part
 
-__all__ = ["Noise"]
-
 
 class Noise(Part):
     """Errors of the sensors, as in a YAML file; each number is a standard deviation of white noise, by default none.

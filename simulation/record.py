@@ -9,8 +9,6 @@ from ..control import ANSWERS
 from ..models.robot import Robot
 from .recorder import Period
 
-__all__ = ["Record"]
-
 
 class Record(Displayed):
     """Keep motions, lengths, tensions and commands of one flight, a row for each period."""

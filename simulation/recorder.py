@@ -8,8 +8,6 @@ import numpy as np
 
 from ..control import Command
 
-__all__ = ["Period", "Recorder"]
-
 
 class Period(NamedTuple):
     """A period of flights side by side, from its beginning on; the next one overwrites its arrays.

@@ -9,8 +9,6 @@ from ..control.command import PLANNED
 from .experiment import Experiment
 from .recorder import Period
 
-__all__ = ["Extremes"]
-
 
 class Extremes:
     """Keep a few numbers of each flight while it is flown.

@@ -23,8 +23,6 @@ from .flights import FIGURES, copies, fly_block, passed
 from .identity import identity
 from .winds import ConstantWind
 
-__all__ = ["fly_many"]
-
 SIDE_BY_SIDE = 250  # flights in one block, at most
 BLOCK_TIME = 3.0  # [s] that a block should take: what is computed is stored so often, and lost if the process ends
 TRIED = 10  # periods of one flight, which tell how large the first block may be
@@ -37,12 +35,7 @@ Part = tuple[int, np.ndarray, float]  # of all flights: the first, figures, and 
 
 
 def fly_many(
-    plant: Plant,
-    controller: Controller,
-    conditions: Experiment,
-    seeds: range,
-    tolerance: float,
-    execution: Execution,
+    plant: Plant, controller: Controller, conditions: Experiment, seeds: range, tolerance: float, execution: Execution
 ) -> np.ndarray:
     """Return the figures of a flight for each seed, (N,) of `FIGURES`: the same to the last bit for all workers.
 

@@ -37,8 +37,6 @@ from .winds import read_wind
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["simulate"]
-
 LONGEST = 1e6  # periods of one flight
 SOFT = 1e8  # weight of the wrench where no tensions give it
 MOST_RUNS = 10_000_000

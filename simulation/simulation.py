@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
     from ..figures.animation import Scene
 
-__all__ = ["Simulation"]
-
 
 @dataclass(frozen=True, eq=False)
 class Simulation(SimulationData, Filmed, Reported):
@@ -104,9 +102,7 @@ class Simulation(SimulationData, Filmed, Reported):
         variables["carrier_reference"] = over(base, stands, "m, rad", "pose that each carrier has in the reference")
         variables["carrier_command"] = over(base, record.orders[rows], "m, rad", "pose that each carrier should have")
         variables["tensions"] = over(cable, record.tensions[rows], "N", "cable tensions, means over the periods")
-        variables["tensions_commanded"] = over(
-            cable, record.commanded[rows], "N", "tensions that the controller orders"
-        )
+        variables["tensions_commanded"] = over(cable, record.commanded[rows], "N", "what the controller orders")
         variables["cable_lengths"] = over(cable, record.lengths[rows], "m", "from anchor to attachment")
         variables["tensions_unlimited"] = over(cable, record.commanded[rows], "N", "the same as tensions_commanded")
         missing = np.nan_to_num(record.shortfall[rows])

@@ -10,8 +10,6 @@ from ..models.dynamics import dynamics_of
 from ..models.part import inertia_matrix
 from ..plant import Plant
 
-__all__ = ["steps_in"]
-
 ANGLE = 1.0  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
 
 

@@ -20,8 +20,6 @@ from ..models.robot import Robot
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Trajectory", "read_trajectory"]
-
 ACCEPTED = "a plan, the NetCDF file of one, a path or a pose (6,)"
 SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")

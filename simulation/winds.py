@@ -13,8 +13,6 @@ from ..models import air
 from ..models.robot import Robot
 from .experiment import Wind
 
-__all__ = ["ConstantWind", "Gusts", "read_wind"]
-
 
 class ConstantWind:
     """The same wind at all times."""

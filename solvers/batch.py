@@ -21,8 +21,6 @@ from .solution import TensionSolution
 from .solve import solve
 from .status import INVALID, STATUSES, UNSURE, Status
 
-__all__ = ["BatchSolution", "solve_batch"]
-
 Array = NDArray[np.float64]
 
 ROWS_WORTH_A_THREAD = 2000  # about a millisecond

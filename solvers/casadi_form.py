@@ -19,8 +19,6 @@ from .solve import solve
 if TYPE_CHECKING:
     import casadi
 
-__all__ = ["casadi_function"]
-
 Array = NDArray[np.float64]
 _Matrix = tuple[str, tuple[int, int]]  # name and shape
 _Options = Mapping[str, Any]

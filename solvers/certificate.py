@@ -23,8 +23,6 @@ from .box_least_squares import Projection, project
 from .exact_arithmetic import exact_optimum
 from .problem import Array, TensionProblem, accepted_error
 
-__all__ = ["Certificate", "CertificateText", "certificate_along", "certify", "sharpest"]
-
 Indices = NDArray[np.intp]
 
 

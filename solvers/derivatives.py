@@ -21,8 +21,6 @@ from ..base.inputs import required
 from .problem import TensionProblem
 from .solution import TensionSolution
 
-__all__ = ["Derivatives", "derivatives", "sensitivity"]
-
 Array = NDArray[np.float64]
 
 # A tension this near to its limit, relative to the largest tension, is at it; a multiplier this small, relative to the

@@ -15,8 +15,6 @@ from ..base.errors import InputError
 from ..base.inputs import real_array, shown, whole_number
 from ..core import PROCESSOR, horizon_places, horizon_relative_to, horizon_size, horizon_solve
 
-__all__ = ["Horizon", "Multipliers", "Residuals"]
-
 Array = NDArray[np.float64]
 
 COLD, WARM, SHIFTED = 0, 1, 2  # of `towline_beginning`
@@ -199,13 +197,7 @@ class Horizon(Displayed):
                 raise InputError(f"{name} must be True or False, got {shown(value)}")
         beginning = SHIFTED if shifted else WARM if warm else COLD
         self._count, self._converged = horizon_solve(
-            *self._sizes,
-            PROCESSOR,
-            beginning,
-            int(self.iterations_max),
-            self.tolerance,
-            self._memory,
-            self._residuals,
+            *self._sizes, PROCESSOR, beginning, int(self.iterations_max), self.tolerance, self._memory, self._residuals
         )
         return self._converged
 

@@ -11,8 +11,6 @@ from .problem import TensionProblem
 from .solve import solve
 from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
-__all__ = ["InPlace"]
-
 Array = NDArray[np.float64]
 
 RHO = 1e8  # weight of the squared wrench error in a soft answer, beside the squared tensions

@@ -22,8 +22,6 @@ from .certificate import certificate_along
 from .exact_arithmetic import exact_optimum
 from .problem import TensionProblem
 
-__all__ = ["Margin", "capacity_margin"]
-
 Array = NDArray[np.float64]
 
 

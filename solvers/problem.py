@@ -11,8 +11,6 @@ from ..base.errors import InputError
 from ..base.inputs import real_array, repeated
 from ..base.tolerances import CANCELLED, DOUBTFUL, FEASIBILITY, ROUNDING, WEIGHTS_APART
 
-__all__ = ["Array", "TensionProblem", "accepted_error"]
-
 Array = NDArray[np.float64]
 
 # Inside this range no square, and no quotient of two inputs, leaves the range of float64.

@@ -7,8 +7,6 @@ from ..base.errors import InputError
 from ..base.inputs import repeated, required, shown
 from .problem import TensionProblem
 
-__all__ = ["limit_rate"]
-
 
 def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike) -> TensionProblem:
     """Narrow a problem's limits to what can be reached from the last tensions.

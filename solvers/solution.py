@@ -13,8 +13,6 @@ from .certificate import Certificate
 from .problem import Array, TensionProblem
 from .status import Status
 
-__all__ = ["TensionSolution"]
-
 
 @dataclass(slots=True, eq=False)
 class TensionSolution(Displayed):

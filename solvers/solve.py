@@ -20,8 +20,6 @@ from .standard_form import StandardForm, standard_forms
 from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES, UNSURE
 from .verify import verify
 
-__all__ = ["methods", "solve"]
-
 
 def methods() -> dict[str, Method]:
     """Return every method by name; each has `guarantee`, `source`, `options` and `backends()`."""

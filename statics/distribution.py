@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from ..models.dynamics import Dynamics
     from ..solvers.methods.method import Method
 
-__all__ = ["pose_problem", "tensions", "wrench_problem"]
-
 COINCIDENT = 1e-9  # [m]: a shorter cable has no direction
 
 

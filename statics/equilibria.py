@@ -75,11 +75,7 @@ class Equilibrium(Displayed):
 
 
 def equilibria(
-    robot: Robot,
-    lengths: np.ndarray,
-    carrier_pose: np.ndarray | None = None,
-    starts: int = 24,
-    seed: int = 0,
+    robot: Robot, lengths: np.ndarray, carrier_pose: np.ndarray | None = None, starts: int = 24, seed: int = 0
 ) -> list[Equilibrium]:
     """Return stable equilibrium poses for cables of `lengths` (m,) [m], lowest potential energy first.
 

@@ -16,8 +16,6 @@ from ..models.rotor_discs import rotor_discs
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["scene"]
-
 TRAIL = 5000  # points of the trail at most
 LONGEST = 100  # letters of the title
 

@@ -10,10 +10,7 @@ from towline import load
 from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.solvers.in_place import InPlace
 
-COPIES = {
-    "pickle": lambda value: pickle.loads(pickle.dumps(value)),
-    "deepcopy": copy.deepcopy,
-}
+COPIES = {"pickle": lambda value: pickle.loads(pickle.dumps(value)), "deepcopy": copy.deepcopy}
 ROBOTS = ["wang-flying", "ipanema-1", "wang-ctmrts", "multi-quadrotor-3", "point-mass-3"]
 
 

@@ -31,10 +31,7 @@ def problem_of(p):
 
 # Cables that pull along w by 5e-12 of the largest, or less, and by 1e-4 of it and more with the tensions that they may
 # have. By hand: together they give 1 + 2 * 5e-12 * 1e7 = 1.0001, and 1 + 5e-12 * 1e9 = 1.005.
-SMALL_PULLS = [
-    ([[1.0, 5e-12, 5e-12], [0.0, 1.0, -1.0]], [1.0, 1e7, 1e7], 1.0001),
-    ([[1.0, 5e-12]], [1.0, 1e9], 1.005),
-]
+SMALL_PULLS = [([[1.0, 5e-12, 5e-12], [0.0, 1.0, -1.0]], [1.0, 1e7, 1e7], 1.0001), ([[1.0, 5e-12]], [1.0, 1e9], 1.005)]
 
 
 @pytest.mark.parametrize(("A", "high", "most"), SMALL_PULLS)

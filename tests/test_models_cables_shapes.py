@@ -56,11 +56,7 @@ def test_energy_decays_monotonically_when_undriven(span):
     state = chain.straight(start, end)
     state[1:15:3] += 0.02 * np.sin(np.arange(5))  # out of the plane, too
     solution = solve_ivp(
-        lambda _, x: chain.dynamics(x, *ends.values())[0].full().ravel(),
-        (0, 0.5),
-        state,
-        rtol=1e-8,
-        atol=1e-10,
+        lambda _, x: chain.dynamics(x, *ends.values())[0].full().ravel(), (0, 0.5), state, rtol=1e-8, atol=1e-10
     )
     energy = call(chain.energy, {"state": solution.y.T} | ends)["total"][..., 0]
     allowed = 1e-9 * np.abs(energy).max()  # of the integrator

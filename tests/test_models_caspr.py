@@ -202,10 +202,7 @@ WRONG_BODIES = {
         ("</links>", BODIES[BODIES.index("<link_rigid") : BODIES.index("</links>")] + "</links>"),
         r"bodies\.xml must have one link, because towline's robots have one platform, got 2",
     ),
-    "revolute": (
-        ("SPATIAL_EULER_XYZ", "R_Z"),
-        r": link_rigid 'box': joint: type must be one of SPATI.*, got 'R_Z'",
-    ),
+    "revolute": (("SPATIAL_EULER_XYZ", "R_Z"), r": link_rigid 'box': joint: type must be one of SPATI.*, got 'R_Z'"),
     "motor": (
         ('type="', 'actuated="true" type="'),
         r"joint must be a joint that only the cables move, got one with a motor",
@@ -215,10 +212,7 @@ WRONG_BODIES = {
         r"links: link_soft must be a link_rigid, got 'link_soft'",
     ),
     "q too short": (("0.4 0.5 0.6", "0.4"), r"joint: q_initial must be 6 finite numbers, got '0.1 0.2 0.3 0.4'"),
-    "no q": (
-        ('q_initial="0.1 0.2 0.3 0.4 0.5 0.6"', ""),
-        r"joint must have the attribute q_initial, got none",
-    ),
+    "no q": (('q_initial="0.1 0.2 0.3 0.4 0.5 0.6"', ""), r"joint must have the attribute q_initial, got none"),
     "mass in words": (("2.5<", "much<"), r"physical: mass must be one finite number, got 'much'"),
     "mass NaN": (("2.5<", "NaN<"), r"mass must be one finite number, got 'NaN'"),
     "mass overflows": (("2.5<", "1e999<"), r"mass must be one finite number, got '1e999'"),
@@ -248,14 +242,8 @@ WRONG_CABLES = {
         ('"joint"', '"end"'),
         r"cable_ideal 'left': attachment_reference must be com or joint, got 'end'",
     ),
-    "no force_max": (
-        ("<force_max>80</force_max>", ""),
-        r"'left': properties must have an element force_max, got none",
-    ),
-    "no limit": (
-        ("<force_max>80<", "<force_max>Inf<"),
-        r"properties: force_max must be one finite number, got 'Inf'",
-    ),
+    "no force_max": (("<force_max>80</force_max>", ""), r"'left': properties must have an element force_max, got none"),
+    "no limit": (("<force_max>80<", "<force_max>Inf<"), r"properties: force_max must be one finite number, got 'Inf'"),
     "pushes": (
         ("<force_min>1.0<", "<force_min>-1.0<"),
         r"cable_ideal 'left': t_min must be greater than or equal to 0",

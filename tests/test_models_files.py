@@ -51,22 +51,14 @@ WRONG = {
         r"cables\[1\]\.carrier must be one of frame, cart, got 'card'",
     ),
     "unknown kind": ("kind: ground", "kind: grond", r"carriers\[0\]\.kind must be one of ground, .*, got 'grond'"),
-    "no kind": (
-        ", kind: ground",
-        "",
-        r"carriers\[0\]\.kind is missing: one of ground, mobile, prescribed, quadrotor",
-    ),
+    "no kind": (", kind: ground", "", r"carriers\[0\]\.kind is missing: one of ground, mobile, prescribed, quadrotor"),
     "same carrier twice": ("name: cart", "name: frame", r"carriers\[1\]\.name must be unique, got 'frame' twice"),
     "typing error": (
         "attachment: [0, 0.1, 0]",
         "atachment: [0, 0.1, 0]",
         r"cables\[0\]\.atachment is not a known key, did you mean 'attachment'\?",
     ),
-    "unknown key": (
-        "source: a test",
-        "source: a test\nsorce: b",
-        r"sorce is not a known key, did you mean 'source'\?",
-    ),
+    "unknown key": ("source: a test", "source: a test\nsorce: b", r"sorce is not a known key, did you mean 'source'\?"),
     "key of a carrier": ("speed_max: 1,", "speed_max: 1, speed: 1,", r"carriers\[1\]\.speed is not a known key"),
     "home out of reach": (
         "home: [0, 0, 3,",

@@ -27,11 +27,7 @@ def body_rates(pose, velocity, acceleration):
     P = np.array([[1, 0, -sp], [0, cr, sr * cp], [0, -sr, cr * cp]])
     dr, dp, _ = velocity[3:]
     dP = np.array(
-        [
-            [0, 0, -cp * dp],
-            [0, -sr * dr, cr * cp * dr - sr * sp * dp],
-            [0, -cr * dr, -sr * cp * dr - cr * sp * dp],
-        ]
+        [[0, 0, -cp * dp], [0, -sr * dr, cr * cp * dr - sr * sp * dp], [0, -cr * dr, -sr * cp * dr - cr * sp * dp]]
     )
     return P @ velocity[3:], dP @ velocity[3:] + P @ acceleration[3:]
 

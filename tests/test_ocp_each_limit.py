@@ -190,17 +190,10 @@ def place(kind, who, distance, **shape):
 CASES = {
     "platform_speed": Case("ipanema-1", OUT, lambda p: speed(p, platform(p)), lambda b: {"platform_speed": b}),
     "platform_acceleration": Case(
-        "ipanema-1",
-        OUT,
-        lambda p: acceleration(p, platform(p)),
-        lambda b: {"platform_acceleration": b},
-        tolerance=5e-3,
+        "ipanema-1", OUT, lambda p: acceleration(p, platform(p)), lambda b: {"platform_acceleration": b}, tolerance=5e-3
     ),
     "platform_turn": Case(
-        "ipanema-1",
-        OUT,
-        lambda p: np.linalg.norm(spin(p, platform(p)), axis=1),
-        lambda b: {"platform_turn": b},
+        "ipanema-1", OUT, lambda p: np.linalg.norm(spin(p, platform(p)), axis=1), lambda b: {"platform_turn": b}
     ),
     "platform_tilt": Case("ipanema-1", OUT, lambda p: tilt(platform(p)), lambda b: {"platform_tilt": b}),
     "platform_box": Case(

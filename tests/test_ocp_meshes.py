@@ -118,10 +118,7 @@ def test_a_turned_box_is_the_box_of_turned_points(ends, angles):
     turned = Block(kind="box", min=low.tolist(), max=high.tolist(), attitude=angles.tolist())
     plain = Block(kind="box", min=low.tolist(), max=high.tolist())
     mesh = ConvexMesh(
-        kind="mesh",
-        vertices=(1000 * (CUBE - 0.5) * (high - low)).tolist(),
-        scale=1e-3,
-        pose=[*centre, *angles],
+        kind="mesh", vertices=(1000 * (CUBE - 0.5) * (high - low)).tolist(), scale=1e-3, pose=[*centre, *angles]
     )
     before = [ca.DM(centre + turn.T @ (end - centre)) for end in ends]
     after = [ca.DM(end) for end in ends]

@@ -124,11 +124,7 @@ def test_what_the_model_leaves_out_is_the_gyroscopic_moment(equations):
     roll, pitch, _ = towing_equations.ANGLES
     # Body rates of ZYX angles, all of which turn by 1 rad/s.
     rates = np.array(
-        [
-            1 - np.sin(pitch),
-            np.cos(roll) + np.sin(roll) * np.cos(pitch),
-            -np.sin(roll) + np.cos(roll) * np.cos(pitch),
-        ]
+        [1 - np.sin(pitch), np.cos(roll) + np.sin(roll) * np.cos(pitch), -np.sin(roll) + np.cos(roll) * np.cos(pitch)]
     )
     first, second, third = np.diag(load("wang-ctmrts").inertia)
     moment = [
@@ -275,8 +271,7 @@ def test_a_verdict_follows_what_is_printed(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("computed", "told"),
-    [((0, 3), "wider"), ((1.2, 1.8), "narrower"), ((0, 1.8), "lower"), ((1.2, 3), "higher")],
+    ("computed", "told"), [((0, 3), "wider"), ((1.2, 1.8), "narrower"), ((0, 1.8), "lower"), ((1.2, 3), "higher")]
 )
 def test_how_a_range_lies_beside_the_printed_one(computed, told):
     assert towing_ranges._beside(np.array(computed), (1.0, 2.0)).startswith(f"{told} than printed")

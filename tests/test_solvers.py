@@ -13,13 +13,7 @@ from towline.base.errors import InputError
 from towline.solvers import Status, TensionProblem, certify, methods, solve, solve_batch
 
 from .problems import T_MAX, T_MIN, ZOO, geometric_matrix, random_feasible, random_infeasible, random_tensions
-from .references import (
-    distance_to_available,
-    linear_program_status,
-    optimum_by_enumeration,
-    row_scale,
-    support_value,
-)
+from .references import distance_to_available, linear_program_status, optimum_by_enumeration, row_scale, support_value
 
 CONTENDERS = [("active-set", None), ("min-norm", None), ("qp", "clarabel"), ("qp", "osqp")]
 EXACT = CONTENDERS[:2]
@@ -295,10 +289,7 @@ WRONG = {
     "w a column": ({"w": np.ones((6, 1))}, r"w must be .*, got shape \(6, 1\)"),
     "w with NaN": ({"w": [0, 0, np.nan, 0, 0, 0]}, r"w must be .*, got nan at index 2"),
     "w infinite": ({"w": [0, 0, 0, 0, -np.inf, 0]}, r"w must be .*, got -inf at index 4"),
-    "w beyond all measure": (
-        {"w": np.full(6, 1e60)},
-        r"w must be finite numbers below 1e\+50, got 1e\+60 at index 0",
-    ),
+    "w beyond all measure": ({"w": np.full(6, 1e60)}, r"w must be finite numbers below 1e\+50, got 1e\+60 at index 0"),
     "w of booleans": ({"w": np.ones(6, dtype=bool)}, r"w must be .*, got entries of type bool"),
     "t_min of another length": ({"t_min": np.zeros(6)}, r"t_min must be of shape \(8,\), .*, got shape \(6,\)"),
     "t_min NaN": ({"t_min": np.nan}, r"t_min must be .*, got nan at index 0"),

@@ -106,11 +106,7 @@ def test_each_row_is_that_of_a_plan(swept):
 def test_fields_inside_of_lists_mappings_and_unset_blocks():
     path = {"kind": "waypoints", "points": [[0, 0, 0.5], [0, 0, 1], [0, 0, 1.5]]}
     task = Task.model_validate({**LIFT, "path": path, "duration": 2})
-    vary = {
-        "path.points[2][2]": np.array([1.5, 2.0]),
-        "limits.platform_speed": (0.1, 5),
-        "tube": [{"position": 0.0}],
-    }
+    vary = {"path.points[2][2]": np.array([1.5, 2.0]), "limits.platform_speed": (0.1, 5), "tube": [{"position": 0.0}]}
     result = sweep(hoist(), task, vary)
     assert result.table["status"].values.tolist() == [[["infeasible"], ["feasible"]]] * 2
     assert result.table["task.tube"].values.tolist() == ['{"position": 0.0}']

@@ -72,11 +72,7 @@ def optimal_duration(robot, path, intervals, margin=0.0):
     given = ca.horzcat(*[A[k] @ tensions[:, k] for k in range(intervals)])
     needed = ca.DM(inertia.T) * ca.repmat(u.T, len(rows), 1) + ca.DM(motion.T) * ca.repmat(x.T, len(rows), 1)
     gap = (given - needed - ca.DM(rest.T)) / robot.force_scale
-    program = {
-        "x": ca.veccat(speed, tensions),
-        "f": ca.sum1(2 * h / (speed[1:] + speed[:-1])),
-        "g": ca.vec(gap),
-    }
+    program = {"x": ca.veccat(speed, tensions), "f": ca.sum1(2 * h / (speed[1:] + speed[:-1])), "g": ca.vec(gap)}
     solver = ca.nlpsol("time", "ipopt", program, {"ipopt.print_level": 0, "print_time": False, "ipopt.sb": "yes"})
     low = np.concatenate([[0.0], np.full(intervals - 1, 1e-4), [0.0], np.tile(robot.t_min + margin, intervals)])
     high = np.concatenate([[0.0], np.full(intervals - 1, np.inf), [0.0], np.tile(robot.t_max - margin, intervals)])

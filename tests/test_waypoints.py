@@ -100,10 +100,7 @@ def test_no_list_of_points_leaves_its_box_or_its_legs():
         spline = [sqrt_spline(points)(SHARES, k) for k in range(3)]
         costs.append(took / (time.process_time() - begun))
         rest = path_of(points, blend=0)
-        each = [
-            peaks_of(*spline),
-            *(peaks_of(*of.at(SHARES, 1.0)) for of in (path, rest)),
-        ]
+        each = [peaks_of(*spline), *(peaks_of(*of.at(SHARES, 1.0)) for of in (path, rest))]
         peaks.append([linear / np.linalg.norm(box) for linear, _ in each])
         if points[:, 3:].any():
             turning.append([[angular, np.hypot(linear, angular)] for linear, angular in each])
@@ -275,11 +272,7 @@ def test_points_come_from_files_beside_the_task(tmp_path):
 
 
 WRONG = {
-    "unit missing": (
-        "a.csv",
-        CSV.replace("z [m]", "z"),
-        "a.csv: the unit of z must be one of m, .*got ''",
-    ),
+    "unit missing": ("a.csv", CSV.replace("z [m]", "z"), "a.csv: the unit of z must be one of m, .*got ''"),
     "unit unknown": ("a.csv", CSV.replace("[deg]", "[turns]"), "the unit of yaw must be one of rad, .*got 'turns'"),
     "no z": ("a.csv", "x [m],y [m]\n0,0\n1,1\n", r"a.csv: column z is missing, such as 'z \[m\]'"),
     "word": ("a.csv", CSV.replace("500", "half"), r"a.csv: line 5, column x \[mm\] must be a number, got 'half'"),

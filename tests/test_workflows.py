@@ -53,10 +53,7 @@ def test_a_selection_runs_on_the_other_platforms_and_with_other_versions_of_the_
     assert platforms["python"] == TESTS["jobs"]["tests"]["strategy"]["matrix"]["python"]
     assert {runner.partition("-")[0] for runner in platforms["runner"]} == {"macos", "windows"}
     oldest, newest = platforms["python"][0], platforms["python"][-1]
-    assert versions["include"] == [
-        {"versions": "lowest", "python": oldest},
-        {"versions": "newest", "python": newest},
-    ]
+    assert versions["include"] == [{"versions": "lowest", "python": oldest}, {"versions": "newest", "python": newest}]
     assert scripts_of("tests", "versions") == "bash .ci/versions ${{ matrix.versions }}"
 
 

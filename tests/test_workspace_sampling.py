@@ -148,11 +148,7 @@ def test_positions_that_follow_from_lengths():
     """Each cable of a sampled place is as long as it was told, wherever the robots drove; the lower of the two."""
     robot = towed_body()
     region = Region.model_validate(
-        {
-            "carriers": "reach",
-            "lengths": {"min": 0.9, "max": 1.3},
-            "attitude": {"min": [-0.2] * 3, "max": [0.2] * 3},
-        }
+        {"carriers": "reach", "lengths": {"min": 0.9, "max": 1.3}, "attitude": {"min": [-0.2] * 3, "max": [0.2] * 3}}
     )
     domain = Domain.of(robot, region)
     units = np.random.default_rng(0).random((500, len(domain.extent)))

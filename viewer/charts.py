@@ -96,8 +96,4 @@ def _drawn(values: np.ndarray, outside: float) -> np.ndarray:
 
 
 def _stroke(index: int) -> dict[str, Any]:
-    return {
-        "stroke": style.colour(index),
-        "width": 1.5,
-        "dash": DASHES[index // len(style.COLOURS) % len(DASHES)],
-    }
+    return {"stroke": style.colour(index), "width": 1.5, "dash": DASHES[index // len(style.COLOURS) % len(DASHES)]}

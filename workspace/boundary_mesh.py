@@ -17,8 +17,6 @@ from ..models.stl import HEADER, RECORD
 from .condition import Condition
 from .places import Places
 
-__all__ = ["Mesh", "boundary", "boundary_of_values"]
-
 MOST_CELLS = 512  # along an edge: 10^8 poses at once
 
 

@@ -19,9 +19,6 @@ from ..models.part import Part, Share
 from .feasibility import too_few_cables
 from .places import Places, check_places
 
-__all__ = ["AllOf", "AnyOf", "Condition", "TensionCondition", "condition_from", "for_robots"]
-
-
 LEAST_SHARE = 1e-9  # of robots that must fulfil a condition, or that need not
 
 

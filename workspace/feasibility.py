@@ -17,16 +17,6 @@ from ..solvers import solve_batch
 from .places import Places, check_places
 from .robust_limits import Tightened
 
-__all__ = [
-    "feasible",
-    "rest_wrench",
-    "scaled",
-    "shortfall",
-    "too_few_cables",
-    "wrench_matrices",
-    "wrench_rows",
-]
-
 PLACES_AT_ONCE = 8192
 ONLY_EXACT = 0.01  # of the force scale
 
@@ -62,11 +52,7 @@ def wrench_matrices(robot: Robot, places: Places, rows: np.ndarray) -> Iterator[
 
 
 def feasible(
-    robot: Robot,
-    places: Places,
-    wrenches: np.ndarray,
-    rows: np.ndarray | None = None,
-    robust: float | None = None,
+    robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None, robust: float | None = None
 ) -> np.ndarray:
     """Return where tensions inside their limits give every one of some wrenches, (n,) of bool.
 
@@ -99,11 +85,7 @@ def feasible(
 
 
 def shortfall(
-    robot: Robot,
-    places: Places,
-    wrenches: np.ndarray,
-    rows: np.ndarray | None = None,
-    robust: float | None = None,
+    robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None, robust: float | None = None
 ) -> np.ndarray:
     """Return a lower bound of the distance of wrenches (k, 6) from the available wrench set, the largest, (n,) [N].
 

@@ -12,8 +12,6 @@ from ..base.errors import InputError
 from ..base.inputs import real_array, required, shown
 from ..models import Robot
 
-__all__ = ["Places", "check_places"]
-
 
 @dataclass(frozen=True, eq=False)
 class Places(Displayed):

@@ -16,8 +16,6 @@ from ..solvers import solve_batch
 from ..statics.robust import Spread, check_share, ellipsoid_factor, uncertainty_of
 from .places import Places
 
-__all__ = ["Tightened"]
-
 ROUNDS = 4
 GROWTH = 1.02  # of the differences: those of the next tensions may be larger
 PLACES_AT_ONCE = 1024  # a place takes some 3000 numbers for a robot of which 48 are uncertain

@@ -7,8 +7,6 @@ import numpy as np
 from ..models import Robot
 from ..models.points import anchors, attachments
 
-__all__ = ["three_cable_pose"]
-
 
 def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Return positions of a platform on three cables of given lengths at given attitudes.

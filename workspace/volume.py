@@ -13,8 +13,6 @@ import numpy as np
 from ..base.display import Displayed
 from ..base.inputs import number, whole_number
 
-__all__ = ["LEVEL", "Volume", "share_interval", "volume"]
-
 LEVEL = 0.95
 LEAST_LEVEL = 1e-9  # and 1 minus it the highest
 MOST_SAMPLES = 10**15

@@ -11,17 +11,6 @@ from typing import Any
 import compiler
 from setuptools import build_meta
 
-__all__ = [
-    "build_editable",
-    "build_sdist",
-    "build_wheel",
-    "get_requires_for_build_editable",
-    "get_requires_for_build_sdist",
-    "get_requires_for_build_wheel",
-    "prepare_metadata_for_build_editable",
-    "prepare_metadata_for_build_wheel",
-]
-
 build_editable = build_meta.build_editable
 build_sdist = build_meta.build_sdist
 build_wheel = build_meta.build_wheel

@@ -8,8 +8,6 @@ import sys
 import sysconfig
 from importlib.util import find_spec
 
-__all__ = ["choose", "required"]
-
 ZIG = "ziglang"
 
 

@@ -18,8 +18,6 @@ from .result import CalibrationData
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Calibration"]
-
 
 @dataclass(frozen=True, eq=False)
 class Calibration(CalibrationData, Drawn, Reported):

@@ -13,8 +13,6 @@ from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .pose_track import PoseTrack
 
-__all__ = ["CLOCK_RANGE", "begin_with_clock", "moves_smoothly"]
-
 CLOCK_RANGE = 1.0  # [s] to each side
 SHARE = 0.25  # of the record, to which the range is limited
 MOST_SAMPLES = 400

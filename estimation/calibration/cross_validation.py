@@ -33,8 +33,6 @@ from .solving import (
 )
 from .starts import fit_from
 
-__all__ = ["Compared", "HeldOut", "compare", "poses_fitted", "select"]
-
 BLOCKS = 10  # of the record
 SHORTEST = 4  # samples of a block; of fewer, every other sample is left out
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have

@@ -15,8 +15,6 @@ import numpy as np
 
 from .model import Derivatives, Residuals
 
-__all__ = ["curvature"]
-
 
 def curvature(residuals: Residuals, derivatives: Derivatives) -> np.ndarray:
     """Return the sum over the cables of residuals times their second derivatives by the pose, (N, 6, 6)."""

@@ -22,8 +22,6 @@ from .parameters import OF_CABLE, Parameters, check_free
 if TYPE_CHECKING:
     import os
 
-__all__ = ["next_poses"]
-
 DRAWN = 8192  # random poses, of which those at which the robot can rest are candidates
 KEPT = 600
 TILT = 0.3  # [rad], of random poses

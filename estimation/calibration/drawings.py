@@ -13,8 +13,6 @@ if TYPE_CHECKING:
 
     from .result import CalibrationData
 
-__all__ = ["drawings"]
-
 KINDS = {  # of the parameters of a cable that are lengths, by the end of their names
     "anchor.x": "anchor x",
     "anchor.y": "anchor y",

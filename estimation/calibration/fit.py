@@ -14,8 +14,6 @@ from .model import Model, State
 from .normal_equations import Diagonals, NormalEquations, metric
 from .settling import settled
 
-__all__ = ["Fit", "fit", "held", "unobservable_below"]
-
 MOST_STEPS = 150
 NEGLIGIBLE = 1e-8  # decrease of the sum of squares relative to 1 + the sum: parameters move by 1e-4 of their sigmas
 STILL = 1e-6  # [m] of a step, where it makes no difference to the sum of squares

@@ -11,8 +11,6 @@ from ...models import points
 from ...models.record import record_of
 from ...models.robot import Robot
 
-__all__ = ["Runs", "runs"]
-
 
 class Runs(NamedTuple):
     """Lengths and directions of m cables at N samples; nan where no cable is tangent to its sheave.

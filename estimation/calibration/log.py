@@ -23,8 +23,6 @@ from ...base.netcdf import check_units
 from ...base.reading import read_bytes
 from .measurements import Measurements, Sigma
 
-__all__ = ["read_measurements"]
-
 LARGEST_LOG = 1_000_000_000  # [bytes]
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-__all__ = ["Measurements", "Sigma"]
-
 SIGMA = 1e-3  # [m] of lengths
 LARGEST_SIGMA = 100.0  # [m] or [rad]
 MOST = 10_000_000  # samples

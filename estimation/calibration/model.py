@@ -30,8 +30,6 @@ from .measurements import Measurements, measured_poses
 from .parameters import OF_CABLE, Parameters, prior_sigmas
 from .pose_track import PoseTrack
 
-__all__ = ["Derivatives", "Model", "State"]
-
 
 class State(NamedTuple):
     """Parameters and poses.

@@ -24,8 +24,6 @@ from .model import Derivatives, Model, Residuals, State
 from .parameters import OF_CABLE
 from .products import inner
 
-__all__ = ["Diagonals", "NormalEquations", "metric", "pose_steps"]
-
 NEARLY_SINGULAR = 1e-10  # added to C_k, relative to its mean, where it has no inverse: the lengths leave the pose open
 FLATTEST = 0.1  # share of C_k that second derivatives leave
 SLOWEST = 1e-3  # [m/s]; a platform that moves less makes a clock offset no better known

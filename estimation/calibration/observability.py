@@ -19,8 +19,6 @@ from .fit import unobservable_below
 from .model import State
 from .parameters import OF_CABLE, WORDS, Parameters
 
-__all__ = ["Observability", "observability"]
-
 INSIDE = 0.999  # of a generator's length that must lie in the open directions
 SAME = 1e-6  # of a direction's length, left after others are taken away: it is one of theirs
 OPEN = 1e-4  # of the square of a parameter's unit vector that lies in open directions: it is not determined

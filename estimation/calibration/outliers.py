@@ -21,8 +21,6 @@ from .normal_equations import NormalEquations, metric
 from .parameters import Parameters
 from .products import onto
 
-__all__ = ["Outlier", "Slip", "alike", "find_outliers", "find_slip"]
-
 LEVEL = 0.005  # of both tests, for all readings together
 LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distribution
 SMALLEST_REDUNDANCY = 0.02  # a reading with less hardly shows its own errors

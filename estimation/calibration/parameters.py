@@ -20,17 +20,9 @@ from ...base.inputs import number, shown
 from ...models import points
 from ...models.robot import Robot
 
-__all__ = ["GROUPS", "OF_CABLE", "Parameters", "check_free", "check_prior"]
-
 OF_CABLE = 9  # parameters of a cable
 GROUPS = ("anchors", "attachments", "offsets", "scales", "radii", "clock")
-COLUMNS = {
-    "anchors": (0, 1, 2),
-    "attachments": (3, 4, 5),
-    "offsets": (6,),
-    "scales": (7,),
-    "radii": (8,),
-}
+COLUMNS = {"anchors": (0, 1, 2), "attachments": (3, 4, 5), "offsets": (6,), "scales": (7,), "radii": (8,)}
 _WORDS = ("anchor.x", "anchor.y", "anchor.z", "attachment.x", "attachment.y", "attachment.z")
 WORDS = (*_WORDS, "offset", "scale", "pulley.radius")
 LARGEST_PRIOR = 1e3

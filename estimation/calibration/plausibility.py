@@ -26,8 +26,6 @@ from .geometry import runs
 from .measurements import Measurements, measured_poses
 from .parameters import Parameters
 
-__all__ = ["doubt"]
-
 CLEARLY, VERY_CLEARLY = 1.25, 2.0  # times smaller differences
 SIGNIFICANT, TOLD_APART = 6.0, 5.0  # standard deviations by which one convention of angles is likelier than another
 BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed what was stated

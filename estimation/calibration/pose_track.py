@@ -7,9 +7,6 @@ from copy import copy
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-__all__ = ["PoseTrack"]
-
-
 NEIGHBOURS = 5  # samples of a parabola
 WIDEST = 5.0  # median times between measured poses; the motion inside a longer gap is not known
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["inner", "onto"]
-
 ONE_THREAD = 200_000  # multiplications in a block; OpenBLAS starts threads from 262 144 on
 
 

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from ...base.display import Fact
     from .result import CalibrationData, Parameter
 
-__all__ = ["report"]
-
 MOST_LISTED = 12
 MOST_NAMED = 4
 LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually better than

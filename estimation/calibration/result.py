@@ -25,8 +25,6 @@ from .solving import Solved, cleaned, covariance_of, inflation_of, lengths_of, n
 if TYPE_CHECKING:
     from .measurements import Measurements
 
-__all__ = ["CalibrationData", "Parameter"]
-
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
 
@@ -129,11 +127,7 @@ class CalibrationData(Displayed):
         determined = self._solved.observability.determined
         return tuple(
             Parameter(
-                of.names[i],
-                float(x[i]),
-                float(sigma) if known else np.inf,
-                float(x[i] - of.first[i]),
-                of.units[i],
+                of.names[i], float(x[i]), float(sigma) if known else np.inf, float(x[i] - of.first[i]), of.units[i]
             )
             for i, sigma, known in zip(where, sigmas, determined, strict=True)
         )

@@ -15,8 +15,6 @@ from .parameters import GROUPS, check_free, check_prior
 from .plausibility import doubt
 from .solving import check_enough, solve, usual
 
-__all__ = ["calibrate"]
-
 
 def calibrate(
     robot: Robot | str | os.PathLike[str],

@@ -7,8 +7,6 @@ import numpy as np
 from .model import Model, State
 from .normal_equations import pose_steps
 
-__all__ = ["settled"]
-
 MOST_STEPS = 10
 SHORTER = 0.25  # of the last step of a pose that fitted worse
 

@@ -20,21 +20,6 @@ from .parameters import Parameters
 from .pose_track import PoseTrack
 from .starts import LARGEST_SHARE, fit_from, level_poses
 
-__all__ = [
-    "Solved",
-    "check_enough",
-    "cleaned",
-    "covariance_of",
-    "inflation_of",
-    "is_enough",
-    "length_of",
-    "lengths_of",
-    "model_of",
-    "noise_of",
-    "solve",
-    "usual",
-]
-
 EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
 
 ROUNDS = 30  # of fits, each without the wrong readings of those before

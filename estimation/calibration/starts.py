@@ -22,8 +22,6 @@ from .fit import Fit, fit
 from .model import Model, State
 from .outliers import find_outliers
 
-__all__ = ["LARGEST_SHARE", "fit_from", "level_poses"]
-
 SHORTEST = 1e-3  # [m]; readings without their offsets may be negative
 UPRIGHT = 0.2  # [rad], standard deviation of the orientation about home
 ROUGH = 5e-3  # [m], standard deviation of the lengths

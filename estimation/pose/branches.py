@@ -23,8 +23,6 @@ from .problem import Problem, problem_of
 from .search import APART, level_platform
 from .taut import taut
 
-__all__ = ["branches"]
-
 
 def branches(
     robot: Robot | str | os.PathLike[str],

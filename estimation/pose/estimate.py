@@ -16,8 +16,6 @@ from ...models.dynamics import dynamics_of
 from ...models.record import record_of
 from ...models.robot import Robot
 
-__all__ = ["PoseEstimate", "gradient", "largest_cost"]
-
 FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
 EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
 MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the geometry is nearly linear

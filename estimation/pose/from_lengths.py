@@ -19,8 +19,6 @@ from .problem import Problem, problem_of
 from .resting import open_estimates
 from .search import estimates
 
-__all__ = ["SIGMA", "checked_lengths", "checked_sigma", "one_pose", "pose_from_lengths"]
-
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
 
 

@@ -12,8 +12,6 @@ from ...models.record import record_of
 from ...models.robot import Robot
 from .estimate import gradient
 
-__all__ = ["Problem", "problem_of"]
-
 DAMPING = 1e-3  # of a first step from afar
 MILD = 3.0  # largest ratio of weights in a descent from afar
 OPEN = 1e-6  # of the gradient of the lengths, a singular value that is zero, relative to the largest

@@ -13,8 +13,6 @@ from .estimate import PoseEstimate
 from .problem import Problem
 from .search import estimates
 
-__all__ = ["open_estimates"]
-
 
 def open_estimates(
     robot: Robot,

@@ -19,8 +19,6 @@ from .estimate import EXACT, PoseEstimate, largest_cost, moved
 from .problem import DAMPING, Problem
 from .taut import taut
 
-__all__ = ["APART", "estimates", "level_platform", "search"]
-
 TURNS = np.radians([45.0, 90.0])
 OBLIQUE = np.radians([60.0, 25.0])  # about an axis between two, for platforms that have many poses with their lengths
 USUAL = np.radians(30.0)  # standard deviation of the angle from home, where several poses fit

@@ -7,8 +7,6 @@ import numpy as np
 from ...models.dynamics import dynamics_of
 from ...models.robot import Robot
 
-__all__ = ["taut"]
-
 PULL = 0.03  # of the weight: a pose is off by the noise of its lengths, and so are the tensions that hold it
 
 

@@ -16,8 +16,6 @@ from ...models.robot import Robot
 from .estimate import PoseEstimate
 from .from_lengths import SIGMA, checked_lengths, checked_sigma, one_pose, pose_from_lengths
 
-__all__ = ["PoseTracker"]
-
 
 class PoseTracker(Displayed):
     """Follow a platform: each estimate starts from the one before, and a search begins where that does not fit.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Costs", "costs", "lines_of"]
-
 ROWS = 6
 
 

@@ -20,8 +20,6 @@ from ...models.tape_c import literal, operations, to_c_function
 from .costs import costs, lines_of
 from .mechanics import mechanics, moving_carriers
 
-__all__ = ["export_step"]
-
 _TEMPLATE = Path(__file__).parent / "template"
 _CORE = Path(__file__).parents[2] / "core" / "distribution"
 # In the order in which each finds what it needs above it.

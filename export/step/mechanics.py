@@ -8,8 +8,6 @@ import numpy as np
 from ...models.dynamics import Dynamics
 from ...models.robot import Robot
 
-__all__ = ["mechanics", "moving_carriers"]
-
 
 def moving_carriers(robot: Robot) -> list[int]:
     """Return the indices of the carriers that move, whose poses the step has to be given."""

@@ -169,10 +169,7 @@ def _cable_constants(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
             raise InputError(f"cables[{index}].stiffness must be E A > 0 [N] for dT_K, got none")
         if cable.damping is None:
             raise InputError(f"cables[{index}].damping must be C >= 0 [N s/m] for dT_C, got none")
-    return (
-        np.array([cable.stiffness for cable in robot.cables]),
-        np.array([cable.damping for cable in robot.cables]),
-    )
+    return (np.array([cable.stiffness for cable in robot.cables]), np.array([cable.damping for cable in robot.cables]))
 
 
 def _series(name: str, value: Any, instants: int) -> np.ndarray:

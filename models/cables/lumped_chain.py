@@ -111,12 +111,7 @@ class LumpedChain(Displayed):
         weight = ca.repmat(ca.DM(self.gravity), 1, self.segments - 1)
         acceleration = (pulls[:, 1:] - pulls[:, :-1]) / self.node_mass + weight
         dstate = ca.vertcat(ca.vec(velocities[:, 1:-1]), ca.vec(acceleration))
-        outputs = {
-            "dstate": dstate,
-            "start_force": pulls[:, 0],
-            "end_force": -pulls[:, -1],
-            "tensions": tensions,
-        }
+        outputs = {"dstate": dstate, "start_force": pulls[:, 0], "end_force": -pulls[:, -1], "tensions": tensions}
         return ca.Function("lumped_chain", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
 
     @cached_property

@@ -24,8 +24,6 @@ from .instants import instants
 from .peaks import with_peaks
 from .tensions import INDEPENDENT, TOLERANCE, scaled
 
-__all__ = ["Audit", "audit", "other_tensions_exist", "other_tensions_may_pass"]
-
 
 @dataclass(frozen=True)
 class Audit(Displayed):

@@ -17,8 +17,6 @@ from ..tasks.resting import end_tensions, largest_support, support_forces
 from ..tasks.scenario import Scenario
 from .tensions import AuditedTensions, Distribute, Distribution
 
-__all__ = ["certified", "distribution", "taken_up"]
-
 
 def distribution(scenario: Scenario, times: np.ndarray, A: np.ndarray) -> Distribute:
     """Return the distribution of the tensions at `times` (n,) with wrench matrices A (n, 6, m)."""

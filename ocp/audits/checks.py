@@ -22,8 +22,6 @@ from ..tasks.scenario import ATTITUDE, POSITION, START_BAND, Scenario
 from ..tasks.task import FreeBase
 from .excess import Excess
 
-__all__ = ["END_TOLERANCE", "START_TENSIONS", "UNDERACTUATED_TOLERANCE", "AuditedMotion", "excesses"]
-
 START_TENSIONS = "initial.tensions"
 
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom

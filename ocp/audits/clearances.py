@@ -19,8 +19,6 @@ from .checks import AuditedMotion
 from .curvature import is_jump, leaves
 from .excess import Excess
 
-__all__ = ["came_too_near"]
-
 UNDECIDED = 0.05  # of a limit's tolerance: less than that beside it is not looked for
 DEEPEST = 0.99  # of the largest excess is found
 MOST_HALVES = 50

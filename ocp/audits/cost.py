@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from ..result import PlanData
 
-__all__ = ["cost"]
-
 
 def cost(plan: PlanData) -> float:
     """Return the objective of a feasible plan without free coordinates, but for the jerk that it does not have."""

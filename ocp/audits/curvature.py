@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["between", "is_jump", "leaves"]
-
 SAME = 1e-7  # of the whole time: nearer instants are the two sides of a jump
 SAFETY = 2.0
 

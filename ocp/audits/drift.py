@@ -16,8 +16,6 @@ import numpy as np
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
-__all__ = ["WINDOW", "Drift", "drift"]
-
 WINDOW = 0.1  # [s]
 MOST_STEPS = 2000  # over the whole plan
 

@@ -10,8 +10,6 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.text import quantity
 
-__all__ = ["Excess"]
-
 
 @dataclass(frozen=True)
 class Excess(Displayed):

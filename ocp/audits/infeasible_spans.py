@@ -13,8 +13,6 @@ from ..tasks.scenario import Scenario
 from .audit import Audit
 from .by_phase import certified
 
-__all__ = ["certificate_at", "infeasible_spans"]
-
 MOST_SPANS = 8
 
 

@@ -16,8 +16,6 @@ from .by_phase import distribution, taken_up
 from .checks import AuditedMotion
 from .tensions import in_all_winds, scaled
 
-__all__ = ["Instants", "instants", "joined"]
-
 OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "violation")
 MOTIONS = ("motion", "carriers")
 
@@ -134,12 +132,7 @@ def joined(some: Instants, others: Instants) -> Instants:
 
 
 def _limited(
-    scenario: Scenario,
-    times: np.ndarray,
-    motion: Motion,
-    carriers: Motion,
-    tensions: np.ndarray,
-    off_path: np.ndarray,
+    scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, tensions: np.ndarray, off_path: np.ndarray
 ) -> list[np.ndarray]:
     """Return what each limit bounds over time, (n, k), in its unit."""
     limits = scenario.limits

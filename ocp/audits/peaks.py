@@ -21,8 +21,6 @@ from .curvature import between, is_jump, leaves
 from .instants import Instants, instants, joined
 from .tensions import TOLERANCE
 
-__all__ = ["with_peaks"]
-
 BESIDE = 2e-9  # of the duration: how far before a jump
 APART = 1e-4  # of the time between two instants: a corner that is nearer to one is as good as at it
 MOST_HALVES = 20  # of the time between two instants

@@ -9,8 +9,6 @@ import numpy as np
 from ..tasks.scenario import Scenario
 from .audit import Audit
 
-__all__ = ["PhaseSummary", "summaries"]
-
 
 class PhaseSummary(NamedTuple):
     """A phase of a motion.

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["PlannerStep"]
-
 
 class PlannerStep(NamedTuple):
     """One step of the planner.

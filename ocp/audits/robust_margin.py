@@ -10,8 +10,6 @@ import numpy as np
 from ...base.display import Displayed
 from .tensions import TOLERANCE
 
-__all__ = ["RobustMargin"]
-
 
 @dataclass(frozen=True)
 class RobustMargin(Displayed):

@@ -20,8 +20,6 @@ from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
 from .checks import UNDERACTUATED_TOLERANCE
 
-__all__ = ["INDEPENDENT", "TOLERANCE", "AuditedTensions", "Distribute", "Distribution", "in_all_winds", "scaled"]
-
 TOLERANCE = 1e-6  # [N]
 INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
 RANK = 1e-9  # the same, below which nothing is given

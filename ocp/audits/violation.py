@@ -8,8 +8,6 @@ from ..tasks.scenario import Scenario
 from .audit import Audit
 from .excess import Excess
 
-__all__ = ["relative_violation"]
-
 
 def relative_violation(scenario: Scenario, audit: Audit) -> float:
     """Return the largest violation of any limit, relative to that limit; zero if the audit passed.

@@ -10,8 +10,6 @@ import numpy as np
 from ...base.text import quantity
 from ..tasks.paths import Stations
 
-__all__ = ["Nearest", "WaypointDistance", "waypoint_distance"]
-
 LOOKS = 41  # about the instant that is nearest to a waypoint
 EXACT = 1e-5  # [m, rad]: less is within the tolerances of a program
 

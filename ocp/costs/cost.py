@@ -14,8 +14,6 @@ import casadi as ca
 
 from ..limits.state import Body, State
 
-__all__ = ["Cost", "CostState", "RateCost"]
-
 
 @dataclass(frozen=True)
 class CostState(State):

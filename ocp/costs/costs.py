@@ -15,8 +15,6 @@ from ..limits.state import Body
 from .cost import Cost, CostState, RateCost
 from .terms import Jerk
 
-__all__ = ["Costs"]
-
 
 @dataclass(frozen=True, eq=False)
 class Costs(Displayed):

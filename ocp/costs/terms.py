@@ -7,8 +7,6 @@ from typing_extensions import override
 
 from .cost import Cost, CostState, RateCost
 
-__all__ = ["CarrierAcceleration", "CarrierOffset", "Jerk", "Margin", "PathDeviation", "Tension", "TensionRate", "Time"]
-
 
 class Tension(Cost):
     """Penalise the tension of each cable."""

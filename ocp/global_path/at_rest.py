@@ -12,8 +12,6 @@ from ..audits.tensions import INDEPENDENT, scaled
 from ..limits import Limit, Rate
 from ..tasks.scenario import Scenario
 
-__all__ = ["AtRest", "Kept", "unsure"]
-
 UNKNOWN = 2.0  # metres by which a limit may change while what moves moves by one, if the limit does not state it
 SPARE = 0.01  # of the weight, from the limits of tensions: a motion needs more than rest does
 BALANCED = 1e-9  # of the weight

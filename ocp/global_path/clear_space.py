@@ -11,8 +11,6 @@ from numpy.random import Generator
 from .at_rest import AtRest, unsure
 from .space import Space
 
-__all__ = ["ClearSpace"]
-
 OF_END = 0.9  # of the slack at an end: what is kept there, if that is less than the reserve
 RISE = 0.3  # of the distance from such an end: how fast the reserve returns
 STEP = 0.25  # of the robot's size: the longest step between places that are checked for tensions

@@ -29,8 +29,6 @@ from .smoothing import rounded, shortened
 from .space import Space
 from .tree import connect
 
-__all__ = ["GlobalPath", "find_global_path"]
-
 RESERVES = (0.02, 0.004)  # of the robot's size, in the order in which they are tried
 MOST_RESERVE = 0.05  # [m]
 MOST = (20_000, 30_000)  # configurations that are evaluated with each reserve

@@ -13,8 +13,6 @@ from ..tasks.scenario import POSITION, Scenario
 from .at_rest import AtRest, Kept, unsure
 from .space import Space
 
-__all__ = ["STILL", "guess_exceeds", "is_open", "limit_name"]
-
 PLACES = 61  # along the usual guess, the first time
 STILL = 1e-9  # [m, rad]: nothing moves, nothing is exceeded
 

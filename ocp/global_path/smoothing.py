@@ -8,8 +8,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.random import Generator
 
-__all__ = ["rounded", "shortened"]
-
 Clear = Callable[[np.ndarray], bool]
 """Return whether the straight pieces between configurations (k, count) are clear."""
 

@@ -25,8 +25,6 @@ from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths.rest_to_rest import rest_to_rest
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 
-__all__ = ["Space"]
-
 TIMES = 101  # at which what is given is evaluated, from start to end
 HOME_SHAPE = (1.0, 0.0, 1.0)
 SMALLEST = 0.15  # of a formation's size, across

@@ -12,8 +12,6 @@ from ..tasks.deviation import Deviation
 from .global_path import find_global_path
 from .need import guess_exceeds, is_open
 
-__all__ = ["motion_past"]
-
 GLOBAL_SHARE = 0.2  # of the time limit
 
 

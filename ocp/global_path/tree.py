@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-__all__ = ["Advance", "connect"]
-
 Advance = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Return the farthest configuration that is reached from the first on the straight line to the second."""
 

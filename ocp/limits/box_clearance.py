@@ -13,8 +13,6 @@ import casadi as ca
 
 from .piecewise import largest, within_segment
 
-__all__ = ["segment_outside_box"]
-
 Point: TypeAlias = Any  # (3, 1), SX or DM
 _Line: TypeAlias = tuple[Any, Any]  # height above a face at the start of a segment, and its change to the end [m]
 

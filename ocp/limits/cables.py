@@ -14,8 +14,6 @@ from .distance import Distance, Pair
 from .limit import Limit
 from .state import State
 
-__all__ = ["CableClearance", "CableLength", "CableSpeed", "names"]
-
 SMALLEST = 1e-3  # [m], of the scale of a length
 
 

@@ -14,15 +14,6 @@ from .distance import Distance, Pair
 from .limit import Angle, Hull, Limit, Magnitude
 from .state import State
 
-__all__ = [
-    "CarrierAcceleration",
-    "CarrierReach",
-    "CarrierSeparation",
-    "CarrierSpeed",
-    "CarrierTilt",
-    "CarrierTurnAcceleration",
-]
-
 
 class _Motion(Magnitude):
     """Limit the first or second `derivative` of a carrier's position."""

@@ -15,8 +15,6 @@ from .box_clearance import segment_outside_box
 from .convex_clearance import cable_outside_mesh, point_outside_mesh
 from .piecewise import largest, within_segment
 
-__all__ = ["between_cables", "between_points", "cable_outside", "point_outside"]
-
 Point: TypeAlias = Any  # (3, 1), SX or DM
 Place: TypeAlias = Shape
 

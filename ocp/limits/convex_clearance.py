@@ -17,8 +17,6 @@ from ...models.polyhedron import Polyhedron
 from ...models.shapes import ConvexMesh
 from .piecewise import within_segment
 
-__all__ = ["cable_outside_mesh", "point_outside_mesh"]
-
 Point: TypeAlias = Any  # (3, 1), SX or DM
 
 _TINY = 1e-20  # [m^2], keeps the root's derivative finite where things touch

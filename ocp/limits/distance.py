@@ -11,8 +11,6 @@ from typing_extensions import override
 from .limit import Limit
 from .state import State
 
-__all__ = ["Distance", "Pair"]
-
 
 class Pair(NamedTuple):
     """Two bodies: the hull of some points, and that of others or, without others, a convex place that stays."""

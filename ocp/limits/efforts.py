@@ -11,8 +11,6 @@ from ...models.carriers import Effort
 from .limit import Limit
 from .state import State
 
-__all__ = ["CarrierEffort", "efforts"]
-
 
 def efforts(robot: Robot, index: int) -> list[CarrierEffort]:
     """Return the limits of what carrier `index` must do; none if its motion is imposed on it."""

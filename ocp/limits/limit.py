@@ -18,8 +18,6 @@ from typing_extensions import override
 
 from .state import State
 
-__all__ = ["Angle", "Hull", "Limit", "Magnitude", "Rate", "Rows"]
-
 TOLERANCE = 1e-6  # of the scale: what the audit accepts beyond a bound
 EQUATION_TOLERANCE = 1e-3  # of the scale: equations hold at the nodes, and between them nearly
 ANGLE_TOLERANCE = 1e-6  # [rad]: programs bound the cosine, which resolves a small angle to no better than this

@@ -18,8 +18,6 @@ from .distance import Distance, Pair
 from .limit import Limit
 from .state import Body, State
 
-__all__ = ["BLOCK", "Limits", "Separating", "in_blocks", "motions", "of_motions"]
-
 Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
 
 BLOCK = 64  # instants: to make a map of all costs more than to evaluate it

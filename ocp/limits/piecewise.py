@@ -7,8 +7,6 @@ from typing import Any
 
 import casadi as ca
 
-__all__ = ["largest", "within_segment"]
-
 
 def within_segment(share: Any) -> Any:
     """Return the share of a segment that is nearest to this one, from 0 to 1."""

@@ -17,8 +17,6 @@ from .clearance import Place, cable_outside, point_outside
 from .distance import Distance, Pair
 from .state import State
 
-__all__ = ["CablesOutside", "CarriersOutside", "PlatformOutside"]
-
 CORNER = 0.25  # of the thickness of a place: a motion that is deeper in it between nodes does not cut a corner
 
 

@@ -9,8 +9,6 @@ from ...models.rotation import body_rate
 from .limit import Angle, Limit, Magnitude
 from .state import State
 
-__all__ = ["PlatformAcceleration", "PlatformBox", "PlatformSpeed", "PlatformTilt", "PlatformTurn"]
-
 
 class PlatformSpeed(Magnitude):
     """Limit the speed of the platform frame's origin."""

@@ -16,8 +16,6 @@ from ...models.carriers import Effort
 from ...models.forward import pull_on_carrier
 from ...models.rotation import rotation
 
-__all__ = ["Body", "State"]
-
 
 class Body(NamedTuple):
     """The motion of platform or carrier in {G}: (x, y, z, roll, pitch, yaw) and its time derivatives, (6, 1) each."""

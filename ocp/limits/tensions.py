@@ -10,8 +10,6 @@ from .cables import names
 from .limit import Limit, Rate
 from .state import State
 
-__all__ = ["Margin", "TensionRate"]
-
 
 class Margin(Limit):
     """Keep each tension so far inside its limits. Only soft: a hard margin bounds the tensions themselves."""

@@ -8,8 +8,6 @@ from typing_extensions import override
 from .limit import Hull, Limit, Magnitude
 from .state import State
 
-__all__ = ["TubeAttitude", "TubePosition"]
-
 TOLERANCE = 1e-7  # [m, rad]
 
 

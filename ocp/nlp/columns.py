@@ -11,8 +11,6 @@ from ..tasks.scheme import Scheme
 from .derivatives import Mapped
 from .unknowns import Unknowns
 
-__all__ = ["Columns"]
-
 
 class Columns:
     """The columns of a program.

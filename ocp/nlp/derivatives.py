@@ -14,8 +14,6 @@ import numpy as np
 
 from .rows import Row
 
-__all__ = ["Block", "Mapped", "derivatives"]
-
 
 class Mapped(NamedTuple):
     """A function of some unknowns that is evaluated for k sets of them.

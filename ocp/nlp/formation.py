@@ -20,8 +20,6 @@ from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
 
-__all__ = ["Formation", "clear_formation"]
-
 DISTANCES = ("keep_out", "cable_clearance", "cable_platform_clearance", "carrier_separation", "platform_box")
 PLACES = 120  # along the path; the first time every second
 LATERAL, VERTICAL, YAW, SQUEEZE = range(4)

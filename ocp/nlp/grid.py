@@ -9,8 +9,6 @@ import numpy as np
 from ...base.display import Displayed
 from ..tasks.scenario import Scenario
 
-__all__ = ["Grid"]
-
 LEAST = 4  # steps of a phase, where there are enough
 
 

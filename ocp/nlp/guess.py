@@ -12,8 +12,6 @@ from ..tasks.ends import fixed_values
 from ..tasks.scenario import POSITION, Scenario
 from .formation import clear_formation
 
-__all__ = ["balanced", "formation_guess", "guess_through", "initial_guess", "usual_guess"]
-
 ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how it tilts, a little
 
 

@@ -19,8 +19,6 @@ from ..tasks.ends import between_fixed_values, fixed_values
 from ..tasks.paths import Motion, WaypointPath
 from ..tasks.scenario import Scenario
 
-__all__ = ["EVERYWHERE", "Spans", "eased", "held_spans", "held_wrench"]
-
 EASE = 0.1  # of the duration, after which all of a limit is tightened
 
 Spans: TypeAlias = tuple[tuple[float, float], ...]

@@ -14,8 +14,6 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
-__all__ = ["heeding", "raise_if_swallowed"]
-
 _arrived = threading.Event()
 
 

@@ -19,23 +19,10 @@ from ..tasks.scenario import Scenario
 from .layout import Layout
 from .near import is_local
 from .objective import cost_function, costs_at
-from .rows import (
-    OTHER_COSTS,
-    Mesh,
-    Row,
-    bounded,
-    differentiated,
-    in_world,
-    motions,
-    reference_symbols,
-    spread,
-    stretch,
-)
+from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread, stretch
 from .thin import swept
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
-
-__all__ = ["Interval", "Points", "interval_of", "points"]
 
 
 class Points(NamedTuple):
@@ -268,11 +255,7 @@ def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: li
 
 
 def _hull_rows(
-    scenario: Scenario,
-    mesh: Mesh,
-    points_of: Callable[[int | None], Points],
-    values: list[ca.SX],
-    rows: list[Row],
+    scenario: Scenario, mesh: Mesh, points_of: Callable[[int | None], Points], values: list[ca.SX], rows: list[Row]
 ) -> None:
     """Add the hard convex limits at the Bernstein points: so they hold between the nodes too."""
     held = mesh.held(scenario)

@@ -10,8 +10,6 @@ from ...base.display import Displayed
 from ..limits import Limit
 from ..tasks.scenario import Scenario
 
-__all__ = ["Layout"]
-
 DURATION, MARGIN = "duration", "margin"
 
 

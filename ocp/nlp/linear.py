@@ -18,8 +18,6 @@ from .derivatives import Block
 from .program import Program
 from .solver import Outcome, Progress, Solver
 
-__all__ = ["LinearDistances"]
-
 MOST_ITERATIONS = 150  # of a pass: those that end well take 10 to 90
 
 

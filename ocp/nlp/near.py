@@ -16,8 +16,6 @@ from ..limits import Limit
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 
-__all__ = ["Near", "has_places", "is_local"]
-
 
 @dataclass(frozen=True)
 class Near(Displayed):

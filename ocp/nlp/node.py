@@ -19,8 +19,6 @@ from .objective import cost_function, costs_at
 from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread
 from .thin import swept
 
-__all__ = ["Node", "node_of"]
-
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
 SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to choose among those of spare points
@@ -61,14 +59,13 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
     parameters_carried, load = reference_symbols("carried", carried)
     platform, *carriers = motions(scenario, layout, x, reference)
     tensions = robot.force_scale * x[layout.tensions]
-    wind = scenario.wind
     pose_rows = [ca.vertcat(*(carrier[k].T for carrier in carriers)) for k in range(3)]
     if scenario.relative:
         A = dynamics.relative.wrench_matrix(platform[0])
-        w = dynamics.relative.required_wrench(*platform, *carriers[0], wind=wind)
+        w = dynamics.relative.required_wrench(*platform, *carriers[0], wind=scenario.wind)
     else:
         A = dynamics.wrench_matrix(platform[0], pose_rows[0])
-        w = dynamics.required_wrench(*platform, *pose_rows, wind=wind)
+        w = dynamics.required_wrench(*platform, *pose_rows, wind=scenario.wind)
     bodies = [in_world(scenario, platform, carriers), *carriers]
     if scenario.phases.carry:
         w += _in_frame(scenario, dynamics.carried_wrench(*bodies[0], load=load[:10]), carriers)
@@ -100,9 +97,7 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
         values += [all_tensions - x[place] - low, high - x[place] - all_tensions]
         rows += [Row("margin", 0.0, np.inf)] * (2 * all_tensions.numel())
     cost += _slack_cost(scenario, mesh, layout, x)
-    off_path = spread(scenario, None) @ x[layout.q]
-    local = []
-    state = [*whole, tensions, off_path]
+    state, local = [*whole, tensions, spread(scenario, None) @ x[layout.q]], []
     for index, more, named in _limit_rows(scenario, mesh, layout, x, state):
         if is_local(scenario.limits.all[index]):
             function = ca.Function(

@@ -11,8 +11,6 @@ from ..tasks.scenario import Scenario
 from .layout import MARGIN, Layout
 from .rows import differentiated, offsets, stretch
 
-__all__ = ["cost_function", "costs_at"]
-
 
 def costs_at(scenario: Scenario, layout: Layout, x: ca.SX, bodies: Sequence[ca.SX]) -> tuple[ca.SX, ca.SX]:
     """Return what costs in column x, and the values whose rates cost, in amounts (`Costs.function`).

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import casadi as ca
 
-__all__ = ["run_in_one_thread"]
-
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
 

@@ -43,8 +43,6 @@ from .node import Node, node_of
 from .rows import Mesh, Row, stretch
 from .unknowns import stacked, unknowns_of
 
-__all__ = ["Program", "build"]
-
 
 @dataclass(frozen=True)
 class Program(Displayed):

@@ -16,21 +16,6 @@ from ..tasks.scenario import Scenario
 from .held import Spans, held_spans
 from .layout import DURATION, Layout
 
-__all__ = [
-    "MANY",
-    "OTHER_COSTS",
-    "Mesh",
-    "Row",
-    "bounded",
-    "differentiated",
-    "in_world",
-    "motions",
-    "offsets",
-    "reference_symbols",
-    "spread",
-    "stretch",
-]
-
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 MANY = 12  # free coordinates: robots with more are teams
 

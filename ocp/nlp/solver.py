@@ -23,8 +23,6 @@ from .program import Program
 from .rows import MANY
 from .waiting import Errands, wait_for
 
-__all__ = ["Outcome", "Progress", "Solver", "check_progress"]
-
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
 PATIENCE = 10  # iterations without a better one

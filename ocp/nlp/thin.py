@@ -9,8 +9,6 @@ from ..limits import Limit
 from ..tasks.scenario import POSITION, Scenario
 from .rows import MANY, Mesh
 
-__all__ = ["swept"]
-
 STEPS = 4  # a motion is rarely that many times as fast as its reference
 
 

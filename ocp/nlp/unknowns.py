@@ -13,8 +13,6 @@ from .grid import Grid
 from .held import eased
 from .layout import Layout
 
-__all__ = ["Unknowns", "stacked", "unknowns_of"]
-
 
 class Unknowns(NamedTuple):
     """A program's unknowns, and the columns that they make.

@@ -14,8 +14,6 @@ from typing import Any, TypeAlias, TypeVar
 
 from .interrupts import raise_if_swallowed
 
-__all__ = ["Errands", "wait_for"]
-
 POLL = 0.1  # [s]: on Windows an interrupt is raised only between two checks
 Result = TypeVar("Result")
 Errands: TypeAlias = "SimpleQueue[Callable[[], Any] | None]"

@@ -17,8 +17,6 @@ import numpy as np
 
 from ..tasks.scenario import Scenario
 
-__all__ = ["Durations", "durations"]
-
 PLACES = 41
 FASTEST = 1e4  # of X: a hundredth of the duration
 SLACK = 1e-6  # relative: by so much the linear programs may be off

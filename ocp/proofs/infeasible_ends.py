@@ -27,8 +27,6 @@ from .no_attitude import CERTAIN, no_attitude
 from .too_fast import too_fast
 from .too_heavy import OF_WEIGHT, too_heavy
 
-__all__ = ["InfeasibleEnds", "infeasible_ends"]
-
 PLACES = 41  # along the path
 GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner
 

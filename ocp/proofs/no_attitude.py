@@ -13,8 +13,6 @@ from ..audits.excess import Excess
 from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 
-__all__ = ["CERTAIN", "no_attitude"]
-
 MOST = 30_000  # boxes
 CERTAIN = 1e-5  # [m], of distances, whose formulas are rounded where things touch
 

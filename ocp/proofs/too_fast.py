@@ -19,8 +19,6 @@ from ..limits.carriers import CarrierAcceleration, CarrierSpeed
 from ..limits.platform import PlatformAcceleration, PlatformSpeed
 from ..tasks.scenario import Scenario
 
-__all__ = ["too_fast"]
-
 
 def too_fast(
     scenario: Scenario, times: np.ndarray, places: np.ndarray, spread: np.ndarray, resting: np.ndarray

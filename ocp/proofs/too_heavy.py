@@ -15,8 +15,6 @@ import numpy as np
 from ..audits.excess import Excess
 from ..tasks.scenario import Scenario
 
-__all__ = ["OF_WEIGHT", "too_heavy"]
-
 OF_WEIGHT = ("t_max", "thrust_max")  # limits that are too small together
 CERTAIN = 1e-6  # of the weight
 

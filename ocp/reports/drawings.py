@@ -19,8 +19,6 @@ from .trajectory import output_rows
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["drawings"]
-
 INSTANTS = 60  # along the carriers' paths in the views
 
 

@@ -7,8 +7,6 @@ import numpy as np
 from ...figures.robot import box_edges
 from ..tasks.task_limits import AnyKeepOut, Block, ConvexMesh, Sphere
 
-__all__ = ["outline"]
-
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
 
 

@@ -7,8 +7,6 @@ import numpy as np
 from ...figures.limits import Limited
 from ..result import PlanData
 
-__all__ = ["limited"]
-
 
 def limited(plan: PlanData, rows: np.ndarray) -> list[Limited]:
     """Return the limits of task, robot and carriers at the audit's `rows`, those of one name and bound together."""

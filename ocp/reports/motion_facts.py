@@ -10,8 +10,6 @@ from ..result import PlanData
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
-__all__ = ["Fact", "millimetres", "motion_facts", "wind"]
-
 Fact = tuple[str, str]  # its name, and the fact with its unit
 
 

@@ -13,8 +13,6 @@ from ...models.parsing import to_yaml
 from ..result import PlanData
 from .keep_out import outline
 
-__all__ = ["output_rows", "trajectory"]
-
 
 def trajectory(plan: PlanData) -> Contents:
     """Return the motion and the audited tensions at the task's output rate.

@@ -11,8 +11,6 @@ from ..nlp.solver import Outcome
 from ..tasks.deviation import Deviation
 from .search import Search
 
-__all__ = ["from_easier"]
-
 COARSE = 50  # steps: from four times as many on, the program of so few is solved first
 COARSE_OF_MANY = 25  # steps, the same where much is free: a team's program of 100 steps then takes a third of the time
 SLOWER = 3.0  # than the duration that the planner starts from

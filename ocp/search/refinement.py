@@ -12,8 +12,6 @@ from ..nlp.solver import Outcome
 from ..tasks.scenario import Scenario
 from .search import Search, ended
 
-__all__ = ["refine"]
-
 REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
 MOST_STEPS = 1600
 RESERVE = 1e-3  # of the weight, from the tension limits

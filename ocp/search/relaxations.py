@@ -24,8 +24,6 @@ from ..tasks.status import MotionStatus
 from ..tasks.task import Task
 from .search import Search
 
-__all__ = ["near_fixed_motion", "near_motion"]
-
 LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
 LONGEST = 100.0  # times the requested duration: a longer one does not help
 TRIES = 3  # of a duration: not all that is exceeded falls as speeds and accelerations do

@@ -18,8 +18,6 @@ from ..tasks.paths.returning import decay
 from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.task import FreeBase, GivenBase
 
-__all__ = ["Remainder", "final_of", "remainder"]
-
 
 class Remainder(NamedTuple):
     """The rest of a motion.

@@ -19,8 +19,6 @@ from ..tasks.scenario import Scenario
 from .remaining_task import final_of, remainder
 from .search import Search
 
-__all__ = ["LEAST", "Replanner"]
-
 LEAST = 1e-3  # [s], of what is left
 RESERVE = 1e-4  # of the weight, from the tension limits: between nodes motions need some 1e-5
 

@@ -27,9 +27,6 @@ from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 
-__all__ = ["Search"]
-
-
 NEAR = 0.3  # of a motion's extent: where a place is, of which a program has rows the first time
 PASSES = 3
 MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
@@ -69,11 +66,7 @@ class Search:
     """
 
     def __init__(
-        self,
-        scenario: Scenario,
-        solvers: dict[Mesh, Solver],
-        progress: Progress | None,
-        seconds: float | None = None,
+        self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None, seconds: float | None = None
     ):
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
         limit = scenario.task.time_limit

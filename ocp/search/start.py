@@ -18,8 +18,6 @@ from ..tasks.paths import AnyPath, PathBase, RestPath
 from ..tasks.scenario import Scenario
 from ..timing.fastest_law import FastestLaw
 
-__all__ = ["deviation_from"]
-
 
 class _Start(Part):
     """A path that stands alone, checked as a task's is."""

@@ -16,8 +16,6 @@ from ..tasks.task import Tube
 from ..tasks.task_limits import TaskLimits
 from ..timing.time_along import KNOWN_LIMITS, time_along
 
-__all__ = ["BOUND", "fastest"]
-
 BOUND = 0.99  # of the fastest law's time on its grid: no law is faster than this
 
 

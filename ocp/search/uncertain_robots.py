@@ -26,8 +26,6 @@ from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 
-__all__ = ["for_robots", "judged"]
-
 ROUNDS = 4  # after the plan for the robot of the file; two suffice as a rule
 GROWTH = 1.05  # of what limits are tightened by: the next plan's tensions may be larger
 AT_ONCE = 4096  # instants

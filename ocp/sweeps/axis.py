@@ -21,8 +21,6 @@ from ...models.parsing import parse_yaml
 from ...models.part import Part
 from .field import Field
 
-__all__ = ["MOST_PLANS", "Axis", "check_figure", "read_axes", "read_option"]
-
 MOST_PLANS = 100_000
 MOST_AXES, MOST_COLUMNS = 3, 6  # of a figure
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,2})?"

@@ -14,8 +14,6 @@ from ..tasks.lay_out import lay_out
 from ..tasks.task import Task
 from .axis import Axis
 
-__all__ = ["Cases"]
-
 
 class Cases:
     """The combinations of values, numbered from 0 with the last axis fastest.

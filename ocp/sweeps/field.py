@@ -11,8 +11,6 @@ from ...base.display import Displayed
 from ...base.errors import InputError
 from ...base.inputs import shown
 
-__all__ = ["Field"]
-
 OF_ROBOT = "robot."  # begins the key of a field of the robot; a task has no field of that name
 _KEY = re.compile(r"[A-Za-z_][\w-]*(\[\d+\])*(\.[A-Za-z_][\w-]*(\[\d+\])*)*")
 _STEP = re.compile(r"[^.\[\]]+")

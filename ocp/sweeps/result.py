@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["Sweep"]
-
 MOST_LINES = 60  # of the table in a report
 
 

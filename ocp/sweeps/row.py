@@ -17,8 +17,6 @@ from ..planner import plan
 from ..reports.report import decisive
 from ..tasks.task import Task
 
-__all__ = ["FAILED", "Row", "plan_case"]
-
 FAILED = "failed"  # the status of a plan that ended with an error, beside those of `MotionStatus`
 
 

@@ -27,8 +27,6 @@ from .cases import Cases
 from .result import Sweep
 from .row import Row, plan_case
 
-__all__ = ["plan_file", "sweep"]
-
 KIND = Kind("sweep", "plan")  # a result is a row as JSON, in which floats keep every bit
 
 Progress = Callable[[int, int, int], None]

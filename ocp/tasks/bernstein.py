@@ -20,8 +20,6 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-__all__ = ["basis", "derivative", "integral", "joined", "mean_square", "value"]
-
 Values: TypeAlias = Any  # np.ndarray or a CasADi expression
 
 

@@ -7,8 +7,6 @@ from ...models import Robot
 from .paths import AnyPath, RestPath
 from .task import GivenBase, HoldBase, Task
 
-__all__ = ["carrier_paths"]
-
 
 def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
     """Return the carriers' reference paths by the index of the carrier; the others stay at home.

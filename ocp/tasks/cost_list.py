@@ -7,19 +7,8 @@ import numpy as np
 from ...models import Robot
 from ..costs.cost import Cost
 from ..costs.costs import Costs
-from ..costs.terms import (
-    CarrierAcceleration,
-    CarrierOffset,
-    Jerk,
-    Margin,
-    PathDeviation,
-    Tension,
-    TensionRate,
-    Time,
-)
+from ..costs.terms import CarrierAcceleration, CarrierOffset, Jerk, Margin, PathDeviation, Tension, TensionRate, Time
 from .task import Task
-
-__all__ = ["cost_list"]
 
 
 def cost_list(robot: Robot, task: Task) -> Costs:

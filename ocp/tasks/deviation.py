@@ -9,8 +9,6 @@ import numpy as np
 from ...base.display import Displayed
 from .scheme import LINEAR, Scheme
 
-__all__ = ["Deviation"]
-
 
 @dataclass(frozen=True)
 class Deviation(Displayed):

@@ -14,8 +14,6 @@ from .paths import AnyPath, LinePath, RestPath
 from .scenario import POSITION, Scenario
 from .task import FreeBase, GivenBase, Task
 
-__all__ = ["FixedValue", "at_rest_without_acceleration", "carrier_ends", "fixed_values", "platform_ends", "with_timing"]
-
 AT_REST = 1e-9  # [m/s, rad/s] and per second: rounding at the end of a path
 
 Word: TypeAlias = Literal["free", "rest", "periodic", "exact"]

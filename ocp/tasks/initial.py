@@ -10,8 +10,6 @@ from ...base.errors import InputError
 from ...models import Robot
 from ...models.part import Finite, Part, Pose
 
-__all__ = ["Final", "Initial", "check_ends"]
-
 STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

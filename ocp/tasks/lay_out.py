@@ -18,8 +18,6 @@ from .scenario import ATTITUDE, POSITION, Scenario
 from .task import FreeBase, GivenBase, HoldBase, Task
 from .task_checks import check_scenario, check_task
 
-__all__ = ["lay_out"]
-
 
 def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, Any] | None = None) -> Scenario:
     """Check that `task` fits `robot` and lay it out.

@@ -16,8 +16,6 @@ from .scheme import SCHEMES
 from .task import Task
 from .wind_set import WindBox
 
-__all__ = ["LEAST_STEPS", "lay_out_phases"]
-
 LEAST_STEPS = 4  # of a phase
 LEAST_INSTANTS = 10  # of the audit, in a phase
 BALANCED = 1e-9  # of the wrench: what supports miss of it

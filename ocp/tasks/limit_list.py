@@ -27,8 +27,6 @@ from ..limits.tube import TubeAttitude, TubePosition
 from .task import FreeBase, Task
 from .task_limits import AnyKeepOut, TaskLimits
 
-__all__ = ["limit_list"]
-
 
 def limit_list(robot: Robot, task: Task) -> Limits:
     """Return the limits of `task` and those of the file of `robot`, each hard unless the task makes it soft."""

@@ -18,8 +18,6 @@ from ...models.part import COORDINATES
 from .initial import Initial
 from .scenario import ATTITUDE, Scenario
 
-__all__ = ["Measured", "initial_of"]
-
 AGREES = 0.01  # [m, rad], of carriers that stay or move as given: sensors are no better
 AGREES_SPEED = 0.1  # [m/s, rad/s]
 FIELDS = ("pose", "velocity", "carrier_pose", "carrier_velocity", "tensions")

@@ -12,8 +12,6 @@ from ...models.part import AT_ORIGIN, Inertia, Name, Part, Pose, Positive, Vecto
 from .paths import RestPath, SequencePath, SinglePath
 from .paths.sequence import Piece, check_continuity, lasting
 
-__all__ = ["Ground", "Load", "Phase", "path_of"]
-
 ROUNDING = 1e-12  # of the largest moment of inertia
 
 

@@ -17,8 +17,6 @@ import numpy as np
 
 from ...base.display import Displayed
 
-__all__ = ["SAME_TIME", "LaidPhase", "PhaseRows", "Phases"]
-
 SAME_TIME = 1e-9  # of the duration: an instant so near to the start of a phase belongs to it
 
 

@@ -17,8 +17,6 @@ from ...statics.distribution import wrench_problem
 from .phases import LaidPhase
 from .scenario import Scenario
 
-__all__ = ["end_tensions", "known_tensions", "largest_support", "support_forces"]
-
 FREE = 1e-6  # weight of support forces beside tensions: cables carry only what the ground cannot
 BALANCED = 1e-9  # of the force scale: what the ground misses of a wrench that it bears
 

@@ -26,8 +26,6 @@ from .scheme import SCHEMES, Scheme
 from .task import Task
 from .wind_set import WindBox, as_wind, choices, decisive_winds_at
 
-__all__ = ["ATTITUDE", "AUDIT_RATE", "LEAST_INTERVALS", "MOST_SAMPLES", "POSITION", "START_BAND", "Scenario"]
-
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]
 LEAST_INTERVALS = 200  # of the audit: short motions are audited between their ends too

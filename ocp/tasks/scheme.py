@@ -29,8 +29,6 @@ from .bernstein import Values
 
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-__all__ = ["LINEAR", "SCHEMES", "Scheme", "SchemeName"]
-
 SchemeName = Literal["linear", "hermite", "spline"]
 
 

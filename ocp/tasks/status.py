@@ -2,8 +2,6 @@
 
 from enum import StrEnum
 
-__all__ = ["MotionStatus"]
-
 
 class MotionStatus(StrEnum):
     """The status of a plan or of a timing; the values are plain strings."""

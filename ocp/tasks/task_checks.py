@@ -21,8 +21,6 @@ from .task import Task
 from .task_limits import OF_CARRIERS
 from .wind_set import WindBox
 
-__all__ = ["check_margin", "check_scenario", "check_task"]
-
 ENDING = ("waypoints", "samples", "sequence", "return")  # kinds of paths that end at a time of their own
 TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on their path
 

@@ -29,8 +29,6 @@ from ...models.part import Part, Vector3
 from ...models.platform import Aero
 from ...models.rigid_body import com_velocity
 
-__all__ = ["WindBox", "as_wind", "choices", "decisive_winds", "decisive_winds_at", "inner_winds"]
-
 LOW, HIGH, ALONG = range(
     3
 )  # which value of a coordinate: the box's smallest, its largest, or that of the CoM's velocity

@@ -16,8 +16,6 @@ from ...statics.distribution import wrench_problem
 from ..tasks.paths import TimedPath
 from .parametrised_path import ParametrisedPath, PathLimits, relative
 
-__all__ = ["Bottleneck", "bottlenecks"]
-
 LOOKS = 120  # instants, at equal times
 REACHED = 0.995  # of a limit of speed or acceleration
 PULLS = 1e-6  # of the largest pull along a facet's normal: less lies in the facet

@@ -15,8 +15,6 @@ from ..tasks.paths import AnyPath, Curve, PathBase, TimedPath
 from .bottlenecks import Bottleneck, bottlenecks
 from .parametrised_path import ParametrisedPath, PathLimits
 
-__all__ = ["FastestLaw"]
-
 SHOWN = 10.0  # [s], of a path without a time law: how long the motion lasts that shows it
 
 

@@ -7,8 +7,6 @@ import numpy as np
 from ...base.errors import InputError
 from ..tasks.paths import AnyPath, Curve, LinePath, ReturnPath, SamplePath, SequencePath, TimedPath, WaypointPath
 
-__all__ = ["geometry"]
-
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
 LOOKS = 20_001
 ON_PATH = 2e-6  # of a path's length: how far that spline may be off

@@ -35,8 +35,6 @@ from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import PhasePlane, phase_plane, proofs
 
-__all__ = ["KNOWN_LIMITS", "time_along"]
-
 KNOWN_LIMITS = ("platform_speed", "cable_speed", "carrier_speed", "carrier_acceleration")
 ATTEMPTS = 8
 MOST_INTERVALS = 6400
@@ -49,10 +47,7 @@ COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer g
 
 
 def time_along(
-    robot: Robot | str | os.PathLike[str],
-    task: Task | dict[str, Any] | str | os.PathLike[str],
-    *,
-    grid: int = 200,
+    robot: Robot | str | os.PathLike[str], task: Task | dict[str, Any] | str | os.PathLike[str], *, grid: int = 200
 ) -> Plan:
     """Find the fastest motion along a task's path, from rest to lasting rest, with every tension inside its limits.
 

@@ -12,8 +12,6 @@ from ..limits.limit import Limit
 from ..limits.places import CarriersOutside
 from .instants import Instants
 
-__all__ = ["into_each_other", "into_places"]
-
 LEAST = 1e-4  # [m]: less is within the tolerances of a program
 Meeting = tuple[float, str]  # by how much [m], and the sentence
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from ...models import Dynamics, Robot, points
 
-__all__ = ["Instants"]
-
 
 class Instants:
     """Compute where the parts of a robot are at some instants of its motion, in {G}.

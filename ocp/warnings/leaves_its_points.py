@@ -5,8 +5,6 @@ from __future__ import annotations
 from ...base.text import quantity
 from ..tasks.paths import PathBase, WaypointPath
 
-__all__ = ["leaves_its_points"]
-
 LEAST = 1e-6  # [m]
 
 

@@ -10,8 +10,6 @@ from ...base.text import quantity, quantity_row
 from ...models import Robot
 from .instants import Instants
 
-__all__ = ["outside_frame"]
-
 LEAST = 1e-3  # [m], and of the size of the frame, whichever is less: nearer than this it is inside
 FLAT = 0.1  # of the largest span of the anchors: an axis along which they span less has no sides
 AXES = "xyz"

@@ -7,8 +7,6 @@ import numpy as np
 from ...base.text import quantity
 from .instants import Instants
 
-__all__ = ["short_cables"]
-
 SHORT = 0.05  # of a cable's length at home
 
 

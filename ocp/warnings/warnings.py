@@ -7,8 +7,6 @@ from .instants import Instants
 from .outside_frame import outside_frame
 from .short_cables import short_cables
 
-__all__ = ["warnings"]
-
 
 def warnings(seen: Instants) -> tuple[str, ...]:
     """Return what a person should know of a motion before a robot follows it, a sentence each."""

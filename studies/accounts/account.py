@@ -17,8 +17,6 @@ from ...base.errors import SolverError
 from ...figures.drawing import Drawing
 from .claim import Claim, Verdict
 
-__all__ = ["Account", "Chapter", "Paper", "Progress", "gather"]
-
 Progress: TypeAlias = Callable[[str, int, int], None]  # what is being computed, chapters done, all of them
 
 

@@ -21,8 +21,6 @@ from ruamel.yaml import YAML
 
 from ...base.text import quantity, quantity_row
 
-__all__ = ["Claim", "Statement", "Value", "Verdict", "statements", "value_text"]
-
 Value: TypeAlias = float | tuple[float, ...] | str | None
 FIELD = re.compile(r"\{(?P<name>[a-z]\w*)(:(?P<format>[^}]*))?\}")  # {G} is a frame
 DIGITS = 5  # of values in reports: one more than papers print
@@ -141,12 +139,7 @@ class Statement:
         return self.stated(computed, same, expected, **fields)
 
     def stated(
-        self,
-        computed: Value,
-        holds: bool,
-        printed: Value = None,
-        otherwise: Verdict = Verdict.DIFFERS,
-        **fields: Any,
+        self, computed: Value, holds: bool, printed: Value = None, otherwise: Verdict = Verdict.DIFFERS, **fields: Any
     ) -> Claim:
         """Return a claim that is reproduced if the statement holds, else `otherwise`."""
         verdict, why = (Verdict.REPRODUCED, self.agrees) if holds else (otherwise, self.differs)

@@ -10,8 +10,6 @@ from ...figures import style
 from . import page, text
 from .account import Account
 
-__all__ = ["write"]
-
 
 def write(account: Account, folder: Path, form: str = "png") -> list[Path]:
     """Write report (Markdown and HTML), errata, claims (JSON) and figures into `folder`; return their paths.

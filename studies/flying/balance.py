@@ -129,11 +129,7 @@ def _moment_printed(dynamics: Dynamics, samples: Instants) -> Claim:
 
 
 def _moment_off(
-    dynamics: Dynamics,
-    samples: Instants,
-    alpha_A: np.ndarray,
-    alpha_B: np.ndarray,
-    last: np.ndarray | None = None,
+    dynamics: Dynamics, samples: Instants, alpha_A: np.ndarray, alpha_B: np.ndarray, last: np.ndarray | None = None
 ) -> np.ndarray:
     """Return the relative difference of the left side of Eq. 34 from dL/dt, in {A}, (n,).
 

@@ -24,8 +24,7 @@ from . import (
 )
 
 PAPER = Paper(
-    "flying",
-    "Q. Wang, H. Chen, Y. Su, L. Qiao: Coupling dynamics analysis of the flying cable driven parallel robot",
+    "flying", "Q. Wang, H. Chen, Y. Su, L. Qiao: Coupling dynamics analysis of the flying cable driven parallel robot"
 )
 CHAPTERS = {
     "Table 1": parameters.chapter,

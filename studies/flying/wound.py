@@ -51,11 +51,7 @@ def wind_up(
     bases = Motion(still + robot.carrier_home, still, still) if carriers is None else carriers
     wound = dynamics.cable_lengths(body.pose, bases.pose) if lengths is None else lengths
     start = plant.start(
-        body.pose[0],
-        body.velocity[0],
-        carrier_pose=bases.pose[0],
-        carrier_velocity=bases.velocity[0],
-        lengths=wound[0],
+        body.pose[0], body.velocity[0], carrier_pose=bases.pose[0], carrier_velocity=bases.velocity[0], lengths=wound[0]
     )
     commands = plant.command(
         wound[1:],

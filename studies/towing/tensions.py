@@ -23,10 +23,7 @@ POSITIONS = 400  # of the load, at which all lambda in (0, 1) are tried
 def chapter() -> Chapter:
     """Check least norm, null space and the rank test of step (d)."""
     claims = [_limit(), _singular(), _least_norm(), _freedom(), _scalar(), _scalar_elsewhere(), _general(), _cases()]
-    return Chapter(
-        [*claims, _rank_test(), _postures()],
-        {"null-space": _along_null_space()},
-    )
+    return Chapter([*claims, _rank_test(), _postures()], {"null-space": _along_null_space()})
 
 
 def forces(robot: Robot, pose: np.ndarray | None = None) -> TensionProblem:

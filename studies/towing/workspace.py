@@ -35,8 +35,6 @@ from ...workspace.three_cable_pose import three_cable_pose
 from ...workspace.volume import Volume, volume
 from .plans import DRIVES, Drive, robot
 
-__all__ = ["PRINTED", "Loops", "in_prism", "loops", "placed_as_both", "reach", "volume_of"]
-
 LOOPS = 60_000
 POSTURE = 1.0  # [rad], largest of each angle
 # Ranges of x, y and z in sections 5.1 to 5.3 [m].

@@ -123,11 +123,7 @@ class Crowd:
 
 
 def kept(
-    controller: ComputedTorque | Predictive,
-    command: Command,
-    rate: Array,
-    now: float,
-    last: tuple[Array, float] | None,
+    controller: ComputedTorque | Predictive, command: Command, rate: Array, now: float, last: tuple[Array, float] | None
 ) -> dict[str, NDArray[np.bool_]]:
     """Return whether each robot's command, of one or of many, keeps each promise, (rows,).
 

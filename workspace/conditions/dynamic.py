@@ -14,8 +14,6 @@ from ..condition import TensionCondition
 from ..feasibility import feasible
 from ..places import Places
 
-__all__ = ["Dynamic"]
-
 
 class Dynamic(TensionCondition):
     """Tensions inside the limits give a platform at rest each of some accelerations.

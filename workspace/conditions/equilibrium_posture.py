@@ -22,8 +22,6 @@ from ..condition import Condition
 from ..feasibility import feasible, rest_wrench
 from ..places import Places, check_places
 
-__all__ = ["EquilibriumPosture"]
-
 STEPS = 20
 STRIDE = 0.5  # [rad], maximum change of an angle in one step
 SOLVED = 1e-9  # of the weight, largest residual

@@ -22,8 +22,6 @@ from ..condition import AnyCondition, Condition
 from ..places import Places
 from ..region import reach_boxes
 
-__all__ = ["ExistsPlacement"]
-
 ROUNDS = 6  # from a box to a sphere and back
 MISPLACED = 1e12  # larger than the shortfall of any condition where the carriers fit
 LARGEST_STEP, SMALLEST_STEP = 0.5, 0.02  # of a box, or of all turns

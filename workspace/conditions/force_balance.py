@@ -15,8 +15,6 @@ from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall, wrench_rows
 from ..places import Places
 
-__all__ = ["ForceBalance"]
-
 
 class ForceBalance(TensionCondition):
     """Tensions inside the limits balance the weight as a force; moments are ignored."""

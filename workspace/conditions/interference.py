@@ -20,8 +20,6 @@ from ...models.shapes import Block, Capsule, ConvexMesh, Sphere
 from ..condition import Condition
 from ..places import Places
 
-__all__ = ["Interference"]
-
 _BISECTIONS = 40  # of a cable: its point nearest to a box, to 1e-12 of its length
 _ROUNDING = 1e-12  # of the size of a mesh
 

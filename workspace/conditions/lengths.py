@@ -14,8 +14,6 @@ from ...models.part import NonNegative, Positive
 from ..condition import Condition
 from ..places import Places
 
-__all__ = ["Lengths"]
-
 
 class Lengths(Condition):
     """Each cable's length lies between a minimum and a maximum."""

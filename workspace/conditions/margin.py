@@ -14,8 +14,6 @@ from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
 from ..places import Places, check_places
 
-__all__ = ["Margin"]
-
 
 class Margin(Condition):
     """The capacity margin at rest is at least a value [N], moments divided by `Robot.length`."""

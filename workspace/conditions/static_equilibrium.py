@@ -11,8 +11,6 @@ from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
 
-__all__ = ["StaticEquilibrium"]
-
 
 class StaticEquilibrium(TensionCondition):
     """Tensions inside the limits balance the platform's weight."""

@@ -17,8 +17,6 @@ from ..condition import Condition
 from ..feasibility import wrench_matrices, wrench_rows
 from ..places import Places
 
-__all__ = ["WrenchClosure"]
-
 
 class WrenchClosure(Condition):
     """The cables can give every wrench by pulling, if they are strong enough; the tension limits are ignored."""

@@ -18,8 +18,6 @@ from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
 
-__all__ = ["WrenchFeasible"]
-
 Wrench = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 

@@ -14,8 +14,6 @@ from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
 from ..places import Places, check_places
 
-__all__ = ["WrenchWithTolerance"]
-
 _RHO = 1e10  # weight of the wrench error relative to the tensions: so large that these do not change it
 
 

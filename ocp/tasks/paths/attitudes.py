@@ -20,8 +20,6 @@ from ....models.batch import call
 from ....models.rotation import angles_of, inverse_rate_matrix, rate_matrix_derivative, rotation
 from .motion import Motion
 
-__all__ = ["Attitudes", "nearest_turn"]
-
 Progress = tuple[np.ndarray, np.ndarray, np.ndarray]
 HALF_TURN = 1e-9  # of the real part of a quaternion: both ways are equally short, and the angles decide
 SAME = 1e-12  # [rad]

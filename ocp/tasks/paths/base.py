@@ -12,8 +12,6 @@ from ....models.part import Part, Pose
 from .motion import Motion
 from .stations import Stations
 
-__all__ = ["PathBase", "PoseOrPosition", "check_times"]
-
 
 def _with_level_attitude(value: object) -> object:
     """Complete (x, y, z) to a level pose."""

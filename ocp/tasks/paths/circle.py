@@ -12,8 +12,6 @@ from ....models.part import Finite, NonNegative, Vector3
 from .base import PathBase
 from .motion import Motion
 
-__all__ = ["CirclePath"]
-
 
 class CirclePath(PathBase):
     """A circle about the vertical at constant speed, with an optional drift of its centre: a helix."""

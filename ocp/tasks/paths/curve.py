@@ -12,7 +12,4 @@ from .rest import RestPath
 from .samples import SamplePath
 from .waypoints import WaypointPath
 
-__all__ = ["Curve"]
-
-
 Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]

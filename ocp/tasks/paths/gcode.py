@@ -9,8 +9,6 @@ from typing import Any
 from ....base.errors import InputError
 from ....base.inputs import printable, shown
 
-__all__ = ["read_gcode"]
-
 UNITS = {20: 0.0254, 21: 0.001}  # [m]: inches, millimetres
 MOVES = {0, 1}
 KNOWN = "G0, G1, G4, G20, G21, G90, G91, M2, M30, and the words F, N, P, X, Y, Z"

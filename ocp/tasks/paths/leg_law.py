@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["PEAK", "inverse", "leg_law"]
-
 RAMP = 0.1  # of the leg, in which the acceleration rises from zero to its peak; it changes sign in twice that
 PEAK = 4 / (1 - 2 * RAMP + 0.4 * RAMP**2)  # so that the way is 1
 HALVINGS = 60

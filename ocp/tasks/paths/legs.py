@@ -29,8 +29,6 @@ from .leg_law import leg_law
 from .motion import Motion
 from .overlap import MOST, even_out, largest_left, shares_of_time, size, zero_between
 
-__all__ = ["Legs"]
-
 LOOKS = 48  # at the angles of each leg
 
 
@@ -239,10 +237,7 @@ def _over(times: np.ndarray, start: np.ndarray, last: np.ndarray) -> tuple[np.nd
 
 
 def _through(
-    offset: np.ndarray,
-    overlap: np.ndarray,
-    before: tuple[np.ndarray, np.ndarray],
-    after: tuple[np.ndarray, np.ndarray],
+    offset: np.ndarray, overlap: np.ndarray, before: tuple[np.ndarray, np.ndarray], after: tuple[np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, ...]:
     """Return what two legs have done where both move, with two derivatives by s; `offset` is s less that of the point.
 

@@ -12,8 +12,6 @@ from .base import PathBase, PoseOrPosition
 from .motion import Motion
 from .rest_to_rest import rest_to_rest, smoother_rest_to_rest
 
-__all__ = ["LinePath"]
-
 
 class LinePath(PathBase):
     """A straight line from one pose to another, over the task's duration."""

@@ -9,8 +9,6 @@ import numpy as np
 
 from ....base.display import record
 
-__all__ = ["Motion"]
-
 
 class Motion(NamedTuple):
     """Poses over time and their derivatives; times come first, coordinates (x, y, z, roll, pitch, yaw) last.

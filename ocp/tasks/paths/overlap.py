@@ -12,8 +12,6 @@ import numpy as np
 
 from .leg_law import PEAK, inverse, leg_law
 
-__all__ = ["MOST", "even_out", "largest_left", "shares_of_time", "size", "zero_between"]
-
 MOST = 0.5  # of the shorter of two legs
 PARTS = 12  # of that, which are compared
 LOOKS = 16  # at the acceleration of two legs together

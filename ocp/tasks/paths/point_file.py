@@ -13,8 +13,6 @@ from ....base.inputs import printable, shown
 from ....base.reading import read_bytes
 from .gcode import read_gcode
 
-__all__ = ["read_csv", "read_points"]
-
 UNITS = {
     **dict.fromkeys(("x", "y", "z"), LENGTHS),
     **dict.fromkeys(("roll", "pitch", "yaw"), ANGLES),

@@ -11,8 +11,6 @@ from typing_extensions import override
 from .base import PathBase, PoseOrPosition
 from .motion import Motion
 
-__all__ = ["RestPath"]
-
 
 class RestPath(PathBase):
     """A pose that is held."""

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["rest_to_rest", "smoother_rest_to_rest"]
-
 
 def rest_to_rest(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the share of the way and its first two derivatives, at the shares s of the time; before and after: rest.

@@ -14,8 +14,6 @@ from .motion import Motion
 from .sequence import SequencePath, SinglePath
 from .stations import Stations
 
-__all__ = ["ReturnPath", "decay"]
-
 STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 

@@ -12,8 +12,6 @@ from ....models.part import Finite
 from .base import PathBase, PoseOrPosition, check_times
 from .motion import Motion
 
-__all__ = ["SamplePath"]
-
 
 class SamplePath(PathBase):
     """Interpolate samples by a quintic spline; its speeds at the ends follow from the samples near them."""

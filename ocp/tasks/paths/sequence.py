@@ -22,8 +22,6 @@ from .stations import Stations
 from .timed import TimedPath
 from .waypoints import WaypointPath
 
-__all__ = ["Piece", "SequencePath", "SinglePath", "check_continuity", "lasting"]
-
 JOINED = 1e-7  # [m, rad, and per second and second squared]: a smaller gap is rounding
 
 SinglePath: TypeAlias = Annotated[

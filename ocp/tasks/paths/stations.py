@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["Stations"]
-
 
 class Stations(NamedTuple):
     """The poses that a path was given to pass, in order.

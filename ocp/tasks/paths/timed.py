@@ -17,8 +17,6 @@ from .motion import Motion
 from .stations import Stations
 from .waypoints import WaypointPath
 
-__all__ = ["TimedPath"]
-
 
 class TimedPath(PathBase):
     """A path with a time law of its own: d2s/dt2 is constant between the given points of it, then it rests at its end.

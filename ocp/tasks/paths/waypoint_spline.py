@@ -9,8 +9,6 @@ import numpy as np
 
 from .motion import Motion
 
-__all__ = ["WaypointSpline"]
-
 NEAREST = 1e-6  # of the length of all steps together: nearer points make a spline turn wildly
 STILL = np.zeros(6)
 

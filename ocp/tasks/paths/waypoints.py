@@ -19,8 +19,6 @@ from .motion import Motion
 from .stations import Stations
 from .waypoint_spline import WaypointSpline
 
-__all__ = ["WaypointPath"]
-
 BLEND = 0.01  # of the span of the points; accelerations hardly fall with more
 LOOKS = 2001  # at the box of the points
 SAME = 1e-12  # [rad], of an attitude after whole turns
