@@ -4,6 +4,7 @@ Its functions work on the memory of arrays; what they take is in `_core.pyi` and
 call them with arrays that they have checked.
 """
 
+# ruff: noqa: F401
 from ._core import (
     CABLES,
     MOST_CABLES,
@@ -39,39 +40,3 @@ from ._core import (
     wrench_by_axes,
     wrench_by_pose,
 )
-
-__all__ = [
-    "CABLES",
-    "MOST_CABLES",
-    "MOST_CARRIERS",
-    "PROCESSOR",
-    "ROWS",
-    "columns_by_geometry",
-    "control_aim",
-    "control_carriers",
-    "control_coordinates",
-    "control_move_on",
-    "control_problem",
-    "control_stages",
-    "control_take",
-    "control_thrusts",
-    "ends",
-    "facets",
-    "finite",
-    "full_rank",
-    "horizon_places",
-    "horizon_relative_to",
-    "horizon_size",
-    "horizon_solve",
-    "lines",
-    "pose_covariance",
-    "pose_from_lengths",
-    "required_wrench",
-    "run_plant",
-    "sense",
-    "solve_packed",
-    "solve_rows",
-    "winch_lengths",
-    "wrench_by_axes",
-    "wrench_by_pose",
-]

@@ -17,26 +17,8 @@ from .motion import RADIUS, circle
 
 TAGS = (1, 2, 2, *range(3, 39))  # numbers of the displayed equations, in order: 2 is printed twice
 IN_STEPS = (6, 11, 12, 23, 24, 39)  # equations by which steps 2 to 7 of section V compute
-OUTSIDE = (
-    6,
-    6,
-    6,
-    14,
-    15,
-    24,
-    25,
-    27,
-    28,
-    29,
-    31,
-    32,
-    33,
-    30,
-    34,
-    27,
-    35,
-    38,
-)  # references in sections II to IV, in order
+# References in sections II to IV, in order.
+OUTSIDE = (6, 6, 6, 14, 15, 24, 25, 27, 28, 29, 31, 32, 33, 30, 34, 27, 35, 38)
 CAPTIONS = {
     "trajectories of platform and quadrotor": 6,
     "lengths and tensions in compound motion": 7,
