@@ -24,12 +24,11 @@ from .command import HOLD, PLANNED, SOFT, Command
 from .command_delay import Pending
 from .controllability import uncontrolled
 from .controller import Controller
-from .records import CABLE, CARRIER, PLATFORM
+from .records import CABLE, CARRIER, PLATFORM, TURNING
 from .reference import Reference
 from .settings import limits_of, reach_of, set_reach, settings_of
 from .state import State
 from .tension_loop import TensionLoop
-from .turning import Turning
 
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
 SHORTEST_LAG = 0.005  # [s]
@@ -78,7 +77,8 @@ class ComputedTorque(Controller):
         Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
         Bandwidths of the loops of flying carriers [rad/s], see `thrusts`. Where carriers turn so late after their
-        orders that the attitude loop would be unstable (see `Turning`), it goes on with the inverse of that lag.
+        orders that the attitude loop would be unstable (core/control/turning.c), it goes on with the inverse of that
+        lag.
     patience
         How long a cable with a sensor may report no tension where one is commanded until it counts as cut [s], and the
         others do without it. It is commanded its least tension then, and counts again once it reports some. Cables of a
@@ -126,7 +126,7 @@ class ComputedTorque(Controller):
         self._settings = settings_of(self.robot, self._limits, *gains)
         far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
-        self._attitude = number("attitude", attitude, 0.1, 1e3)
+        self._settings["attitude"] = self._attitude = number("attitude", attitude, 0.1, 1e3)
         loop = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1e3)
         self._loop = TensionLoop(loop[0], max(loop[1], SHORTEST_LAG), *self._limits) if loop[0] else None
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
@@ -134,7 +134,7 @@ class ComputedTorque(Controller):
         self._robot = record_of(self.robot)
         self._flies = bool(self._settings["by_wrench"].any())
         self._moves_carriers = self._flies or bool(far.any())
-        self._turning = Turning(self._attitude) if self._flies else None
+        self._negligible = NEGLIGIBLE * self.robot.force_scale
         self._begin(1)
 
     @override
@@ -180,9 +180,7 @@ class ComputedTorque(Controller):
         self._platform["attitude"], self._platform["integrates"] = self._attitude, 1
         self._of_carriers = np.zeros((rows, count), CARRIER)
         self._actuation = np.zeros((rows, count, max(len(carrier.actuators) for carrier in self.robot.carriers)))
-        self._lags = np.zeros(rows)
-        if self._turning is not None:
-            self._turning.reset()
+        self._turning = np.zeros(rows, TURNING) if self._flies else None
         self._problems = problems = InPlace(rows, 6, m, self.robot.length)
         orders = self._carriers if self._moves_carriers else None
         memory = self._cables, self._platform, self._of_carriers
@@ -301,11 +299,12 @@ class ComputedTorque(Controller):
         self._accelerations[:] = carriers[2]
         actuation = None
         if self._flies:
-            self._actuate(tensions)
+            memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation
+            given = self._measured, self._carriers, tensions, *memory
+            lacking = control_thrusts(self._elapsed, self._robot, self._settings, *given)
             actuation = self._actuation.copy()
-            lacking = self._of_carriers["lacking"].max(axis=1)
-            if (lacking > NEGLIGIBLE * self.robot.force_scale).any():  # not of a largest one, which may be nan
-                answered, proof = self._with_thrust_lacking(lacking, answered, proof)
+            if lacking > self._negligible:
+                answered, proof = self._with_thrust_lacking(answered, proof)
         tensions = self._sent(tensions)
         if alone:
             own = None if actuation is None else actuation[0]
@@ -314,22 +313,12 @@ class ComputedTorque(Controller):
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
 
     def _with_thrust_lacking(
-        self, lacking: np.ndarray, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray]
+        self, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray]
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """Return how rows were answered, and what was missing, where carriers lack thrust [N] for the tensions."""
-        lacks = (answered == PLANNED) & (lacking > NEGLIGIBLE * self.robot.force_scale)
+        """Return how rows were answered, and what was missing, where carriers lack thrust for the tensions."""
+        lacking = self._of_carriers["lacking"].max(axis=1)
+        lacks = (answered == PLANNED) & (lacking > self._negligible)
         return np.where(lacks, SOFT, answered).astype(np.int8), (proof[0], np.where(lacks, lacking, proof[1]))
-
-    def _actuate(self, tensions: np.ndarray) -> None:
-        """Write the commands of actuators; lower the bandwidth of attitudes where carriers turn too late for it."""
-        carriers, attitude = self._of_carriers, self._platform["attitude"]
-        ordered = carriers["ordered"].copy()
-        given = self._measured, self._carriers, tensions, self._cables, self._platform, carriers
-        control_thrusts(self._elapsed, self._robot, self._settings, *given, self._actuation)
-        if self._turning is not None:
-            self._lags = self._turning.lag(self._elapsed, ordered, carriers["turning"])
-            if self._lags.any():
-                attitude[:] = np.minimum(attitude, 1.0 / np.maximum(self._lags, 1.0 / self._attitude))
 
     def _sent(self, wanted: np.ndarray) -> np.ndarray:
         """Return what winches are sent so that tensions are as wanted, (N, m) [N]."""

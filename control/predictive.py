@@ -57,7 +57,7 @@ class Predictive(ComputedTorque):
 
     The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. Where a tenth
     of the weight is left unexplained, in the mean of some 50 ms, or there is no solution for that long, or noise of the
-    velocity requires more tension than limits permit, or carriers turn too late (see `Turning`), this
+    velocity requires more tension than limits permit, or carriers turn too late (core/control/turning.c), this
     `ComputedTorque` controls the robot until `reset` ("not as modelled"). It does from the start, with a warning, where
     the loop is unstable at home with carriers that turn before they accelerate: with cables that begin below their CoM.
 
@@ -280,7 +280,7 @@ class Predictive(ComputedTorque):
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         command = self._command(reference, tensions, answered, proof, alone=True)
         self._agree(self, self._beside)
-        if lag := self._lags[0]:
+        if self._turning is not None and (lag := self._turning["lag"][0]):
             self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._attitude:.0f}")
         return command._replace(unexplained=unexplained)
 

@@ -20,7 +20,7 @@ CONTROLLER = np.dtype(
         *((name, "i4") for name in ("reacts", "corrects")),
         *((name, "f8") for name in ("carrier_bandwidth", "carrier_acceleration")),
         ("reach", "f8", (MOST_CARRIERS, 6)),
-        ("place", "f8"),
+        *((name, "f8") for name in ("place", "attitude")),
         ("by_wrench", "f8", (MOST_CARRIERS, MOST_ACTUATORS, 6)),
         ("limits", _LIMITS, MOST_CABLES),
     ]
@@ -40,6 +40,10 @@ CARRIER = np.dtype(
         *((name, "f8", 3) for name in ("force", "explained", "ordered", "turning")),
         ("lacking", "f8"),
     ]
+)
+_AXIS = np.dtype([(name, "f8") for name in ("usual", "order", "late_order", "late_rate")])
+TURNING = np.dtype(
+    [("axis", _AXIS, (MOST_CARRIERS, 3)), *((name, "f8") for name in ("along", "square", "lag")), ("has_begun", "i8")]
 )
 TETHER = np.dtype(
     [

@@ -42,13 +42,17 @@ typedef struct {
     const double *carriers; /* (c, 3, 6), how they should move */
     const double *tensions; /* (m), commanded [N] */
     const towline_cable_memory *cables;
-    const towline_platform_memory *platform;
+    towline_platform_memory *platform;
     towline_carrier_memory *memory;
-    double *actuation; /* (c, a), commands of the last step and then of this one; a: as many as any carrier has */
+    towline_turning *turning; /* NULL: whether they turn too late is not of interest */
+    double *actuation;        /* (c, a), commands of the last step and then of this one; a: as many as any carrier has */
 } towline_flight;
 
-/* Write the commands of all actuators inside their limits; of a state that is none, those of before. */
-void towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
+/*
+ * Write the commands of all actuators inside their limits; of a state that is none, those of before. Carriers that turn
+ * too late turn more slowly from the next step on. Return the most that the thrust of a carrier lacks [N].
+ */
+double towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
                            towline_flight flight);
 
 /* Return how many actuators the carrier with the most has. */

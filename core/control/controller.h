@@ -27,6 +27,7 @@ typedef struct {
     double carrier_bandwidth, carrier_acceleration; /* of that motion [rad/s], and at most [m/s^2, rad/s^2] */
     double reach[TOWLINE_MOST_CARRIERS][6];         /* how far each coordinate may go [m, rad] */
     double place;                                   /* bandwidth with which flying carriers keep their place [rad/s] */
+    double attitude;                                /* and with which they turn, unless that is too fast [rad/s] */
     double by_wrench[TOWLINE_MOST_CARRIERS][TOWLINE_MOST_ACTUATORS][6]; /* commands of actuators for units of force and
                                                                            moment in the carrier's axes */
     towline_limits limits[TOWLINE_MOST_CABLES];
@@ -62,6 +63,21 @@ typedef struct {
     double turning[3];                /* rate that is measured, in its own axes */
     double lacking;                   /* thrust that its actuators do not give, or give too much, by their limits [N] */
 } towline_carrier_memory;
+
+/* How an axis of a carrier turns: what is ordered, and what is measured; see turning.c. */
+typedef struct {
+    double usual;                 /* rate, in the mean of the last time */
+    double order;                 /* integral of the ordered acceleration, without what it was long ago */
+    double late_order, late_rate; /* x and r */
+} towline_turning_axis;
+
+/* How late the carriers of a robot turn. */
+typedef struct {
+    towline_turning_axis axis[TOWLINE_MOST_CARRIERS][3];
+    double along, square; /* means of (x - r) dr/dt and of its square */
+    double lag;           /* of carriers that turn too late, else 0 [s] */
+    int64_t has_begun;    /* 1 after the first step */
+} towline_turning;
 
 enum { TOWLINE_MOST_TETHERS = 3 };
 

@@ -13,6 +13,13 @@ void towline_write_bounds(const towline_robot *robot, const towline_controller *
 void towline_compensate(const towline_robot *robot, const towline_controller *controller, double dt,
                         const configuration *at, const double *A, const double *missing, towline_row *row);
 
+/*
+ * turning.c: measure how late carriers turn, `dt` after the last step [s], with what they were `ordered` in it (c, 3);
+ * nan, where actuators were at their limits, starts the comparison of that axis again, as rates do that are no numbers.
+ */
+void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt, const double ordered[][3],
+                         const towline_carrier_memory *carriers, towline_turning *it);
+
 /* Add the offsets of all carriers, and their rates, to the poses and velocities that are ordered. */
 void towline_add_offsets(const towline_robot *robot, towline_row *row);
 

@@ -12,6 +12,8 @@
  * axis is there at once; the rest comes when the carrier has turned. Source: T. Lee, M. Leok and N. H. McClamroch,
  * "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
  */
+#include <string.h>
+
 #include "control/internal.h"
 #include "control/observer.h"
 #include "control/usable.h"
@@ -147,9 +149,10 @@ static void command(const flier *it, const double *wrench, double *actuation) {
     }
 }
 
-void towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
-                           towline_flight flight) {
+double towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
+                             towline_flight flight) {
     const int most = towline_most_actuators(robot);
+    double ordered[TOWLINE_MOST_CARRIERS][3], lacking = 0;
     const int measured = is_measured(robot, flight.measured, flight.cables);
     configuration at;
     configuration_at(robot, flight.measured, &at);
@@ -161,14 +164,23 @@ void towline_write_thrusts(const towline_robot *robot, const towline_controller 
             c,     &flight.memory[c],
         };
         double wrench[6], *actuation = flight.actuation + most * c;
+        memcpy(ordered[c], it.memory->ordered, sizeof ordered[c]);
         if (body->actuators > 0) {
             if (measured) {
                 observe_carrier(&it, dt, flight.cables, actuation);
             }
             wrench_of_carrier(&it, flight.tensions, wrench);
             command(&it, wrench, actuation);
+            lacking = fmax(lacking, it.memory->lacking); /* not a number that is none */
         }
     }
+    if (flight.turning) {
+        towline_measure_lag(robot, controller->attitude, dt, (const double (*)[3])ordered, flight.memory, flight.turning);
+        if (flight.turning->lag > 0) {
+            flight.platform->attitude = fmin(flight.platform->attitude, 1 / flight.turning->lag);
+        }
+    }
+    return lacking;
 }
 
 int towline_most_actuators(const towline_robot *robot) {

@@ -1,6 +1,7 @@
 /* The step of a controller for Python: what it is given, and what core/control does with it. */
 #include "control/control.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "python/arrays.h"
@@ -59,6 +60,7 @@ static int have_rows(const arrays *given, int first, int last, Py_ssize_t rows, 
 static const Py_ssize_t PER_CABLE = sizeof(towline_cable_memory) / sizeof(double);
 static const Py_ssize_t PER_PLATFORM = sizeof(towline_platform_memory) / sizeof(double);
 static const Py_ssize_t PER_CARRIER = sizeof(towline_carrier_memory) / sizeof(double);
+static const Py_ssize_t PER_TURNING = sizeof(towline_turning) / sizeof(double);
 
 enum {
     MOTION = 12,
@@ -190,10 +192,10 @@ PyObject *towline_py_control_problem(PyObject *module, PyObject *const *argument
 
 PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
-    enum { ROBOT, CONTROLLER, MEASURED, CARRIERS, TENSIONS, CABLES, PLATFORM, MEMORY, ACTUATION, ALL };
+    enum { ROBOT, CONTROLLER, MEASURED, CARRIERS, TENSIONS, CABLES, PLATFORM, MEMORY, TURNING, ACTUATION, ALL };
     arrays given;
-    double dt = 0;
-    if (!take_numbers(arguments, count, 1, &dt) || !take(&given, arguments + 1, count - 1, ALL, MEMORY)) {
+    double dt = 0, lacking = 0;
+    if (!take_numbers(arguments, count, 1, &dt) || !take(&given, arguments + 1, count - 1, ALL, PLATFORM)) {
         return NULL;
     }
     const towline_robot *robot = robot_of(&given);
@@ -201,13 +203,13 @@ PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *argument
     double *const *of = given.of;
     int fits = robot && controller;
     for (int i = MEASURED; i < ALL; i++) {
-        fits = fits && of[i];
+        fits = fits && (of[i] || i == TURNING);
     }
     if (fits) {
         const Py_ssize_t m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
         const Py_ssize_t rows = given.size[TENSIONS] / m, each = c * towline_most_actuators(robot);
         const Py_ssize_t sizes[ALL] = {
-            0, 0, motions, ORDER * c, m, m * PER_CABLE, PER_PLATFORM, c * PER_CARRIER, each,
+            0, 0, motions, ORDER * c, m, m * PER_CABLE, PER_PLATFORM, c * PER_CARRIER, PER_TURNING, each,
         };
         fits = have_rows(&given, MEASURED, ALL, rows, sizes);
         Py_BEGIN_ALLOW_THREADS;
@@ -217,15 +219,21 @@ PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *argument
                 .carriers = of[CARRIERS] + row * ORDER * c,
                 .tensions = of[TENSIONS] + row * m,
                 .cables = (const towline_cable_memory *)(const void *)of[CABLES] + row * m,
-                .platform = (const towline_platform_memory *)(const void *)of[PLATFORM] + row,
+                .platform = (towline_platform_memory *)(void *)of[PLATFORM] + row,
                 .memory = (towline_carrier_memory *)(void *)of[MEMORY] + row * c,
+                .turning = of[TURNING] ? (towline_turning *)(void *)of[TURNING] + row : NULL,
                 .actuation = of[ACTUATION] + row * each,
             };
-            towline_write_thrusts(robot, controller, dt, here);
+            lacking = fmax(lacking, towline_write_thrusts(robot, controller, dt, here));
         }
         Py_END_ALLOW_THREADS;
     }
-    return done(&given, fits);
+    PyObject *nothing = done(&given, fits);
+    if (!nothing) {
+        return NULL;
+    }
+    Py_DECREF(nothing);
+    return PyFloat_FromDouble(lacking);
 }
 
 PyObject *towline_py_control_move_on(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {

@@ -66,8 +66,9 @@ static PyMethodDef functions[] = {
      " cables, platform, memory, A, w, bounds)\n--\n\n"
      "Update the memory of each row, and write the problem of tension distribution of this step."},
     {"control_thrusts", (PyCFunction)(void (*)(void))towline_py_control_thrusts, METH_FASTCALL,
-     "control_thrusts(dt, robot, controller, measured, carriers, tensions, cables, platform, memory, actuation)\n--\n\n"
-     "Write the commands of the actuators of flying carriers."},
+     "control_thrusts(dt, robot, controller, measured, carriers, tensions, cables, platform, memory, turning, "
+     "actuation)\n--\n\n"
+     "Write the commands of the actuators of flying carriers; return the most that a thrust lacks [N]."},
     {"control_move_on", (PyCFunction)(void (*)(void))towline_py_control_move_on, METH_FASTCALL,
      "control_move_on(dt, robot, disturbance, tensions, accelerations, measured)\n--\n\n"
      "Move motions that were measured earlier on, with the tensions (parts, N, m) since."},

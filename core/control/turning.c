@@ -1,0 +1,66 @@
+/*
+ * How late flying carriers turn after the angular accelerations that they are ordered.
+ *
+ * With rotors that follow their commands with a lag tau, a critically damped attitude loop of bandwidth h,
+ *
+ *     tau phi''' + phi'' + 2 h phi' + h^2 phi = 0,
+ *
+ * is stable for h tau < 2 (Routh). Rates r without what they were long ago, and the integrals x of ordered
+ * accelerations without the same, obey tau dr/dt = x - r. A delay of D counts as D at most. So
+ *
+ *     tau = <x - r, dr/dt> / <dr/dt, dr/dt>
+ *
+ * of all carriers and axes of a robot, where a lag of 1 / h before gives derivatives, and keeps vibrations away.
+ */
+#include <string.h>
+
+#include "control/internal.h"
+
+static const double LATE = 1.5;    /* over the bandwidth: a lag of 2 is where the loop gets unstable */
+static const double WINDOW = 0.05; /* [s], in which orders and rates are compared */
+static const double FASTEST = 1e4; /* [rad/s]: nothing turns faster */
+static const double SEEN = 0.01;   /* [rad]: what the lag makes of a carrier's attitude until it is believed */
+
+/* Update one axis, whose comparison starts again where a number is none, and return dr/dt. */
+static double follow(double bandwidth, double dt, double order, double rate, towline_turning_axis *it) {
+    const double share = 1 - exp(-bandwidth * dt), slow = dt / WINDOW;
+    it->order += dt * order - slow * it->order;
+    it->usual += slow * (rate - it->usual);
+    const double change = rate - it->usual - it->late_rate;
+    it->late_order += share * (it->order - it->late_order);
+    it->late_rate += share * change;
+    if (!isfinite(it->late_order + it->late_rate)) {
+        *it = (towline_turning_axis){.usual = rate};
+        return 0;
+    }
+    return bandwidth * change;
+}
+
+void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt, const double ordered[][3],
+                         const towline_carrier_memory *carriers, towline_turning *it) {
+    const int again = !it->has_begun || dt > WINDOW;
+    double along = 0, square = 0;
+    if (again) {
+        memset(it, 0, sizeof *it);
+        it->has_begun = 1;
+    }
+    for (int c = 0; c < robot->carriers; c++) {
+        for (int k = 0; k < 3; k++) {
+            const double measured = carriers[c].turning[k], rate = fabs(measured) <= FASTEST ? measured : NAN;
+            towline_turning_axis *axis = &it->axis[c][k];
+            if (again) {
+                axis->usual = rate;
+            } else {
+                const double change = follow(bandwidth, dt, ordered[c][k], rate, axis);
+                along += (axis->late_order - axis->late_rate) * change;
+                square += change * change;
+            }
+        }
+    }
+    const double slow = dt / WINDOW, late = LATE / bandwidth, rate = SEEN * WINDOW * bandwidth * bandwidth / late;
+    if (!again) {
+        it->along += slow * (along - it->along);
+        it->square += slow * (square - it->square);
+    }
+    it->lag = it->along > late * it->square && it->square > rate * rate ? it->along / it->square : 0;
+}
