@@ -20,6 +20,7 @@ from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
+from .as_floats import as_floats
 from .carrier_references import Flown, Freed, Moved, Tethered
 from .command import HOLD, OTHERWISE, SHIFTED, Command
 from .computed_torque import SOMETHING, ComputedTorque
@@ -166,7 +167,7 @@ class Predictive(ComputedTorque):
         unknown = np.zeros(self.robot.m) if the_robot.fixed_lengths is None else self._statics
         # How far rates let tensions go until the end of each stage.
         self._room = self._limits.rate * self._times[1:, None]
-        self._preview = Preview(self._steps, self._moved, unknown)
+        self._preview = Preview(self.robot, self._steps, self._moved, unknown)
         A, B = self._at_home()
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
         self._weights = weights(self.robot, self._bandwidth, reaches, returning, self._steps[0], moves)
@@ -179,8 +180,7 @@ class Predictive(ComputedTorque):
         h.tolerance, h.iterations_max = TOLERANCE, ITERATIONS
         h.Q[:count], h.Q[count], h.R[:] = np.diag(self._weights.states), self._end, np.diag(self._weights.controls)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
-        usual = self.robot.force_scale / self.robot.platform.mass
-        self._watch = Watch(scale, usual, None if correct else self._ripple())
+        self._watch = Watch(scale, the_robot.force_scale / the_robot.platform.mass, None if correct else self._ripple())
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
         self._has_winches, self._none = the_robot.fixed_lengths is None, np.zeros(self.robot.m)
         self._from_the_start: HandOver | None = None
@@ -215,8 +215,8 @@ class Predictive(ComputedTorque):
         return asked / np.maximum(room, SOMETHING * high)[:, None]
 
     @override
-    def reset(self) -> None:
-        super().reset()
+    def _forget(self) -> None:
+        super()._forget()
         self._beside.reset()
         self._watch.reset()
         self.handed_over = self._from_the_start
@@ -244,20 +244,15 @@ class Predictive(ComputedTorque):
         InputError
             If an argument has a wrong type or value.
         """
-        self._preview.follow(references, period, start)
+        with self._alone:
+            self._preview.follow(references, period, start)
 
     @override
-    def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the command for the time from `time` [s] until the next step.
-
-        Raises
-        ------
-        InputError
-            If the time is not later than that of the step before, or state or reference are not of this one robot.
-        """
-        dt = self._measure(time, state, reference)
-        if len(self._wanted) != 1 or np.ndim(state.pose) != 1:
+    def _step(self, time: float, state: State, reference: Reference) -> Command:
+        dt, state, reference = self._measure(time, state, reference)
+        if np.ndim(state.pose) != 1:
             raise InputError(f"state must be of one robot, got {len(self._wanted)} of them")
+        reference = as_floats(reference, self.robot, None)
         if self.handed_over is None:
             self._compare(time, dt, reference)
         self._beside._turning = None if self.handed_over is None else self._turning  # of the orders that are sent
@@ -357,8 +352,7 @@ class Predictive(ComputedTorque):
         gained += h.B[0, 6:12, :m] @ (pulls[0] - planned[0, :m])
         by_tensions = h.B[0, 6:12, :m] / self._steps[0]
         self._watch.explain(time, gained / self._steps[0], by_tensions, self._solved == time)
-        late = len(under_way)
-        more = np.clip(controls[late, m:] - planned[late, m:], -self._strongest, self._strongest)
+        more = np.clip((controls - planned[:-1])[len(under_way), m:], -self._strongest, self._strongest)
         self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
         return pulls
 
