@@ -24,9 +24,9 @@ class Pending:
         self._time += dt
 
     def add(self, command: np.ndarray) -> None:
-        """Command numbers, (count,), from now on."""
+        """Command numbers, (count,), from now on; the array is kept."""
         commands = self._commands
-        commands.append((self._time, command.copy()))
+        commands.append((self._time, command))
         while len(commands) > 1 and commands[1][0] <= self._time - self._kept:
             commands.popleft()
 

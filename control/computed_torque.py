@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from math import ceil
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
-from ..base.inputs import number, shown
+from ..base.inputs import number, required, shown
 from ..core import control_move_on, control_problem, control_take, control_thrusts
 from ..models.files import as_robot
 from ..models.record import record_of
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
+from .as_floats import as_floats, is_time, rows_of
 from .boxes import boxes, stay_inside
 from .command import HOLD, PLANNED, SOFT, Command
 from .command_delay import Pending
 from .controllability import uncontrolled
 from .controller import Controller
+from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
 from .reference import Reference
 from .settings import limits_of, reach_of, set_reach, settings_of
@@ -33,7 +33,6 @@ from .tension_loop import TensionLoop
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
 SHORTEST_LAG = 0.005  # [s]
 ROUNDING = 1e-9  # [s]
-LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
 OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; of the time since a state was measured
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
@@ -116,7 +115,7 @@ class ComputedTorque(Controller):
         tension_loop: float = 0.0,
         tension_lag: float = 0.005,
     ):
-        self.robot = as_robot(robot)
+        self.robot, self._alone = as_robot(robot), OneAtATime()
         few = self._few = self.robot.m < len(self.robot.platform.dof)
         self._scale = self.robot.wrench_scale
         self._limits = limits_of(self.robot, rate)
@@ -139,6 +138,10 @@ class ComputedTorque(Controller):
 
     @override
     def reset(self) -> None:
+        with self._alone:
+            self._forget()
+
+    def _forget(self) -> None:
         self._begin(1)
 
     @property
@@ -199,9 +202,14 @@ class ComputedTorque(Controller):
         Raises
         ------
         InputError
-            If the time is not later than that of the step before, or an array does not have the shape of the robot's.
+            If the time is not later than that of the step before, an array does not have the shape of the robot's, or
+            another thread uses the controller.
         """
-        self._measure(time, state, reference)
+        with self._alone:
+            return self._step(time, state, reference)
+
+    def _step(self, time: float, state: State, reference: Reference) -> Command:
+        _, state, reference = self._measure(time, state, reference)
         tensions, answered, proof = self._distribute()
         if answered is not self._as_planned:
             self._platform["integrates"] = answered == PLANNED
@@ -218,28 +226,30 @@ class ComputedTorque(Controller):
         answered = self._answer_others()
         return problems.tensions.copy(), answered, (problems.direction.copy(), problems.shortfall.copy())
 
-    def _measure(self, time: float, state: State, reference: Reference) -> float:
-        """Update the memory, and write the problem of this step; return the time since the last one [s], or 0."""
-        if not isinstance(state, State):
-            raise InputError(f"state must be a State, got {shown(state)}")
-        if not isinstance(reference, Reference):
-            raise InputError(f"reference must be a Reference, got {shown(reference)}")
-        if isinstance(time, np.timedelta64) or not isinstance(time, Real) or not abs(time) <= LATEST:
+    def _measure(self, time: float, state: State, reference: Reference) -> tuple[float, State, Reference]:
+        """Update the memory, and write the problem of this step.
+
+        Return the time since the last one [s], or 0, and the state and the reference as arrays.
+        """
+        required("state", state, State)
+        required("reference", reference, Reference)
+        if not is_time(time):
             raise InputError(f"time must be a finite number [s], got {shown(time)}")
-        rows = 1 if np.ndim(state.pose) == 1 else len(state.pose)
-        if rows != len(self._wanted):
-            self._begin(rows)
+        time, rows = float(time), rows_of(state)
+        if (rows if rows is not None else 1) != len(self._wanted):
+            self._begin(1 if rows is None else rows)
         dt = 0.0 if self._time is None else time - self._time
         if not (dt > 0 or self._time is None):
             raise InputError(
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
-        self._take(state, reference)
-        since, late = self._move_on(float(time), state, dt)
-        control_problem(dt, since, self._robot, self._settings, self._measured, late, *self._arrays)
-        self._first = float(time) if self._time is None else self._first
-        self._time, self._elapsed = float(time), dt
-        return dt
+        state, reference = self._take(state, reference)
+        since, late = self._move_on(time, state, dt)
+        own = self._robot, self._settings, self._measured, late, *self._arrays
+        self._has_cut = control_problem(dt, since, *own) > 0
+        self._first = time if self._time is None else self._first
+        self._time, self._elapsed = time, dt
+        return dt, state, reference
 
     def _move_on(self, time: float, state: State, dt: float) -> tuple[float, np.ndarray | None]:
         """Make the measured state that of now; return how long after the last it was measured [s], and itself if late.
@@ -249,23 +259,24 @@ class ComputedTorque(Controller):
         """
         cables, measured = self._cables, self._measured
         seen = time if state.time is None else state.time
-        if not isinstance(seen, Real) or not -LATEST <= seen <= time + ROUNDING:
+        if not is_time(seen) or not float(seen) <= time + ROUNDING:
             raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
         age, since = time - float(seen), 0.0 if self._time is None else float(seen) - self._seen
         self._seen = float(seen)
         first = dt > 0 and self._time == self._first  # whose command is taken for that of the time before
         for lasted in (OLDEST, dt) if first else (dt,):
-            self._commanded.add(cables["last"].ravel())
+            self._commanded.add(cables["last"].flatten())
             self._commanded.wait(lasted)
-        otherwise = cables["known"] - cables["then"]
-        if age <= ROUNDING and since == dt:
+        on_time = age <= ROUNDING
+        otherwise = None if on_time else cables["known"] - cables["then"]
+        if on_time and since == dt:
             cables["then"] = cables["last"]
         elif dt > 0:
             window = since if since > 0 else dt
             cables["then"] = self._commanded.means(age + window, 1, window).reshape(cables.shape)
         if not self._senses:
             cables["measured"] = cables["then"]
-        if age <= ROUNDING:
+        if otherwise is None:
             return since, None
         late = measured.copy()
         if age > OLDEST:
@@ -287,7 +298,7 @@ class ComputedTorque(Controller):
     ) -> Command:
         """Return the command of tensions (N, m) and the carriers' reference, which those that react or fly leave."""
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
-        if np.count_nonzero(self._cables["is_cut"]):
+        if self._has_cut:
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
         rows, self._cables["last"] = len(tensions), tensions
         if self._moves_carriers:
@@ -327,29 +338,16 @@ class ComputedTorque(Controller):
         reports = self._cables["measured"] if self._senses else None
         return self._loop.sent(self._elapsed, wanted, self._cables["then"], reports, self.cut)
 
-    def _take(self, state: State, reference: Reference) -> None:
-        """Copy a state and a reference to where the core reads them."""
+    def _take(self, state: State, reference: Reference) -> tuple[State, Reference]:
+        """Copy a state and a reference to where the core reads them, and return them as arrays."""
         self._senses = state.tensions is not None
         try:
             control_take(state, reference, *self._inputs)
-        except (ValueError, TypeError, BufferError):
-            try:  # as arrays of float64, which they need not be
-                control_take(_floats(state[:5]), _floats(reference), *self._inputs)
-            except (ValueError, TypeError):
-                raise InputError(self._misfit(state, reference)) from None
-
-    def _misfit(self, state: State, reference: Reference) -> str:
-        """Return which array of a state or a reference does not fit the robot."""
-        m, count = self.robot.m, len(self.robot.carriers)
-        for given in (state, reference):
-            for name, value in given._asdict().items():
-                if name == "time":
-                    continue
-                core = (m,) if name == "tensions" else (count, 6) if name.startswith("carrier") else (6,)
-                shape = np.shape(value) if value is not None else core
-                if shape[-len(core) :] != core or shape[: -len(core)] not in ((), (len(self._wanted),)):
-                    return f"{type(given).__name__.lower()}.{name} must be of shape {_shape(core)}, got shape {shape}"
-        return "state and reference must be arrays of numbers"
+        except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
+            rows = len(self._wanted)
+            state, reference = as_floats(state, self.robot, rows), as_floats(reference, self.robot, rows)
+            control_take(state, reference, *self._inputs)
+        return state, reference
 
     def _answer_others(self) -> np.ndarray:
         """Give rows without tensions a command, and return how each row was answered."""
@@ -371,13 +369,5 @@ class ComputedTorque(Controller):
         return answered
 
 
-def _floats(parts: Iterable[Any]) -> tuple[np.ndarray | None, ...]:
-    return tuple(None if part is None else np.asarray(part, dtype=float) for part in parts)
-
-
 def _for_all(value: np.ndarray, rows: int) -> np.ndarray:
     return np.broadcast_to(value, (rows, *np.shape(value)[-2:]))
-
-
-def _shape(core: tuple[int, ...]) -> str:
-    return f"(..., {', '.join(map(str, core))})"

@@ -8,8 +8,10 @@ import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
+from ..base.inputs import required
 from ..models.files import as_robot
 from ..models.robot import Robot
+from .as_floats import as_floats, rows_of
 from .command import HOLD, PLANNED, Command
 from .controller import Controller
 from .reference import Reference
@@ -51,8 +53,15 @@ class OpenLoop(Controller):
             Do not matter, but for the leading dimension of the state.
         reference
             The plan at this time.
+
+        Raises
+        ------
+        InputError
+            If state or reference are none, or an array of theirs does not have the shape of the robot's.
         """
-        lead, planned = np.shape(state.pose)[:-1], reference.tensions
+        rows = rows_of(required("state", state, State))
+        reference = as_floats(required("reference", reference, Reference), self.robot, rows)
+        lead, planned = () if rows is None else (rows,), reference.tensions
         known = planned is not None and bool(np.isfinite(planned).all())
         tensions = self.robot.t_min if planned is None or not known else planned
         carriers = (reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration)

@@ -20,6 +20,7 @@ from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
+from .as_floats import as_floats
 from .carrier_references import Flown, Freed, Moved, Tethered
 from .command import HOLD, OTHERWISE, SHIFTED, Command
 from .computed_torque import SOMETHING, ComputedTorque
@@ -155,7 +156,8 @@ class Predictive(ComputedTorque):
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
         # How far rates let tensions go until the end of each stage.
         self._room = self._limits.rate * self._times[1:, None]
-        self._preview = Preview(self._steps, self._moved, 0 * self._statics if self._has_winches else self._statics)
+        unknown = 0 * self._statics if self._has_winches else self._statics
+        self._preview = Preview(self.robot, self._steps, self._moved, unknown)
         self._surroundings = Surroundings(self.robot, tube, keep_out)
         self._horizon = self._program(reaches, returning)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
@@ -218,8 +220,8 @@ class Predictive(ComputedTorque):
         return asked / np.maximum(room, SOMETHING * high)[:, None]
 
     @override
-    def reset(self) -> None:
-        super().reset()
+    def _forget(self) -> None:
+        super()._forget()
         self._beside.reset()
         self._watch.reset()
         self.handed_over = self._from_the_start
@@ -246,20 +248,15 @@ class Predictive(ComputedTorque):
         InputError
             If an argument has a wrong type or value.
         """
-        self._preview.follow(references, period, start)
+        with self._alone:
+            self._preview.follow(references, period, start)
 
     @override
-    def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the command for the time from `time` [s] until the next step.
-
-        Raises
-        ------
-        InputError
-            If the time is not later than that of the step before, or state or reference are not of this one robot.
-        """
-        dt = self._measure(time, state, reference)
-        if len(self._wanted) != 1 or np.ndim(state.pose) != 1:
+    def _step(self, time: float, state: State, reference: Reference) -> Command:
+        dt, state, reference = self._measure(time, state, reference)
+        if np.ndim(state.pose) != 1:
             raise InputError(f"state must be of one robot, got {len(self._wanted)} of them")
+        reference = as_floats(reference, self.robot, None)
         if self.handed_over is None:
             self._compare(time, dt, reference)
         self._beside._turning = None if self.handed_over is None else self._turning  # of the orders that are sent
@@ -360,7 +357,7 @@ class Predictive(ComputedTorque):
         gained += h.B[0, 6:12, :m] @ (pulls[0] - planned[0, :m])
         by_tensions = h.B[0, 6:12, :m] / self._steps[0]
         self._watch.explain(time, gained / self._steps[0], by_tensions, self._solved == time)
-        more = (controls[:, m:] - planned[:-1, m:])[len(under_way)].clip(-self._strongest, self._strongest)
+        more = np.clip((controls - planned[:-1])[len(under_way), m:], -self._strongest, self._strongest)
         self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
         return pulls
 

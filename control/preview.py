@@ -8,6 +8,8 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.inputs import number, shown
+from ..models.robot import Robot
+from .as_floats import as_floats
 from .carrier_references import Moved
 from .reference import Reference
 
@@ -20,6 +22,8 @@ class Preview:
 
     Parameters
     ----------
+    robot
+        Whose they are.
     steps
         How long stages last, (N,) [s].
     moved
@@ -28,8 +32,8 @@ class Preview:
         Those of a reference that has none, (m,) [N].
     """
 
-    def __init__(self, steps: np.ndarray, moved: Moved, tensions: np.ndarray):
-        self._moved, self._unknown = moved, tensions
+    def __init__(self, robot: Robot, steps: np.ndarray, moved: Moved, tensions: np.ndarray):
+        self._robot, self._moved, self._unknown = robot, moved, tensions
         self._times = np.concatenate([[0.0], np.cumsum(steps)])
         self._half, self._sixth = steps[:, None] / 2, steps[:, None] ** 2 / 6
         self.reset()
@@ -53,7 +57,7 @@ class Preview:
         ):
             raise InputError(f"references must be a list of References, got {shown(references)}")
         period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
-        self._announced = start, period, self.rows(references)
+        self._announced = start, period, self.rows([as_floats(each, self._robot, None) for each in references])
 
     def rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, np.ndarray]:
         """Return motions (K, 3, 6 + 6 c + f) and tensions (K, m).

@@ -134,6 +134,13 @@ PyObject *towline_py_control_take(PyObject *module, PyObject *const *arguments, 
     Py_RETURN_NONE;
 }
 
+/* Release the arrays, and return a number, or NULL with an exception if they do not fit. */
+static PyObject *number_done(arrays *given, int fits, double number) {
+    PyObject *nothing = done(given, fits);
+    Py_XDECREF(nothing);
+    return nothing ? PyFloat_FromDouble(number) : NULL;
+}
+
 /* Return the controller if the second array is the record of one, else NULL. */
 static const towline_controller *controller_of(const arrays *given) {
     const int is_one = given->of[1] && given->view[1].len == (Py_ssize_t)sizeof(towline_controller);
@@ -153,6 +160,7 @@ PyObject *towline_py_control_problem(PyObject *module, PyObject *const *argument
     enum { ROBOT, CONTROLLER, MEASURED, LATE, REFERENCE, T_REF, CARRIERS, CABLES, PLATFORM, MEMORY, A, W, BOUNDS, ALL };
     arrays given;
     double times[2] = {0, 0};
+    Py_ssize_t cut = 0;
     if (!take_numbers(arguments, count, 2, times) || !take(&given, arguments + 2, count - 2, ALL, CARRIERS)) {
         return NULL;
     }
@@ -184,10 +192,13 @@ PyObject *towline_py_control_problem(PyObject *module, PyObject *const *argument
                 .high = of[BOUNDS] + (rows + row) * m,
             };
             towline_write_problem(robot, controller, times[0], times[1], here);
+            for (Py_ssize_t i = 0; i < m; i++) {
+                cut += here.cables[i].is_cut != 0;
+            }
         }
         Py_END_ALLOW_THREADS;
     }
-    return done(&given, fits);
+    return number_done(&given, fits, (double)cut);
 }
 
 PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
@@ -228,12 +239,7 @@ PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *argument
         }
         Py_END_ALLOW_THREADS;
     }
-    PyObject *nothing = done(&given, fits);
-    if (!nothing) {
-        return NULL;
-    }
-    Py_DECREF(nothing);
-    return PyFloat_FromDouble(lacking);
+    return number_done(&given, fits, lacking);
 }
 
 PyObject *towline_py_control_move_on(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {

@@ -1,0 +1,91 @@
+"""What a controller is given, checked: `as_floats`, a state or a reference as arrays; `rows_of`, `is_time`."""
+
+from __future__ import annotations
+
+from numbers import Real
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.inputs import shown
+from ..models.robot import Robot
+from .reference import Reference
+from .state import State
+
+Given = TypeVar("Given", State, Reference)
+
+LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
+
+_FLOAT = np.dtype(np.float64)
+
+
+def is_time(value: object) -> bool:
+    """Return whether a value is a number that can be a time [s]."""
+    if type(value) is float:  # at a third of the time
+        return abs(value) <= LATEST
+    number: Any = value
+    return isinstance(value, Real) and not isinstance(value, np.timedelta64) and bool(abs(number) <= LATEST)
+
+
+def rows_of(state: State) -> int | None:
+    """Return how many robots a state is of, None for the arrays of one without a leading dimension.
+
+    Raises
+    ------
+    InputError
+        If its pose is no array of (6,) or (N, 6) numbers.
+    """
+    pose = _array("state.pose", state.pose, (6,))
+    if pose.ndim > 2:
+        raise InputError(f"state.pose must be of shape (6,) or (N, 6), got shape {pose.shape}")
+    return None if pose.ndim == 1 else len(pose)
+
+
+def as_floats(given: Given, robot: Robot, rows: int | None) -> Given:
+    """Return a state or a reference whose arrays are NumPy's own, of float64; nan stays, for a sensor without a value.
+
+    Parameters
+    ----------
+    robot
+        Whose it is.
+    rows
+        The leading dimension that arrays may have, or None if they have none.
+
+    Raises
+    ------
+    InputError
+        Naming the array that does not fit.
+    """
+    kind, shape = type(given).__name__.lower(), {"tensions": (robot.m,), "carrier": (len(robot.carriers), 6)}
+    arrays: dict[str, Any] = {}
+    for name, value in zip(given._fields, given, strict=True):
+        if name != "time" and not (name == "tensions" and value is None):
+            core = shape.get(name.partition("_")[0], (6,))
+            array = arrays[name] = _array(f"{kind}.{name}", value, core)
+            if array.ndim > len(core) and (rows is None or array.shape[: -len(core)] != (rows,)):
+                accepted = _shape(core) if rows is not None else core
+                raise InputError(f"{kind}.{name} must be of shape {accepted}, got shape {array.shape}")
+    return given._replace(**arrays)
+
+
+def _array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
+    """Return an array of float64 whose last dimensions are `core`, or raise InputError."""
+    if type(value) is np.ndarray and value.dtype is _FLOAT and value.shape[-len(core) :] == core:
+        return value
+    try:
+        array = np.asarray(value)
+        fits = array.dtype.kind in "fiubO"
+        with np.errstate(over="ignore"):  # of a longer float
+            array = array.astype(float, copy=False) if fits else array
+    except Exception:  # whatever the array interface of another library, or an object of an array, raises
+        fits = False
+    if not fits:
+        raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}")
+    if array.shape[-len(core) :] != core:
+        raise InputError(f"{name} must be of shape {_shape(core)}, got shape {array.shape}")
+    return array
+
+
+def _shape(core: tuple[int, ...]) -> str:
+    return f"(..., {', '.join(map(str, core))})"

@@ -1,0 +1,30 @@
+"""`OneAtATime`: what one thread does, and a second one is refused meanwhile."""
+
+from __future__ import annotations
+
+import threading
+
+from ..base.errors import InputError
+
+
+class OneAtATime:
+    """A block of a controller's code that one thread runs at a time; a copy of it is free.
+
+    The steps of a controller follow each other in time: those of two threads would mix two robots in one memory.
+    """
+
+    def __init__(self):
+        self._lock = threading.RLock()  # a step of a predictive controller is made of others
+
+    def __enter__(self) -> None:
+        """Enter, or raise InputError if another thread is inside."""
+        if not self._lock.acquire(blocking=False):
+            raise InputError("controller must be used by one thread at a time, got two; each robot needs its own")
+
+    def __exit__(self, *_: object) -> None:
+        """Leave to others."""
+        self._lock.release()
+
+    def __reduce__(self) -> tuple[type[OneAtATime], tuple[()]]:
+        """Copy and pickle without the lock, which belongs to this process and its threads."""
+        return OneAtATime, ()
