@@ -1,6 +1,7 @@
 """The wheel of the sources: compiling the core takes half a minute, so it is done once for all tests."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from .c_programs import WARNINGS
 from .once import made_once
 
 ROOT = Path(__file__).parent.parent
@@ -48,10 +50,10 @@ def run(code, folder, path, **variables):
     return done.stdout.splitlines()[-1]
 
 
-def build(kind, folder, path=None):
+def build(kind, folder, path=None, **variables):
     """Build a wheel, an sdist or an editable installation in a folder of sources; return the path of what was built."""
     path = os.environ["PATH"] if path is None else path
-    return folder / "dist" / run(f"{BACKEND}; print(backend.build_{kind}('dist'))", folder, path)
+    return folder / "dist" / run(f"{BACKEND}; print(backend.build_{kind}('dist'))", folder, path, **variables)
 
 
 def require_setuptools():
@@ -94,6 +96,12 @@ def unpacked_sdist(factory):
     return next(made_once(factory, "sdist", make).glob("towline-*"))
 
 
+def warned():
+    """Return the variable that lets GCC and Clang optimise all sources without a warning: some are due only then."""
+    command = sysconfig.get_config_var("CC") or ""
+    return {"CFLAGS": " ".join(WARNINGS)} if re.search("gcc|clang|cc", command) and has_compiler() else {}
+
+
 def built_sources(factory):
     """Return the folder of sources, those of the sdist in a clone, in which a wheel was built, in dist/."""
     require_setuptools()
@@ -105,6 +113,6 @@ def built_sources(factory):
             shutil.copytree(ROOT, folder / "sources", ignore=LEFT_OUT)
         else:
             shutil.copytree(unpacked_sdist(factory), folder / "sources")
-        build("wheel", folder / "sources")
+        build("wheel", folder / "sources", **warned())
 
     return made_once(factory, "wheel", make) / "sources"
