@@ -1,6 +1,6 @@
 """C of the core, compiled for tests: without a warning, with the bits of the extension, and watched by sanitizers.
 
-Each source is compiled once for all tests, without optimisation: that takes a third of the time, and has the same bits.
+Each source is compiled once for all tests, most without optimisation: that takes a third of the time, with the same bits.
 """
 
 import shutil
@@ -21,6 +21,7 @@ FLAGS = ["-std=c99", *WARNINGS, f"-I{CORE}", f"-I{CORE}/distribution", "-isystem
          "-DPy_LIMITED_API=0x030B0000", "-DTOWLINE_CABLES=32",
          "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"]  # fmt: skip
 WATCH = ["-g1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+OPTIMISED = ("plant", "horizon")  # parts that tests run for longer than it takes
 WITHOUT_LANES = "-DTOWLINE_NO_LANES"
 
 
@@ -43,8 +44,10 @@ def watched_object(factory: pytest.TempPathFactory, source: Path, *options: str,
     # What this processor cannot run need not be watched, which takes seconds to compile.
     watch = WATCH if PROCESSOR == 2 or not source.stem.endswith("avx512") else []
 
+    level = "-O1" if source.parent.name in OPTIMISED else "-O0"
+
     def make(folder: Path) -> None:
-        command = [compiler, *FLAGS, *watch, *options, "-O0", "-fPIC", "-c", str(source)]
+        command = [compiler, *FLAGS, *watch, *options, level, "-fPIC", "-c", str(source)]
         subprocess.run([*command, "-o", str(folder / "object.o")], check=True)
 
     return made_once(factory, "-".join([named, *options, source.parent.name, source.stem]), make) / "object.o"
