@@ -49,6 +49,7 @@ def linked(folder: str, name: str) -> bool:
 def main() -> None:
     """Run setuptools on pyproject.toml with the extension and the description."""
     import sys
+    import sysconfig
     import tomllib
     from concurrent.futures import ThreadPoolExecutor
     from pathlib import Path
@@ -65,8 +66,17 @@ def main() -> None:
         """The build of the core by the machine's compiler or that of the package ziglang."""
 
         def run(self) -> None:
+            """Build; for an editable installation where other builds do, and not anew what is up to date there."""
             compiler.choose()
+            if self.editable_mode:
+                kind = f"lib.{sysconfig.get_platform()}-{sys.implementation.cache_tag}"
+                self.build_lib = os.path.join("build", kind)
             super().run()
+
+        def copy_extensions_to_source(self) -> None:
+            """Copy also an older one: that in the sources may be of another machine."""
+            self.force = True
+            super().copy_extensions_to_source()
 
         def build_extensions(self) -> None:
             """Compile as many files at once as there are processors."""
@@ -93,7 +103,7 @@ def main() -> None:
     core = Extension(
         "towline.core._core",
         sorted(str(path) for path in Path(CORE).glob("*/*.c")),
-        depends=sorted(str(path) for path in Path(CORE).rglob("*.h")),
+        depends=["setup.py", *sorted(str(path) for path in Path(CORE).rglob("*.h"))],
         include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
         extra_compile_args=[] if sys.platform == "win32" else FLAGS,

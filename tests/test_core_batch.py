@@ -9,11 +9,10 @@ import pytest
 from towline import core
 from towline.solvers.status import UNSURE
 
-from .c_programs import FLAGS, program_of, require, sources_of
+from .c_programs import FLAGS, WITHOUT_LANES, program_of, require, sources_of, watched_objects
 from .soak.exactness import awkward_problem
 
 SOURCES = sources_of("batch", "available_wrench", "distribution", "numbers")
-CABLES = "-DTOWLINE_CABLES=32"
 SHAPES = [(1, 3), (3, 3), (3, 7), (6, 3), (6, 6), (6, 7), (6, 8), (6, 12), (6, 32)]
 
 
@@ -27,8 +26,8 @@ def compiler(request):
 @pytest.fixture(scope="module")
 def solve(compiler, tmp_path_factory):
     """Return a function that solves batches in a program of their own, which sanitizers watch."""
-    folder = tmp_path_factory.mktemp(compiler)
-    program = program_of(folder, "core_batch.c", SOURCES, CABLES, "-O1", compiler=compiler)
+    parts = watched_objects(tmp_path_factory, SOURCES, compiler=compiler)
+    program = program_of(tmp_path_factory, "core_batch.c", parts, compiler=compiler)
 
     def run(arrays, rho, form):
         rows, n, m = arrays[0].shape
@@ -62,9 +61,9 @@ def awkward(n, m, count):
     return arrays
 
 
-@pytest.mark.parametrize("lanes", [[], ["-DTOWLINE_NO_LANES"]])
+@pytest.mark.parametrize("lanes", [[], [WITHOUT_LANES]])
 def test_no_compiler_has_a_warning(compiler, lanes):
-    subprocess.run([compiler, *FLAGS, CABLES, *lanes, "-fsyntax-only", *SOURCES], check=True)
+    subprocess.run([compiler, *FLAGS, *lanes, "-fsyntax-only", *SOURCES], check=True)
 
 
 @pytest.mark.parametrize(("n", "m"), SHAPES)

@@ -1,8 +1,6 @@
 """Predictive control in C: sanitizers and compilers are silent, and all processors have the same bits."""
 
-import shutil
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,23 +8,17 @@ import pytest
 from towline.core import PROCESSOR, horizon_places, horizon_size, horizon_solve
 from towline.solvers import Horizon, horizon
 
+from .c_programs import program_of, require, sources_of, watched_objects
 from .test_solvers_horizon import random_problem, written
 
-CORE = Path(__file__).parent.parent / "core"
-SOURCES = [*sorted((CORE / "horizon").glob("*.c")), Path(__file__).parent / "core_horizon.c"]
-FLAGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wno-psabi", "-O1", "-g"]
 
-
-@pytest.mark.parametrize("vectors", [[], ["-DTOWLINE_NO_LANES"]])
+@pytest.mark.parametrize("vectors", [True, False])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_sanitizers_and_compilers_are_silent(compiler, vectors, tmp_path):
+def test_sanitizers_and_compilers_are_silent(compiler, vectors, tmp_path_factory):
     """Random horizons, and nonsense in each of their arrays, in memory that is exactly as large as it must be."""
-    if shutil.which(compiler) is None:
-        pytest.skip(f"there is no {compiler}")
-    program = tmp_path / "program"
-    options = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", f"-DPROCESSOR={PROCESSOR}", f"-I{CORE}"]
-    command = [compiler, *FLAGS, *vectors, *options, *map(str, SOURCES), "-lm", "-o", str(program)]
-    subprocess.run(command, check=True)
+    require(compiler)
+    parts = watched_objects(tmp_path_factory, sources_of("horizon"), lanes=vectors, compiler=compiler)
+    program = program_of(tmp_path_factory, "core_horizon.c", parts, f"-DPROCESSOR={PROCESSOR}", compiler=compiler)
     finished = subprocess.run([program], capture_output=True, text=True)
     assert finished.returncode == 0, finished.stdout + finished.stderr
 

@@ -13,7 +13,7 @@ from towline.core import _core
 from towline.models import mechanics
 from towline.models.record import RECORD, record_of
 
-from .c_programs import program_of, sources_of
+from .c_programs import program_of, sources_of, watched_objects
 
 LEVEL = np.pi / 2
 COUNT = 203  # no multiple of eight
@@ -226,11 +226,17 @@ def test_numbers_that_are_none_are_found_at_any_address(number):
         assert not _core.finite(moved)
 
 
-@pytest.mark.parametrize("lanes", [[], ["-DTOWLINE_NO_LANES"]])
-def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path, lanes):
-    """Of all results at poses of which some have a number that is none, infinite or huge, with lanes and without."""
-    sources = sources_of("mechanics", "numbers/processor.c")
-    program = program_of(tmp_path, "core_mechanics.c", sources, "-O1", *lanes)
+@pytest.mark.parametrize(
+    ("lanes", "processor"), [(False, 0), *((True, processor) for processor in range(_core.PROCESSOR + 1))]
+)
+def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path_factory, lanes, processor):
+    """Of all results at poses of which some have a number that is none, infinite or huge, with lanes and without.
+
+    The driver says which processor this is, so that each form runs that can.
+    """
+    program = program_of(
+        tmp_path_factory, "core_mechanics.c", watched_objects(tmp_path_factory, sources_of("mechanics"), lanes=lanes)
+    )
     for name in ("caroca-pulleys", "wang-ctmrts-6"):
         robot, rng = load(name), np.random.default_rng(11)
         pose, velocity, acceleration, carriers = motions(robot, rng)
@@ -242,7 +248,7 @@ def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path, lanes):
         for rows in (COUNT, 1):
             given = [array[:rows] for array in (pose, velocity, acceleration, carriers, tensions)]
             sent = record_of(robot).tobytes() + b"".join(array.tobytes() for array in given)
-            done = subprocess.run([program, str(rows)], input=sent, capture_output=True, check=False)
+            done = subprocess.run([program, str(rows), str(processor)], input=sent, capture_output=True, check=False)
             assert done.returncode == 0, done.stderr.decode()
             record, (m, c) = record_of(robot), (robot.m, given[3])
             of_lines = [np.empty((rows, size * m)) for size in (1, 6, 6, 3, 7)]

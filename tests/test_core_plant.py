@@ -9,7 +9,7 @@ from towline import Dynamics, load
 from towline.core import run_plant, sense
 from towline.plant import Plant
 
-from .c_programs import program_of, sources_of
+from .c_programs import program_of, sources_of, watched_objects
 
 NONSENSE = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300]
 ROWS, STEPS, KEEP, SUBSTEPS, PERIOD = 8, 30, 4, 2, 2e-3
@@ -18,7 +18,7 @@ ROWS, STEPS, KEEP, SUBSTEPS, PERIOD = 8, 30, 4, 2, 2e-3
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Return a program that runs a plant, which sanitizers watch."""
-    return program_of(tmp_path_factory.mktemp("plant"), "core_plant.c", sources_of("plant"), "-O1")
+    return program_of(tmp_path_factory, "core_plant.c", watched_objects(tmp_path_factory, sources_of("plant")))
 
 
 def plant_of(name, drive, stiffness):

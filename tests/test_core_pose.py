@@ -11,7 +11,7 @@ from towline.estimation.pose.estimate import moved
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
 
-from .c_programs import program_of, sources_of
+from .c_programs import program_of, sources_of, watched_objects
 
 NONSENSE = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300, 0.0]
 SIZES = [21, 6, None, 1, 36]  # numbers a row that the program writes: curvature, pose, errors, steps, covariance
@@ -20,7 +20,8 @@ SIZES = [21, 6, None, 1, 36]  # numbers a row that the program writes: curvature
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """Return a program that computes poses from lengths, which sanitizers watch."""
-    return program_of(tmp_path_factory.mktemp("pose"), "core_pose.c", sources_of("pose", "numbers/processor.c"))
+    parts = watched_objects(tmp_path_factory, sources_of("pose", "numbers/processor.c"))
+    return program_of(tmp_path_factory, "core_pose.c", parts)
 
 
 def cases(robot, rows, seed):

@@ -1,18 +1,13 @@
 """Controllers in C: nothing for sanitizers to find in any numbers, through Python, with the whole extension watched."""
 
 import os
-import shutil
 import subprocess
 import sys
-import sysconfig
 
 import pytest
 
-from .c_programs import CORE, compile_watched
+from .c_programs import CORE, link_watched, require, watched_objects
 
-# One form for all processors, which compiles in a third of the time: controllers have no other.
-OPTIONS = ["-O0", "-fPIC", "-shared", "-DTOWLINE_NO_LANES", "-DPy_LIMITED_API=0x030B0000", "-DTOWLINE_CABLES=32",
-           f"-I{CORE}/distribution", "-isystem", sysconfig.get_path("include")]  # fmt: skip
 ROBOTS = ["caroca-pulleys", "wang-flying-quadrotor", "multi-quadrotor-3", "wang-ctmrts-4"]
 
 # The module that the package imports is the one that is watched.
@@ -59,17 +54,17 @@ for name in sys.argv[2:]:
 @pytest.fixture(scope="module")
 def watched(tmp_path_factory):
     """Return the extension that sanitizers watch, and the environment of a process that can load it."""
-    compiler = shutil.which("cc")
-    if compiler is None or not sys.platform.startswith("linux"):
-        pytest.skip("there is no C compiler on Linux: no command cc")
+    if not sys.platform.startswith("linux"):
+        pytest.skip("sanitizers are loaded in other ways than on Linux")
+    require("cc")
     libraries = []
     for name in ("libasan.so", "libstdc++.so"):  # CasADi throws: the sanitizer looks for that function as it starts
-        path = subprocess.run([compiler, f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout
+        path = subprocess.run(["cc", f"-print-file-name={name}"], capture_output=True, text=True, check=True).stdout
         if not os.path.isabs(path.strip()):
             pytest.skip(f"there is no {name}")
         libraries.append(path.strip())
     extension = tmp_path_factory.mktemp("sanitized") / "_core.abi3.so"
-    compile_watched(extension, sorted(CORE.glob("*/*.c")), *OPTIONS)
+    link_watched(extension, watched_objects(tmp_path_factory, sorted(CORE.glob("*/*.c"))), "-shared")
     options = {"ASAN_OPTIONS": "detect_leaks=0", "LD_PRELOAD": " ".join(libraries), "PYTHONMALLOC": "malloc"}
     return extension, os.environ | options
 

@@ -2,77 +2,37 @@
 
 import os
 import re
-import shutil
-import subprocess
-import sys
-import tarfile
 import tomllib
-from importlib.metadata import version
-from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from .built import ROOT, built_sources, tracked_files, unpacked_sdist
+
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
-BUILD = "from setuptools import build_meta; build_meta.build_{}('dist')"
 METADATA = re.compile(r"PKG-INFO|setup\.cfg|towline\.egg-info/.*")
-# What work in a clone leaves there, and git does not track.
-LEFT_BEHIND = (
-    ".venv/lib/site.py",
-    "build/lib/old.py",
-    "notes.txt",
-    "notebooks/.ipynb_checkpoints/01_quickstart.ipynb",
-    "shared/notes.md",
-    "site/index.html",
-    "core/_core.abi3.so",
-    "tests/__pycache__/test_sdist.cpython-311.pyc",
-    "towline-demo/circle-free.nc",
-)
-
-
-def build(kind, folder):
-    """Build an sdist or a wheel in a folder of sources and return its path."""
-    done = subprocess.run([sys.executable, "-c", BUILD.format(kind)], cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return next((folder / "dist").iterdir())
 
 
 @pytest.fixture(scope="module")
 def tracked():
     """Return the paths of all files that git tracks."""
-    if not (ROOT / ".git").exists() or shutil.which("git") is None:
+    files = tracked_files()
+    if files is None:
         pytest.skip("only a clone knows which files belong to the project")
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    return {name for name in listed.split("\0") if name and (ROOT / name).exists()}
+    return files
 
 
 @pytest.fixture(scope="module")
 def sdist(tracked, tmp_path_factory):
     """Return the folder that an sdist unpacks to, which was built where work had left files behind."""
-    if int(version("setuptools").split(".")[0]) < 77:
-        pytest.skip("building needs setuptools >= 77, which the extra dev installs")
-    clone, unpacked = tmp_path_factory.mktemp("clone"), tmp_path_factory.mktemp("unpacked")
-    for name in tracked:
-        (clone / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, clone / name)
-    for name in LEFT_BEHIND:
-        (clone / name).parent.mkdir(parents=True, exist_ok=True)
-        (clone / name).write_text(str(clone))
-    if sys.platform != "win32":  # where a link needs permission
-        (clone / ".editable").mkdir()
-        (clone / ".editable" / "towline").symlink_to(os.pardir, target_is_directory=True)
-    with tarfile.open(build("sdist", clone)) as archive:
-        archive.extractall(unpacked, filter="data")
-    return unpacked / f"towline-{PROJECT['project']['version']}"
+    return unpacked_sdist(tmp_path_factory)
 
 
 @pytest.fixture(scope="module")
-def wheel(sdist, tmp_path_factory):
+def wheel(tracked, tmp_path_factory):
     """Return the folder that the wheel of the sdist unpacks to."""
-    sources, unpacked = tmp_path_factory.mktemp("sources") / "sources", tmp_path_factory.mktemp("wheel")
-    shutil.copytree(sdist, sources)
-    with ZipFile(build("wheel", sources)) as archive:
+    unpacked = tmp_path_factory.mktemp("wheel")
+    with ZipFile(next((built_sources(tmp_path_factory) / "dist").glob("*.whl"))) as archive:
         archive.extractall(unpacked)
     return unpacked
 
