@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import float64, shown
 from ..models.robot import Robot
 from .reference import Reference
 from .state import State
@@ -84,8 +84,7 @@ def _array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     if array.shape[-len(core) :] != core:
         raise InputError(f"{name} must be of shape {_shape(core)}, got shape {array.shape}")
     try:
-        with np.errstate(over="ignore"):  # of a longer float
-            return array.astype(float, copy=False)
+        return float64(array)
     except Exception:  # of an object among them
         raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
 
