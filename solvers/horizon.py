@@ -177,7 +177,7 @@ class Horizon(Displayed):
             if array.shape != shape:  # before a copy: a view of one number may have any shape
                 raise InputError(f"{name} must have shape {shape}, got {array.shape}")
             given.append(np.ascontiguousarray(array, dtype=np.float64))
-        horizon_relative_to(*self._sizes, PROCESSOR, *given, self._memory)
+        horizon_relative_to(*self._sizes, PROCESSOR, given[0], given[1], self._memory)
 
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:
         """Solve the problem in the arrays, and return whether the solution converged.
