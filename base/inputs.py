@@ -14,8 +14,11 @@ from .errors import InputError
 
 Kind = TypeVar("Kind")
 
+FLOAT = np.dtype(np.float64)
+
 _LONGEST = 60  # letters of a value in a message
 LONGEST_TEXT = 240  # letters of a path or of a part of a message
+MOST_DIMENSIONS = 32  # leading ones, with which NumPy combines arrays
 MOST_ROWS = 100_000  # of a list of rows of numbers in a field
 
 
@@ -122,7 +125,13 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
     if array.dtype.kind not in "fiu":
         given = shown(value) if array.ndim == 0 else f"entries of type {array.dtype.name}"
         raise InputError(f"{name} must be an array of real numbers, got {given}")
-    return array
+    return float64(array) if array.dtype.itemsize > FLOAT.itemsize else array
+
+
+def float64(array: NDArray[Any]) -> NDArray[np.float64]:
+    """Return numbers as float64, without a copy where they are; what a longer float has beyond is infinite."""
+    with np.errstate(over="ignore"):
+        return array.astype(FLOAT, copy=False)
 
 
 def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -144,14 +153,22 @@ def repeated(name: str, value: Any, size: int) -> NDArray[np.float64]:
     return np.full(size, given, dtype=np.float64)
 
 
+def check_dimensions(name: str, count: int) -> None:
+    """Raise InputError if an array has more leading dimensions than `MOST_DIMENSIONS`."""
+    if count > MOST_DIMENSIONS:
+        raise InputError(f"{name} must have at most {MOST_DIMENSIONS} leading dimensions, got {count}")
+
+
 def leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     """Return the common leading dimensions of arguments, from those of each.
 
     Raises
     ------
     InputError
-        If they differ where none is 1.
+        If they differ where none is 1, or are more than NumPy has.
     """
+    for name, shape in shapes.items():
+        check_dimensions(name, len(shape))
     try:
         return np.broadcast_shapes(*shapes.values())
     except ValueError:

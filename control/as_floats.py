@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import FLOAT, float64, shown
 from ..models.robot import Robot
 from .reference import Reference
 from .state import State
@@ -16,8 +16,6 @@ from .state import State
 Given = TypeVar("Given", State, Reference)
 
 LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
-
-_FLOAT = np.dtype(np.float64)
 
 
 def is_time(value: object) -> bool:
@@ -71,13 +69,12 @@ def as_floats(given: Given, robot: Robot, rows: int | None) -> Given:
 
 def _array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     """Return an array of float64 whose last dimensions are `core`, or raise InputError."""
-    if type(value) is np.ndarray and value.dtype is _FLOAT and value.shape[-len(core) :] == core:
+    if type(value) is np.ndarray and value.dtype is FLOAT and value.shape[-len(core) :] == core:
         return value
     try:
         array = np.asarray(value)
         fits = array.dtype.kind in "fiubO"
-        with np.errstate(over="ignore"):  # of a longer float
-            array = array.astype(float, copy=False) if fits else array
+        array = float64(array) if fits else array
     except Exception:  # whatever the array interface of another library, or an object of an array, raises
         fits = False
     if not fits:

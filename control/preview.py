@@ -57,7 +57,8 @@ class Preview:
         ):
             raise InputError(f"references must be a list of References, got {shown(references)}")
         period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
-        self._announced = start, period, self.rows([as_floats(each, self._robot, None) for each in references])
+        with np.errstate(invalid="ignore"):  # of angles that are infinite: the step holds what it has
+            self._announced = start, period, self.rows([as_floats(each, self._robot, None) for each in references])
 
     def rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, np.ndarray]:
         """Return motions (K, 3, 6 + 6 c + f) and tensions (K, m).

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from ..base.errors import InputError, SolverError
-from ..base.inputs import leading, shown
+from ..base.inputs import check_dimensions, float64, leading, shown
 from ..core import finite
 from .tape import dense
 
@@ -68,11 +68,12 @@ def as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
             given = np.asarray(value)
             if given.dtype.kind not in "fiubO":
                 raise TypeError
-            array = given.astype(float, copy=False)
+            array = float64(given)
         except Exception:  # whatever the array interface of another library raises
             raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}") from None
     if array.shape[array.ndim - len(core) :] != core or array.ndim < len(core):
         raise InputError(f"{name} must have the shape {_shape(core)}, got {array.shape}")
+    check_dimensions(name, array.ndim - len(core))
     if not finite(array if array.flags.c_contiguous else np.ascontiguousarray(array)):
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{name} must be finite numbers, got {array[index]} at index {index}")

@@ -20,6 +20,7 @@ from .batch import SYMBOLIC, arrays, call, is_symbolic
 from .files import as_robot
 from .mechanics import Mechanics
 from .motion import Motion
+from .part import LARGEST
 from .record import fits
 from .relative_dynamics import RelativeDynamics
 from .robot import Robot
@@ -323,10 +324,16 @@ class Dynamics(Displayed):
         Frequencies, ascending (k,) [Hz], negative where the motion is unstable, and modes (6, k): twists of
         translation of the CoM [m] and rotation vector [rad] in {G}.
         """
-        pose, tensions = arrays({"pose": (pose, (6,)), "tensions": (tensions, (self.robot.m,))})
-        for name, array in (("pose", pose), ("tensions", tensions)):
-            if array.ndim != 1:
-                raise InputError(f"{name} must have the shape ({array.shape[-1]},), got {array.shape}")
+        places = home = self.robot.carrier_home
+        if carrier_pose is not None:
+            places = carrier_pose
+        given = {"pose": (pose, (6,)), "tensions": (tensions, (self.robot.m,)), "carrier_pose": (places, home.shape)}
+        pose, tensions, carrier_pose = checked = arrays(given)
+        for (name, (_, core)), array in zip(given.items(), checked, strict=True):
+            if array.shape != core:
+                raise InputError(f"{name} must have the shape {core}, got {array.shape}")
+            if (largest := np.abs(array).max()) > LARGEST:
+                raise InputError(f"{name} must be numbers up to {LARGEST:g}, got {largest:g}")
         K = self.stiffness(pose, tensions, carrier_pose, elastic=elastic)
         rows = np.flatnonzero(self.robot.dof_mask)
         free = np.eye(6)[:, rows]

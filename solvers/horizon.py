@@ -171,11 +171,11 @@ class Horizon(Displayed):
         N, n, m, _ = self._sizes
         given = []
         for name, value, shape in (("states", states, (N + 1, n)), ("controls", controls, (N, m))):
-            array = np.ascontiguousarray(real_array(name, value), dtype=np.float64)
-            if array.shape != shape:
+            array = real_array(name, value)
+            if array.shape != shape:  # before a copy: a view of one number may have any shape
                 raise InputError(f"{name} must have shape {shape}, got {array.shape}")
-            given.append(array)
-        horizon_relative_to(*self._sizes, PROCESSOR, self._memory, *given)
+            given.append(np.ascontiguousarray(array, dtype=np.float64))
+        horizon_relative_to(*self._sizes, PROCESSOR, given[0], given[1], self._memory)
 
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:
         """Solve the problem in the arrays, and return whether the solution converged.

@@ -53,7 +53,7 @@ static PyMethodDef functions[] = {
     {"horizon_places", (PyCFunction)(void (*)(void))towline_py_horizon_places, METH_FASTCALL,
      "horizon_places(N, n, m, p, memory)\n--\n\nReturn where in memory the arrays of problem and solution begin."},
     {"horizon_relative_to", (PyCFunction)(void (*)(void))towline_py_horizon_relative_to, METH_FASTCALL,
-     "horizon_relative_to(N, n, m, p, processor, memory, states, controls)\n--\n\n"
+     "horizon_relative_to(N, n, m, p, processor, states, controls, memory)\n--\n\n"
      "Write the same problem in differences from a reference."},
     {"horizon_solve", (PyCFunction)(void (*)(void))towline_py_horizon_solve, METH_FASTCALL,
      "horizon_solve(N, n, m, p, processor, beginning, iterations_max, tolerance, memory, residuals)\n--\n\n"

@@ -104,7 +104,7 @@ PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments
 
 PyObject *towline_py_horizon_relative_to(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
-    enum { MEMORY, REFERENCE_STATES, REFERENCE_CONTROLS, ARRAYS };
+    enum { REFERENCE_STATES, REFERENCE_CONTROLS, MEMORY, ARRAYS };
     int whole[SIZES + 1];
     arrays given;
     const Py_ssize_t size = sizes_of(arguments, count, SIZES + 1 + ARRAYS, whole);

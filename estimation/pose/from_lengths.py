@@ -20,6 +20,7 @@ from .resting import open_estimates
 from .search import estimates
 
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
+MOST = 1e100  # [m]: larger ones, and inverses of smaller ones, cannot be squared beside lengths
 
 
 def pose_from_lengths(
@@ -59,12 +60,10 @@ def pose_from_lengths(
     shapes = {"lengths": lengths.shape[:-1]}
     carriers = None
     if carrier_pose is not None:
-        carriers = as_array("carrier_pose", carrier_pose, (len(robot.carriers), 6))
+        carriers = _poses("carrier_pose", carrier_pose, (len(robot.carriers), 6))
         shapes["carrier_pose"] = carriers.shape[:-2]
     if start is not None:
-        start = as_array("start", start, (6,))
-        if np.abs(start).max(initial=0.0) > LARGEST:
-            raise InputError(f"start must be numbers up to {LARGEST:g} [m, rad], got {np.abs(start).max():g}")
+        start = _poses("start", start, (6,))
         shapes["start"] = start.shape[:-1]
     first, *others = shapes.values()
     batch = first if all(other == first for other in others) else leading(shapes)
@@ -96,19 +95,20 @@ def one_pose(lengths: ArrayLike, carrier_pose: ArrayLike | None, robot: Robot) -
     if measured.ndim != 1:
         raise InputError(f"lengths must have the shape ({robot.m},), those of one pose, got {shown(measured)}")
     if carrier_pose is not None:
-        carriers = as_array("carrier_pose", carrier_pose, (len(robot.carriers), 6))
+        carriers = _poses("carrier_pose", carrier_pose, (len(robot.carriers), 6))
         if carriers.ndim != 2:
             raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {carriers.shape}")
     return measured, carriers
 
 
 def checked_sigma(sigma: ArrayLike, m: int) -> np.ndarray:
-    """Return standard deviations (m,) of one number or (m,), or raise InputError unless all are above zero."""
-    if isinstance(sigma, float) and 0.0 < sigma < np.inf:
+    """Return standard deviations (m,) of one number or (m,), or raise InputError unless they can be squared."""
+    if isinstance(sigma, float) and 1.0 / MOST < sigma < MOST:
         return _equal(sigma, m)
     deviations = repeated("sigma", sigma, m)
-    if not ((deviations > 0.0) & (deviations < np.inf)).all():
-        raise InputError(f"sigma must be numbers > 0 [m], got {deviations.min():g}")
+    wrong = ~((deviations > 1.0 / MOST) & (deviations < MOST))
+    if wrong.any():
+        raise InputError(f"sigma must be numbers > 0 [m], {1 / MOST:g} to {MOST:g}, got {deviations[wrong][0]:g}")
     return deviations
 
 
@@ -118,6 +118,14 @@ def _equal(sigma: float, m: int) -> np.ndarray:
     deviations = np.full(m, sigma)
     deviations.flags.writeable = False
     return deviations
+
+
+def _poses(name: str, value: ArrayLike, core: tuple[int, ...]) -> np.ndarray:
+    """Return poses, or raise InputError unless they are of a size that can be squared."""
+    poses = as_array(name, value, core)
+    if (largest := np.abs(poses).max(initial=0.0)) > LARGEST:
+        raise InputError(f"{name} must be numbers up to {LARGEST:g} [m, rad], got {largest:g}")
+    return poses
 
 
 def _rows(array: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:
