@@ -141,7 +141,7 @@ def fly(
         else:
             command = _held(command, period)
         # Only shapes are compared in each period, since all checks take longer than a step: NumPy broadcasts silently.
-        shapes = [np.shape(part) for part in command if part is not None] if isinstance(command, Command) else None
+        shapes = [_shape_of(part) for part in command] if isinstance(command, Command) else None
         if shapes is None or shapes != expected:
             check_command(command, robot, flights, time)
             expected = shapes
@@ -183,6 +183,11 @@ def _held(command: Command, period: float) -> Command:
         carrier_acceleration=np.zeros_like(acceleration),
         answered=np.full(np.shape(command.answered), HOLD, dtype=np.int8),
     )
+
+
+def _shape_of(part: Any) -> tuple[int, ...] | None:
+    """Return the shape of a part of a command, None of one that it does not have."""
+    return part.shape if type(part) is np.ndarray else None if part is None else np.shape(part)
 
 
 def _square(values: np.ndarray) -> float:
