@@ -5,6 +5,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
+from towline import plan
 from towline.models import Dynamics, Robot, load
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
@@ -140,3 +141,28 @@ def test_a_tightened_program_has_a_motion_from_its_limit(case):
         if limit.name in ("platform_box", "keep_out", "cable_length"):
             inside = np.minimum(values - limit.low, limit.high - values)
             assert inside.min() >= SHRINK * limit.scale - 1e-6
+
+
+@pytest.mark.parametrize("where", ["initial", "final"])
+def test_a_motion_that_meets_the_largest_cable_speed_at_an_end_is_not_faster_beside_it(where):
+    """The acceleration there is free: between the nodes a motion left the limit on every mesh up to 320 steps."""
+    robot = load("ipanema-1")
+    home, velocity, off = robot.home, np.array([0.0, 0.3, 0.0, 0.0, 0.0, 0.0]), np.array([0.4, 0.0, 0.0, 0.0, 0.0, 0.0])
+    lengths = Dynamics(robot).cable_lengths
+    fastest = np.abs(lengths(home + 1e-7 * velocity) - lengths(home - 1e-7 * velocity)).max() / 2e-7
+    ends = [home, home + off] if where == "initial" else [home + off, home]
+    found = plan(
+        robot,
+        {
+            "path": {"kind": "line", "start": ends[0].tolist(), "end": ends[1].tolist()},
+            "duration": 3.0,
+            "steps": 20,
+            "tube": {"position": "free", "attitude": 0.1},
+            "limits": {"cable_speed": fastest * (1 + 1e-9)},
+            where: {"pose": home.tolist(), "velocity": velocity.tolist()},
+        },
+    )
+    assert found.feasible, found.reason
+    pose, times = found.audit.motion.pose, found.audit.times
+    rates = np.diff([lengths(at) for at in pose], axis=0) / np.diff(times)[:, None]
+    assert np.abs(rates).max() < fastest * (1 + 1e-5)

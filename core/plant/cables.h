@@ -90,6 +90,7 @@ static void set_lines(plant *p, const motion *now) {
         for (int j = 0; j < 3; j++) {
             on->arm[j] = arm[j];
             on->carrier_arm[j] = carrier_arm[j];
+            on->drift[j] = w[j];
         }
         if (own_lengths) {
             on->stretch = on->length - now->length[i];

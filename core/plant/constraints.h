@@ -25,48 +25,55 @@ enum { REFINED = 2 };
 /* Of a cable's own entry in G: with less left after elimination it depends on others. */
 static const double DEPENDENT = 1e-14;
 
-/* The angular acceleration in {G} of a body by a moment in {G}. */
-static void turning_by(const plant *p, int b, const double *moment, double *turning) {
-    double own[3], result[3];
-    turn_back(p->body[b].R, moment, own);
-    turn(p->robot->body[b].inverse_inertia, own, result);
-    turn(p->body[b].R, result, turning);
+/* Write R I^-1 R^T of the free bodies: the angular acceleration in {G} by a moment in {G}. */
+static void set_inverse_inertias(plant *p) {
+    for (int b = 0; b < p->bodies; b++) {
+        const double *R = p->body[b].R;
+        for (int i = 0; i < 3 && is_free(p, b); i++) {
+            double row[3];
+            turn(p->robot->body[b].inverse_inertia, R + 3 * i, row);
+            turn(R, row, p->body[b].inverse_inertia + 3 * i);
+        }
+    }
+}
+
+/* Write how a body yields to a pull at `arm` from its position. */
+static void set_yielding(const plant *p, int b, const double *arm, const double *pull, yielding *by) {
+    cross(arm, pull, by->moment);
+    turn(p->body[b].inverse_inertia, by->moment, by->turned);
+    for (int i = 0; i < 3; i++) {
+        by->moved[i] = p->robot->body[b].inverse_mass[i] * pull[i];
+    }
 }
 
 /* What a body adds to G for two cables that pull on it. */
-static double coupling(const double *inverse_mass, const double *pull, const double *moment, const double *other_pull,
-                       const double *other_turning) {
-    const double accelerated[3] = {inverse_mass[0] * other_pull[0], inverse_mass[1] * other_pull[1],
-                                   inverse_mass[2] * other_pull[2]};
-    return dot(pull, accelerated) + dot(moment, other_turning);
+static double coupling(const cable_now *one, const yielding *by_one, const yielding *by_other) {
+    return dot(one->pull, by_other->moved) + dot(by_one->moment, by_other->turned);
 }
 
-/* Write G among the candidates, and the angular accelerations per newton of them. */
+/* Write G among the candidates, and how bodies yield to them. */
 static void set_gram(plant *p) {
     constraints *taut = &p->taut;
     double trace = 0, lengths = 1e-300;
+    set_inverse_inertias(p);
     for (int i = 0; i < p->cables; i++) {
         cable_now *one = &p->cable[i];
         const int owner = owner_of(p, i);
         if (!taut->candidate[i]) {
             continue;
         }
-        cross(one->arm, one->pull, one->moment);
-        turning_by(p, 0, one->moment, one->turning);
+        set_yielding(p, 0, one->arm, one->pull, &one->platform);
         if (is_free(p, owner)) {
-            cross(one->carrier_arm, one->pull, one->carrier_moment);
-            turning_by(p, owner, one->carrier_moment, one->carrier_turning);
+            set_yielding(p, owner, one->carrier_arm, one->pull, &one->carrier);
         }
         for (int j = 0; j <= i; j++) {
             const cable_now *other = &p->cable[j];
             if (!taut->candidate[j]) {
                 continue;
             }
-            double total =
-                coupling(p->robot->body[0].inverse_mass, one->pull, one->moment, other->pull, other->turning);
+            double total = coupling(one, &one->platform, &other->platform);
             if (owner == owner_of(p, j) && is_free(p, owner)) {
-                total += coupling(p->robot->body[owner].inverse_mass, one->pull, one->carrier_moment, other->pull,
-                                  other->carrier_turning);
+                total += coupling(one, &one->carrier, &other->carrier);
             }
             taut->gram[i][j] = taut->gram[j][i] = total;
         }
@@ -79,36 +86,39 @@ static void set_gram(plant *p) {
     }
 }
 
-/* Acceleration in {G} of the point of body `b` at `arm` from its position, and its velocity. */
-static void moved_point(const plant *p, const motion *now, const motion *change, int b, const double *arm,
-                        double *acceleration, double *velocity) {
-    const double *omega = p->body[b].omega;
-    double turning[3], tangential[3], around[3], centripetal[3];
-    turn(p->body[b].R, change->body[b].rate, turning);
-    cross(turning, arm, tangential);
-    cross(omega, arm, around);
-    cross(omega, around, centripetal);
+/* Acceleration in {G} of the point of body `b` at `arm` from its position. */
+static void accelerate_point(const plant *p, const motion *change, int b, const double *arm, double *acceleration) {
+    const body_now *body = &p->body[b];
+    double tangential[3], around[3], centripetal[3];
+    cross(body->turning, arm, tangential);
+    cross(body->omega, arm, around);
+    cross(body->omega, around, centripetal);
     for (int i = 0; i < 3; i++) {
         acceleration[i] = change->body[b].velocity[i] + tangential[i] + centripetal[i];
-        velocity[i] = now->body[b].velocity[i] + around[i];
     }
 }
 
-/* d2e/dt2 [m/s^2] of cable `i` for the accelerations in `change`. */
-static double free_stretch_acceleration(const plant *p, const motion *now, const motion *change, int i) {
-    const cable_now *on = &p->cable[i];
-    const int owner = owner_of(p, i);
-    double a[3], v[3], carrier_a[3], carrier_v[3], coriolis[3];
-    moved_point(p, now, change, 0, on->arm, a, v);
-    moved_point(p, now, change, owner, on->carrier_arm, carrier_a, carrier_v);
-    for (int j = 0; j < 3; j++) {
-        v[j] -= carrier_v[j];
+/* Write d2e/dt2 [m/s^2] for the accelerations in `change` as the right-hand side for the candidates. */
+static void set_stretch_accelerations(plant *p, const motion *change) {
+    for (int b = 0; b < p->bodies; b++) {
+        turn(p->body[b].R, change->body[b].rate, p->body[b].turning);
     }
-    cross(p->body[owner].omega, v, coriolis);
-    for (int j = 0; j < 3; j++) {
-        a[j] -= carrier_a[j] + 2 * coriolis[j];
+    for (int i = 0; i < p->cables; i++) {
+        const cable_now *on = &p->cable[i];
+        const int owner = owner_of(p, i);
+        double a[3], carrier_a[3], coriolis[3];
+        if (!p->taut.candidate[i]) {
+            p->taut.right[i] = 0;
+            continue;
+        }
+        accelerate_point(p, change, 0, on->arm, a);
+        accelerate_point(p, change, owner, on->carrier_arm, carrier_a);
+        cross(p->body[owner].omega, on->drift, coriolis);
+        for (int j = 0; j < 3; j++) {
+            a[j] -= carrier_a[j] + 2 * coriolis[j];
+        }
+        p->taut.right[i] = on->curvature - dot(on->pull, a) - change->rate[i];
     }
-    return on->curvature - dot(on->pull, a) - change->rate[i];
 }
 
 /* Add a cable to the factor; return 0, and leave it out, if it depends on those before. */
@@ -187,14 +197,23 @@ static void solve_pulling(plant *p) {
     }
 }
 
-/* Factor G over the candidates, but for those that depend on others. */
+/* Factor G over the pulling cables without stiffness, but for those that depend on others. */
 static void factor_pulling(plant *p) {
-    p->taut.count = 0;
+    constraints *taut = &p->taut;
+    if (taut->holds) {
+        return;
+    }
     for (int i = 0; i < p->cables; i++) {
-        if (p->taut.candidate[i]) {
-            append(&p->taut, i);
+        taut->candidate[i] = never_stretches(p, i) && p->cable[i].mode == PULLS;
+    }
+    set_gram(p);
+    taut->count = 0;
+    for (int i = 0; i < p->cables; i++) {
+        if (taut->candidate[i]) {
+            append(taut, i);
         }
     }
+    taut->holds = 1;
 }
 
 /* Take the picked cable at `gone` out of the factor and of x. */

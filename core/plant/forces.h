@@ -62,16 +62,8 @@ static int elastic_tensions(plant *p, const motion *now, motion *change) {
 /* Write the tensions that keep the pulling cables without stiffness from stretching, and what they accelerate. */
 static void constrain(plant *p, const motion *now, motion *change, double time) {
     constraints *taut = &p->taut;
-    if (!taut->holds) {
-        for (int i = 0; i < p->cables; i++) {
-            taut->candidate[i] = never_stretches(p, i) && p->cable[i].mode == PULLS;
-        }
-        set_gram(p);
-        factor_pulling(p);
-    }
-    for (int i = 0; i < p->cables; i++) {
-        taut->right[i] = taut->candidate[i] ? free_stretch_acceleration(p, now, change, i) : 0;
-    }
+    factor_pulling(p);
+    set_stretch_accelerations(p, change);
     solve_pulling(p);
     for (int i = 0; i < p->cables; i++) {
         if (taut->candidate[i]) {

@@ -15,15 +15,13 @@ static void rotate(double *q, const double *by) {
     q[3] += 0.5 * (by[2] * w + by[0] * y - by[1] * x);
 }
 
-/* Apply an impulse [N s], of so much along `pull`, to the velocities of a body, or a displacement to its position. */
-static void shift_body(const plant *p, motion *now, int b, double size, const double *pull, const double *turning,
-                       int positions) {
-    const double *inverse_mass = p->robot->body[b].inverse_mass;
+/* Apply an impulse [N s] to the velocities of a body, or a displacement [kg m] to its position. */
+static void shift_body(const plant *p, motion *now, int b, double size, const yielding *by, int positions) {
     body_motion *body = &now->body[b];
     double *moved = positions ? body->position : body->velocity;
-    const double turned[3] = {size * turning[0], size * turning[1], size * turning[2]};
+    const double turned[3] = {size * by->turned[0], size * by->turned[1], size * by->turned[2]};
     for (int i = 0; i < 3; i++) {
-        moved[i] += size * inverse_mass[i] * pull[i];
+        moved[i] += size * by->moved[i];
     }
     if (positions) {
         rotate(body->quaternion, turned);
@@ -46,9 +44,9 @@ static void shift(const plant *p, motion *now, int positions) {
             continue;
         }
         *(positions ? &now->length[i] : &now->rate[i]) += size * winch_yielding(p, i);
-        shift_body(p, now, 0, size, on->pull, on->turning, positions);
+        shift_body(p, now, 0, size, &on->platform, positions);
         if (is_free(p, owner)) {
-            shift_body(p, now, owner, -size, on->pull, on->carrier_turning, positions);
+            shift_body(p, now, owner, -size, &on->carrier, positions);
         }
     }
     if (positions) {
@@ -97,7 +95,7 @@ static int any_candidate_stretches(const plant *p) {
     return 0;
 }
 
-/* Return whether the cables that pulled are still taut, and all others are not. */
+/* Return whether the cables that pulled still do and are taut, and all others are not. */
 static int as_before(const plant *p) {
     for (int i = 0; i < p->cables; i++) {
         const cable_now *on = &p->cable[i];
@@ -110,7 +108,8 @@ static int as_before(const plant *p) {
                 return 0;
             }
         } else if (pulls) {
-            if (fabs(on->stretch) > TOUCHING_LENGTH * p->robot->length_scale || fabs(on->stretch_rate) > STILL) {
+            const double most = TOUCHING_LENGTH * p->robot->length_scale;
+            if (on->tension <= 0 || fabs(on->stretch) > most || fabs(on->stretch_rate) > STILL) {
                 return 0;
             }
         } else if (on->stretch > -RESTING_LENGTH * p->robot->length_scale) {
@@ -150,23 +149,16 @@ static void collide(plant *p, motion *now, motion *change, double time) {
 
 /* Bring the elongations of the pulling cables without stiffness, and their rates, back to zero. */
 static void hold(plant *p, motion *now, motion *change, double time) {
-    int any_pulls = 0;
-    for (int i = 0; i < p->cables; i++) {
-        p->taut.candidate[i] = never_stretches(p, i) && p->cable[i].mode == PULLS;
-        any_pulls |= p->taut.candidate[i];
-    }
-    if (!any_pulls) {
+    factor_pulling(p); /* the positions hardly change it */
+    if (p->taut.count == 0) {
         return;
     }
-    set_gram(p); /* the positions hardly change it */
-    factor_pulling(p);
     for (int positions = 1; positions >= 0; positions--) {
         set_right(p, positions);
         solve_pulling(p);
         shift(p, now, positions);
         set_geometry(p, now, change, time);
     }
-    p->taut.holds = 1;
 }
 
 /*
@@ -190,13 +182,15 @@ static void resolve(plant *p, motion *now, motion *change, double time, double p
     set_forces(p, now, change, time);
     choose_touching(p, -parting);
     set_gram(p);
-    for (int i = 0; i < p->cables; i++) {
-        p->taut.right[i] = p->taut.candidate[i] ? free_stretch_acceleration(p, now, change, i) : 0;
-    }
+    set_stretch_accelerations(p, change);
     solve_non_negative(p);
-    for (int i = 0; i < p->cables; i++) {
+    p->taut.holds = 1;
+    for (int a = 0; a < p->taut.count; a++) {
+        const int i = p->taut.picked[a];
         if (p->taut.solution[i] > 0) {
             p->cable[i].mode = PULLS;
+        } else {
+            p->taut.holds = 0;
         }
     }
     if (parting > PARTING) {

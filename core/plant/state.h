@@ -40,11 +40,18 @@ typedef struct {
 typedef struct {
     double R[9], omega[3];
     double force[3], moment[3]; /* about the CoM */
+    /* For cables without stiffness: the angular acceleration by a moment, and that which other forces give. */
+    double inverse_inertia[9], turning[3];
     int turned;                 /* since the lines of the cables were last computed */
 } body_now;
 
 /* Limp: longer than unstrained, with a damper that outweighs it. */
 typedef enum { SLACK, PULLS, LIMP } contact;
+
+/* How a body yields to a newton of a cable's tension: the moment, and the accelerations that it gives. */
+typedef struct {
+    double moment[3], moved[3], turned[3];
+} yielding;
 
 /* A cable at a motion, vectors in {G}. */
 typedef struct {
@@ -52,6 +59,7 @@ typedef struct {
     double pull[3];            /* unit vector in which it pulls the platform */
     double arm[3];             /* from the platform's CoM to the attachment */
     double carrier_arm[3];     /* from the carrier's position to the attachment, on the line along which it pulls */
+    double drift[3];           /* velocity of the attachment in the carrier's frame */
     double length, length_rate;
     double curvature; /* d2 length / dt2 for an attachment that does not accelerate in the carrier's frame */
     double stretch, stretch_rate; /* beyond the unstrained length */
@@ -61,8 +69,7 @@ typedef struct {
     double beyond, sliding; /* by how much cable and winch are beyond their modes [m]; negative: inside */
     contact mode;
     int slip;                              /* 1: pays out, -1: hauls in, 0: friction holds the winch */
-    double moment[3], carrier_moment[3];   /* about platform and carrier per newton of tension */
-    double turning[3], carrier_turning[3]; /* angular acceleration that gives [1/(kg m)] */
+    yielding platform, carrier;            /* without stiffness; the carrier counts along -pull */
 } cable_now;
 
 /* Equations of the cables without stiffness, see constraints.c. Arrays have a place for each cable of the robot. */

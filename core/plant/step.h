@@ -92,12 +92,12 @@ static double attempt(plant *p, const motion *from, step_memory *of, double time
     sum_slopes(p, slope);
     move_on(p, from, step / 6, &slope[3], trial);
     normalise(p, trial);
+    p->taut.holds = 0;
     if (!p->locates) {
         return 0;
     }
     set_geometry(p, trial, &slope[4], time + step);
     if (p->kind == CONSTRAINED) {
-        p->taut.holds = 0;
         hold(p, trial, &slope[4], time + step);
     }
     if (p->kind != ELASTIC) {

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...solvers import solve_batch
 from ..limits import Angle, Limit, Rate
+from ..tasks.deviation import Deviation
 from ..tasks.ends import between_fixed_values, fixed_values
 from ..tasks.paths import Motion, WaypointPath
 from ..tasks.scenario import Scenario
@@ -35,7 +36,7 @@ def held_spans(scenario: Scenario, shrink_of: Callable[[Limit], float]) -> dict[
     Fixed ends that are inside a limit by twice the share by which it is reduced do not count.
     """
     function, limits, spans = scenario.limits.function, scenario.limits, dict[Limit, Spans]()
-    platform, carriers = _at_ends(scenario)
+    platform, carriers = at_ends(scenario)
     values = limits.along(platform, carriers, None, scenario.off_path(_both_ends(scenario), platform, carriers))
     patterns = (ca.DM(function.jac_sparsity(0, i), 1.0) for i in range(function.n_in()))
     *bodies, of_tensions, of_offset = (pattern.full() > 0 for pattern in patterns)
@@ -59,7 +60,7 @@ def held_wrench(scenario: Scenario, reserve: float) -> Spans:
 
     A fixed end with tensions that are inside their limits by twice the `reserve` [N] does not count.
     """
-    platform, carriers = _at_ends(scenario)
+    platform, carriers = at_ends(scenario)
     times, scale = _both_ends(scenario), scenario.robot.dof_mask * scenario.robot.wrench_scale
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * scale[:, None]
     w = scenario.required_wrench(times, platform, carriers, scenario.wind) * scale
@@ -73,10 +74,14 @@ def _both_ends(scenario: Scenario) -> np.ndarray:
     return np.array([0.0, scenario.duration])
 
 
-def _at_ends(scenario: Scenario) -> tuple[Motion, Motion]:
+def at_ends(scenario: Scenario) -> tuple[Motion, Motion]:
     """Return the motions of platform and carriers at both ends, with what the task fixes there."""
-    fixed = between_fixed_values(scenario) if scenario.count else None
-    return scenario.motion(_both_ends(scenario), fixed)
+    fixed, times = between_fixed_values(scenario) if scenario.count else None, _both_ends(scenario)
+    if fixed is not None:
+        # A motion is what its nodes say at the beginning of an interval; at its end it has what integration leaves.
+        q, v, a, tensions = (part[[0, -1, -1]] for part in (fixed.q, fixed.v, fixed.a, fixed.tensions))
+        fixed = Deviation(scenario.duration * np.arange(3.0), q, v, a, tensions)
+    return scenario.motion(times, fixed)
 
 
 def eased(held: Spans, first: np.ndarray, last: np.ndarray) -> np.ndarray:

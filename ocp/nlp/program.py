@@ -10,6 +10,7 @@ duration T too where the task leaves it free:
           the same two for tensions of their own in each decisive wind of a box    (`wind_set`)
           n_k >= 0, platform at rest on its path                        on the ground, else n_k = 0 (`tasks.phases`)
           the limits of `limits`                                        at every point
+          their slopes lead inside where a fixed end is on one          (`leaving`)
           tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
 
 What holds at one point is in `node`, what binds an interval's in `interval`. Tensions are in units of
@@ -38,6 +39,7 @@ from .grid import Grid
 from .held import eased, held_wrench
 from .interval import Interval, Points, interval_of, points
 from .layout import DURATION, MARGIN, Layout
+from .leaving import leaving_rows
 from .near import Near
 from .node import Node, node_of
 from .rows import Mesh, Row, stretch
@@ -156,7 +158,8 @@ class Program(Displayed):
 def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: bool = False) -> Program:
     """Build the nonlinear program of `scenario` on `mesh`, with local limits where they are `near`; default: all.
 
-    A `movable` one has the references and the length of the intervals as parameters (`Program.of`).
+    A `movable` one has the references and the length of the intervals as parameters (`Program.of`). Its ends are not
+    yet known, so that it has no `leaving_rows`.
     """
     steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
     grid = Grid.of(scenario, steps)
@@ -188,6 +191,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         Block(everywhere.values, node.rows, np.arange(len(times)) // scheme.size, everywhere),
         Block(between.values, interval.rows, np.arange(steps), between),
         *_single_rows(scenario, layout, X, X_end, grid.steps),
+        *([] if movable else leaving_rows(scenario, layout, references, columns)),
     ]
     g, bounds = stacked(blocks, grid)
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
