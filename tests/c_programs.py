@@ -1,6 +1,6 @@
 """C of the core, compiled for tests: without a warning, with the bits of the extension, and watched by sanitizers.
 
-Each source is compiled once for all tests, most without optimisation: that takes a third of the time, for the same bits.
+Each source is compiled once for all tests, mostly without optimisation: a third of the time, for the same bits.
 """
 
 import shutil
