@@ -52,12 +52,13 @@ def drift(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motio
     step = times[1] - times[0]
     pairs = max(min(round(WINDOW / step), intervals) // 2, 1)
     starts = np.arange(0, intervals - 2 * pairs + 1, 2 * pairs)
-    along, plan = _forward(scenario), (motion, carriers, tensions)
-    ends = np.array([_run(along, plan, start, pairs, 1, step)[-1] for start in starts])
+    forward, plan = _forward(scenario), (motion, carriers, tensions)
+    of_pairs = forward.mapaccum(pairs)
+    ends = np.array([_run(of_pairs, plan, start, pairs, 1, step)[-1] for start in starts])
     windows = _differences(ends, motion.pose[starts + 2 * pairs])
     stride = max(int(np.ceil(intervals / 2 / MOST_STEPS)), 1)
     count = intervals // (2 * stride)
-    whole = _run(along, plan, 0, count, stride, step)
+    whole = _run(forward.mapaccum(count), plan, 0, count, stride, step)
     over_all = _differences(whole, motion.pose[2 * stride * np.arange(1, count + 1)])
     return Drift(2 * pairs * float(step), *windows, *over_all)
 
@@ -84,15 +85,16 @@ def _forward(scenario: Scenario) -> ca.Function:
 
 
 def _run(
-    forward: ca.Function, plan: tuple[Motion, Motion, np.ndarray], row: int, count: int, stride: int, step: float
+    steps: ca.Function, plan: tuple[Motion, Motion, np.ndarray], row: int, count: int, stride: int, step: float
 ) -> np.ndarray:
     """Return poses (count, 6) after each of `count` steps of 2 `stride` samples, from the plan at `row`.
 
+    `steps` is `_forward`, that often.
     Where a run diverges beyond all numbers the poses are nan from there on.
     """
     motion, carriers, tensions = plan
     at = row + stride * (2 * np.arange(count)[:, None] + np.arange(3)).ravel()  # beginning, middle, end of each step
-    states = forward.mapaccum(count)(
+    states = steps(
         np.concatenate([motion.pose[row], motion.velocity[row]]),
         np.full((1, count), 2 * stride * step),
         np.concatenate(list(carriers.pose[at]), axis=1),
