@@ -137,9 +137,9 @@ def motion(robot, t):
 @pytest.mark.parametrize("clock", [0.0, 0.034, -3.3, 7.25])
 def test_a_clock_is_found_where_there_are_times_and_poses(clock):
     """By default, and offsets of many seconds too."""
-    robot, times = load("cogiro"), 0.06 * np.arange(400)
-    built = as_built(400, 3, poses=motion(robot, times + clock))
-    seen = motion(robot, times) + np.random.default_rng(0).normal(0, 5e-4, (400, 6))
+    robot, times = load("cogiro"), 0.06 * np.arange(250)
+    built = as_built(250, 3, poses=motion(robot, times + clock))
+    seen = motion(robot, times) + np.random.default_rng(0).normal(0, 5e-4, (250, 6))
     sigma = {"lengths": 1e-3, "position": 5e-4, "rotation": 5e-4}
     for free in (None, "auto") if abs(clock) < 1 else (None,):
         result = calibrate(robot, Measurements(built.readings, seen, times=times, sigma=sigma), free, outliers=False)

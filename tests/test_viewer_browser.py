@@ -191,10 +191,10 @@ def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_
     subject = read(str(folder / name) if name.endswith(".nc") else name)
     robot = subject.robot
     with serve(subject, port=0) as url:
-        open_viewer(page, url, 1600, 1000)
+        open_viewer(page, url, 1200, 750)
         pose = opening_pose(robot, Geometry(robot)) if subject.replay is None else subject.replay.at(0).pose
         points = at_rest(Dynamics(robot), Geometry(robot), pose, robot.carrier_home).points
-        for width, height in ((1600, 1000), (400, 800)):
+        for width, height in ((1200, 750), (400, 800)):
             page.set_viewport_size({"width": width, "height": height})
             for _ in range(40):  # until the camera has turned, and the panel has moved
                 page.wait_for_timeout(250)

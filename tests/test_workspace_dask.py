@@ -32,7 +32,7 @@ def cluster():
 
 
 def test_a_killed_worker_leaves_the_file_identical(cluster, tmp_path):
-    robot, samples = load("wang-flying"), 800_000
+    robot, samples = load("wang-flying"), 400_000
     begun = threading.Event()
 
     def progress(done, total, accepted):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from ..tasks.paths import Motion
@@ -49,53 +50,56 @@ def drift(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motio
     step = times[1] - times[0]
     pairs = max(min(round(WINDOW / step), intervals) // 2, 1)
     starts = np.arange(0, intervals - 2 * pairs + 1, 2 * pairs)
-    inputs = (carriers.pose, tensions)
-    ends = _run(scenario, motion, inputs, starts, pairs, 1, step)[-1]
+    forward, plan = _forward(scenario), (motion, carriers, tensions)
+    of_pairs = forward.mapaccum(pairs)
+    ends = np.array([_run(of_pairs, plan, start, pairs, 1, step)[-1] for start in starts])
     windows = _differences(ends, motion.pose[starts + 2 * pairs])
     stride = max(int(np.ceil(intervals / 2 / MOST_STEPS)), 1)
     count = intervals // (2 * stride)
-    whole = _run(scenario, motion, inputs, np.zeros(1, dtype=int), count, stride, step)[:, 0]
+    whole = _run(forward.mapaccum(count), plan, 0, count, stride, step)
     over_all = _differences(whole, motion.pose[2 * stride * np.arange(1, count + 1)])
     return Drift(2 * pairs * float(step), *windows, *over_all)
 
 
-def _run(
-    scenario: Scenario,
-    motion: Motion,
-    inputs: tuple[np.ndarray, np.ndarray],
-    rows: np.ndarray,
-    count: int,
-    stride: int,
-    step: float,
-) -> np.ndarray:
-    """Return poses (count, k, 6) after each of `count` steps of 2 `stride` samples, from the plan at `rows` (k,).
+def _forward(scenario: Scenario) -> ca.Function:
+    """Return the step of a state: pose and velocity (12,) to those after `h` [s].
 
-    Where a run diverges beyond all numbers it ends: from there on the poses are nan.
+    Carriers' poses and tensions are those at the beginning, the middle and the end of the step, one after the other.
     """
-    h = 2 * stride * step
+    c, m = len(scenario.robot.carriers), scenario.robot.m
+    state, h = ca.MX.sym("state", 12), ca.MX.sym("h")
+    carriers, tensions = ca.MX.sym("carriers", c, 18), ca.MX.sym("tensions", m, 3)
 
-    def slope(state: np.ndarray, at: np.ndarray) -> np.ndarray:
-        if not np.isfinite(state).all():
-            return np.full_like(state, np.nan)
-        pose, velocity = state[:, :6], state[:, 6:]
-        carrier_pose, tensions = (values[at] for values in inputs)
-        return np.hstack(
-            [velocity, scenario.dynamics.acceleration(pose, velocity, tensions, carrier_pose, scenario.wind)]
-        )
+    def slope(state: ca.MX, instant: int) -> ca.MX:
+        given = state[:6], state[6:], tensions[:, instant], carriers[:, 6 * instant : 6 * (instant + 1)]
+        return ca.vertcat(state[6:], scenario.dynamics.acceleration(*given, scenario.wind))
 
-    state = np.hstack([motion.pose[rows], motion.velocity[rows]])
-    poses = np.full((count, len(rows), 6), np.nan)
-    for k in range(count):
-        if not np.isfinite(state).all():
-            break
-        first = slope(state, rows)
-        middle = slope(state + h / 2 * first, rows + stride)
-        again = slope(state + h / 2 * middle, rows + stride)
-        rows = rows + 2 * stride
-        last = slope(state + h * again, rows)
-        state = state + h / 6 * (first + 2 * middle + 2 * again + last)
-        poses[k] = state[:, :6]
-    return poses
+    first = slope(state, 0)
+    middle = slope(state + h / 2 * first, 1)
+    again = slope(state + h / 2 * middle, 1)
+    last = slope(state + h * again, 2)
+    after = state + h / 6 * (first + 2 * middle + 2 * again + last)
+    return ca.Function("forward", [state, h, carriers, tensions], [after])
+
+
+def _run(
+    steps: ca.Function, plan: tuple[Motion, Motion, np.ndarray], row: int, count: int, stride: int, step: float
+) -> np.ndarray:
+    """Return poses (count, 6) after each of `count` steps of 2 `stride` samples, from the plan at `row`.
+
+    `steps` is `_forward`, that often.
+    Where a run diverges beyond all numbers the poses are nan from there on.
+    """
+    motion, carriers, tensions = plan
+    at = row + stride * (2 * np.arange(count)[:, None] + np.arange(3)).ravel()  # beginning, middle, end of each step
+    states = steps(
+        np.concatenate([motion.pose[row], motion.velocity[row]]),
+        np.full((1, count), 2 * stride * step),
+        np.concatenate(list(carriers.pose[at]), axis=1),
+        tensions[at].T,
+    )
+    poses = np.asarray(states).T[:, :6]
+    return np.where(np.isfinite(poses), poses, np.nan)
 
 
 def _differences(poses: np.ndarray, planned: np.ndarray) -> tuple[float, float]:

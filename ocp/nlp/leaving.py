@@ -21,7 +21,6 @@ from .held import at_ends, held_spans
 from .layout import Layout
 from .rows import Row, differentiated, in_world, motions, reference_symbols
 
-
 ON_IT = 1e-6  # of the scale of a limit: an end so near to a bound is on it
 
 

@@ -20,7 +20,7 @@ from towline.control import ANSWERS, ComputedTorque, Controller, Predictive, Ref
 from towline.models import Robot, air, load
 from towline.models.dynamics import dynamics_of
 from towline.ocp import plan
-from towline.simulation import simulate
+from towline.simulation.trajectory import read_trajectory
 from towline.solvers import solve_batch
 
 from .mujoco_plant import Hardware, World
@@ -106,7 +106,11 @@ def team(name: str) -> Task:
     robot = load(name)
     line = {"kind": "line", "start": [0, 0, 0], "end": [3.2, 0, 0]}
     made = plan(robot, {"path": line, "duration": 4.0, "base": {"kind": "free"}, "steps": 30})
-    references = list(simulate(robot, made, duration=5.0, period=PERIOD).references)
+    trajectory, times = read_trajectory(robot, made, 5.0), PERIOD * np.arange(5000)
+    assert trajectory.tensions is not None
+    platform, carriers = trajectory.at(times)
+    rows = zip(*platform, *carriers, trajectory.tensions(times), strict=True)
+    references = [Reference(*row) for row in rows]
     return Task(robot, references, None, Hardware(stiffness=2e4, damping=50.0), (2, 1.5, 0.3), 1.0, 0.1)
 
 
