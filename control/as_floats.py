@@ -29,7 +29,7 @@ def is_time(value: object) -> bool:
 
 
 def rows_of(state: State) -> int | None:
-    """Return how many robots a state is of, None for the arrays of one without a leading dimension.
+    """Return how many robots a state is of, or None where its arrays have no leading dimension.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def as_floats(given: Given, robot: Robot, rows: int | None) -> Given:
     robot
         Whose it is.
     rows
-        The leading dimension that arrays may have; None: they have none.
+        The leading dimension that arrays may have; default: they have none.
 
     Raises
     ------
