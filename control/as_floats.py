@@ -27,7 +27,7 @@ def is_time(value: object) -> bool:
 
 
 def rows_of(state: State) -> int | None:
-    """Return how many robots a state is of, None for the arrays of one without a leading dimension.
+    """Return how many robots a state is of, or None where its arrays have no leading dimension.
 
     Raises
     ------

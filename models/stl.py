@@ -12,7 +12,8 @@ from ..base.inputs import printable
 from ..base.reading import read_bytes
 from .part import LARGEST
 
-LARGEST_FILE = 50_000_000  # [bytes], a million triangles
+LARGEST_FILE = 50_000_000  # [bytes], of text with as many triangles
+MOST = 250_000  # triangles
 HEADER = 84  # bytes of a binary file before its triangles
 RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)")  # in small letters
@@ -54,11 +55,13 @@ def _from_binary(content: bytes, count: int, where: str) -> np.ndarray:
     if len(content) < size:
         stated = f"the {count} triangles that its header states, {size} bytes"
         raise InputError(f"{where} must have {stated}, got {len(content)} bytes")
+    _check_count(count, where)
     with np.errstate(invalid="ignore"):  # of a signalling nan, which is refused with the others
         return np.frombuffer(content, RECORD, count, HEADER)["corners"].astype(float)
 
 
 def _from_text(content: bytes, where: str) -> np.ndarray:
+    _check_count(content.count(b"vertex") // 3, where)
     vertices = VERTEX.findall(content)
     if b"endsolid" not in content or len(vertices) % 3 or len(vertices) != content.count(b"vertex"):
         raise InputError(f"{where} must be an STL file, got text that is cut off after {len(vertices)} vertices")
@@ -66,3 +69,9 @@ def _from_text(content: bytes, where: str) -> np.ndarray:
         return np.array(vertices, dtype="S32").astype(float).reshape(-1, 3, 3)
     except ValueError:
         raise InputError(f"{where} must have numbers as coordinates, got a vertex with another word") from None
+
+
+def _check_count(count: int, where: str) -> None:
+    """Raise InputError if there are so many triangles that reading them takes too much time and memory."""
+    if count > MOST:
+        raise InputError(f"{where} must have at most {MOST} triangles, got {count}")

@@ -1,6 +1,8 @@
 """Logs of calibration, good and bad, and `towline calibrate` through the entry point."""
 
 import json
+import time
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -271,3 +273,36 @@ def test_the_command_refuses_bad_logs(what, tmp_path):
     missing = towline("calibrate", "cogiro", "none.csv", cwd=tmp_path)
     assert (missing.returncode, missing.stderr) == (2, "towline: none.csv: no such file\n")
     assert towline("calibrate", "point-mass-3", "log.csv", cwd=tmp_path).returncode == 2
+
+
+HEAD = "l0 [m],l1 [m]\n"
+LARGE = {
+    "rows": (HEAD + "1,2\n" * 1_000_000, "must have at most 2000000 fields, got 2000"),
+    "other ends": (HEAD + "1,2\u2028" * 1_000_000, "must have at most 2000000 fields, got 2000"),
+    "columns": (HEAD + "1," * 1_999_000, "line 2 must have at most 1000 columns, got 1999001"),
+    "header": ("l0 [m]," * 1_999_000 + "\n1\n", "line 1 must have at most 1000 columns, got 1999001"),
+    "bytes": (HEAD + " " * 50_000_000, "must be a CSV file of at most 50 MB, got 50"),
+}
+
+
+@pytest.mark.parametrize("case", LARGE)
+def test_csv_that_is_too_large_is_refused_before_its_fields_are_read(case, tmp_path):
+    """Such files of 10 to 20 MB took 9 s and 1.1 GB."""
+    text, message = LARGE[case]
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    start = time.process_time()
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=message):
+            read_measurements(tmp_path / "log.csv")
+        assert tracemalloc.get_traced_memory()[1] < 300e6
+    finally:
+        tracemalloc.stop()
+    assert time.process_time() - start < 5
+
+
+def test_empty_fields_and_quotes_are_read_as_before(tmp_path):
+    (tmp_path / "log.csv").write_text('l0 [mm]; x [m];y [m];z [m]\n"1000";;nan; \n# between\n\n2000; 1;2 ;"3"\n')
+    log = read_measurements(tmp_path / "log.csv")
+    np.testing.assert_array_equal(log.lengths, [[1.0], [2.0]])
+    np.testing.assert_array_equal(log.poses[:, :3], [[np.nan] * 3, [1.0, 2.0, 3.0]])

@@ -222,6 +222,8 @@ def wrong(content, message, **fields):
         wrong(binary_stl(triangles_of(CUBE)), "vertices must be left out", vertices=CUBE.tolist()),
         wrong(binary_stl(CUBE[[[0, 1, 2], [1, 2, 3]]]), "file 'part.stl' must span a body, got 4 different points"),
         wrong(binary_stl(l_shape()), "must be convex, got a surface up to 0.000707 m inside its convex hull"),
+        wrong(binary_stl(np.zeros((250_001, 3, 3))), "must have at most 250000 triangles, got 250001"),
+        wrong(b"solid\n" + b"vertex 1 2 3\n" * 750_003 + b"endsolid", "at most 250000 triangles, got 250001"),
         wrong(None, "part.stl: no such file"),
         wrong(None, "keep_out[0].file"),
     ],

@@ -11,6 +11,7 @@ import io
 import os
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,11 @@ from ...base.declared import check_hdf5
 from ...base.errors import InputError
 from ...base.inputs import file_path, printable
 from ...base.netcdf import check_units
-from ...base.reading import read_bytes
+from ...base.reading import check_file, read_bytes
 from .measurements import Measurements, Sigma
 
-LARGEST_LOG = 1_000_000_000  # [bytes]
+LARGEST_LOG, LARGEST_CSV = 1_000_000_000, 50_000_000  # [bytes]
+BINARY = (b"\x89HDF\r\n\x1a\n", b"CDF")  # how NetCDF files begin
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
 NUMBERS = {"1": 1.0, "-": 1.0}
@@ -59,10 +61,11 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
     """
     file = file_path("log", path, "the path of a CSV or NetCDF file")
     where = printable(str(file))
-    content = read_bytes(file, "a CSV or NetCDF file", LARGEST_LOG)
+    check_file(file, "a CSV or NetCDF file", LARGEST_LOG)
+    binary = _begins(file).startswith(BINARY)
+    content = read_bytes(file, *(("a NetCDF file", LARGEST_LOG) if binary else ("a CSV file", LARGEST_CSV)))
     if not content.strip():
         raise InputError(f"{where} must be a CSV or NetCDF file, got an empty file")
-    binary = content.startswith((b"\x89HDF\r\n\x1a\n", b"CDF"))
     try:
         arguments = _from_netcdf(content) if binary else _from_columns(_csv_columns(content))
         if sigma is not None:
@@ -70,6 +73,15 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
         return Measurements(**arguments)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def _begins(file: Path) -> bytes:
+    """Return the first bytes of a file, none if it cannot be read: `read_bytes` says why."""
+    try:
+        with file.open("rb") as stream:
+            return stream.read(8)
+    except OSError:
+        return b""
 
 
 def _csv_columns(content: bytes) -> dict[str, np.ndarray]:
