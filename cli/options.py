@@ -74,11 +74,11 @@ def check_animation(animate: Path | None, speed: float, fps: float) -> None:
     if animate is not None:
         from ..figures.animation import check_film
 
-        return check_film(animate, speed, fps)
+        check_film(animate, speed, fps)
+        return
     for name, value, default in (("--speed", speed, SPEED), ("--fps", fps, FPS)):
         if value != default:
             raise InputError(f"{name} must be left out without --animate, got {value:g}")
-    return None
 
 
 def print_json(value: dict[str, Any]) -> None:

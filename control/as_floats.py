@@ -72,12 +72,11 @@ def _array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     if type(value) is np.ndarray and value.dtype is FLOAT and value.shape[-len(core) :] == core:
         return value
     try:
-        array = np.asarray(value)
-        fits = array.dtype.kind in "fiubO"
-        array = float64(array) if fits else array
+        given = np.asarray(value)
+        array = float64(given) if given.dtype.kind in "fiubO" else None
     except Exception:  # whatever the array interface of another library, or an object of an array, raises
-        fits = False
-    if not fits:
+        array = None
+    if array is None:
         raise InputError(f"{name} must be numbers of shape {_shape(core)}, got {shown(value)}")
     if array.shape[-len(core) :] != core:
         raise InputError(f"{name} must be of shape {_shape(core)}, got shape {array.shape}")

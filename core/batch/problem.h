@@ -147,7 +147,8 @@ INLINE num wrench_error(const demands *p, const matrices *M) {
 INLINE mask judge(demands *p, const matrices *M, num *error) {
     num terms = number(0);
     for (int c = 0; c < M->m; c++) {
-        p->s[c] = between(p->t_min[c], p->t_ref[c] + M->unit[c] * p->s[c], p->t_max[c]);
+        const num moved = where(M->norm[c] > 0, p->s[c], number(0)); /* what does not pull stays at its reference */
+        p->s[c] = between(p->t_min[c], p->t_ref[c] + M->unit[c] * moved, p->t_max[c]);
         terms += M->norm[c] * magnitude(p->s[c]);
     }
     *error = wrench_error(p, M);

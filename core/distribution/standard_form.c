@@ -1,6 +1,15 @@
 /* The problem in s, of least norm; see towline_core.c, 1 to 3. */
 #include "internal.h"
 
+/* Whether a cable adds to the wrench at all: one that does not stays at its reference, and is not chosen. */
+static int pulls(const towline_problem *problem, int c) {
+    int does = 0;
+    for (int i = 0; i < problem->n; i++) {
+        does |= problem->A[i * problem->m + c] != 0;
+    }
+    return does;
+}
+
 /*
  * Bring a problem to standard form: rho > 0 for a soft answer, else 0; with `all`, fixed cables count as free. Return
  * the size of the tensions needed.
@@ -15,8 +24,8 @@ real towline_standard_form(form *f, const towline_problem *problem, real rho, in
     f->n = n;
     f->columns = 0;
     for (int c = 0; c < m; c++) {
-        t[c] = problem->t_min[c];
-        if (all || problem->t_min[c] < problem->t_max[c]) {
+        t[c] = between(problem->t_min[c], reference(problem, c), problem->t_max[c]);
+        if (all || (problem->t_min[c] < problem->t_max[c] && pulls(problem, c))) {
             const int i = f->columns++;
             t[c] = reference(problem, c);
             f->moving[i] = c;

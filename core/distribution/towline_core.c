@@ -80,7 +80,7 @@ static int is_in_range(real weight) { return weight >= 1 / HEAVIEST && weight <=
 /* Write the tensions of s, moved inside the limits if rounding put them outside. */
 static void write_tensions(const form *f, const towline_problem *problem, real *t) {
     for (int c = 0; c < problem->m; c++) {
-        t[c] = problem->t_min[c];
+        t[c] = between(problem->t_min[c], reference(problem, c), problem->t_max[c]);
     }
     for (int c = 0; c < f->cables; c++) {
         const int i = f->moving[c];
