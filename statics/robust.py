@@ -35,6 +35,8 @@ from ..models.robot import Robot
 if TYPE_CHECKING:
     from ..models.uncertainty import Uncertainty
 
+__all__ = ["RobotShare", "Spread", "check_share", "ellipsoid_factor", "motion_factor", "share_of_robots", "spread"]
+
 RANK = 1e-9  # of the largest singular value
 HALVINGS = 60
 ROUNDING = 1e-9  # of the force scale, in comparisons of tensions
