@@ -25,9 +25,9 @@ typedef struct {
 /* The platform or a carrier. The frame of a carrier is at its CoM; that of the platform need not be, see `com`. */
 typedef struct {
     int32_t motion, actuators;
-    double mass[3], inverse_mass[3]; /* along the axes of {G}; both 0 where it cannot move */
-    double inertia[9];               /* about the CoM, in the body's axes */
-    double inverse_inertia[9];       /* 0 about axes about which it cannot turn */
+    double mass[3], inverse_mass[3];    /* along the axes of {G}; both 0 where it cannot move */
+    double inertia[9];                  /* about the CoM, in the body's axes */
+    double inverse_inertia[9];          /* 0 about axes about which it cannot turn */
     double speed_max, acceleration_max; /* of a lagged carrier */
     towline_actuator actuator[TOWLINE_MOST_ACTUATORS];
 } towline_body;
@@ -36,10 +36,10 @@ typedef struct {
     int32_t carrier, has_winch;
     double anchor[3];     /* in the carrier's frame */
     double attachment[3]; /* in the platform's frame */
-    double axis[3];       /* swivel axis of the pulley in the carrier's frame, of unit length, as the cable comes up it */
-    double radius;        /* of the pulley's sheave; 0: the anchor is a point */
-    double stiffness;     /* E A [N]; 0: the cable does not stretch */
-    double damping;       /* [N s] */
+    double axis[3];   /* swivel axis of the pulley in the carrier's frame, of unit length, as the cable comes up it */
+    double radius;    /* of the pulley's sheave; 0: the anchor is a point */
+    double stiffness; /* E A [N]; 0: the cable does not stretch */
+    double damping;   /* [N s] */
     double winch_inertia; /* as the mass that the cable feels [kg] */
     double winch_friction, winch_speed_max, winch_force_max;
 } towline_cable;
@@ -51,10 +51,10 @@ typedef struct {
     double mass;
     double com[3]; /* of the platform, in its frame */
     double gravity[3];
-    double drag, lift;   /* 1/2 rho S times the coefficients */
-    double freedom[6];   /* 1 for each coordinate in which the platform moves, else 0 */
-    double force_scale;  /* newtons that matter: the weight, or what the limits permit */
-    double length_scale; /* metres that matter */
+    double drag, lift;                            /* 1/2 rho S times the coefficients */
+    double freedom[6];                            /* 1 for each coordinate in which the platform moves, else 0 */
+    double force_scale;                           /* newtons that matter: the weight, or what the limits permit */
+    double length_scale;                          /* metres that matter */
     towline_body body[1 + TOWLINE_MOST_CARRIERS]; /* the platform, then the carriers */
     towline_cable cable[TOWLINE_MOST_CABLES];
 } towline_robot;

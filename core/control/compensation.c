@@ -138,8 +138,8 @@ void towline_compensate(const towline_robot *robot, const towline_controller *co
                 change += columns[6 * c + k][j] * x[j];
             }
             const double wanted = (controller->corrects ? memory->offset[k] : 0) + change * reach;
-            bends[k] = follow(controller, dt, fmin(fmax(wanted, -reach), reach), &memory->offset[k],
-                              &memory->offset_rate[k]);
+            bends[k] =
+                follow(controller, dt, fmin(fmax(wanted, -reach), reach), &memory->offset[k], &memory->offset_rate[k]);
         }
         add_offset(carrier[5], bends, carrier + 12);
     }

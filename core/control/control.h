@@ -45,7 +45,7 @@ typedef struct {
     towline_platform_memory *platform;
     towline_carrier_memory *memory;
     towline_turning *turning; /* NULL: whether they turn too late is not of interest */
-    double *actuation;        /* (c, a), commands of the last step and then of this one; a: as many as any carrier has */
+    double *actuation; /* (c, a), commands of the last step and then of this one; a: as many as any carrier has */
 } towline_flight;
 
 /*
@@ -53,7 +53,7 @@ typedef struct {
  * too late turn more slowly from the next step on. Return the most that the thrust of a carrier lacks [N].
  */
 double towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
-                           towline_flight flight);
+                             towline_flight flight);
 
 /* Return how many actuators the carrier with the most has. */
 int towline_most_actuators(const towline_robot *robot);

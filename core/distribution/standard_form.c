@@ -105,7 +105,8 @@ real towline_least_norm(form *f, int *worst, real *missing) {
 /* Move s to the point of least norm inside the limits. */
 outcome towline_enter_limits(form *f) {
     const int last = f->rank - 1;
-    f->parallel = last < 0 ? PARALLEL : larger(PARALLEL, PARALLEL_PIVOT * magnitude(f->L[0] / f->L[last * ROWS + last]));
+    f->parallel =
+        last < 0 ? PARALLEL : larger(PARALLEL, PARALLEL_PIVOT * magnitude(f->L[0] / f->L[last * ROWS + last]));
     int outside = 0;
     for (int c = 0; c < f->cables; c++) {
         outside |= f->s[c] < f->low[c] - f->slack || f->s[c] > f->high[c] + f->slack;

@@ -7,22 +7,22 @@
 
 #ifndef TOWLINE_FLOAT
 
-#define LARGEST 1e50          /* of A, w and t_ref; limits beyond it count as infinite */
-#define HEAVIEST 1e20         /* weights and length lie between 1 / HEAVIEST and HEAVIEST */
-#define WEIGHTS_APART 1e14    /* the heaviest weight relative to the lightest */
-#define FEASIBILITY 1e-9      /* wrench error that is accepted, relative to what the problem requires */
-#define ROUNDING 1e-13        /* rounding of a matrix-vector product, relative to the sum of the absolute terms */
-#define CANCELLED 1e10        /* terms of A t count up to this many times what the problem requires */
-#define NEGLIGIBLE 1e-11      /* a cable pulls along d only beyond this part of its column norm; else w is off the range */
-#define ORTHOGONAL 1e-13      /* a cable without a limit may pull by this part of its column norm: rounding */
-#define CLEAR 4.0             /* a shortfall is beyond doubt from this many tolerances */
-#define RANK 1e-12            /* singular values below this part of the largest make a problem singular */
-#define OUTSIDE 1e-10         /* part of w outside the range of A that makes a problem singular */
-#define SURE_PIVOT 1e-9       /* a pivot above this part of the largest counts; */
-#define SMALL_PIVOT 4e-11     /* one below this part only if w needs it; between them the rank is in doubt */
-#define RECOUNT 1e-12         /* square of a pivot, relative to the first, below which rows are measured anew */
-#define SLACK 1e-12           /* how far s may pass a limit, relative to the size of s */
-#define PARALLEL 1e-11        /* length of a normal that is rounding, and */
+#define LARGEST 1e50       /* of A, w and t_ref; limits beyond it count as infinite */
+#define HEAVIEST 1e20      /* weights and length lie between 1 / HEAVIEST and HEAVIEST */
+#define WEIGHTS_APART 1e14 /* the heaviest weight relative to the lightest */
+#define FEASIBILITY 1e-9   /* wrench error that is accepted, relative to what the problem requires */
+#define ROUNDING 1e-13     /* rounding of a matrix-vector product, relative to the sum of the absolute terms */
+#define CANCELLED 1e10     /* terms of A t count up to this many times what the problem requires */
+#define NEGLIGIBLE 1e-11   /* a cable pulls along d only beyond this part of its column norm; else w is off the range */
+#define ORTHOGONAL 1e-13   /* a cable without a limit may pull by this part of its column norm: rounding */
+#define CLEAR 4.0          /* a shortfall is beyond doubt from this many tolerances */
+#define RANK 1e-12         /* singular values below this part of the largest make a problem singular */
+#define OUTSIDE 1e-10      /* part of w outside the range of A that makes a problem singular */
+#define SURE_PIVOT 1e-9    /* a pivot above this part of the largest counts; */
+#define SMALL_PIVOT 4e-11  /* one below this part only if w needs it; between them the rank is in doubt */
+#define RECOUNT 1e-12      /* square of a pivot, relative to the first, below which rows are measured anew */
+#define SLACK 1e-12        /* how far s may pass a limit, relative to the size of s */
+#define PARALLEL 1e-11     /* length of a normal that is rounding, and */
 #define PARALLEL_PIVOT 2e-15  /* its part of the largest pivot, over the least: the null space is known to that */
 #define STATIONARY 1e-10      /* part of the gradient that the multipliers may leave, relative to the size of s */
 #define DECISIVE 1e-5         /* relative change of the cost if limits move by the slack: above it rounding chooses */

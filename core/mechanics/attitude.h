@@ -17,9 +17,15 @@ INLINE attitude attitude_of(const num *angles) {
     sine_and_cosine(angles[1], &sp, &cp);
     sine_and_cosine(angles[2], &sy, &cy);
     const num R[9] = {
-        cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr, /* */
-        sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr, /* */
-        -sp,     cp * sr,                cp * cr,                /* */
+        cy * cp,
+        cy * sp * sr - sy * cr,
+        cy * sp * cr + sy * sr, /* */
+        sy * cp,
+        sy * sp * sr + cy * cr,
+        sy * sp * cr - cy * sr, /* */
+        -sp,
+        cp * sr,
+        cp * cr, /* */
     };
     for (int i = 0; i < 9; i++) {
         at.R[i] = R[i];

@@ -19,11 +19,16 @@ int towline_processor(void);
 
 /* Call the best form of a function. */
 #ifdef TOWLINE_X86
-#define BEST_FORM(name, ...)                                                                                           \
-    switch (towline_processor()) {                                                                                     \
-        case 2: name##_avx512(__VA_ARGS__); break;                                                                     \
-        case 1: name##_avx2(__VA_ARGS__); break;                                                                       \
-        default: name##_plain(__VA_ARGS__);                                                                            \
+#define BEST_FORM(name, ...)            \
+    switch (towline_processor()) {      \
+        case 2:                         \
+            name##_avx512(__VA_ARGS__); \
+            break;                      \
+        case 1:                         \
+            name##_avx2(__VA_ARGS__);   \
+            break;                      \
+        default:                        \
+            name##_plain(__VA_ARGS__);  \
     }
 #else
 #define BEST_FORM(name, ...) name##_plain(__VA_ARGS__)

@@ -42,7 +42,7 @@ typedef struct {
     double force[3], moment[3]; /* about the CoM */
     /* For cables without stiffness: the angular acceleration by a moment, and that which other forces give. */
     double inverse_inertia[9], turning[3];
-    int turned;                 /* since the lines of the cables were last computed */
+    int turned; /* since the lines of the cables were last computed */
 } body_now;
 
 /* Limp: longer than unstrained, with a damper that outweighs it. */
@@ -68,8 +68,8 @@ typedef struct {
     double reference_rate;  /* of the commanded length */
     double beyond, sliding; /* by how much cable and winch are beyond their modes [m]; negative: inside */
     contact mode;
-    int slip;                              /* 1: pays out, -1: hauls in, 0: friction holds the winch */
-    yielding platform, carrier;            /* without stiffness; the carrier counts along -pull */
+    int slip;                   /* 1: pays out, -1: hauls in, 0: friction holds the winch */
+    yielding platform, carrier; /* without stiffness; the carrier counts along -pull */
 } cable_now;
 
 /* Equations of the cables without stiffness, see constraints.c. Arrays have a place for each cable of the robot. */

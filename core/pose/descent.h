@@ -13,7 +13,8 @@
 #include "pose/lanes_of_rows.h"
 
 static const double LEAST_DAMPING = 1e-6, MOST_DAMPING = 1e8; /* once a step did not help */
-static const double COARSE = 100; /* times the smallest step: one that does not help ends a row whose rounding is coarser */
+static const double COARSE =
+    100; /* times the smallest step: one that does not help ends a row whose rounding is coarser */
 static const double NEAR = 0.005; /* times the platform's size: steps so short are judged by whether they are slow: */
 static const double SLOW = 0.01;  /* ratio of a step to the one before; so they converge where errors are large */
 

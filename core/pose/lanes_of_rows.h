@@ -20,7 +20,7 @@ typedef struct {
 
 typedef struct {
     ptrdiff_t row[LANES];
-    ptrdiff_t next;       /* the first row that no lane had yet */
+    ptrdiff_t next; /* the first row that no lane had yet */
     num start[6], carriers[6 * TOWLINE_MOST_CARRIERS], lengths[TOWLINE_MOST_CABLES];
     origins from;
     place at, trial;

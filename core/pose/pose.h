@@ -8,12 +8,13 @@
 
 /* Rows of measured lengths. */
 typedef struct {
-    const double *carriers;    /* (c, 6), poses of the carriers of a row */
-    ptrdiff_t carriers_per;    /* numbers from those of one row to those of the next: 6 c, or 0 if all have them in one place */
-    const double *lengths;     /* (rows, m) [m] */
-    const double *weights;     /* (m), of the error of each cable, 1 / sigma [1/m] */
-    const double *free;        /* (6), 1 for coordinates that move in this descent, else 0 */
-    double damping;            /* of the first step: 0 from nearby */
+    const double *carriers; /* (c, 6), poses of the carriers of a row */
+    ptrdiff_t
+        carriers_per; /* numbers from those of one row to those of the next: 6 c, or 0 if all have them in one place */
+    const double *lengths; /* (rows, m) [m] */
+    const double *weights; /* (m), of the error of each cable, 1 / sigma [1/m] */
+    const double *free;    /* (6), 1 for coordinates that move in this descent, else 0 */
+    double damping;        /* of the first step: 0 from nearby */
 } towline_lengths;
 
 typedef struct {

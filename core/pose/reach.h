@@ -16,12 +16,12 @@ typedef struct {
 } origins;
 
 typedef struct {
-    num arm[3];      /* from the platform frame's origin to the attachment */
-    num n[3];        /* the unit vector along which the cable reaches it */
-    num length;      /* from the anchor, over the sheave, to the attachment */
-    num straight;    /* of that the free part */
-    num across[3];   /* the normal of the sheave's plane */
-    num turning;     /* how fast n turns in that plane's normal, less 1 / straight; for a point anchor 0 */
+    num arm[3];    /* from the platform frame's origin to the attachment */
+    num n[3];      /* the unit vector along which the cable reaches it */
+    num length;    /* from the anchor, over the sheave, to the attachment */
+    num straight;  /* of that the free part */
+    num across[3]; /* the normal of the sheave's plane */
+    num turning;   /* how fast n turns in that plane's normal, less 1 / straight; for a point anchor 0 */
 } reach;
 
 INLINE place place_of(const num *pose) {

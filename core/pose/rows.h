@@ -5,12 +5,12 @@
 #include "numbers/processor.h"
 #include "pose/pose.h"
 
-#define DESCEND_ROWS(form)                                                                                \
+#define DESCEND_ROWS(form)                                                                         \
     void descend_rows_##form(const towline_robot *robot, ptrdiff_t rows, towline_lengths measured, \
                              towline_poses results)
-#define SPREAD_ROWS(form)                                                                                 \
-    void spread_rows_##form(const towline_robot *robot, ptrdiff_t rows, towline_lengths measured,  \
-                            const double *poses, double *covariances)
+#define SPREAD_ROWS(form)                                                                                              \
+    void spread_rows_##form(const towline_robot *robot, ptrdiff_t rows, towline_lengths measured, const double *poses, \
+                            double *covariances)
 
 DESCEND_ROWS(plain);
 DESCEND_ROWS(avx2);

@@ -124,9 +124,15 @@ INLINE void move(const place *at, const num *step, place *to) {
     const num a = 0.5 * step[3], b = 0.5 * step[4], c = 0.5 * step[5];
     const num inverse = 1.0 / (1.0 + a * a + b * b + c * c), twice = inverse + inverse;
     const num Q[9] = {
-        (1.0 + a * a - b * b - c * c) * inverse, (a * b - c) * twice, (a * c + b) * twice, /* */
-        (a * b + c) * twice, (1.0 - a * a + b * b - c * c) * inverse, (b * c - a) * twice, /* */
-        (a * c - b) * twice, (b * c + a) * twice, (1.0 - a * a - b * b + c * c) * inverse, /* */
+        (1.0 + a * a - b * b - c * c) * inverse,
+        (a * b - c) * twice,
+        (a * c + b) * twice, /* */
+        (a * b + c) * twice,
+        (1.0 - a * a + b * b - c * c) * inverse,
+        (b * c - a) * twice, /* */
+        (a * c - b) * twice,
+        (b * c + a) * twice,
+        (1.0 - a * a - b * b + c * c) * inverse, /* */
     };
     for (int i = 0; i < 3; i++) {
         to->x[i] = at->x[i] + step[i];

@@ -64,8 +64,8 @@ static PyMethodDef functions[] = {
     {"control_problem", (PyCFunction)(void (*)(void))towline_py_control_problem, METH_FASTCALL,
      "control_problem(dt, since, robot, controller, measured, late, wanted, t_ref, carriers, "
      " cables, platform, memory, A, w, bounds)\n--\n\n"
-     "Update the memory of each row, and write the problem of tension distribution of this step; return how many cables "
-     "count as cut."},
+     "Update the memory of each row, and write the problem of tension distribution of this step; return how many "
+     "cables count as cut."},
     {"control_thrusts", (PyCFunction)(void (*)(void))towline_py_control_thrusts, METH_FASTCALL,
      "control_thrusts(dt, robot, controller, measured, carriers, tensions, cables, platform, memory, turning, "
      "actuation)\n--\n\n"

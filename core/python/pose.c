@@ -27,8 +27,8 @@ PyObject *towline_py_pose_from_lengths(PyObject *module, PyObject *const *argume
                given.size[WEIGHTS] == m && given.size[FREE] == 6 && given.size[DAMPING] == 1 &&
                given.size[POSES] == 6 * rows && given.size[ERRORS] == rows * m;
         if (fits) {
-            const towline_lengths measured = {given.of[CARRIERS], per,           given.of[LENGTHS], given.of[WEIGHTS],
-                                              given.of[FREE],     *given.of[DAMPING]};
+            const towline_lengths measured = {
+                given.of[CARRIERS], per, given.of[LENGTHS], given.of[WEIGHTS], given.of[FREE], *given.of[DAMPING]};
             const towline_poses results = {given.of[POSES], given.of[ERRORS], given.of[STEPS]};
             Py_BEGIN_ALLOW_THREADS;
             towline_pose_from_lengths(robot, rows, measured, results);
