@@ -79,13 +79,14 @@ def main() -> None:
             super().copy_extensions_to_source()
 
         def build_extensions(self) -> None:
-            """Compile as many files at once as there are processors."""
+            """Compile as many files at once as there are processors, after a first one, with which compilers set up."""
             compile_some = self.compiler.compile
 
             def compile_all(sources: list[str], **options: Any) -> list[str]:
+                first = compile_some(sources[:1], **options)
                 with ThreadPoolExecutor(os.cpu_count()) as pool:
-                    made = pool.map(lambda source: compile_some([source], **options), sources)
-                    return [name for names in made for name in names]
+                    made = pool.map(lambda source: compile_some([source], **options), sources[1:])
+                    return [*first, *(name for names in made for name in names)]
 
             self.compiler.compile = compile_all
             super().build_extensions()
