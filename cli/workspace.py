@@ -45,7 +45,7 @@ RobustOption = Annotated[
     typer.Option(
         metavar="SHARE",
         help="Share of the robots of the robot file's uncertainty, such as 0.95, for which the conditions about "
-        "tension limits must hold, at all accepted poses at once. Default: the robot counts as exact.",
+        "tension limits must hold, at all accepted poses at once. Default: the robot is as its file has it.",
     ),
 ]
 BoxOption = Annotated[

@@ -143,7 +143,7 @@ class TensionCondition(Condition, ABC):
     robust: Share | None = Field(
         default=None,
         description="share of the robots of the robot's `uncertainty` for which the condition must hold, to first "
-        "order, at all accepted places at once, such as 0.95; default: the robot counts as exact",
+        "order, at all accepted places at once, such as 0.95; default: the robot is as its file has it",
     )
 
 

@@ -63,7 +63,7 @@ def feasible(
     rows
         Wrench rows to give; default: those of the coordinates that can move.
     robust
-        Share of the robots of an uncertainty whose tensions must exist; default: the robot counts as exact.
+        Share of the robots of an uncertainty whose tensions must exist; default: the robot is as its file has it.
     """
     rows = wrench_rows(robot) if rows is None else rows
     tightened = None if robust is None else Tightened(robot, robust, rows)

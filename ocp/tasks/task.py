@@ -181,7 +181,7 @@ class Task(Part):
     robust: Share | None = Field(
         default=None,
         description="share of the robots of the robot's `uncertainty` whose tensions must stay inside their limits "
-        "less the margin, to first order, such as 0.95; default: the robot counts as exact",
+        "less the margin, to first order, such as 0.95; default: the robot is as its file has it",
     )
     wind: Vector3 | WindBox | None = Field(
         default=None,
