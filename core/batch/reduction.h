@@ -7,7 +7,7 @@
 
 #include "batch/problem.h"
 
-#define PIVOTS_APART 1e10 /* square of a row's part that is left, over that which is gone, or of the first */
+#define PIVOTS_APART 1e10 /* square of the largest row, over that of a row's part that is left */
 
 /* x -= tau v (v . x), beginning at entry `from`. */
 INLINE void reflect(num *x, const num *v, num tau, int from, int m) {
@@ -59,11 +59,12 @@ INLINE void reduce(matrices *M) {
     const int n = M->n, m = M->m;
     num largest = number(0);
     for (int j = 0; j < n; j++) {
+        largest = larger(largest, square_of(M->B + j * m, 0, m));
+    }
+    for (int j = 0; j < n; j++) {
         num *v = M->B + j * m;
-        const num gone = square_of(v, 0, j), square = square_of(v, j, m);
-        largest = j == 0 ? square : largest;
-        M->good &= (PIVOTS_APART * square > gone) & (PIVOTS_APART * square > largest);
-        M->good &= square < PIVOTS_APART * largest;
+        const num square = square_of(v, j, m);
+        M->good &= PIVOTS_APART * square > largest;
         const num length = square_root(where(M->good, square, number(1))), head = v[j];
         const num pivot = where(head > 0.0, -length, length);
         M->diagonal[j] = pivot;

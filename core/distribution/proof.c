@@ -159,6 +159,52 @@ int towline_proves_feasible(const form *f, const towline_problem *problem, const
     return change <= ACCURACY * scale_of_tensions(f);
 }
 
+/* x -= (v . x) v */
+static void take_away(real *x, const real *v, int n) {
+    real along = 0;
+    for (int i = 0; i < n; i++) {
+        along += v[i] * x[i];
+    }
+    for (int i = 0; i < n; i++) {
+        x[i] -= along * v[i];
+    }
+}
+
+/*
+ * Take from a unit direction, in the rows of S A, what rounding has left of the pulls of cables without a limit: it was
+ * solved for with columns divided by the roots of their weights, and is off by as much as these differ.
+ */
+static void turn_away(const form *f, const towline_problem *problem, real *d) {
+    const int n = problem->n, m = problem->m;
+    real basis[ROWS][ROWS]; /* orthonormal, of these cables' columns */
+    int count = 0;
+    for (int c = 0; c < m && count < n; c++) {
+        real *v = basis[count], pull = 0, square = 0, left = 0;
+        for (int i = 0; i < n; i++) {
+            v[i] = f->scale[i] * problem->A[i * m + c];
+            pull += v[i] * d[i];
+            square += v[i] * v[i];
+        }
+        const int limited = magnitude(problem->t_min[c]) <= LARGEST && magnitude(problem->t_max[c]) <= LARGEST;
+        if (limited || !(magnitude(pull) <= NEGLIGIBLE * root(square))) {
+            continue;
+        }
+        for (int j = 0; j < count; j++) {
+            take_away(v, basis[j], n);
+        }
+        for (int i = 0; i < n; i++) {
+            left += v[i] * v[i];
+        }
+        for (int i = 0; i < n; i++) {
+            v[i] /= root(left);
+        }
+        count += left > RANK * square;
+    }
+    for (int j = 0; j < count; j++) {
+        take_away(d, basis[j], n);
+    }
+}
+
 /*
  * Check whether the scaled direction in `answer`, made unit and unscaled here, proves w out of reach: by how much d . w
  * exceeds the most that tensions inside the limits can give along d. Fill support and shortfall.
@@ -181,7 +227,11 @@ towline_status towline_proves_infeasible(const form *f, const towline_problem *p
     }
     const real per_length = 1 / root(square);
     for (int i = 0; i < n; i++) {
-        d[i] *= per_length * f->scale[i];
+        d[i] *= per_length;
+    }
+    turn_away(f, problem, d);
+    for (int i = 0; i < n; i++) {
+        d[i] *= f->scale[i];
         demand += d[i] * problem->w[i];
     }
     for (int c = 0; c < m; c++) {
