@@ -189,8 +189,8 @@ static void turn_away(const form *f, const towline_problem *problem, real *d) {
         if (limited || !(magnitude(pull) <= NEGLIGIBLE * root(square))) {
             continue;
         }
-        for (int j = 0; j < count; j++) {
-            take_away(v, basis[j], n);
+        for (int j = 0; j < 2 * count; j++) { /* twice: the first leaves rounding of what it takes */
+            take_away(v, basis[j % count], n);
         }
         for (int i = 0; i < n; i++) {
             left += v[i] * v[i];
@@ -198,7 +198,7 @@ static void turn_away(const form *f, const towline_problem *problem, real *d) {
         for (int i = 0; i < n; i++) {
             v[i] /= root(left);
         }
-        count += left > RANK * square;
+        count += left > DEPENDENT * square;
     }
     for (int j = 0; j < count; j++) {
         take_away(d, basis[j], n);
