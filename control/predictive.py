@@ -31,7 +31,7 @@ from .settings import positive, reach_of, set_reach
 from .stability import grows
 from .state import State
 from .watch import LATE, UNSTABLE, HandOver, Watch
-from .weights import CORRECTING, PATIENT, STILL, tensions_of, terminal, weights
+from .weights import PATIENT, STILL, TEAM, TOWING, tensions_of, terminal, weights
 
 TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
@@ -69,7 +69,8 @@ class Predictive(ComputedTorque):
         fixed length.
     bandwidth
         With which errors decay where no limit is near [rad/s], a number or one for each coordinate of the pose.
-        Default: 40, but 6 where carriers have to correct errors: those of towing robots and of teams of quadrotors.
+        Default: 40, but less where carriers have to correct errors: 8 of teams with cables of fixed length, 6 of towing
+        robots with winches.
     stages, stage
         How many there are, and how long each lasts [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may leave
         their reference, which takes longer, and of 0.025 s where they have to correct errors.
@@ -134,7 +135,8 @@ class Predictive(ComputedTorque):
         flies = np.array([bool(carrier.efforts) for carrier in the_robot.carriers])
         reacts = far * flies[:, None] * (not correct)
         far = far - reacts
-        usual = CORRECTING if correct else PATIENT if far.any() else STILL
+        correcting = TOWING if the_robot.fixed_lengths is None else TEAM
+        usual = correcting if correct else PATIENT if far.any() else STILL
         self._bandwidth = positive("bandwidth", usual.bandwidth if bandwidth is None else bandwidth, 6)
         carrier_bandwidth = usual.carrier_bandwidth if carrier_bandwidth is None else carrier_bandwidth
         returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)

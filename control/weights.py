@@ -19,8 +19,9 @@ class Usual(NamedTuple):
     stage: float
 
 
-# Carriers that correct errors; those that may leave their reference, and are slower than tensions; and those that stay.
-CORRECTING = Usual(6.0, 6.0, 20.0, 0.025)
+# Carriers that correct errors, with cables of fixed length or with winches; those that may leave their reference, and
+# are slower than tensions; and those that stay.
+TEAM, TOWING = Usual(8.0, 6.0, 20.0, 0.025), Usual(6.0, 6.0, 20.0, 0.025)
 PATIENT, STILL = Usual(40.0, 2.0, 60.0, 0.03), Usual(40.0, 2.0, 60.0, 0.015)
 
 SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much as a carrier at the end of its reach

@@ -172,7 +172,8 @@ static void take_away(real *x, const real *v, int n) {
 
 /*
  * Take from a unit direction, in the rows of S A, what rounding has left of the pulls of cables without a limit: it was
- * solved for with columns divided by the roots of their weights, and is off by as much as these differ.
+ * solved for with columns divided by the roots of their weights, and is off by as much as these differ. Where these
+ * columns are nearly dependent it stays as it is: what is left of them would be rounding too.
  */
 static void turn_away(const form *f, const towline_problem *problem, real *d) {
     const int n = problem->n, m = problem->m;
@@ -189,16 +190,19 @@ static void turn_away(const form *f, const towline_problem *problem, real *d) {
         if (limited || !(magnitude(pull) <= NEGLIGIBLE * root(square))) {
             continue;
         }
-        for (int j = 0; j < 2 * count; j++) { /* twice: the first leaves rounding of what it takes */
-            take_away(v, basis[j % count], n);
+        for (int j = 0; j < count; j++) {
+            take_away(v, basis[j], n);
         }
         for (int i = 0; i < n; i++) {
             left += v[i] * v[i];
         }
+        if (!(left > RANK * square)) {
+            return;
+        }
         for (int i = 0; i < n; i++) {
             v[i] /= root(left);
         }
-        count += left > DEPENDENT * square;
+        count++;
     }
     for (int j = 0; j < count; j++) {
         take_away(d, basis[j], n);
