@@ -1,8 +1,9 @@
-"""Write numbers for people: about four digits, no exponent where none is needed, never "-0.000"."""
+"""Write numbers for people: about four digits, a prefix of the unit instead of an exponent, never "-0.000"."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import SupportsFloat, SupportsIndex
 
@@ -13,29 +14,37 @@ NO_VALUE = "-"  # for None and nan
 PLAIN_FROM, PLAIN_BELOW = 1e-3, 1e7  # magnitudes that are written without an exponent
 GROUPED_FROM = 10_000  # 1034, but 10 340
 NEGLIGIBLE = 1e-12  # smaller magnitudes are rounding and are written as 0
+SMALL_DIGITS = 2  # of a number below PLAIN_FROM in its unit: "0.52 uN"
+PREFIXES = ("n", "u", "m", "", "k", "M", "G")  # in steps of a thousand
+PREFIXED = ("N", "m", "s", "rad", "g", "W", "Hz", "Pa")  # symbols that take a prefix
+OTHERS = {"m^2": ("mm^2", 1e6), "m^3": ("cm^3", 1e6)}  # what a small value is written in, and how many make one
 
 
 def quantity(value: Number, unit: str = "", digits: int = DIGITS) -> str:
-    """Write a number with its unit: `quantity(10337.2, "N")` is "10 340 N".
+    """Write a number with its unit: `quantity(10337.2, "N")` is "10 340 N", `quantity(5.2e-7, "N")` is "0.52 uN".
 
     Parameters
     ----------
     value
         A number of type int is exact, any other is rounded; None and nan become "-".
     unit
-        Is written after the number; default: no unit.
+        Written after the number, with another prefix if the number is very small or very large (default: no unit).
     digits
         How many significant digits a rounded number has at most; trailing zeros are left out.
     """
     if value is None or math.isnan(value):
         return NO_VALUE
-    text = _whole(value) if isinstance(value, int) else _rounded(float(value), digits)
-    return f"{text} {unit}" if unit else text
+    if isinstance(value, int):
+        return f"{_whole(value)} {unit}".rstrip()
+    scale, unit, digits = _scaled(abs(float(value)), unit, digits)
+    return f"{_rounded(scale * float(value), digits)} {unit}".rstrip()
 
 
 def quantity_row(values: Iterable[Number], unit: str = "", digits: int = DIGITS) -> str:
     """Write numbers separated by commas, and their unit once: "1, 2.5, 10 340 N"; `digits` as in `quantity`."""
-    text = ", ".join(quantity(value, digits=digits) for value in values)
+    cells = list(values)
+    scale, unit, digits = _scaled(_largest(cells), unit, digits)
+    text = ", ".join(_cell(value, scale, unit, digits) for value in cells)
     return f"{text} {unit}" if unit and text else text
 
 
@@ -47,7 +56,8 @@ def quantity_range(values: Iterable[Number], unit: str = "", digits: int = DIGIT
     known = [value for value in values if value is not None and not math.isnan(value)]
     if not known:
         return NO_VALUE
-    low, high = (quantity(end, digits=digits) for end in (min(known, key=float), max(known, key=float)))
+    scale, unit, digits = _scaled(_largest(known), unit, digits)
+    low, high = (_cell(end, scale, unit, digits) for end in (min(known, key=float), max(known, key=float)))
     text = low if low == high else f"{low} to {high}"
     return f"{text} {unit}" if unit else text
 
@@ -64,6 +74,41 @@ def column(values: Iterable[Number], digits: int = DIGITS) -> list[str]:
         quantity(value) if value is None or not math.isfinite(value) else _decimals(float(value), decimals)
         for value in cells
     ]
+
+
+def _scaled(size: float, unit: str, digits: int) -> tuple[float, str, int]:
+    """Return the factor, the unit and the digits with which a number of this size is written without an exponent."""
+    if not unit or PLAIN_FROM <= float(f"{size:.{digits - 1}e}") < PLAIN_BELOW or size == 0 or math.isinf(size):
+        return 1.0, unit, digits
+    if size < PLAIN_FROM:
+        digits = min(digits, SMALL_DIGITS)
+    if unit in OTHERS:
+        smaller, factor = OTHERS[unit]
+        return (factor, smaller, digits) if size < PLAIN_FROM else (1.0, unit, digits)
+    first = re.match(r"[A-Za-z]+(?!\^|[A-Za-z])", unit)
+    symbol = next((one for one in PREFIXED if first and first[0] in [prefix + one for prefix in PREFIXES]), None)
+    if first is None or symbol is None:
+        return 1.0, unit, digits
+    own = PREFIXES.index(first[0].removesuffix(symbol))
+    below = 0.1 if size < PLAIN_FROM else 1.0
+    steps = [step for step in range(len(PREFIXES)) if size * 1000.0 ** (own - step) >= below]
+    step = max(steps, default=0)
+    scale = 1000.0 ** (own - step) if steps else 0.0  # less than a tenth of a nano-unit is 0
+    return scale, (PREFIXES[step] if steps else PREFIXES[own]) + symbol + unit[first.end() :], digits
+
+
+def _largest(values: Iterable[Number]) -> float:
+    return max((abs(float(value)) for value in values if value is not None and math.isfinite(value)), default=0.0)
+
+
+def _cell(value: Number, scale: float, unit: str, digits: int) -> str:
+    """Write a number of a row; beside larger ones with the same unit a very small one needs no exponent."""
+    if isinstance(value, int) or value is None or not math.isfinite(value):
+        return quantity(value, digits=digits)
+    scaled = scale * float(value)
+    if unit and abs(scaled) < PLAIN_FROM:
+        return _decimals(scaled, 6).rstrip("0").rstrip(".")
+    return _rounded(scaled, digits)
 
 
 def _rounded(value: float, digits: int) -> str:

@@ -39,7 +39,42 @@ WRITTEN = [
 @pytest.mark.parametrize(("value", "text"), WRITTEN)
 def test_a_quantity_is_plain(value, text):
     assert quantity(value) == text
-    assert quantity(value, "N") == (text if text == "-" else f"{text} N")
+
+
+WITH_UNITS = [
+    (10337.2, "N", "10 340 N"),
+    (5.171e-7, "N", "0.52 uN"),
+    (-5.171e-7, "N", "-0.52 uN"),
+    (1e-6, "N", "1 uN"),
+    (0.0009999999, "m", "0.001 m"),
+    (4.2e-4, "N m", "0.42 mN m"),
+    (1.326e-7, "mrad", "0.13 nrad"),
+    (3e-5, "mm", "30 nm"),
+    (2e-4, "kg m^2", "0.2 g m^2"),
+    (1e-12, "N", "0 N"),
+    (1.369e-11, "N", "0 N"),
+    (0.0, "N", "0 N"),
+    (1.2e7, "N", "12 MN"),
+    (2.5e8, "N/m", "250 MN/m"),
+    (2e-4, "m/s^2", "0.2 mm/s^2"),
+    (2.5e-5, "m^3", "25 cm^3"),
+    (20_000_000, "samples", "20 000 000 samples"),
+    (math.nan, "N", "-"),
+    (math.inf, "N", "inf N"),
+]
+
+
+@pytest.mark.parametrize(("value", "unit", "text"), WITH_UNITS)
+def test_a_unit_takes_a_prefix_instead_of_an_exponent(value, unit, text):
+    assert quantity(value, unit) == text
+
+
+@pytest.mark.parametrize("unit", ["N", "mm", "mrad", "N m", "m/s", "kg"])
+def test_with_a_unit_no_number_has_an_exponent(unit):
+    for value in 10 ** np.random.default_rng(0).uniform(-20, 12, 500):
+        number, prefixed = quantity(value, unit).rsplit(" ", unit.count(" ") + 1)[:2]
+        assert "e" not in number
+        assert prefixed
 
 
 def test_no_exponent_and_no_signed_zero_where_none_is_needed():
@@ -55,6 +90,9 @@ def test_no_exponent_and_no_signed_zero_where_none_is_needed():
 def test_rows_and_ranges_have_their_unit_once():
     assert quantity_row([1, 2.5, 10337.2], "N") == "1, 2.5, 10 340 N"
     assert quantity_row([], "N") == ""
+    assert quantity_row([1e-5, -3e-9, 250.0], "N") == "0.00001, 0, 250 N"
+    assert quantity_row([1e-5, 2e-5], "N") == "10, 20 uN"
+    assert quantity_range([1e-9, 2e-6], "N") == "0.001 to 2 uN"
     assert quantity_range(np.array([30.0, 2.0, math.nan]), "N") == "2 to 30 N"
     assert quantity_range([5.0, 5.0 + 1e-9], "N") == "5 N"
     assert quantity_range([None, math.nan], "N") == "-"
