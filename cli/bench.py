@@ -1,4 +1,4 @@
-"""`towline bench`: towline against other solvers, here and now."""
+"""`towline bench`: towline against other solvers, measured on this machine."""
 
 from __future__ import annotations
 
@@ -71,11 +71,11 @@ def tension(
 
 @app.command("control", cls=Command)
 def control(
-    steps: Annotated[int, typer.Option(help="Steps of a flight, one each millisecond.")] = 500,
-    seeds: Annotated[int, typer.Option(help="Flights of each controller, each in other gusts.")] = 3,
+    steps: Annotated[int, typer.Option(help="Control steps per run, one per millisecond.")] = 500,
+    seeds: Annotated[int, typer.Option(help="Runs of each controller, each with different gusts.")] = 3,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure control steps, and the programs of predictive control against other solvers."""
+    """Compare control steps and solvers for predictive control."""
     from ..benchmarks import control as benchmark
 
     with results_alone(), progress_bar("control", quiet=as_json) as progress:

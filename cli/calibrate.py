@@ -1,4 +1,4 @@
-"""`towline calibrate`: the robot as built, from a log of its cable lengths."""
+"""`towline calibrate`: geometric calibration from a log of cable lengths."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LogArgument = Annotated[
     Path,
     typer.Argument(
         metavar="LOG",
-        help="Lengths, and poses, tensions and times where known: NetCDF, or CSV with a header such as "
+        help="Log of lengths and, if known, poses, tensions and times: NetCDF, or CSV with a header such as "
         "'t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
     ),
 ]
@@ -27,8 +27,9 @@ FreeOption = Annotated[
     str | None,
     typer.Option(
         metavar="NAMES",
-        help="What to find, separated by commas: anchors, attachments, offsets, scales, radii, clock; or auto. "
-        "Default: anchors, offsets, and clock if the log has times and poses of a motion.",
+        help="Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, clock; or "
+        "auto. "
+        "Default: anchors, offsets, and clock if the log records times and poses of a motion.",
     ),
 ]
 PriorOption = Annotated[
@@ -36,7 +37,7 @@ PriorOption = Annotated[
     typer.Option(
         metavar="NAME=SIGMA,...",
         help="Standard deviations about the file's values [m], of scales [1], of the clock [s], as "
-        "'anchors=0.02,offsets=0.05'; default: what the log does not determine changes least.",
+        "'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.",
     ),
 ]
 SigmaOption = Annotated[
@@ -47,12 +48,14 @@ SigmaOption = Annotated[
         "'lengths=0.001,position=0.0005'; default: the log's, or 1 mm and exact poses.",
     ),
 ]
-OutliersOption = Annotated[
-    bool, typer.Option("--outliers/--no-outliers", help="Look for wrong readings and slipped winches.")
+OutliersOption = Annotated[bool, typer.Option("--outliers/--no-outliers", help="Detect outliers and slipped winches.")]
+OutOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.yaml", help="Robot file to write; default: ROBOT-calibrated.yaml in this folder."),
 ]
-OutOption = Annotated[Path | None, typer.Option(metavar="FILE.yaml", help="Default: ROBOT-calibrated.yaml here.")]
 FiguresOption = Annotated[
-    Path | None, typer.Option(metavar="FOLDER", help="Folder to draw in: residuals, anchors, observability.")
+    Path | None,
+    typer.Option(metavar="FOLDER", help="Folder for figures of residuals, anchors and standard deviations."),
 ]
 
 
@@ -68,11 +71,11 @@ def calibrate(
     form: FormatOption = "png",
     as_json: JsonOption = False,
 ) -> None:
-    """Find a robot's anchors, offsets and more from measured cable lengths, and write it as a robot file.
+    """Estimate anchors, offsets and more from measured cable lengths, and write a calibrated robot file.
 
-    The file has the uncertainty of its new numbers. Carriers are at home. Nothing is written, and the exit code is 1,
-    if the log seems to have a slip (cables in another order, other units or angles), the values did not converge, or
-    samples left out fit worse than with the robot's file.
+    The file includes the covariance of its new parameters. Carriers are at home. Nothing is written, and the exit code
+    is 1, if the log probably has an input error (order of cables, units, conventions of angles), the fit did not
+    converge, or validation samples fit worse than with the robot's file.
     """
     from ..estimation.calibration import calibrate as find
     from ..estimation.calibration import read_measurements

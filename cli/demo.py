@@ -1,4 +1,4 @@
-"""`towline demo`: plan a circle of the flying cable robot, and fly it."""
+"""`towline demo`: plan a circle of the flying cable robot, and simulate it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def demo(
     form: FormatOption = "png",
     as_json: JsonOption = False,
 ) -> None:
-    """Plan a circle of the flying cable robot and fly it in wind.
+    """Plan a circle of the flying cable robot and simulate it in wind.
 
     The circle is infeasible while the quadrotor hovers, and feasible if it moves. The exit code is 0 if the plans show
-    this and the flight passes.
+    this and the simulation passes.
     """
     from ..figures.style import FORMATS
     from ..studies.flying import circle as flying_circle
@@ -36,7 +36,7 @@ def demo(
         typer.echo(result.free.report())
         print_written([*result.pictures, *result.files])
         typer.echo(f"\nThis plan, flown in wind of {flying_circle.WIND} m/s with gusts of {flying_circle.GUSTS} m/s:\n")
-    with watching("flying the circle in wind", quiet=as_json):
+    with watching("simulating the circle in wind", quiet=as_json):
         flight, flown = flying_circle.fly(folder, result.free, form)
     passed = result.as_expected and flight.passed
     if as_json:

@@ -2,8 +2,9 @@
 
 A command's module is imported only when the command runs or shows its help, so that `towline --help` starts at once.
 
-Exit codes: 0, the answer is yes (feasible, tensions exist); 1, it is no; 2, wrong input; 3, an error in towline itself;
-130, stopped by Ctrl-C; 143, by SIGTERM; 141, the reader of the output has closed it, as `| head -1` does.
+Exit codes: 0, the result is positive (feasible, tensions exist); 1, it is negative; 2, wrong input; 3, an error in
+towline itself; 130, stopped by Ctrl-C; 143, by SIGTERM; 141, the reader of the output has closed it, as `| head -1`
+does.
 """
 
 from __future__ import annotations
@@ -24,20 +25,20 @@ from .options import PLAIN, Command
 from .stopping import end, requested
 
 COMMANDS = {
-    "demo": "Plan a circle of a flying cable robot, draw it and fly it: a first look.",
+    "demo": "Plan, draw and simulate a circle of a flying cable robot.",
     "robots": "List the robots of the library, or diagnose one.",
     "tension": "Compute the cable tensions at one pose, by every method.",
     "pose": "Estimate the pose of the platform from its cable lengths.",
     "plan": "Plan a motion that keeps every tension inside its limits.",
     "time": "Compute the fastest motion along a path.",
-    "simulate": "Fly a plan: wind, slack cables, sensors, faults, a controller.",
+    "simulate": "Simulate a plan in closed loop, with wind, noise and faults.",
     "workspace": "Sample the poses that a robot can reach.",
-    "calibrate": "Find a robot's anchors, offsets and more from measured cable lengths.",
-    "view": "Show robots, plans, flights and workspaces in the browser.",
+    "calibrate": "Calibrate a robot from measured cable lengths.",
+    "view": "Show robots, plans, simulations and workspaces in the browser.",
     "import": "Convert a robot of another program to a robot file.",
-    "reproduce": "Compute a paper's results again, claim by claim.",
+    "reproduce": "Recompute a paper's results, claim by claim.",
     "export": "Export a robot as a MuJoCo model or as C code.",
-    "bench": "Measure towline and other solvers on this machine.",
+    "bench": "Compare towline with other solvers on this machine.",
 }
 MODULES = {"import": "import_"}  # where the module is not named like the command
 TRACEBACK = "TOWLINE_TRACEBACK"  # environment variable: show the traceback of an error in towline itself
@@ -104,8 +105,9 @@ def _options(
 ) -> None:
     """Plan motions of cable robots and distribute the tensions of their cables.
 
-    The exit code is 0 if the answer is yes (feasible, tensions exist), 1 if it is no, 2 for wrong input, 3 for an error
-    in towline itself, 130 after Ctrl-C, 143 after SIGTERM, and 141 if the reader of the output closes it (| head -1).
+    The exit code is 0 if the result is positive (feasible, tensions exist), 1 if it is negative, 2 for wrong input, 3
+    for an error in towline itself, 130 after Ctrl-C, 143 after SIGTERM, and 141 if the reader of the output closes it
+    (| head -1).
     """
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())

@@ -11,14 +11,14 @@ from ..base.errors import InputError
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None] | None = None) -> None:
     """Check that the outputs of a command can be written, and are neither inputs nor the same file twice.
 
-    Call it when robot and task are read, and before anything takes long.
+    Call it after reading robot and task, and before any long computation.
 
     Parameters
     ----------
     outputs
-        The files by the names of their options, None if there is none.
+        Files by the names of their options; None for an option that is not used.
     inputs
-        Files by what they are; those that have been read so far need not be named.
+        Files by their meaning; files that have been read so far may be omitted.
 
     Raises
     ------

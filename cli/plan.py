@@ -46,31 +46,31 @@ OutOption = Annotated[
 FiguresOption = Annotated[
     Path | None,
     typer.Option(
-        help="Folder to draw in: path, views, tensions and, where they apply, carriers (base.png), limits and the "
-        "solver's convergence."
+        help="Folder for figures: path.png, views.png, tensions.png and, if applicable, base.png (carriers), "
+        "limits.png and convergence.png."
     ),
 ]
 ReportOption = Annotated[
-    Path | None, typer.Option(help="HTML file to write: the report with its figures, to open anywhere.")
+    Path | None, typer.Option(help="HTML file to write: the report with its figures, in one file.")
 ]
 AnimateOption = Annotated[Path | None, typer.Option(help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")]
 RobustOption = Annotated[
     float | None,
     typer.Option(
         metavar="SHARE",
-        help="Share of the robots of the robot file's uncertainty, such as 0.95, whose tensions must stay inside "
-        "their limits; default: that of the task.",
+        help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
+        "limits must hold; default: the task's value.",
     ),
 ]
 VaryOption = Annotated[
     list[str] | None,
     typer.Option(
         metavar="KEY=VALUES",
-        help="Plan for each of some values of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
+        help="Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
         "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
         "robot.platform.mass. Repeat the option to plan all combinations. Writes one table instead of one plan: "
-        "--out names its NetCDF file, with a CSV file beside it (default: ROBOT-TASK-sweep.nc); --figures draws "
-        "sweep.png: where plans are feasible, cost and margin. The exit code is 1 if no plan is feasible.",
+        "--out names its NetCDF file, and a CSV file of the same name is written too (default: ROBOT-TASK-sweep.nc). "
+        "--figures draws sweep.png with feasibility, cost and margin. The exit code is 1 if no plan is feasible.",
     ),
 ]
 WorkersOption = Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")]
@@ -107,7 +107,7 @@ def plan(
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or report why none exists.
 
-    With --vary it plans many, one for each combination of some values, and writes a table.
+    With --vary it plans once per combination of the given values, and writes a table.
     """
     from ..figures.style import FORMATS
 
@@ -116,7 +116,9 @@ def plan(
     if vary:
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:
-                instead = "the task's key robust serves all plans" if name == "--robust" else "--keep saves the plans"
+                instead = (
+                    "the task's key robust applies to all plans" if name == "--robust" else "--keep saves the plans"
+                )
                 raise InputError(f"{name} must be left out with --vary, got {shown(str(value))}; {instead}")
         sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep, form), out, figures, as_json)
         return

@@ -21,18 +21,18 @@ def pose(
     ],
     start: Annotated[
         str | None,
-        typer.Option(metavar=f"'{SIX}'", help="Pose to start from [m, rad]; default: a search that needs none."),
+        typer.Option(metavar=f"'{SIX}'", help="Pose to start from [m, rad]; default: search without a start."),
     ] = None,
     carrier_pose: CarrierPoseOption = None,
     sigma: Annotated[
-        str, typer.Option(metavar="S", help="Standard deviation of the lengths [m], one or one for each cable.")
+        str, typer.Option(metavar="S", help="Standard deviation of the lengths [m]: one number, or one per cable.")
     ] = "0.001",
     as_json: JsonOption = False,
 ) -> None:
     """Estimate the pose of the platform from its cable lengths, and list other poses that fit them.
 
-    Where the lengths leave a motion open, it is the pose in which the platform rests. The exit code is 1 if no pose
-    fits the lengths.
+    If the lengths do not determine the pose, the result is the equilibrium pose. The exit code is 1 if no pose fits the
+    lengths.
     """
     from ..models import branches, load, pose_from_lengths
 
@@ -65,9 +65,9 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
 
     from ..base.text import quantity, quantity_row
 
-    verdict = "a pose fits the lengths," if estimate.consistent else "NO POSE FITS THE LENGTHS, the nearest one has"
+    verdict = "a pose fits the lengths," if estimate.consistent else "NO POSE FITS THE LENGTHS, the closest one has"
     if estimate.by_gravity and not estimate.converged:
-        verdict = "NO REST WITH THESE LENGTHS, the nearest pose has"
+        verdict = "NO EQUILIBRIUM WITH THESE LENGTHS, the closest pose has"
     typer.echo(f"{robot.name}: {verdict} residuals of {quantity(1e3 * estimate.residual, 'mm', 3)}")
     scale = np.repeat([1e3, 180.0 / np.pi], 3)
     rows = []
@@ -77,18 +77,18 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         spread = quantity(deviation, small, 3) if np.isfinite(deviation) else "undetermined"
         rows.append((name, quantity(round(estimate.pose[i], 9), unit, 7), spread if robot.dof_mask[i] else "fixed"))
     print_table(["", "estimate", "sigma"], rows, "lrr")
-    typer.echo("The angles' sigmas are of small rotations about the axes of {G}.")
+    typer.echo("The sigmas of the angles are those of small rotations about the axes of {G}.")
     if estimate.by_gravity and estimate.converged:
-        typer.echo("The lengths leave motions open: this is where the platform rests under its weight.")
+        typer.echo("The lengths do not determine the pose. This is the equilibrium pose.")
     if estimate.consistent and not estimate.determined:
-        typer.echo("Undetermined: some motion changes none of these lengths.")
+        typer.echo("Undetermined: at least one motion changes none of these lengths.")
     elif estimate.consistent and not estimate.conditioned:
         typer.echo(
-            "Nearly singular: the lengths are not linear within the sigmas, which are then only a rough measure."
+            "Nearly singular: the lengths are not linear within the sigmas, so the sigmas are only a rough measure."
         )
     if not estimate.consistent and robot.m > robot.dof_mask.sum():
         off = int(np.argmax(estimate.suspects()))
-        typer.echo(f"The least credible length is that of cable {off + 1}.")
+        typer.echo(f"The most likely wrong length is that of cable {off + 1}.")
     for other in others:
         held = "" if other.taut else ", which cables cannot hold at rest"
         typer.echo(f"Also fits: ({quantity_row(np.round(other.pose, 6))}) [m, rad]{held}")

@@ -1,4 +1,4 @@
-"""Long runs on workers and with a checkpoint: their options, and what the line of an interrupt adds."""
+"""Long runs on workers and with a checkpoint: their options, and the hint how to resume after an interrupt."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def scheduler_option(when: str = "") -> Any:
 
 def checkpoint_option(when: str = "") -> Any:
     """Return --checkpoint, with `when` it may be used."""
-    text = f"{when}file in which to store progress; must not exist. Continue later with --resume."
+    text = f"{when}file in which to save progress; must not exist. Continue later with --resume."
     return typer.Option("--checkpoint", help=_sentence(text))
 
 
 def resume_option(when: str = "") -> Any:
     """Return --resume, with `when` it may be used."""
     return typer.Option(
-        "--resume", metavar="FILE", help=_sentence(f"{when}checkpoint to continue, or to create if there is none.")
+        "--resume", metavar="FILE", help=_sentence(f"{when}checkpoint to continue, or to create if it does not exist.")
     )
 
 
@@ -65,7 +65,7 @@ def resumable(
         more = f"to continue, repeat the command with --resume {shlex.quote(str(checkpoint))}"
         add_to_message(f"; {more}")  # before the first result
     else:
-        more = "they are lost: only --checkpoint and --resume store them"
+        more = "they are lost: only --checkpoint and --resume save them"
 
     def progress(done: int, total: int, counted: int) -> None:
         show(done, total, counted)

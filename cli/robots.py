@@ -35,8 +35,8 @@ def robots(
 ) -> None:
     """List the robots of the library, or diagnose one.
 
-    The diagnosis has the rank of the wrench matrix and its reason, the tensions at rest at home or the proof that
-    there are none, and warnings about implausible numbers.
+    The diagnosis reports the rank of the wrench matrix (and why, if it is deficient), the tensions at rest at home or
+    the proof that none exist, and warnings about implausible numbers.
     """
     if schema:
         from ..models import Robot
@@ -135,7 +135,7 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> Non
 
 
 def _rest(at_home: TensionSolution) -> list[str]:
-    """Return the tensions that hold the robot at home, or the proof that there are none."""
+    """Return the tensions that hold the robot at home, or the proof that none exist."""
     from ..base.text import quantity_range
 
     if at_home.tensions is not None:

@@ -1,4 +1,4 @@
-"""`towline simulate`: fly a plan, step by step, in wind, with sensors and faults."""
+"""`towline simulate`: simulate a plan in closed loop, with wind, sensor noise and faults."""
 
 from __future__ import annotations
 
@@ -71,19 +71,20 @@ EventOption = Annotated[
         "--event",
         "--fault",
         metavar="EVENT",
-        help="What happens: 'cut 3 at 2.5' (cable 3 tears at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
+        help="Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
         "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s). Repeat the "
         "option for more.",
     ),
 ]
 DurationOption = Annotated[
-    float | None, typer.Option(help="Time of the flight [s]; default: that of the plan, at whose end the robot rests.")
+    float | None,
+    typer.Option(help="Simulated time [s]; default: the plan's. After its end the robot holds the final pose."),
 ]
-ToleranceOption = Annotated[float, typer.Option(help="Largest error of the position of a flight that passes [m].")]
-SeedOption = Annotated[int, typer.Option(help="Seed of gusts and noise; the same seed gives the same flight.")]
+ToleranceOption = Annotated[float, typer.Option(help="Largest position error allowed for a pass [m].")]
+SeedOption = Annotated[int, typer.Option(help="Seed of gusts and noise; the same seed gives the same run.")]
 RunsOption = Annotated[
     int | None,
-    typer.Option(help="Number of flights, with the seeds from --seed on. Writes one table instead of one flight."),
+    typer.Option(help="Number of runs, with the seeds from --seed on. Writes one table instead of one motion."),
 ]
 WorkersOption = Annotated[int, typer.Option(help="With --runs: number of processes on this machine.")]
 SchedulerOption = Annotated[str | None, scheduler_option(_MANY)]
@@ -98,9 +99,9 @@ OutOption = Annotated[
 ]
 FiguresOption = Annotated[
     Path | None,
-    typer.Option(help="Folder to draw in: error, tensions and answers; with --runs: errors of all flights."),
+    typer.Option(help="Folder for figures of error, tensions and controller status; with --runs: errors of all runs."),
 ]
-AnimateOption = Annotated[Path | None, typer.Option(help="Film of the flight to write: .gif, or .mp4 with ffmpeg.")]
+AnimateOption = Annotated[Path | None, typer.Option(help="Film of the simulation to write: .gif, or .mp4 with ffmpeg.")]
 
 
 def simulate(
@@ -127,11 +128,11 @@ def simulate(
     fps: FpsOption = FPS,
     as_json: JsonOption = False,
 ) -> None:
-    """Fly a plan with a controller, in wind, with slack cables, sensors and faults.
+    """Simulate a plan in closed loop, with wind, sensor noise and faults.
 
-    A flight passes if it lasts, its error stays within --tolerance, no tension exceeds t_max by more than 0.1 % of the
-    cable's range, and no cable whose t_min is above zero goes slack.
-    The exit code is 0 if the flight passes, with --runs if all of them do, and else 1.
+    A run passes if it does not diverge, its position error stays within --tolerance, no tension exceeds t_max by more
+    than 0.1 % of the cable's range, and no cable with t_min above zero goes slack. The exit code is 0 if all runs pass,
+    otherwise 1.
     """
     from ..figures.style import FORMATS
 

@@ -64,7 +64,7 @@ def ignore() -> None:
 
 
 def add_to_message(text: str) -> None:
-    """Set what the line of an interrupt states beside "stopped", such as how to resume."""
+    """Set the text that an interrupt prints after "stopped", such as how to resume."""
     global _message
     _message = f"towline: stopped{text}"
 

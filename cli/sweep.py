@@ -31,7 +31,7 @@ class Sweeping:
 
 
 def sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures: Path | None, as_json: bool) -> None:
-    """Plan all combinations, save the table, draw and print it; exit code 1 if no plan is feasible."""
+    """Plan all combinations, save, draw and print the table; the exit code is 1 if no plan is feasible."""
     # Before libraries load: a plan must not depend on the number of threads, nor on that of processes.
     with one_thread_each():
         _sweep(robot, task, options, out, figures, as_json)
@@ -48,7 +48,7 @@ def _sweep(robot: str, task: Path, options: Sweeping, out: Path | None, figures:
     vary = read_option(options.vary)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-sweep.nc")
     if target.suffix == ".csv":
-        raise InputError(f"--out must be a NetCDF file, beside which the CSV is written, got {target}")
+        raise InputError(f"--out must be a NetCDF file (.nc), got {target}")
     check_ending("--out", target, ".nc")
     picture = None if figures is None else figures / f"sweep.{options.form}"
     if picture is not None:

@@ -1,4 +1,4 @@
-"""`towline tension`: the tensions of one instant, by every method."""
+"""`towline tension`: the tensions at one instant, by every method."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def tension(
 ) -> None:
     """Compute the cable tensions at one pose and motion, by every method.
 
-    The exit code is 1 if the method finds no tensions inside the limits; if none exist, the proof is printed.
+    The exit code is 1 if the method returns no tensions inside the limits. If none exist, the proof is printed.
     """
     from ..models import load
     from ..solvers import methods
@@ -69,7 +69,7 @@ def tension(
 
 
 def _solve(problem: TensionProblem, method: str, backend: str | None = None) -> TensionSolution:
-    """Solve twice: the first call loads libraries, and its time is not the method's."""
+    """Solve twice, because the first call also loads libraries, and time the second call."""
     from ..solvers import solve
 
     solve(problem, method=method, backend=backend)

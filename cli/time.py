@@ -23,18 +23,18 @@ def time(
             "files. An existing file is overwritten.",
         ),
     ] = None,
-    grid: Annotated[int, typer.Option(help="Number of intervals of the path at first; refined if necessary.")] = 200,
+    grid: Annotated[int, typer.Option(help="Initial number of intervals of the path; refined if necessary.")] = 200,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the fastest motion along a task's path with every tension inside its limits; exit code 1 if there is none.
+    """Find the fastest motion along a task's path with every tension inside its limits; exit code 1 if none exists.
 
-    Of the task it uses `path`, `base` (hold or given), `margin`, and of `limits` platform_speed, cable_speed,
-    carrier_speed and carrier_acceleration; of `duration` only that of a circle. With `wind: [0, 0, 0]` the drag of
-    still air counts; without `wind` there are no aerodynamic forces. Any other wind or limit, a tube and a free base
-    are refused.
+    It uses these keys of the task: `path`, `base` (hold or given), `margin`, and in `limits` platform_speed,
+    cable_speed, carrier_speed and carrier_acceleration. `duration` is ignored, except for circles. `wind: [0, 0, 0]`
+    includes the drag of still air; without `wind` there are no aerodynamic forces. Any other wind or limit, a tube and
+    a free base are refused.
 
-    The motion is audited as every plan is. The result is a task file with the time law in it, which `towline plan`
-    reads like any other task.
+    The motion is audited like every plan. The result is a task file that contains the time law, and `towline plan`
+    reads it like any other task.
     """
     from ..models import load
     from ..ocp import read_task, time_along

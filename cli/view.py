@@ -1,4 +1,4 @@
-"""`towline view`: show a robot, plan, flight or workspace in the browser, or write a page that needs no server."""
+"""`towline view`: show a robot, plan, simulation or workspace in the browser, or write a page that needs no server."""
 
 from __future__ import annotations
 
@@ -22,24 +22,26 @@ def view(
         str,
         typer.Argument(
             metavar="TARGET",
-            help="A robot (name or YAML file), or a plan, flight or workspace file (NetCDF).",
+            help="A robot (name or YAML file), or a plan, simulation or workspace file (NetCDF).",
             autocompletion=robot_names,
         ),
     ],
     other: Annotated[
-        str | None, typer.Argument(metavar="[OTHER]", help="A plan or flight file to compare a plan or flight with.")
+        str | None, typer.Argument(metavar="[OTHER]", help="A second plan or simulation file, for comparison.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option("--html", help="HTML file to write instead, which plays without a server.")
+        Path | None, typer.Option("--html", help="HTML file to write instead; it plays without a server.")
     ] = None,
     robot: Annotated[
         str | None, typer.Option("--robot", help="Robot file of a workspace whose robot is not in the library.")
     ] = None,
     host: Annotated[str, typer.Option(help="Address to listen on; 127.0.0.1: this machine only.")] = HOST,
-    port: Annotated[int, typer.Option(help="Port to listen on; if in use, one of the next; 0: any free one.")] = PORT,
+    port: Annotated[
+        int, typer.Option(help="Port to listen on; if taken, the next free port is used; 0 picks any.")
+    ] = PORT,
     as_json: JsonOption = False,
 ) -> None:
-    """Show a robot with sliders, one or two plans or flights, or a workspace, in the browser (extra viewer)."""
+    """Show a robot, a plan, a simulation or a workspace in the browser, or compare two motions (extra viewer)."""
     import threading
 
     from ..viewer import read, save_page, serve
@@ -67,7 +69,7 @@ def view(
             else:
                 typer.echo(f"{subject.title}\n{url}   (Ctrl-C ends it)")
             if host not in LOOPBACK:
-                typer.echo("towline: everyone who can reach this address can watch and move the sliders", err=True)
+                typer.echo("towline: anyone who can connect to this address can watch and move the sliders", err=True)
             threading.Event().wait()
         except KeyboardInterrupt:
             if requested():  # SIGTERM

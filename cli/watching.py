@@ -71,12 +71,12 @@ class Watch:
 
 @contextmanager
 def watching(what: str, quiet: bool = False, console: Console | None = None) -> Iterator[Watch]:
-    """Show a solver's iterations while the block runs, if a person is watching: on a terminal, and not `quiet`.
+    """Show a solver's iterations while the block runs, on a terminal and unless `quiet`.
 
     Parameters
     ----------
     what
-        What is being done, as the label.
+        Label.
     quiet
         Show nothing, because standard output is for a program (`--json`).
     console
@@ -101,14 +101,14 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
 
 @contextmanager
 def counting(what: str, counted: str, quiet: bool = False) -> Iterator[Callable[[int, int, int], None]]:
-    """Show a bar with rate and remaining time while the block runs, if a person is watching, as `watching` does.
+    """Show a bar with rate and remaining time while the block runs, on a terminal and unless `quiet`.
 
     Parameters
     ----------
     what
-        What is being done, as the label.
+        Label.
     counted
-        What the last number counts: "accepted", "feasible".
+        Meaning of the last number: "accepted", "feasible".
     quiet
         Show nothing, because standard output is for a program (`--json`).
 

@@ -31,21 +31,20 @@ CONDITIONS = ", ".join(sorted(["all", "any", *(file.stem.replace("_", "-") for f
 ConditionOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Condition that a pose must fulfil: its kind, or JSON with the kind and its keys, such as "
+        help="Condition: its kind, or JSON with the kind and its keys, such as "
         f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
         "Default: static-equilibrium."
     ),
 ]
 DefineOption = Annotated[
-    list[Path] | None,
-    typer.Option(metavar="FILE.py", help="Python file with conditions of your own, to use by their kinds."),
+    list[Path] | None, typer.Option(metavar="FILE.py", help="Python file with conditions of your own.")
 ]
 RobustOption = Annotated[
     float | None,
     typer.Option(
         metavar="SHARE",
-        help="Share of the robots of the robot file's uncertainty, such as 0.95, for which the conditions about "
-        "tension limits must hold, at all accepted poses at once. Default: the robot is as its file has it.",
+        help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
+        "conditions hold at all accepted poses simultaneously. Default: the nominal robot only.",
     ),
 ]
 BoxOption = Annotated[
@@ -57,11 +56,12 @@ BoxOption = Annotated[
 AttitudeOption = Annotated[
     str | None,
     typer.Option(
-        help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: that of home."
+        help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: the attitude at "
+        "home."
     ),
 ]
 CarriersOption = Annotated[
-    str, typer.Option(help="Where the carriers are: home, or reach (mobile carriers anywhere in their reach boxes).")
+    str, typer.Option(help="Positions of the carriers: home, or reach (mobile carriers anywhere in their reach boxes).")
 ]
 LengthsOption = Annotated[
     str | None,
@@ -70,11 +70,13 @@ LengthsOption = Annotated[
     ),
 ]
 SamplesOption = Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")]
-MethodOption = Annotated[str, typer.Option(help="How to sample: random, sobol, grid or adaptive.")]
+MethodOption = Annotated[str, typer.Option(help="Sampling method: random, sobol, grid or adaptive.")]
 SeedOption = Annotated[int, typer.Option(help="Seed of the random numbers.")]
 SizeOption = Annotated[
     float | None,
-    typer.Option(help="Edge of the smallest cells of the method adaptive [m]. Default: as small as the samples allow."),
+    typer.Option(
+        help="Smallest cell edge of the method adaptive [m]. Default: as small as the number of samples permits."
+    ),
 ]
 WorkersOption = Annotated[int, typer.Option(help="Number of processes on this machine.")]
 SchedulerOption = Annotated[str | None, scheduler_option()]
@@ -119,7 +121,7 @@ def workspace(
     mesh: MeshOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Sample which poses of a robot's platform fulfil a condition; the exit code is 1 if none does."""
+    """Sample the poses at which a condition holds; the exit code is 1 if there are none."""
     from ..base.execution import Execution
     from ..models import load
     from ..workspace import sample
@@ -134,7 +136,7 @@ def workspace(
     stored = checkpoint_of(checkpoint, resume)
     _check_files(target, figure, mesh, stored, define or [])
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
-        raise InputError(f"--mesh must be of a region in which only positions vary, got {mesh} of another")
+        raise InputError(f"--mesh requires a region in which only positions vary, got {mesh} of another")
     # Before the samples, so that an error in it is reported before hours of work.
     surface = None if mesh is None else _boundary(loaded, required, region)
     with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as show:

@@ -44,7 +44,7 @@ def test_lengths_that_no_pose_has_give_one():
     done = run("pose", "cogiro", "--lengths", text(lengths))
     assert done.returncode == 1
     assert "NO POSE FITS THE LENGTHS" in done.stdout
-    assert "The least credible length is that of cable" in done.stdout
+    assert "The most likely wrong length is that of cable" in done.stdout
 
 
 def test_three_cables_hang_and_too_short_ones_do_not():

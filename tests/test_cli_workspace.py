@@ -131,7 +131,7 @@ def test_checkpoint_then_resume(folder):
         (("--samples", "1e300"), "got 1e+300"),
         (("--condition", '{"kind": ["margin"]}'), "got ['margin']"),
         (("--mesh", "m.stl", "--box", "0 0 0; 1 1 0"), "low must be below high"),
-        (("--mesh", "m.stl", "--attitude", "0 0 0; 0 0 1"), "--mesh must be of a region in which only positions vary"),
+        (("--mesh", "m.stl", "--attitude", "0 0 0; 0 0 1"), "--mesh requires a region in which only positions vary"),
         (("--resume", "/proc/a"), "/proc/a: cannot be written (No such file or directory)"),
     ],
 )
