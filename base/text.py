@@ -40,6 +40,13 @@ def quantity(value: Number, unit: str = "", digits: int = DIGITS) -> str:
     return f"{_rounded(scale * float(value), digits)} {unit}".rstrip()
 
 
+def at_most(value: float, unit: str, resolution: float) -> str:
+    """Write the largest value of an error: "at most 2.5 mm", or "under 0.01 mm" below the resolution."""
+    if value < resolution:
+        return f"under {quantity(resolution, unit)}"
+    return f"at most {quantity(value, unit, digits=3)}"
+
+
 def quantity_row(values: Iterable[Number], unit: str = "", digits: int = DIGITS) -> str:
     """Write numbers separated by commas, and their unit once: "1, 2.5, 10 340 N"; `digits` as in `quantity`."""
     cells = list(values)

@@ -114,7 +114,9 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> Non
     of = f"of {len(robot.platform.dof)}"
     highest = f"{result['rank_level']} with the platform level, {result['rank_tilted']} tilted"
     reason = f" ({result['reason']})" if result["reason"] else ""
-    rank = f"rank {result['rank']} {of} at home{reason}; highest rank near home: {highest}"
+    rank = f"rank {result['rank']} {of} at home{reason}"
+    if result["rank"] < len(robot.platform.dof):
+        rank += f"; highest rank near home: {highest}"
     lines = [
         f"{result['name']}: {result['cables']} cables; carriers: {_count(result['carriers'])}",
         f"  mass {quantity(result['mass'], 'kg')}, weight {quantity(result['weight'], 'N')}, "

@@ -295,7 +295,7 @@ def _message(left: Durations | None) -> str:
         return ""
     if not left.exist:
         part = f"first {quantity(100 * left.at, '%', 3)}" if left.at else "start"
-        return f"none is feasible with the task's time law (decided by the {part} of the motion)"
+        return f"no duration is feasible with the task's time law (shown on the {part} of the motion)"
     upper = "" if left.longest == float("inf") else f", at most {quantity(left.longest, 's')}"
     return f"at least {quantity(left.shortest, 's')}{upper} with the task's time law"
 

@@ -1,4 +1,4 @@
-"""Forward time: a plant, wind, slack, sensors, faults and a controller make a flight, `simulate`."""
+"""Closed-loop simulation of a plan with wind, sensor noise, faults and a controller: `simulate`."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -15,5 +15,5 @@ __all__ = ["Conditions", "Execution", "Noise", "Simulation", "simulate"]
 if not TYPE_CHECKING:  # a type checker would accept any name
 
     def __getattr__(name: str) -> Any:
-        """Return what a former name stands for."""
+        """Return the object of a former name."""
         return moved_name("simulation", name)

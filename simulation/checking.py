@@ -1,4 +1,4 @@
-"""`check_command`: refuse what a controller of a user returned and no plant can follow, in one line."""
+"""`check_command`: refuse invalid commands of a user's controller with a one-line error."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..models.robot import Robot
 
 
 def check_command(command: Any, robot: Robot, flights: int, time: float) -> None:
-    """Check a command of all flights, or of the only one.
+    """Check a command of all runs, or of a single one.
 
     Raises
     ------
     InputError
-        If it is no `Command`, or has wrong shapes, numbers that are not finite or an unknown answer.
+        If it is no `Command`, or has wrong shapes, numbers that are not finite or an unknown status.
     """
     if not isinstance(command, Command):
         raise InputError(f"controller must return a Command from step, got {shown(command)} at t = {time:g} s")

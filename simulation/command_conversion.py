@@ -1,4 +1,4 @@
-"""`Orders`: what a plant is commanded in each period, from a controller's commands and the wind."""
+"""`Orders`: convert controller commands and wind to plant commands."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ FASTEST = 1e3  # [m/s], of the air
 
 
 class Orders:
-    """Translate commands.
+    """Convert controller commands to plant commands for each drive type.
 
-    Tensions are commanded as they are if the plant's drive has them, or winches that pull with a force. Elastic cables
-    without winches in their file are assumed to have some that measure their tension and reach it within the period:
-    core/plant/winch_lengths.c. Carriers are commanded for one instant; until the next they move as the reference does.
+    Drives of tensions and of winches with forces receive the tensions themselves. Elastic cables without winches in
+    their file are assumed to have winches that measure their tension and reach it within the period:
+    core/plant/winch_lengths.c. Carriers are commanded for one instant and move like the reference until the next.
 
     Parameters
     ----------
     plant
         The plant.
     conditions
-        Of the flights.
+        Conditions of the runs.
     seeds
-        One for each flight: of its wind.
+        Seed of the wind, one for each run.
     """
 
     def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int]):
@@ -88,7 +88,7 @@ class Orders:
 
 
 def _air(wind: Wind, times: np.ndarray, seed: int) -> np.ndarray:
-    """Return the velocity of the air of one flight, (K, 3) [m/s]; refuse what a user's function may return instead."""
+    """Return the velocity of the air in one run, (K, 3) [m/s]; refuse invalid results of a user's function."""
     try:
         velocity = np.asarray(wind(times, seed), dtype=float)
     except (TypeError, ValueError) as error:

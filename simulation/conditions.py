@@ -17,7 +17,7 @@ from .noise import Noise
 
 @dataclass(frozen=True)
 class Conditions(Displayed):
-    """Conditions of a simulation; `simulate` accepts each field by its name too.
+    """Conditions of a simulation. `simulate` also accepts each field by its name.
 
     Attributes
     ----------
@@ -27,25 +27,24 @@ class Conditions(Displayed):
     gusts
         Intensity of Dryden turbulence about a constant wind [m/s].
     noise
-        Of the sensors, see `Noise`, also as a mapping; default: none.
+        Sensor noise, a `Noise` or a mapping (default: none).
     events
-        What happens to the robot on the way, a line each: "cut 3 at 2.5", a cable tears (they count from 1; times in
-        [s]); "stick 2 at 1", its winch stops; "lose quad-1 at 2", the actuators of a carrier give nothing any more;
-        "miss 0.05 at 1.2", the controller is late.
+        Events, a string each: "cut 3 at 2.5", cable 3 breaks (counted from 1; times in [s]); "stick 2 at 1", its winch
+        stops; "lose quad-1 at 2", the actuators of a carrier stop; "miss 0.05 at 1.2", the controller does not respond.
     disturbance
         Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
     duration
-        [s]; default: that of the reference. A reference that ends earlier rests at its end.
+        Simulated time [s] (default: the reference's). After the end of the reference the robot holds its final pose.
     period
-        Of the controller [s].
+        Period of the controller [s].
     substeps
-        Runge-Kutta steps of the plant in a period; default: as many as the stiffness and the damping of the cables
-        require, see `steps.steps_in`.
+        Runge-Kutta steps of the plant per period (default: chosen by the stiffness and damping of the cables, see
+        `steps.steps_in`).
     drive
-        What the plant is commanded, see `Plant`; default: "forces" if all cables have winches, "lengths" if all stretch
-        or keep their lengths, else "tensions".
+        Type of command of the plant, see `Plant`; default: "forces" if all cables have winches, "lengths" if all are
+        elastic or of fixed length, otherwise "tensions".
     tolerance
-        Largest error of the position of a run that passes [m].
+        Largest position error allowed for a pass [m].
 
     Raises
     ------
@@ -65,7 +64,7 @@ class Conditions(Displayed):
     tolerance: float = 0.05
 
     def __post_init__(self) -> None:
-        """Check all that needs no robot."""
+        """Check everything that does not depend on the robot."""
         number("gusts", self.gusts, 0.0, 100.0)
         number("period", self.period, 1e-6, 10.0)
         number("tolerance", self.tolerance, 0.0, 1e6)

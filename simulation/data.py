@@ -1,4 +1,4 @@
-"""`SimulationData`: what a robot did along a reference, as numbers, which events, figures and reports read."""
+"""`SimulationData`: the numbers of a simulation, which events, figures and reports use."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_
 
 @dataclass(frozen=True, eq=False)
 class SimulationData(Displayed):
-    """Numbers of what a robot did along a reference, without figures, files and reports.
+    """Numbers of a simulation, without figures, files and reports.
 
     Attributes
     ----------
@@ -30,19 +30,19 @@ class SimulationData(Displayed):
     conditions
         References, faults and noise, see `Experiment`.
     seed
-        Of wind and noise.
+        Seed of wind and noise.
     record
-        What happened, a row for each period.
+        Motion, tensions and commands, a row for each period.
     lasted
-        How many periods the flight lasted, fewer than there are references if the motion grew beyond all numbers.
+        Number of simulated periods; smaller than the number of references if the simulation diverged.
     tolerance
-        Largest error of the position [m] of a flight that passes.
+        Largest position error allowed for a pass [m].
     wind
         Velocity of the air in {G} [m/s], (K, 3); None if there is no air.
     seconds
-        How long each step of the controller took [s], (K,).
+        Computing time of each step of the controller [s], (K,).
     wall
-        Wall time of the whole flight [s].
+        Wall time of the simulation [s].
     """
 
     robot: Robot
@@ -67,7 +67,7 @@ class SimulationData(Displayed):
 
     @property
     def _recorded(self) -> int:
-        """Return how many periods have a row: the first one has, also if the motion does not survive it."""
+        """Return the number of recorded periods: at least the first one, even if the simulation diverges in it."""
         return max(self.lasted, 1)
 
     @cached_property
@@ -83,27 +83,27 @@ class SimulationData(Displayed):
 
     @cached_property
     def slack(self) -> np.ndarray:
-        """Return where a cable is slack that should pull, (n, m)."""
+        """Return whether each cable with t_min > 0 is slack, (n, m)."""
         pulls = self.conditions.should_pull(self.robot.t_min, np.arange(self._recorded))
         return (self.record.tensions[: self._recorded] <= 0) & pulls
 
     @cached_property
     def above(self) -> np.ndarray:
-        """Return by how much tensions exceed t_max with its tolerance [N], (n, m); below zero where they do not."""
+        """Return the excess of tensions over t_max plus its tolerance [N], (n, m); negative inside."""
         robot = self.robot
         return self.record.tensions[: self._recorded] - robot.t_max - TENSION_TOLERANCE * (robot.t_max - robot.t_min)
 
     @property
     def passed(self) -> bool:
-        """Return whether the flight lasted, near its reference, with tensions inside their limits and cables taut."""
+        """Return whether the run is complete, near its reference, and keeps tension limits and taut cables."""
         return not self.failures
 
     @cached_property
     def failures(self) -> tuple[str, ...]:
-        """Return why the flight did not pass, a line each."""
+        """Return the reasons why the run failed, a line each."""
         lines = []
         if self.lasted < len(self.references):
-            lines.append(f"the motion grew beyond all numbers at t = {self.lasted * self.period:.3f} s")
+            lines.append(f"the simulation diverged at t = {self.lasted * self.period:.3f} s")
         at = int(self.error.argmax())  # the first nan, if there is one
         if np.isnan(self.error[at]):
             lines.append(f"no position at t = {self.times[at]:.3f} s")
@@ -128,17 +128,17 @@ class SimulationData(Displayed):
 
     @property
     def slack_s(self) -> float:
-        """Return for how long a cable was slack that should pull [s]."""
+        """Return the time with a slack cable whose t_min is above zero [s]."""
         return float(self.slack.any(axis=1).sum() * self.period)
 
     @property
     def answered(self) -> dict[str, int]:
-        """Return how many steps were answered in each way."""
+        """Return the number of control steps with each status."""
         counts = np.bincount(self.record.answered[: self._recorded], minlength=len(ANSWERS))
         return dict(zip(ANSWERS, counts.tolist(), strict=True))
 
     @property
     def handed_over(self) -> float | None:
-        """Return when computed torque took over [s], as the robot does not move as its controller predicts, or None."""
+        """Return when computed torque took over from predictive control [s], or None."""
         steps = np.flatnonzero(self.record.answered[: self._recorded] == OTHERWISE)
         return float(self.times[steps[0]]) if steps.size else None

@@ -1,4 +1,4 @@
-"""Events of a flight in the order of their times: faults, and where its limits were first exceeded."""
+"""Events of a simulation in order of time: faults, and the first instants at which limits were exceeded."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .data import SimulationData
 
 
 class Event(NamedTuple):
-    """Something that happened at a time [s].
+    """An event at a time [s].
 
     Its kind is "fault", "slack", "tension", "error" or "end".
     """
@@ -26,7 +26,7 @@ class Event(NamedTuple):
 
 
 def events(flight: SimulationData) -> list[Event]:
-    """Return the faults of a flight and the first instants at which a limit was exceeded, the earliest first."""
+    """Return the faults of a run and the first instants at which limits were exceeded, in order of time."""
     found = [Event(fault.at, "fault", _words(fault, flight)) for fault in flight.conditions.faults]
     if flight.slack.any():
         row, cable = np.argwhere(flight.slack)[0]
@@ -38,7 +38,7 @@ def events(flight: SimulationData) -> list[Event]:
         within = quantity(1e3 * flight.tolerance, "mm")
         found.append(Event(float(flight.times[np.argmax(beyond)]), "error", f"the error left {within}"))
     if flight.lasted < len(flight.references):
-        found.append(Event(flight.lasted * flight.period, "end", "the motion grew beyond all numbers"))
+        found.append(Event(flight.lasted * flight.period, "end", "the simulation diverged"))
     shown = [event for event in found if event.at <= max(flight.lasted, 1) * flight.period]
     return sorted(shown, key=lambda event: event.at)
 

@@ -1,4 +1,4 @@
-"""`Experiment`: the conditions of runs, laid out for one robot and one reference."""
+"""`Experiment`: the settings of all runs, for one robot and one reference."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ class Wind(Protocol):
     """A wind over time."""
 
     def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
-        """Return the velocity of the air at the times, (K, 3) [m/s]."""
+        """Return the wind at the times (K,) [s] for this seed, (K, 3) [m/s]."""
         ...
 
 
 class Experiment(NamedTuple):
-    """The conditions of runs along a reference, see `Conditions`.
+    """Settings shared by all runs: controller period, references, wind, noise and faults, see `Conditions`.
 
     Attributes
     ----------
     period
-        Of the controller [s].
+        Period of the controller [s].
     substeps
-        Runge-Kutta steps in a period.
+        Runge-Kutta steps per period.
     references
-        One for each period.
+        Reference of each period.
     wind
         Velocity of the air in {G} [m/s], a function of the times (K,) and a seed that returns (K, 3); None without
         air.
     disturbance
         Force [N] and moment about the CoM [N m] on the platform in {G}, (6,).
     noise
-        Of the sensors.
+        Sensor noise.
     faults
-        In the order of their times.
+        Faults in order of time.
     keep_out
-        Outlines of the regions that the reference keeps out of, see `Trajectory`.
+        Outlines of the keep-out regions of the reference, see `Trajectory`.
     """
 
     period: float
@@ -57,7 +57,7 @@ class Experiment(NamedTuple):
     __repr__ = record
 
     def should_pull(self, t_min: np.ndarray, periods: np.ndarray) -> np.ndarray:
-        """Return where a slack cable is a failure, (n, m): one with a lowest tension (m,) [N] that no fault has cut.
+        """Return where a slack cable is a failure, (n, m): t_min (m,) [N] is above zero and no fault has cut it.
 
         `periods`, (n,), are their numbers.
         """
@@ -72,7 +72,7 @@ class Experiment(NamedTuple):
         return result
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what the references do not hold, ready for JSON."""
+        """Return all settings except the references, ready for JSON."""
         return {
             "period": self.period,
             "substeps": self.substeps,

@@ -1,4 +1,4 @@
-"""`Fault`: something that breaks during a flight, from a line such as "cut 3 at 2.5"."""
+"""`Fault`: a fault during a simulation, from a string such as "cut 3 at 2.5"."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class Fault(NamedTuple):
     Attributes
     ----------
     kind
-        "cut": a cable tears; "stick": its winch holds it at its length; "lose": the actuators of a carrier give nothing
-        any more, such as the thrust of a quadrotor; "miss": the controller does not answer.
+        "cut": a cable breaks; "stick": its winch holds its length; "lose": the actuators of a carrier stop, such as the
+        thrust of a quadrotor; "miss": the controller does not respond.
     at
-        When it begins [s].
+        Time at which it begins [s].
     part
         Index of the cable or, for "lose", of the carrier, from 0; -1 for "miss".
     lasting
-        How long the controller does not answer [s].
+        Time during which the controller does not respond [s].
     """
 
     kind: str
@@ -42,21 +42,21 @@ def read_faults(robot: Robot, faults: Sequence[str], duration: float, name: str 
     Parameters
     ----------
     robot
-        The robot, whose cables count from 1 in `faults`, and whose carriers have names.
+        The robot. In `faults` its cables count from 1, and its carriers are named.
     faults
-        Lines: "cut 3 at 2.5", "stick 2 at 1", "lose quad-1 at 2", "miss 0.05 at 1.2" (times in [s]).
+        Strings: "cut 3 at 2.5", "stick 2 at 1", "lose quad-1 at 2", "miss 0.05 at 1.2" (times in [s]).
     duration
-        Of the flight [s]: faults begin before its end.
+        Simulated time [s]; faults must begin before its end.
     name
-        Of the argument, for errors.
+        Name of the argument, for errors.
 
     Raises
     ------
     InputError
-        If a line has another form, there is no such cable or carrier, or the flight ends before.
+        If a string has another form, there is no such cable or carrier, or the simulation ends earlier.
     """
     if isinstance(faults, str) or not isinstance(faults, Sequence):
-        raise InputError(f"{name} must be a list of texts, each {ACCEPTED}, got {shown(faults)}")
+        raise InputError(f"{name} must be a list of strings, each {ACCEPTED}, got {shown(faults)}")
     read = [_read(robot, text, f"{name}[{number}]") for number, text in enumerate(faults)]
     for number, fault in enumerate(read):
         if fault.at >= duration:
@@ -80,7 +80,7 @@ def _read(robot: Robot, text: object, where: str) -> Fault:
 
 
 def _with_actuators(robot: Robot, name: str, where: str) -> int:
-    """Return the index of a carrier that has actuators to lose."""
+    """Return the index of a carrier with actuators."""
     known = {carrier.name: index for index, carrier in enumerate(robot.carriers) if carrier.actuators}
     if name not in known:
         names = ", ".join(known) or "it has none"

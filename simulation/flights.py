@@ -1,4 +1,4 @@
-"""Many flights with one reference, each with its own seed: `fly_block`, and their dataset, `flights`."""
+"""Many runs with one reference, each with its own seed: `fly_block`, and their dataset, `flights`."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from .run_statistics import Extremes
 if TYPE_CHECKING:
     import xarray as xr
 
-# What is kept of a flight: the periods that it lasted, errors [m], tensions [N], by how much they exceed t_max in
-# proportion to the cable's range, the periods that begin with a slack cable, and those answered in each way.
+# The statistics of a run: its number of periods, errors [m], tensions [N], their excess over t_max relative to the
+# cable's range, the number of periods that begin with a slack cable, and the number of periods with each status.
 FIGURES = np.dtype(
     [
         ("lasted", "<i8"),
@@ -40,7 +40,7 @@ FIGURES = np.dtype(
 
 
 def copies(controller: Controller, count: int) -> list[Controller]:
-    """Return a controller for each of so many flights, or the one that accepts batches.
+    """Return a controller for each of `count` runs, or the given one if it accepts batches.
 
     Raises
     ------
@@ -54,13 +54,13 @@ def copies(controller: Controller, count: int) -> list[Controller]:
     except Exception as error:  # a user's object, and whatever it raises
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
-            f"controller must be one that can be copied for each of many runs, got {type(controller).__name__} "
-            f"({reason}): fly one run at a time, open such handles in reset, or give it __deepcopy__"
+            f"controller must be copyable for many runs, got {type(controller).__name__} "
+            f"({reason}): simulate one run at a time, open such handles in reset, or give it __deepcopy__"
         ) from None
 
 
 def fly_block(plant: Plant, controller: Controller, conditions: Experiment, seeds: Sequence[int]) -> np.ndarray:
-    """Fly a block of flights side by side, and return the figures of each, (N,) of `FIGURES`."""
+    """Simulate a block of runs in parallel, and return the statistics of each, (N,) of `FIGURES`."""
     robot = plant.robot
     kept = Extremes(conditions, robot.t_min, robot.t_max, len(seeds))
     lasted, _ = fly(plant, copies(controller, len(seeds)), conditions, seeds, kept)
@@ -73,13 +73,13 @@ def fly_block(plant: Plant, controller: Controller, conditions: Experiment, seed
 
 
 def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:
-    """Return which flights passed, (N,), from their figures: lasted, near the reference, with tensions in range."""
+    """Return which runs passed, (N,), from their statistics: complete, near the reference, with tensions in range."""
     lasted_near = (of["lasted"] == periods) & (of["error_max"] <= tolerance)
     return lasted_near & (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
 
 
 def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], tolerance: float, of: np.ndarray) -> xr.Dataset:
-    """Return the figures of all flights, (N,) of `FIGURES`, as a dataset, by their seeds."""
+    """Return the statistics of all runs, (N,) of `FIGURES`, as a dataset indexed by their seeds."""
     periods, period = len(conditions.references), conditions.period
 
     def over(values: np.ndarray, unit: str, about: str) -> Variable:
@@ -87,21 +87,23 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
 
     variables = {
         "passed": Variable(("seed",), passed(of, periods, tolerance), {"long_name": "error, tensions and slack hold"}),
-        "duration": over(of["lasted"] * period, "s", "how long the flight lasted"),
-        "error_rms": over(of["error_rms"], "m", "error of the position"),
-        "error_max": over(of["error_max"], "m", "largest error of the position"),
+        "duration": over(of["lasted"] * period, "s", "simulated time"),
+        "error_rms": over(of["error_rms"], "m", "rms position error"),
+        "error_max": over(of["error_max"], "m", "largest position error"),
         "tension_min": over(of["tension_min"], "N", "smallest tension"),
         "tension_max": over(of["tension_max"], "N", "largest tension"),
-        "slack_s": over(of["slack"] * period, "s", "how long a cable was slack that should pull"),
-        "answered": Variable(("seed", "answer"), of["answered"], {"long_name": "steps answered in each way"}),
+        "slack_s": over(of["slack"] * period, "s", "time with a slack cable whose t_min is above zero"),
+        "answered": Variable(
+            ("seed", "answer"), of["answered"], {"long_name": "number of control steps with each status"}
+        ),
     }
     coordinates = {"seed": Variable(("seed",), np.array(seeds)), "answer": Variable(("answer",), np.array(ANSWERS))}
-    attributes = {"title": f"towline flights of {robot.name}", "robot": to_yaml(robot), "tolerance_m": tolerance}
+    attributes = {"title": f"towline simulations of {robot.name}", "robot": to_yaml(robot), "tolerance_m": tolerance}
     return Contents(variables, coordinates, attributes).dataset()
 
 
 def summary(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return what `towline simulate --runs N --json` prints of many flights, ready for JSON."""
+    """Return the output of `towline simulate --runs N --json`, ready for JSON."""
     worst = dataset["error_max"].values
     return {
         "runs": int(dataset.sizes["seed"]),
@@ -116,7 +118,7 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def report(dataset: xr.Dataset) -> Report:
-    """Return the report of many flights: how many passed, then the facts behind it."""
+    """Return the report of many runs: how many passed, then the details."""
     short = summary(dataset)
     name = parse_yaml(dataset.attrs["robot"], Robot, "robot").name
     longest = quantity(float(dataset["duration"].values.max()), "s")
@@ -129,15 +131,15 @@ def report(dataset: xr.Dataset) -> Report:
         "tolerance": quantity(1e3 * float(dataset.attrs["tolerance_m"]), "mm"),
         "tensions": f"{quantity(float(dataset['tension_min'].values.min()), 'N')} to "
         f"{quantity(float(dataset['tension_max'].values.max()), 'N')}",
-        "slack": f"in {int((slack > 0).sum())} flights, up to {quantity(float(slack.max()), 's')}"
+        "slack": f"in {int((slack > 0).sum())} runs, up to {quantity(float(slack.max()), 's')}"
         if slack.any()
         else "none",
-        "steps answered": ", ".join(
+        "controller status": ", ".join(
             f"{quantity(int(count))} {answer}" for answer, count in zip(ANSWERS, counts, strict=True) if count
         ),
     }
     return Report(
-        about=f"{name}, {short['runs']} flights of {longest}",
+        about=f"{name}, {short['runs']} runs of {longest}",
         status="passed" if short["passed"] == short["runs"] else "failed",
         summary=f"{short['passed']} passed",
         parts=[Section("", list(rows.items()))],
@@ -145,7 +147,7 @@ def report(dataset: xr.Dataset) -> Report:
 
 
 def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:
-    """Save the numbers of many flights as NetCDF atomically; the same seeds give the same bytes.
+    """Save the statistics of many runs as NetCDF atomically; the same seeds give the same bytes.
 
     Raises
     ------

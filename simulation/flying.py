@@ -1,4 +1,4 @@
-"""Close the loop of plant, sensors and controller, for one flight or many side by side: `fly`."""
+"""Close the loop of plant, sensors and controller, for one run or many in parallel: `fly`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
 
 
 class Sensors:
-    """Sensors with noise, bias and delay, each flight with random numbers of its own."""
+    """Sensors with noise, bias and delay, with separate random numbers for each run."""
 
     def __init__(self, noise: Noise, seeds: Sequence[int], period: float, m: int):
         self._noise, self._delay = noise, round(noise.delay / period)
@@ -40,7 +40,7 @@ class Sensors:
         self._late: list[tuple[np.ndarray, np.ndarray]] = []
 
     def report(self, k: int, motions: np.ndarray, tensions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what sensors report in period `k` of motions (N, 1 + c, 12) and tensions (N, m)."""
+        """Return the sensor readings in period `k` for motions (N, 1 + c, 12) and tensions (N, m)."""
         if not (self._exact and self._exact_tensions):
             if k % DRAWN_AT_ONCE == 0:
                 size = (DRAWN_AT_ONCE, 12 + self._m)
@@ -56,7 +56,7 @@ class Sensors:
 
 
 class Pilot:
-    """The controllers of all flights: one that accepts batches, or one for each."""
+    """The controllers of all runs: one that accepts batches, or one for each."""
 
     def __init__(self, controllers: Sequence[Controller], flights: int, conditions: Experiment):
         self._controllers, self._alone = controllers, flights == 1
@@ -67,7 +67,7 @@ class Pilot:
         self.seconds: list[float] = []
 
     def step(self, time: float, motions: np.ndarray, tensions: np.ndarray, reference: Reference) -> Command:
-        """Return the command of the only flight, or those of all, and keep how long they took, per flight."""
+        """Return the command of the only run, or of all, and record the computing time per run."""
         start = perf_counter()
         if self._alone:
             command = self._controllers[0].step(time, _state(motions[0], tensions[0]), reference)
@@ -87,7 +87,7 @@ def _state(motions: np.ndarray, tensions: np.ndarray) -> State:
 
 
 def _stacked(commands: list[Command]) -> Command:
-    """Return the commands of all flights as one, or the first that is no command."""
+    """Return the commands of all runs as one, or the first invalid one."""
     for command in commands:
         if not isinstance(command, Command):
             return command
@@ -98,18 +98,18 @@ def _stacked(commands: list[Command]) -> Command:
 def fly(
     plant: Plant, controllers: Sequence[Controller], conditions: Experiment, seeds: Sequence[int], recorder: Recorder
 ) -> tuple[np.ndarray, list[float]]:
-    """Fly one flight for each seed, from the reference's beginning on, with a controller each or one for all.
+    """Simulate one run per seed from the beginning of the reference, with a controller for each or one for all.
 
     Returns
     -------
     tuple
-        How many periods each flight lasted, (N,): fewer than there are references where the motion grew beyond all
-        numbers, and 1 for those that did at once; and how long the steps of the controller took [s].
+        Number of simulated periods of each run, (N,), smaller than the number of references if it diverged (at least
+        1); and the computing times of the controller's steps [s].
 
     Raises
     ------
     InputError
-        If the controller returns what no plant can follow.
+        If the controller returns an invalid command.
     """
     robot, m, flights, period = plant.robot, plant.robot.m, len(seeds), conditions.period
     first = conditions.references[0]
@@ -172,9 +172,10 @@ def fly(
 
 
 def _held(command: Command, period: float) -> Command:
-    """Return what goes on a period after a command without another: tensions, and the velocities of carriers.
+    """Return the command for a period in which the controller does not respond.
 
-    A drive that hears nothing has no reason to return to the last pose, as the reference would if it were repeated.
+    It holds the tensions and continues the velocities of the carriers. Repeating the reference instead would move the
+    carriers back to their last pose.
     """
     pose, velocity, acceleration = (np.asarray(part, dtype=float) for part in command[1:4])
     return command._replace(
@@ -186,10 +187,10 @@ def _held(command: Command, period: float) -> Command:
 
 
 def _shape_of(part: Any) -> tuple[int, ...] | None:
-    """Return the shape of a part of a command, None of one that it does not have."""
+    """Return the shape of a part of a command, or None if it is missing."""
     return part.shape if type(part) is np.ndarray else None if part is None else np.shape(part)
 
 
 def _square(values: np.ndarray) -> float:
-    """Return the sum of squares; of large arrays without BLAS, whose threads would wait for each other."""
+    """Return the sum of squares, without BLAS for large arrays, since its threads would wait for each other."""
     return float(np.vdot(values, values) if values.size < FEW else np.einsum("ijk,ijk->", values, values))

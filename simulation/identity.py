@@ -1,4 +1,4 @@
-"""`identity`: a text by which a later process knows objects again, for checkpoints."""
+"""`identity`: a text that identifies objects in a later process, for checkpoints."""
 
 from __future__ import annotations
 

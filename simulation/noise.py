@@ -1,4 +1,4 @@
-"""`Noise`: what sensors add to what is, and how late they report it."""
+"""`Noise`: errors and delay of the sensors."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from ..models.part import Part
 
 
 class Noise(Part):
-    """Errors of the sensors, as in a YAML file; each number is a standard deviation of white noise, by default none.
+    """Errors of the sensors, as in a YAML file; each number is a standard deviation of white noise (default: 0).
 
-    The bias of a flight is drawn once, at its beginning.
+    The bias of a run is drawn once, at its beginning.
     """
 
     position: float = Field(default=0.0, ge=0, le=1e3, description="of the platform's position [m]")
@@ -22,7 +22,7 @@ class Noise(Part):
     position_bias: float = Field(default=0.0, ge=0, le=1e3, description="of the bias of the position [m]")
     attitude_bias: float = Field(default=0.0, ge=0, le=10, description="of the bias of roll, pitch and yaw [rad]")
     tension_bias: float = Field(default=0.0, ge=0, le=1e9, description="of the bias of the tensions [N]")
-    delay: float = Field(default=0.0, ge=0, le=10, description="of all sensors [s]; counted in whole control periods")
+    delay: float = Field(default=0.0, ge=0, le=10, description="of all sensors [s]; rounded to whole control periods")
 
     @property
     def of_motion(self) -> np.ndarray:

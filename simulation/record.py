@@ -1,4 +1,4 @@
-"""`Record`: all that happens in one flight."""
+"""`Record`: the complete history of one run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .recorder import Period
 
 
 class Record(Displayed):
-    """Keep motions, lengths, tensions and commands of one flight, a row for each period."""
+    """Record motions, lengths, tensions and commands of one run, a row for each period."""
 
     def __init__(self, robot: Robot, periods: int):
         carriers, m = len(robot.carriers), robot.m

@@ -1,4 +1,4 @@
-"""`Recorder`: whatever keeps what happens in flights, `Period` by `Period`."""
+"""`Recorder`: the interface of objects that record runs, `Period` by `Period`."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ..control import Command
 
 
 class Period(NamedTuple):
-    """A period of flights side by side, from its beginning on; the next one overwrites its arrays.
+    """A period of parallel runs, from its beginning on. The next one overwrites its arrays.
 
     Attributes
     ----------
     number
-        From 0.
+        Number of the period, from 0.
     alive
-        Which flights survive it, (N,); the others are over.
+        Runs that have not diverged at its end, (N,).
     motions, lengths
         As `core.sense` writes them.
     tensions
-        Their means over the period, (N, m) [N].
+        Mean tensions over the period, (N, m) [N].
     command
-        Of all flights; of a single one its arrays have no leading dimension.
+        Command of all runs; for a single run its arrays have no leading dimension.
     """
 
     number: int
@@ -38,5 +38,5 @@ class Recorder(Protocol):
     """A record of flights."""
 
     def take(self, period: Period) -> None:
-        """Keep what a period has to be kept for."""
+        """Record a period."""
         ...

@@ -1,4 +1,4 @@
-"""`Extremes`: what is kept of each of many flights: errors, extreme tensions, slack, and how steps were answered."""
+"""`Extremes`: statistics of each of many runs: errors, extreme tensions, slack, and the status of control steps."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from .recorder import Period
 
 
 class Extremes:
-    """Keep a few numbers of each flight while it is flown.
+    """Accumulate per-run statistics.
 
-    Each period costs a few operations on whole arrays; the properties reduce them to a number for each flight.
+    Each period takes a few operations on whole arrays. The properties reduce them to one number per run.
 
     Attributes
     ----------
     squares
-        Sum of the squared errors of the position [m^2], (N,).
+        Sum of the squared position errors [m^2], (N,).
     slack
-        How many periods begin with a slack cable that should pull, (N,).
+        Number of periods that begin with a slack cable whose t_min is above zero, (N,).
     answers
-        How many steps were answered in each way of `ANSWERS`, (N, 4).
+        Number of control steps with each status of `ANSWERS`, (N, 5).
     """
 
     def __init__(self, conditions: Experiment, t_min: np.ndarray, t_max: np.ndarray, flights: int):
@@ -59,7 +59,7 @@ class Extremes:
 
     @property
     def error_max(self) -> np.ndarray:
-        """Return the largest error of the position [m], (N,)."""
+        """Return the largest position error [m], (N,)."""
         return np.sqrt(self._largest)
 
     @property
@@ -76,5 +76,5 @@ class Extremes:
 
     @property
     def exceeded(self) -> np.ndarray:
-        """Return by how much tensions are above t_max at most, in proportion to the cable's range, at least 0, (N,)."""
+        """Return the largest excess of tensions over t_max relative to the cable's range, at least 0, (N,)."""
         return np.maximum(((self._most - self._t_max) / self._range).max(axis=1), 0.0)

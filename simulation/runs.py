@@ -1,4 +1,4 @@
-"""Fly one reference many times, each time with a seed of its own, on workers and with a checkpoint: `fly_many`."""
+"""Simulate one reference many times with different seeds, on workers and with a checkpoint: `fly_many`."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ Part = tuple[int, np.ndarray, float]  # of all flights: the first, figures, and 
 def fly_many(
     plant: Plant, controller: Controller, conditions: Experiment, seeds: range, tolerance: float, execution: Execution
 ) -> np.ndarray:
-    """Return the figures of a flight for each seed, (N,) of `FIGURES`: the same to the last bit for all workers.
+    """Return the statistics of one run per seed, (N,) of `FIGURES`; they do not depend on the workers.
 
     Raises
     ------
     InputError
-        If the controller cannot be copied, it or the wind cannot be sent to a process or stored, the checkpoint cannot
-        be used, or there is no such scheduler.
+        If the controller cannot be copied, controller or wind cannot be sent to a process or stored, the checkpoint
+        cannot be used, or the scheduler does not exist.
     SolverError
         If workers end before their work is done.
     """
@@ -78,24 +78,24 @@ def fly_many(
 
 
 class _Sizes:
-    """Choose how many flights the next block has, by the time that flights have taken."""
+    """Choose the number of runs of the next block from the time per run so far."""
 
     def __init__(self, each: float, workers: Callable[[], int] | None):
         self._each, self._longest, self._workers = each, SIDE_BY_SIDE, workers
 
     def learn(self, count: int, seconds: float) -> None:
-        """Use that a block of `count` flights took `seconds`."""
+        """Update the estimate: a block of `count` runs took `seconds`."""
         self._each, self._longest = seconds / count, FASTER * count
 
     def choose(self, left: int) -> int:
-        """Return the number for the next block if `left` flights have not been given away yet."""
+        """Return the number of runs of the next block if `left` runs remain."""
         if self._workers is not None:
             left = max(FEWEST, -(-left // (self._workers() * PARTS)))
         return max(1, min(SIDE_BY_SIDE, left, self._longest, int(BLOCK_TIME / max(self._each, 1e-9))))
 
 
 def _estimated(everything: tuple[Plant, Controller, Experiment], seeds: range) -> float:
-    """Return how long a flight takes by itself [s], from the first periods of one."""
+    """Return the estimated time of a single run [s], from its first periods."""
     plant, controller, conditions = everything
 
     def lasts(periods: int) -> float:  # the first of two loads what flights need
@@ -106,13 +106,13 @@ def _estimated(everything: tuple[Plant, Controller, Experiment], seeds: range) -
 
 
 def fly_part(everything: tuple[Plant, Controller, Experiment], first: int, seeds: range) -> Part:
-    """Fly a block; return the number of its first flight, its figures and how long it took [s]."""
+    """Simulate a block; return the number of its first run, its statistics and its time [s]."""
     start = perf_counter()
     return first, fly_block(*everything, seeds), perf_counter() - start
 
 
 def fly_packed(packed: bytes, first: int, seeds: range) -> Part:
-    """Fly a block in another process or thread, with a controller of its own."""
+    """Simulate a block in another process or thread, with a separate controller."""
     return fly_part(pickle.loads(packed), first, seeds)
 
 
@@ -131,7 +131,7 @@ def _packed(everything: tuple[Plant, Controller, Experiment], scheduler: str | N
 
 
 def _blocks(done: np.ndarray, sizes: _Sizes) -> Iterator[range]:
-    """Yield the flights still to be flown, block after block."""
+    """Yield the remaining runs, block after block."""
     edges = np.flatnonzero(np.diff(np.concatenate([[True], done, [True]]).astype(int))).reshape(-1, 2)
     left = int((~done).sum())
     for start, end in edges.tolist():
@@ -142,7 +142,7 @@ def _blocks(done: np.ndarray, sizes: _Sizes) -> Iterator[range]:
 
 
 def _header(plant: Plant, controller: Controller, conditions: Experiment, seeds: range) -> dict[str, Any]:
-    """Return everything that the figures depend on."""
+    """Return everything on which the statistics depend."""
     controller.reset()  # what an earlier flight has left in it
     references = [part for reference in conditions.references for part in reference if part is not None]
     motion = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in references)).hexdigest()
@@ -165,6 +165,6 @@ def _header(plant: Plant, controller: Controller, conditions: Experiment, seeds:
 
 
 def _named(wind: Wind) -> str:
-    """Return what identifies a wind, readable if it is not a function of a user."""
+    """Return an identification of a wind, readable unless it is a user's function."""
     known = f"{wind} " if isinstance(wind, ConstantWind) else ""
     return known + identity(wind)

@@ -1,4 +1,4 @@
-"""Fly a reference with a controller, once or many times: `simulate`."""
+"""Simulate a reference motion in closed loop, once or many times: `simulate`."""
 
 from __future__ import annotations
 
@@ -105,40 +105,40 @@ def simulate(
     execution: Execution | None = None,
     **options: Unpack[Options],
 ) -> Simulation | xr.Dataset:
-    """Simulate a robot along a reference: the plant, a controller, wind, sensors and events, step by step.
+    """Simulate a reference motion in closed loop, with wind, sensor noise and events.
 
     Parameters
     ----------
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
     reference
-        A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to stay at.
+        A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to hold.
     controller
-        Default: `ComputedTorque(robot)`. One run calls its `reset` and uses it as it is; many use copies, unless it
-        accepts batches.
+        Controller (default: `ComputedTorque(robot)`). A single run calls its `reset` and uses the object itself. Many
+        runs use copies, unless it accepts batches.
     wind, noise, events, duration
         As in `Conditions`.
     seed
-        Of wind and noise. The same seed gives the same run.
+        Seed of wind and noise. The same seed gives the same run.
     runs
-        How many runs, with the seeds from `seed` on; default: one.
+        Number of runs, with the seeds from `seed` on (default: one).
     conditions
-        `Conditions`; fields that are given by their names replace its own.
+        `Conditions`; arguments given by name replace its fields.
     execution
-        Where many runs are computed and stored, see `Execution`.
+        Workers and checkpoint of many runs, see `Execution`.
     options
         Other fields of `Conditions` and `Execution`, by their names. `faults` is the former name of `events`.
 
     Returns
     -------
     Simulation or xarray.Dataset
-        With `runs`, a dataset with the numbers of each run.
+        With `runs`, a dataset with the statistics of each run.
 
     Raises
     ------
     InputError
         If an argument has a wrong value, the reference belongs to another robot, the checkpoint cannot be written, is
-        damaged or of other runs, or there is no such scheduler.
+        damaged or belongs to other runs, or the scheduler does not exist.
     SolverError
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
@@ -172,10 +172,10 @@ def simulate(
 
 
 def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> tuple[Plant, Experiment]:
-    """Return the plant, and the conditions laid out along the reference; `events` is what the caller calls them."""
+    """Return the plant, and the conditions along the reference; `events` is their name in error messages."""
     trajectory = read_trajectory(robot, reference, meets.duration)
     if meets.duration is None and trajectory.duration is None:
-        raise InputError("duration must be the time of the flight [s] where the reference is a pose, got None")
+        raise InputError("duration must be the simulated time [s] if the reference is a pose, got None")
     period, lasting = meets.period, trajectory.duration if meets.duration is None else meets.duration
     assert lasting is not None
     periods = max(1, round(lasting / period))
@@ -210,7 +210,7 @@ def _references(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> list
 
 
 def _tensions_along(robot: Robot, platform: Motion, carriers: Motion) -> np.ndarray:
-    """Return the smallest tensions that a reference needs, (n, m) [N], or where there are none the nearest."""
+    """Return the smallest tensions for a reference, (n, m) [N]; where none exist, those with the closest wrench."""
     dynamics, mask = dynamics_of(robot), robot.dof_mask
     A = dynamics.wrench_matrix(platform[0], carriers[0]) * mask[:, None]
     w = dynamics.required_wrench(*platform, *carriers) * mask

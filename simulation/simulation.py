@@ -1,4 +1,4 @@
-"""`Simulation`: what a robot did along a reference, as data, dataset, file, figures and report."""
+"""`Simulation`: a simulated motion as data, dataset, file, figures and report."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from ..base.display import Fact, tensions_over_time
 from ..base.inputs import check_ending, file_path
 from ..base.netcdf import Contents, Variable, save_netcdf
-from ..base.text import quantity
+from ..base.text import at_most, quantity
 from ..control import ANSWERS
 from ..figures.drawn import Filmed
 from ..figures.outlines import outline_variables
@@ -30,13 +30,15 @@ if TYPE_CHECKING:
 
     from ..figures.animation import Scene
 
+RESOLVED = 0.01  # [mm]: the digits of a smaller position error mean nothing
+
 
 @dataclass(frozen=True, eq=False)
 class Simulation(SimulationData, Filmed, Reported):
-    """A flown motion; its numbers are those of `SimulationData`."""
+    """A simulated motion: the numbers of `SimulationData`, with files, figures and report."""
 
     def figures_of_merit(self) -> dict[str, Any]:
-        """Return what the flight is judged by, without times of the machine: the same for the same seed."""
+        """Return the result metrics, without wall times: the same seed gives the same metrics."""
         periods = np.arange(self._recorded)
         tensions = self.record.tensions[: self._recorded]
         pulling = tensions[~self.conditions.cut(self.robot.m, periods + 1)]  # where no cut falls inside the period
@@ -57,7 +59,7 @@ class Simulation(SimulationData, Filmed, Reported):
         }
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `towline simulate --json` prints, ready for JSON."""
+        """Return the output of `towline simulate --json`, ready for JSON."""
         micro = 1e6 * self.seconds
         return self.figures_of_merit() | {
             "step_us": {
@@ -70,7 +72,7 @@ class Simulation(SimulationData, Filmed, Reported):
 
     @cached_property
     def trajectory(self) -> xr.Dataset:
-        """Return the flight over time, with the variables of a plan and more, units as attributes.
+        """Return the motion over time: the variables of a plan and more, with units as attributes.
 
         Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
         """
@@ -97,12 +99,14 @@ class Simulation(SimulationData, Filmed, Reported):
             variables[name] = over(body, values[:, 0], unit, f"{name} of the platform frame in G")
             variables[f"carrier_{name}"] = over(base, values[:, 1:], unit, f"{name} of each carrier in G")
         wanted = np.stack([reference.pose for reference in references])
-        variables["reference_pose"] = over(body, wanted, "m, rad", "pose that the platform should have")
+        variables["reference_pose"] = over(body, wanted, "m, rad", "reference pose of the platform")
         stands = np.stack([reference.carrier_pose for reference in references])
-        variables["carrier_reference"] = over(base, stands, "m, rad", "pose that each carrier has in the reference")
-        variables["carrier_command"] = over(base, record.orders[rows], "m, rad", "pose that each carrier should have")
+        variables["carrier_reference"] = over(base, stands, "m, rad", "reference pose of each carrier")
+        variables["carrier_command"] = over(base, record.orders[rows], "m, rad", "commanded pose of each carrier")
         variables["tensions"] = over(cable, record.tensions[rows], "N", "cable tensions, means over the periods")
-        variables["tensions_commanded"] = over(cable, record.commanded[rows], "N", "what the controller orders")
+        variables["tensions_commanded"] = over(
+            cable, record.commanded[rows], "N", "tensions commanded by the controller"
+        )
         variables["cable_lengths"] = over(cable, record.lengths[rows], "m", "from anchor to attachment")
         variables["tensions_unlimited"] = over(cable, record.commanded[rows], "N", "the same as tensions_commanded")
         missing = np.nan_to_num(record.shortfall[rows])
@@ -112,14 +116,14 @@ class Simulation(SimulationData, Filmed, Reported):
             about = "mean acceleration of the platform that was not predicted, angles times the robot's length"
             variables["unexplained"] = over(("time",), record.unexplained[rows], "m/s^2", about)
         words = {"flag_values": np.arange(len(ANSWERS), dtype=np.int8), "flag_meanings": " ".join(_flags())}
-        about = {"long_name": "how the step was answered", **words}
+        about = {"long_name": "status of the control step", **words}
         variables["answered"] = Variable(("time",), record.answered[rows], about)
         actuators = [actuator.name for actuator in max((c.actuators for c in robot.carriers), key=len)]
         if actuators:
-            about = "what the actuators of each carrier are commanded"
+            about = "commands to the actuators of each carrier"
             variables["actuation"] = over(("time", "carrier", "actuator"), record.actuation[rows], "N, N m", about)
         if (gone := self.conditions.cut(self.robot.m, np.arange(self._recorded))).any():
-            variables["cut"] = Variable(cable, gone.astype(np.int8), {"long_name": "1 from when a cable is cut"})
+            variables["cut"] = Variable(cable, gone.astype(np.int8), {"long_name": "1 once the cable is cut"})
         if self.wind is not None:
             variables["wind"] = over(("time", "axis"), self.wind[rows], "m/s", "velocity of the air in G")
         variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
@@ -127,7 +131,7 @@ class Simulation(SimulationData, Filmed, Reported):
         variables |= outline_variables(self.conditions.keep_out)
         status = "passed" if self.passed else "failed"
         attributes = {
-            "title": f"{robot.name}, flight: {status}",
+            "title": f"{robot.name}, simulation: {status}",
             "status": status,
             "tolerance_m": self.tolerance,
             "robot": to_yaml(robot),
@@ -140,7 +144,7 @@ class Simulation(SimulationData, Filmed, Reported):
         return Contents(variables, coordinates, attributes)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the flight as NetCDF atomically; the same seed gives the same bytes.
+        """Save the motion as NetCDF atomically; the same seed gives the same bytes.
 
         Raises
         ------
@@ -150,7 +154,7 @@ class Simulation(SimulationData, Filmed, Reported):
         return save_netcdf(self._contents(), check_ending("file", file_path("file", file), ".nc"))
 
     def figures(self) -> dict[str, Figure]:
-        """Draw the flight, by the names of files: "flight", error, answers, wind and carriers over time; "tensions"."""
+        """Draw "flight" (error, controller status, wind and carriers over time) and "tensions", by file names."""
         from ..figures import flight
 
         return {"flight": flight.flight(self.trajectory), "tensions": flight.tensions(self.trajectory)}
@@ -165,9 +169,9 @@ class Simulation(SimulationData, Filmed, Reported):
         return scene(self.robot, self.trajectory, times)
 
     def _report(self) -> Report:
-        largest = f"error of at most {quantity(1e3 * self.error.max(), 'mm')}"
+        largest = f"position error {at_most(1e3 * self.error.max(), 'mm', RESOLVED)}"
         return Report(
-            about=f"{self.robot.name}, flight of {quantity(self.lasted * self.period, 's')}",
+            about=f"{self.robot.name}, simulation of {quantity(self.lasted * self.period, 's')}",
             status="passed" if self.passed else "failed",
             summary="; ".join(self.failures) or largest,
             parts=[Section("", self._facts())],
@@ -180,21 +184,22 @@ class Simulation(SimulationData, Filmed, Reported):
 
     def _facts(self) -> list[Fact]:
         merit, happened = self.figures_of_merit(), events(self)
-        rows = {"in this order": sentence(happened)} if happened else {}
+        rows = {"events": sentence(happened)} if happened else {}
         rows |= {
-            "error of the position": f"{quantity(1e3 * merit['error_rms'], 'mm')} rms, "
-            f"{quantity(1e3 * merit['error_max'], 'mm')} at most",
+            "position error": f"{quantity(1e3 * merit['error_rms'], 'mm', digits=3)} rms, "
+            f"{quantity(1e3 * merit['error_max'], 'mm', digits=3)} at most",
             "tensions": f"{quantity(merit['tension_min'], 'N')} to {quantity(merit['tension_max'], 'N')}",
             "slack": quantity(merit["slack_s"], "s"),
-            "steps answered": ", ".join(
+            "controller status": ", ".join(
                 f"{quantity(count)} {name}" for name, count in merit["answered"].items() if count
             ),
-            "controller": f"{np.median(1e6 * self.seconds):.0f} us a step, one every {quantity(self.period, 's')}",
+            "controller time": f"{np.median(1e6 * self.seconds):.0f} us per step, one step every "
+            f"{quantity(1e3 * self.period, 'ms')}",
         }
         if merit["handed_over"] is not None:
             rows["not as modelled"] = self._why()
         if merit["shortfall_max"] is not None:
-            rows["shortfall of the wrench"] = f"up to {quantity(merit['shortfall_max'], 'N')}"
+            rows["wrench shortfall"] = f"up to {quantity(merit['shortfall_max'], 'N')}"
         return list(rows.items())
 
     def _picture(self) -> str:
@@ -202,7 +207,7 @@ class Simulation(SimulationData, Filmed, Reported):
         return tensions_over_time(self.times, tensions, self.robot.t_min, self.robot.t_max)
 
     def _why(self) -> str:
-        """Return since when computed torque controls the robot instead of predictions, and why."""
+        """Return when and why computed torque took over from predictive control."""
         at = self.handed_over
         assert at is not None
         if at == 0:
@@ -215,5 +220,5 @@ class Simulation(SimulationData, Filmed, Reported):
 
 
 def _flags() -> list[str]:
-    """Return the answers as the CF conventions write them, without blanks."""
+    """Return the status words without blanks, as the CF conventions require."""
     return [answer.replace(" ", "_") for answer in ANSWERS]

@@ -1,4 +1,4 @@
-"""`steps_in`: how many Runge-Kutta steps a period needs."""
+"""`steps_in`: the number of Runge-Kutta steps per period."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ANGLE = 1.0  # what the fastest motion of the cables may turn or decay by in a s
 
 
 def steps_in(period: float, plant: Plant) -> int:
-    """Return how many steps in a period resolve the fastest motion of elastic cables at the robot's home.
+    """Return the number of steps per period that resolves the fastest motion of elastic cables at the robot's home.
 
     With the elongations e of taut cables, d2e/dt2 = -G (K e + C de/dt), where G has the accelerations along the cables
     that unit tensions cause; the largest eigenvalues of G K and G C bound frequency and decay.

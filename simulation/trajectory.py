@@ -1,4 +1,4 @@
-"""`Trajectory`: the reference of a flight over time, from a plan, its file, a path or a pose."""
+"""`Trajectory`: the reference of a simulation over time, from a plan, its file, a path or a pose."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class Trajectory(NamedTuple):
     Attributes
     ----------
     duration
-        How long it lasts [s]; None for a rest without an end.
+        Duration [s]; None for a pose to hold.
     at
-        Returns platform and carriers at times (n,) [s]: pose, velocity and acceleration, (n, 6) each, and (n, c, 6)
-        each.
+        Function of times (n,) [s] that returns pose, velocity and acceleration of the platform, (n, 6) each, and of the
+        carriers, (n, c, 6) each.
     tensions
-        Returns the planned tensions at times, (n, m) [N]; None if none are planned.
+        Function of times that returns the planned tensions, (n, m) [N]; None if none are planned.
     keep_out
-        For each region that a plan keeps out of, the lines that outline it, (n, 3) each in {G} [m].
+        For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
     """
 
     duration: float | None
@@ -49,12 +49,12 @@ class Trajectory(NamedTuple):
 
 
 def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
-    """Return what `reference` is over time.
+    """Return `reference` as a trajectory.
 
     Raises
     ------
     InputError
-        If it is none of the accepted kinds, or belongs to another robot.
+        If it has another type, or belongs to another robot.
     """
     if isinstance(reference, str | os.PathLike):
         return _of_dataset(robot, _loaded(reference))
@@ -127,7 +127,7 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
     if "phase_load" in dataset and (loads := read("phase_load", (-1,))).any():
         raise InputError(
-            f"reference must be a plan without loads, which flights do not carry, got one of {loads.max():g} kg"
+            f"reference must be a plan without loads, which simulations do not support, got one of {loads.max():g} kg"
         )
     first, *_ = str(dataset.attrs.get("robot", "")).splitlines() or [""]
     name = first.removeprefix("name:").strip().strip("\"'")

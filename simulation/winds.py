@@ -1,4 +1,4 @@
-"""Winds of flights: constant, with gusts, or a function of a user's own."""
+"""Winds of simulations: constant, with gusts, or a user's function."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ConstantWind:
 
 
 class Gusts(ConstantWind):
-    """Dryden turbulence about a mean wind, with half of the intensity upwards."""
+    """Dryden turbulence about a mean wind, with half the intensity vertically."""
 
     def __init__(self, velocity: np.ndarray, intensity: float):
         super().__init__(velocity)
@@ -47,7 +47,7 @@ class Gusts(ConstantWind):
 
 
 def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
-    """Return the wind of flights from what a user gives `simulate`, see there.
+    """Return the wind from the arguments of `simulate`, see there.
 
     Raises
     ------

@@ -39,7 +39,7 @@ def test_demo_shows_both_halves(demo):
     files = ["circle-flight.nc", "circle-free.nc", "circle-hovering.nc"]
     assert names == sorted(["base.png", "flight.png", "path.png", "tensions.png", *files])
     assert all(f"towline-demo/{name}" in done.stdout for name in names)
-    assert "wang-flying, flight of 10 s: PASSED" in free
+    assert "wang-flying, simulation of 10 s: PASSED" in free
     flight = xr.load_dataset(folder / "towline-demo" / "circle-flight.nc")
     assert np.linalg.norm(flight["pose"].values[:, :2] - 50, axis=1) == pytest.approx(
         1, abs=0.05

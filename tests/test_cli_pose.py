@@ -53,7 +53,7 @@ def test_three_cables_hang_and_too_short_ones_do_not():
     assert json.loads(done.stdout)["by_gravity"]
     done = run("pose", "wang-ctmrts", "--lengths", "0.1 0.1 0.1")
     assert done.returncode == 1
-    assert "NO REST WITH THESE LENGTHS" in done.stdout
+    assert "NO EQUILIBRIUM WITH THESE LENGTHS" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def test_report_of_a_feasible_plan_tells_what_the_audit_saw(free):
     assert "(limit 3 m/s^2)" in told["Carriers", "quad"]
     assert told["Audit", "instants"] == "10 001, one every 1 ms"
     assert seen.violation.max() < 1e-12
-    assert told["Audit", "worst violation"] == "0 N (tolerance 1e-6 N)"
+    assert told["Audit", "largest wrench error"] == "0 N (tolerance 1 uN)"
     assert number(told["Computation", "solving programs"]) == pytest.approx(free.solve_s, rel=1e-2)
     assert [(row[0], row[2]) for row in stages_table(free).rows] == [
         ("nonlinear program, 100 steps", f"solved in {free.iterations} iterations"),

@@ -285,7 +285,7 @@ def test_a_controller_of_ones_own_that_orders_nothing_lets_the_load_fall():
 
 def test_a_plan_whose_loads_the_plant_would_not_carry_is_refused(crane):
     loaded = crane.trajectory.assign(phase_load=("phase", [0.0, 12.0]))
-    with pytest.raises(InputError, match="without loads, which flights do not carry, got one of 12 kg"):
+    with pytest.raises(InputError, match="without loads, which simulations do not support, got one of 12 kg"):
         simulate("ipanema-1", loaded)
 
 
@@ -450,8 +450,8 @@ def test_a_flight_has_what_a_plan_has_and_reports_it(crane):
     flight = simulate("ipanema-1", crane, duration=0.01)
     assert set(crane.trajectory.variables) <= set(flight.trajectory.variables)
     report = flight.report().splitlines()
-    assert report[0].startswith("ipanema-1, flight of 0.01 s: PASSED")
-    named = ["error of the position", "tensions", "slack", "steps answered", "controller"]
+    assert report[0].startswith("ipanema-1, simulation of 0.01 s: PASSED")
+    named = ["position error", "tensions", "slack", "controller status", "controller time"]
     assert [line.strip()[: len(name)] for line, name in zip(report[1:], named, strict=True)] == named
     tensions = flight.record.tensions
     assert f"{tensions.min():.4g} N to {tensions.max():.4g} N" in report[2]

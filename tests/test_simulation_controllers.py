@@ -60,7 +60,7 @@ def test_a_second_run_starts_afresh(tmp_path, law):
 @pytest.mark.parametrize("others", [{}, {"workers": 2}, {"checkpoint": "runs"}])
 def test_many_runs_refuse_what_cannot_be_copied_in_one_line(tmp_path, monkeypatch, others):
     monkeypatch.chdir(tmp_path)
-    refused = pytest.raises(InputError, match="controller must be one that can be copied")
+    refused = pytest.raises(InputError, match="controller must be copyable")
     with socket.socket() as handle, refused as error:
         fly(Logging(handle), runs=3, **others)
     assert "Logging (cannot pickle 'socket' object)" in str(error.value)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from towline.base.text import column, quantity, quantity_range, quantity_row
+from towline.base.text import at_most, column, quantity, quantity_range, quantity_row
 
 WRITTEN = [
     (10337.2, "10 340"),
@@ -102,3 +102,9 @@ def test_a_column_has_equally_many_decimals():
     assert column([1.0, 20.125, -1e-9]) == ["1.00", "20.12", "0.00"]
     assert column([12345.6, 1.0, None, math.inf]) == ["12 346", "1", "-", "inf"]
     assert column([0.0, 0.0]) == ["0", "0"]
+
+
+def test_errors_below_their_resolution_have_no_digits():
+    assert at_most(0.00237, "mm", 0.01) == "under 0.01 mm"
+    assert at_most(12.3456, "mm", 0.01) == "at most 12.3 mm"
+    assert at_most(math.nan, "mm", 0.01) == "at most -"

@@ -13,24 +13,24 @@ from ...base.text import quantity
 
 @dataclass(frozen=True)
 class Excess(Displayed):
-    """One limit at the instant where it is exceeded by most. Its text is the sentence in a report.
+    """One limit at the instant where it is exceeded by most. As text it is a sentence of a report.
 
     Attributes
     ----------
-    limit
-        Its name in the task or the robot's file.
+        limit
+        Name of the limit in the task or the robot's file.
     about
         "cable 3", "quad1", "platform".
     time
-        [s]; None if it applies to no instant.
+                Instant [s]; None if the limit does not refer to one.
     value, bound
         The value and its bound, in `unit`; nan if there is no value.
-    unit
-        Of both.
+        unit
+        Unit of value and bound.
     accepted
-        On which side of the bound the value must be.
+        Side of the bound on which the value must be.
     why
-        More to know; empty: nothing.
+        Explanation; may be empty.
     """
 
     limit: str
@@ -45,6 +45,10 @@ class Excess(Displayed):
     def __str__(self) -> str:
         """Return "carrier_speed of quad1 must be at most 2 m/s, is 2.5 m/s at t = 1.250 s"."""
         at = "" if self.time is None else f" at t = {self.time:.3f} s"
+        body, _, region = self.about.partition(" outside ")
+        if self.limit == "keep_out" and region and self.value < 0:
+            required = f" (required distance: {quantity(self.bound, self.unit)})" if self.bound > 0 else ""
+            return f"{body} is {quantity(-self.value, self.unit)} inside the keep-out region {region!r}{at}{required}"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "
         value, bound = (quantity(number, self.unit, digits=6) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value

@@ -26,7 +26,7 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
     """Return the figures by the names of their files, without suffix; a figure without content is left out."""
     times = np.linspace(0.0, plan.scenario.duration, INSTANTS)
     drawn = {
-        "path": Drawing("Path of the platform and places of the carriers", plan_figures.path(trajectory)),
+        "path": Drawing("Path of the platform and positions of the carriers", plan_figures.path(trajectory)),
         "views": Drawing("From above and from the side", views(scene(plan.scenario.robot, trajectory, times))),
         "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from ...base.text import quantity, quantity_row
+from ...base.text import at_most, quantity, quantity_row
 from ...figures.drawing import Drawing
 from ...figures.report import Report, Section, Table
 from ...models.parsing import to_yaml
@@ -14,9 +14,10 @@ from ...solvers import Certificate
 from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
 from ..timing.fastest_law import FastestLaw
-from .motion_facts import Fact, millimetres, motion_facts, wind
+from .motion_facts import Fact, motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
+RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding
 
 
 def headline(plan: PlanData) -> str:
@@ -37,10 +38,10 @@ def sections(plan: PlanData) -> list[Section]:
     every = [
         Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
         Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
-        Section("What is at its limit along the path (s = 0 at its start, 1 at its end)", _bottlenecks(plan)),
+        Section("Active limits along the path (s = 0 at its start, 1 at its end)", _bottlenecks(plan)),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
-        Section("Robots of the uncertainty", _robots(plan)),
+        Section("Uncertain geometry", _robots(plan)),
         Section("Motion", motion_facts(plan)),
         Section("Carriers", _carriers(plan)),
         Section("Audit", _audit(plan)),
@@ -117,7 +118,7 @@ def report(plan: PlanData, drawings: Callable[[], Iterable[Drawing]] = tuple) ->
         drawings=drawings,
         files=[
             ("The robot's file", to_yaml(robot)),
-            ("The task with all keys (frame: world is {G})", to_yaml(task.in_file())),
+            ("Complete task, defaults included (frame: world is {G})", to_yaml(task.in_file())),
         ],
     )
 
@@ -150,7 +151,7 @@ def _of_the_motion(plan: PlanData) -> str:
 
 def _without_law(law: FastestLaw) -> str:
     if law.certificate is None:
-        return "one that only shows the path"
+        return "the motion only shows the path"
     return f"short by {quantity(law.certificate.shortfall, 'N')} at s = {law.at:.4g}, whatever the speed"
 
 
@@ -178,8 +179,8 @@ def _reasons(plan: PlanData) -> list[Fact]:
         if plan.law.certificate is None:
             facts.append(("search ended at", place))
         else:
-            facts.append(("worst place", f"{place}, where no time law is feasible"))
-        facts.append(("motion", f"the one below only shows the path, in {quantity(plan.duration, 's')}"))
+            facts.append(("worst position", f"{place}, where no time law is feasible"))
+        facts.append(("motion", f"the motion below only shows the path, in {quantity(plan.duration, 's')}"))
     if (certificate := plan.certificate) is not None:
         text, phase = certificate.text(_up(plan)), _in_phase(plan, certificate.time)
         facts += [
@@ -200,7 +201,7 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
     if relaxed.name == "duration":
         longer = relaxed.possible > relaxed.requested
         side, other = ("shortest", "; `towline time` computes the fastest time law") if longer else ("longest", "")
-        return "feasible duration", f"{fact}, about the {side} with the task's time law{other}"
+        return "feasible duration", f"{fact}, close to the {side} feasible one for this time law{other}"
     others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]
     return f"feasible {relaxed.name}", fact + (f", together with {', '.join(others)}" if others else "")
 
@@ -240,11 +241,12 @@ def _tensions(plan: PlanData) -> list[Fact]:
         above = values[nearest] - t_min[nearest] == inside[nearest]
         side = " above t_min" if above else " below t_max"
         required = plan.scenario.task.margin
+        part = "" if exist.all() else " elsewhere"
         also = f" ({quantity(required, 'N')} required)" * (required > 0)
         facts += [
-            ("smallest", located(int(values.argmin()), values)),
-            ("largest", located(int(values.argmax()), values)),
-            ("tension margin", f"{located(int(inside.argmin()), inside, side)}{also}"),
+            (f"smallest{part}", located(int(values.argmin()), values)),
+            (f"largest{part}", located(int(values.argmax()), values)),
+            (f"tension margin{part}", f"{located(int(inside.argmin()), inside, side)}{also}"),
         ]
     limits = zip(robot.t_min, robot.t_max, strict=True)
     pairs = list(dict.fromkeys(f"{quantity(low, 'N')} to {quantity(high, 'N')}" for low, high in limits))
@@ -255,7 +257,7 @@ def _tensions(plan: PlanData) -> list[Fact]:
 
 
 def _robots(plan: PlanData) -> list[Fact]:
-    """Return what tensions differ by between the robots of the uncertainty, and how many drawn ones keep the limits."""
+    """Return the spread of tensions due to the geometric uncertainty, and how many sampled robots keep the limits."""
     margin = plan.robust
     if margin is None:
         return []
@@ -267,10 +269,10 @@ def _robots(plan: PlanData) -> list[Fact]:
     return [
         (share, kept),
         (
-            "tensions differ",
+            "tension spread",
             f"by up to {quantity(margin.reach.max(), 'N')} {at}, {margin.factor:.3g} standard deviations",
         ),
-        ("drawn at random", f"{int(drawn.sum())} of {len(drawn)} robots have tensions inside their limits throughout"),
+        ("random samples", f"{int(drawn.sum())} of {len(drawn)} robots have tensions inside their limits throughout"),
     ]
 
 
@@ -280,7 +282,7 @@ def _jumps(plan: PlanData) -> list[Fact]:
     for time in plan.scenario.phases.jumps:
         after = int(np.searchsorted(plan.audit.times, time * (1 - SAME_TIME)))
         rise = np.abs(plan.audit.tensions[after] - plan.audit.tensions[after - 1]).max()
-        why = "the load changes with no phase on the ground beside it"
+        why = "the load changes between two phases off the ground"
         facts.append(("jump", f"by up to {quantity(rise, 'N')} at t = {time:.3f} s, where {why}"))
     return facts
 
@@ -321,10 +323,10 @@ def _audit(plan: PlanData) -> list[Fact]:
         worst += f" at t = {audit.times[audit.worst]:.3f} s"
     facts = [
         ("instants", f"{quantity(len(audit.times))}, one every {quantity(1e3 / audit.rate, 'ms')}"),
-        ("worst violation", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
+        ("largest wrench error", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
     ]
     if names := list(dict.fromkeys(limit.name for limit in plan.scenario.limits if limit.shown)):
-        facts.append(("also checked", ", ".join(names)))
+        facts.append(("other limits checked", ", ".join(name.replace("_", " ") for name in names)))
     if (drift := audit.drift) is not None:
         window = _error(drift.window_position, drift.window_attitude)
         after = f"platform error after {quantity(drift.window, 's', digits=2)} with the planned tensions: {window}"
@@ -337,7 +339,7 @@ def _error(position: float, attitude: float) -> str:
     """Return the largest error of a simulated platform, from [m] and [rad]."""
     if not np.isfinite([position, attitude]).all():
         return "the simulation diverges"
-    return f"at most {millimetres(position)} and {quantity(attitude * 1e3, 'mrad')}"
+    return f"{at_most(position * 1e3, 'mm', RESOLVED)} and {at_most(attitude * 1e3, 'mrad', RESOLVED)}"
 
 
 def _computation(plan: PlanData) -> list[Fact]:
