@@ -1,7 +1,7 @@
-"""One step of control: a measured state and a reference in, a command out.
+"""Controllers: each step maps a measured state and a reference to a command.
 
-`Controller` is the base of all controllers, `ComputedTorque` one for every robot, `Predictive` one that looks ahead,
-and `OpenLoop` the plan without sensors.
+`Controller` is their base class. `ComputedTorque` works for every robot, `Predictive` looks ahead, and `OpenLoop`
+commands the plan without sensors.
 """
 
 from .command import ANSWERS, Command

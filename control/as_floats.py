@@ -1,4 +1,4 @@
-"""What a controller is given, checked: `as_floats`, a state or a reference as arrays; `rows_of`, `is_time`."""
+"""Check the arguments of a controller: `as_floats`, a state or a reference as arrays; `rows_of`, `is_time`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
 
 
 def is_time(value: object) -> bool:
-    """Return whether a value is a number that can be a time [s]."""
+    """Return whether a value is a valid time [s]."""
     if type(value) is float:  # at a third of the time
         return abs(value) <= LATEST
     number: Any = value
@@ -27,7 +27,7 @@ def is_time(value: object) -> bool:
 
 
 def rows_of(state: State) -> int | None:
-    """Return how many robots a state is of, or None where its arrays have no leading dimension.
+    """Return the number of robots of a state, or None if its arrays have no leading dimension.
 
     Raises
     ------
@@ -41,14 +41,14 @@ def rows_of(state: State) -> int | None:
 
 
 def as_floats(given: Given, robot: Robot, rows: int | None) -> Given:
-    """Return a state or a reference whose arrays are NumPy's own, of float64; nan stays, for a sensor without a value.
+    """Return a state or a reference with NumPy arrays of float64; nan stays, for a sensor without a value.
 
     Parameters
     ----------
     robot
-        Whose it is.
+        Robot of the state or reference.
     rows
-        The leading dimension that arrays may have, or None if they have none.
+        Leading dimension that arrays may have, or None if they have none.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`boxes`: where carriers may be commanded to be, and `stay_inside` of them."""
+"""`boxes`: the positions that may be commanded to carriers; `stay_inside` keeps motions inside them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..models.robot import Robot
 
 
 def boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the least and largest coordinates of the places that carriers may reach, (c, 3) each [m]; None if any."""
+    """Return the smallest and largest coordinates of the carriers' reach, (c, 3) each [m]; None if it is unlimited."""
     each = [carrier.motion_limits.reach for carrier in robot.carriers]
     if not any(each):
         return None
@@ -17,7 +17,7 @@ def boxes(robot: Robot) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def stay_inside(carriers: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """Let the carriers' motions, (N, c, 3, 6), end at the sides of their boxes, (c, 3) [m]."""
+    """Clip the carriers' motions, (N, c, 3, 6), to their boxes, (c, 3) [m]."""
     place = carriers[:, :, 0, :3]
     outside = (place < low) | (place > high)
     if outside.any():

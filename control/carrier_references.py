@@ -1,4 +1,4 @@
-"""What a predictive controller moves of the carriers: where they leave their reference, or what cables leave them."""
+"""Coordinates of carriers that a predictive controller moves: deviations from references, or remaining freedoms."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are
 
 
 class Moved(ABC):
-    """Coordinates of carriers that a solution moves, with accelerations as its controls.
+    """Coordinates of carriers in a predictive solution, with their accelerations as controls.
 
     Attributes
     ----------
     freed
-        Carrier and coordinate of each that may leave the reference, (f, 2) or (0, 2).
+        Carrier and coordinate of each one that may leave the reference, (f, 2) or (0, 2).
     tethers
-        (k,) of `TETHER`, the carriers that cables of fixed length hold.
+        Carriers held by cables of fixed length, (k,) of `TETHER`.
     count
-        How many coordinates there are, f.
+        Number of coordinates, f.
     """
 
     freed: np.ndarray
@@ -42,48 +42,48 @@ class Moved(ABC):
 
     @abstractmethod
     def along(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
-        """Return them and two derivatives, (K, 3, f), of motions (K, 3, 6) and (K, c, 3, 6)."""
+        """Return the coordinates and two derivatives, (K, 3, f), for motions (K, 3, 6) and (K, c, 3, 6)."""
 
     @abstractmethod
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Return them and their rate, (2, f), `dt` [s] after the last step.
+        """Return the coordinates and their rates, (2, f), `dt` [s] after the last step.
 
         Parameters
         ----------
         measured
             (1 + c, 12), poses and velocities.
         reference
-            (3, f), what `along` returns of the reference.
+            (3, f), the result of `along` for the reference.
         """
 
     def under_way(self) -> np.ndarray:
-        """Return the accelerations of the stages that earlier commands decide, (d, f), less the reference's.
+        """Return the accelerations of the stages that earlier commands determine, (d, f), minus the reference's.
 
-        What is commanded now comes after these. Default: no stages.
+        A new command takes effect after these stages. Default: no stages.
         """
         return np.zeros((0, self.count))
 
     @abstractmethod
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
-        """Write how carriers should move, (c, 3, 6), with accelerations (f,), and the platform's (6,).
+        """Write the carrier references, (c, 3, 6), from accelerations (f,) and the platform's (6,).
 
-        The accelerations are those of the reference now, and what the solution adds to them.
+        The accelerations are those of the current reference plus the corrections of the solution.
         """
 
     @abstractmethod
     def rest(self, stage: float, carriers: np.ndarray) -> None:
-        """Write how carriers should move, (c, 3, 6), where there is no solution."""
+        """Write the carrier references, (c, 3, 6), without a solution."""
 
     def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
-        """Return how far they are off the reference (c, 3, 6) now, and how fast, as `reaction` has it, (2, c, 6).
+        """Return the current deviation from the reference (c, 3, 6) and its rate, (2, c, 6), for `reaction`.
 
-        None, the default, where each follows commands wherever it is.
+        The default is None: each carrier follows commands at any position.
         """
         return None
 
 
 class Freed(Moved):
-    """Coordinates of carriers whose place is commanded: a solution starts where the last command left them."""
+    """Coordinates of carriers with commanded positions: a solution starts from the last command."""
 
     def __init__(self, reach: np.ndarray, strongest: float, boxes: tuple[np.ndarray, np.ndarray] | None = None):
         self.freed = np.ascontiguousarray(np.argwhere(reach))
@@ -108,7 +108,7 @@ class Freed(Moved):
 
     @override
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Return them and their rate, (2, f): the reference's at first, then as ordered."""
+        """Return the coordinates and their rates, (2, f): first those of the reference, then as commanded."""
         place, rate, acceleration = self._placed
         if self.count and np.isfinite(self._placed).all():
             place += dt * rate + dt * dt / 2 * acceleration
@@ -129,7 +129,7 @@ class Freed(Moved):
 
     @override
     def rest(self, stage: float, carriers: np.ndarray) -> None:
-        """Let carriers come to rest."""
+        """Bring the carriers to rest."""
         slower = np.clip(-self._placed[1] / stage, -self._strongest, self._strongest)
         self.order(slower, np.zeros(self.count), np.zeros(6), carriers)
 
@@ -145,9 +145,9 @@ class Freed(Moved):
 
 
 class Flown(Freed):
-    """Coordinates of carriers that fly: a solution starts where they are measured.
+    """Coordinates of flying carriers: a solution starts from the measured state.
 
-    They turn before they accelerate, so that what is commanded beside the reference comes after a delay.
+    They turn before they accelerate, so commanded deviations from the reference take effect after a delay.
     """
 
     def __init__(self, reach: np.ndarray, strongest: float, delay: float, stage: float):
@@ -185,7 +185,7 @@ class Flown(Freed):
 
 
 class Tethered(Moved):
-    """Coordinates that cables of fixed length leave to carriers: a solution starts where they are measured."""
+    """Degrees of freedom of carriers held by cables of fixed length: a solution starts from the measured state."""
 
     def __init__(self, robot: Robot, delay: float, stage: float):
         self.freed = np.zeros((0, 2), dtype=np.int64)
@@ -239,12 +239,12 @@ class Tethered(Moved):
 
 
 def _tethers(robot: Robot) -> np.ndarray:
-    """Return the carriers that cables of fixed length hold, (c,) of `TETHER`.
+    """Return the carriers held by cables of fixed length, (c,) of `TETHER`.
 
     Raises
     ------
     InputError
-        If a carrier has none or more than three of them.
+        If a carrier has no cable or more than three of them.
     """
     lengths: Any = robot.fixed_lengths
     anchors, attachments = dynamics_of(robot).points(robot.home, robot.carrier_home)

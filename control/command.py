@@ -1,4 +1,4 @@
-"""`Command`: what a controller orders for the time until its next step."""
+"""`Command`: the output of a controller until its next step."""
 
 from __future__ import annotations
 
@@ -20,20 +20,19 @@ class Command(NamedTuple):
     Attributes
     ----------
     tensions
-        (..., m) [N], inside their limits and within the limit of their rates; little for a cable that counts as cut.
+        (..., m) [N], inside their limits and rate limits; small for a cable that is treated as cut.
     carrier_pose, carrier_velocity, carrier_acceleration
-        Where carriers are to be, (..., c, 6); those with thrusts of their own follow `actuation` instead.
+        Commanded motion of the carriers, (..., c, 6). Flying carriers follow `actuation` instead.
     answered
-        (...), how the step was answered, an index of `ANSWERS`: with the tensions that give the required wrench ("as
-        planned"), with an earlier plan ("shifted plan"), with those that miss it by least ("soft wrench"), with the
-        last command ("hold"), or by computed torque, because the robot does not move as a controller predicts ("not
-        as modelled").
+        (...), status of the step, an index of `ANSWERS`: tensions give the required wrench ("as planned"); an earlier
+        solution is used ("shifted plan"); tensions with the closest wrench ("soft wrench"); the last command is held
+        ("hold"); or computed torque, because the robot does not move as predicted ("not as modelled").
     direction, shortfall
-        Where no tensions inside the limits and rates give the required wrench: a direction along which they miss it,
-        (..., 6), and by how much [N], (...); nan elsewhere, which is the default. Where tensions would, but a carrier
-        that flies lacks thrust for them, only by how much.
+        If no tensions inside the limits and rates give the required wrench: the direction of the missing wrench,
+        (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying carrier has too
+        little thrust for them, only the size.
     actuation
-        Commands of the actuators of each carrier, (..., c, a); None if no carrier has any.
+        Commands to the actuators of each carrier, (..., c, a); None if no carrier has any.
     unexplained
         Mean acceleration of the platform that was not predicted, (...) [m/s^2], angles times the robot's length; nan
         from controllers that do not predict.

@@ -1,4 +1,4 @@
-"""`Pending`: commands that have not come true yet, or that no report has shown yet."""
+"""`Pending`: a queue of commands that have not taken effect yet, or are not visible in measurements yet."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Pending:
         self._time += dt
 
     def add(self, command: np.ndarray) -> None:
-        """Command numbers, (count,), from now on; the array is kept."""
+        """Add a command, (count,), from now on; the array is kept."""
         commands = self._commands
         commands.append((self._time, command))
         while len(commands) > 1 and commands[1][0] <= self._time - self._kept:

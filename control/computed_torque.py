@@ -1,4 +1,4 @@
-"""`ComputedTorque`: a wanted acceleration, the wrench that it needs, and the tensions that give it."""
+"""`ComputedTorque`: desired acceleration, the wrench required for it, and the tensions that produce this wrench."""
 
 from __future__ import annotations
 
@@ -39,56 +39,54 @@ CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot gi
 
 
 class ComputedTorque(Controller):
-    """Control a robot by its inverse dynamics, whatever its cables hang from.
+    """Control a robot by its inverse dynamics, with any carriers.
 
         a* = a_ref + Kd (v_ref - v) + Kp (x_ref - x) + Ki integral of (x_ref - x)
         t  = argmin |t - t_ref|^2    s.t.  A t = w(x, v, a*) - d,  t_min <= t <= t_max,  |t - t_last| <= rate dt
 
-    with d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state is answered:
-    with these tensions if there are any ("as planned"), else with those whose wrench is nearest ("soft wrench"), and a
-    state that is no state (nan from a sensor) with the last command, which goes to the planned tensions as fast as the
-    rate permits ("hold"). What is missing up to 0.1 % of the robot's weight counts as given; with fewer cables than
-    degrees of freedom, which never give all, up to 0.1 % along each cable and 10 % in all. Carriers follow the
-    reference, or help the tensions within their `reach`: so the loads of towing robots and of teams of quadrotors, with
-    fewer cables than degrees of freedom, do not swing. Quadrotors have loops of their own for place and attitude (see
-    `thrusts`).
+    with d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state gets a
+    command: these tensions if they exist (status "as planned"), otherwise those with the closest wrench ("soft
+    wrench"). For a state with nan it is the last command, which moves to the planned tensions as fast as the rate
+    permits ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted; with fewer cables than degrees of
+    freedom, 0.1 % along each cable and 10 % in all. Carriers follow the reference, or deviate from it within their
+    `reach` to help the tensions. This damps the swing of loads of towing robots and of teams of quadrotors, with fewer
+    cables than degrees of freedom. Quadrotors have separate loops for position and attitude (see `thrusts`).
 
     Parameters
     ----------
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
     bandwidth
-        w of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = w^2. Default: 10, but 1.5
-        for fewer cables than degrees of freedom, whose load swings with its carriers.
+        Bandwidth w of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = w^2. Default:
+        10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers.
     damping
-        z of the same: Kd = 2 z w.
+        Damping ratio z: Kd = 2 z w.
     integral
-        Ki [1/s^3], a number or one for each coordinate; it pauses while a step is not answered as planned.
+        Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
     observer
-        Bandwidth of the estimates of the disturbance, and of forces on flying carriers [rad/s]; 0: none are made.
+        Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no estimates.
     rate
-        Largest rate of change of tensions [N/s], a number or one for each cable; default: none.
+        Largest rate of change of tensions [N/s], a number or one for each cable (default: no limit).
     reach
-        How far carriers may go off their reference to help the tensions (see `core/control/compensation.c`): position
-        [m] and attitude [rad]; default: they follow it, but for fewer cables than degrees of freedom, where they may
-        go 0.5 m.
+        Largest deviation of carriers from their reference to help the tensions (see `core/control/compensation.c`):
+        position [m] and attitude [rad]. Default: 0, but 0.5 m with fewer cables than degrees of freedom.
     carrier_bandwidth, carrier_acceleration
-        Bandwidth of that motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
+        Bandwidth of this motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
-        Bandwidths of the loops of flying carriers [rad/s], see `thrusts`. Where carriers turn so late after their
-        orders that the attitude loop would be unstable (core/control/turning.c), it goes on with the inverse of that
-        lag.
+        Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`. If carriers turn so
+        late that the attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the inverse of
+        this lag.
     patience
-        How long a cable with a sensor may report no tension where one is commanded until it counts as cut [s], and the
-        others do without it. It is commanded its least tension then, and counts again once it reports some. Cables of a
-        fixed length never count as cut.
+        Time for which the sensor of a cable may report no tension, although one is commanded, until the cable is
+        treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again once
+        its sensor reports a tension. Cables of fixed length are never treated as cut.
     tension_loop
-        Bandwidth of a loop on measured tensions [rad/s], for winches that do not give the tensions that they are sent:
-        the command grows until sensors report what is wanted, inside the limits of tensions and rates. 0: none, where
-        the observer alone makes up for winches; 20 does in a tenth of a second what that does in a third.
+        Bandwidth of a loop on measured tensions [rad/s], for winches that do not deliver the commanded tensions: the
+        command is corrected until the sensors report the desired tensions, inside the limits of tensions and rates.
+        With 0 only the observer compensates, in a third of a second; with 20 it takes a tenth of a second.
     tension_lag
-        Time constant with which winches follow a command [s], at least 5 ms: the loop compares what is measured with
-        what was wanted then.
+        Time constant with which winches follow a command [s], at least 5 ms: the loop compares measurements with the
+        desired tensions of that time.
 
     Raises
     ------
@@ -146,22 +144,22 @@ class ComputedTorque(Controller):
 
     @property
     def disturbance(self) -> np.ndarray:
-        """Return the estimated force [N] and moment about the CoM [N m] beside cables and weight, (n, 6)."""
+        """Return the estimated disturbance force [N] and moment about the CoM [N m] on the platform, (n, 6)."""
         return self._platform["disturbance"].copy()
 
     @property
     def disturbance_of_carriers(self) -> np.ndarray:
-        """Return the estimated force on each flying carrier beside thrust, cables and weight, (n, c, 3) [N]."""
+        """Return the estimated disturbance force on each flying carrier, (n, c, 3) [N]."""
         return self._of_carriers["force"].copy()
 
     @property
     def uncontrolled(self) -> np.ndarray:
-        """Return what the controller cannot change at home: wrench directions (k, 6), moments over the length [N]."""
+        """Return wrench directions that the controller cannot change at home, (k, 6), moments over the length [N]."""
         return uncontrolled(self.robot, self._settings["reach"][: len(self.robot.carriers)])
 
     @property
     def cut(self) -> np.ndarray:
-        """Return which cables count as cut, (n, m)."""
+        """Return which cables are treated as cut, (n, m)."""
         return self._cables["is_cut"] > 0
 
     @property
@@ -170,7 +168,7 @@ class ComputedTorque(Controller):
         return self._problems
 
     def _begin(self, rows: int) -> None:
-        """Make the memory of one robot, or of as many as a batch has rows."""
+        """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
         self._first: float | None = None  # time of the first step
@@ -202,8 +200,8 @@ class ComputedTorque(Controller):
         Raises
         ------
         InputError
-            If the time is not later than that of the step before, an array does not have the shape of the robot's, or
-            another thread uses the controller.
+            If the time is not later than that of the previous step, an array has a wrong shape, or another thread uses
+            the controller.
         """
         with self._alone:
             return self._step(time, state, reference)
@@ -219,7 +217,7 @@ class ComputedTorque(Controller):
         return self._command(reference, tensions, answered, proof, np.ndim(state.pose) == 1)
 
     def _distribute(self) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """Return the tensions of this step's problem, (N, m) [N], how each row was answered, and what was missing."""
+        """Return the tensions of this step's problem, (N, m) [N], the status of each row, and the missing wrench."""
         problems = self._problems
         if problems.solve():
             return problems.tensions.copy(), self._as_planned, self._nowhere
@@ -252,10 +250,10 @@ class ComputedTorque(Controller):
         return dt, state, reference
 
     def _move_on(self, time: float, state: State, dt: float) -> tuple[float, np.ndarray | None]:
-        """Make the measured state that of now; return how long after the last it was measured [s], and itself if late.
+        """Predict the current state; return the time since the last measurement [s], and the measured state if late.
 
-        The observers compare it as it was measured: with one that is predicted they would correct what they predict,
-        and be unstable from the inverse of their bandwidth on.
+        The observers use the measured state. With a predicted state they would correct their own prediction and be
+        unstable for delays beyond the inverse of their bandwidth.
         """
         cables, measured = self._cables, self._measured
         seen = time if state.time is None else state.time
@@ -296,7 +294,7 @@ class ComputedTorque(Controller):
         proof: tuple[np.ndarray, np.ndarray],
         alone: bool,
     ) -> Command:
-        """Return the command of tensions (N, m) and the carriers' reference, which those that react or fly leave."""
+        """Return the command from tensions (N, m) and the carriers' reference, which compensating and flying ones leave."""
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
         if self._has_cut:
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
@@ -326,20 +324,20 @@ class ComputedTorque(Controller):
     def _with_thrust_lacking(
         self, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray]
     ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """Return how rows were answered, and what was missing, where carriers lack thrust for the tensions."""
+        """Return the status of each row and the missing thrust, where carriers have too little for the tensions."""
         lacking = self._of_carriers["lacking"].max(axis=1)
         lacks = (answered == PLANNED) & (lacking > self._negligible)
         return np.where(lacks, SOFT, answered).astype(np.int8), (proof[0], np.where(lacks, lacking, proof[1]))
 
     def _sent(self, wanted: np.ndarray) -> np.ndarray:
-        """Return what winches are sent so that tensions are as wanted, (N, m) [N]."""
+        """Return the commands to the winches that produce the desired tensions, (N, m) [N]."""
         if self._loop is None:
             return wanted
         reports = self._cables["measured"] if self._senses else None
         return self._loop.sent(self._elapsed, wanted, self._cables["then"], reports, self.cut)
 
     def _take(self, state: State, reference: Reference) -> tuple[State, Reference]:
-        """Copy a state and a reference to where the core reads them, and return them as arrays."""
+        """Copy a state and a reference to the memory of the core, and return them as arrays."""
         self._senses = state.tensions is not None
         try:
             control_take(state, reference, *self._inputs)
@@ -350,7 +348,7 @@ class ComputedTorque(Controller):
         return state, reference
 
     def _answer_others(self) -> np.ndarray:
-        """Give rows without tensions a command, and return how each row was answered."""
+        """Give rows without tensions a command, and return the status of each row."""
         problems, force = self._problems, self.robot.force_scale
         if self._few:
             # What is missing along a cable, tensions would give if limits let them; the rest is for the carriers.

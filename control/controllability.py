@@ -1,4 +1,4 @@
-"""`uncontrolled`: the wrenches that neither tensions nor carriers can change."""
+"""`uncontrolled`: wrench directions that neither tensions nor carriers can change."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ NONE = 1e-6  # of the largest singular value
 
 
 def uncontrolled(robot: Robot, reach: np.ndarray) -> np.ndarray:
-    """Return wrench directions that a robot at rest at home cannot change, (k, 6), moments over its length [N].
+    """Return the wrench directions that a robot at rest at home cannot change, (k, 6), moments over its length [N].
 
-    To first order, by tensions, and by carriers that move where their `reach`, (c, 6) [m, rad], is not zero while the
-    tensions stay. A motion along such a direction of a towed load swings, and no controller damps it.
+    To first order the wrench changes with the tensions, and, at constant tensions, with the coordinates of carriers
+    whose `reach`, (c, 6) [m, rad], is not zero. A towed load swings along the returned directions, and no controller
+    damps it.
     """
     dynamics, home = dynamics_of(robot), robot.carrier_home
     found = tensions(robot, robot.home, method="soft-wrench").tensions

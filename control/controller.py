@@ -1,4 +1,4 @@
-"""`Controller`: the base of all controllers."""
+"""`Controller`: the base class of all controllers."""
 
 from __future__ import annotations
 
@@ -11,32 +11,33 @@ from .state import State
 
 
 class Controller(ABC):
-    """One step: a time, a measured state and a reference in, a command out. docs/adding-a-controller.md has an example.
+    """Base class of controllers: `step` maps time, measured state and reference to a command.
 
-    A controller has memory of its own (integrals, the last command), which `reset` erases; a simulation calls it first.
+    A controller may have memory (integrals, the last command), which `reset` clears; a simulation calls it first. For
+    an example see docs/adding-a-controller.md.
 
     Attributes
     ----------
     batches
-        Whether `step` accepts states with a leading dimension, a robot in each row, and answers each row as it answers
-        it alone. Controllers that do not are copied for each flight of a simulation of many.
+        True if `step` accepts states with a leading dimension, a robot in each row, and treats every row independently.
+        Otherwise each of many runs uses a copy.
     """
 
     batches = False
 
     @abstractmethod
     def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the command for the time [s] from now until the next step."""
+        """Return the command from the time [s] until the next step."""
 
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
-        """Receive the references of the times to come; default: they are not needed.
+        """Receive the future references; the default ignores them.
 
         Parameters
         ----------
         references
-            One for each period, from `start` [s] on; the last one holds afterwards.
+            Reference of each period, from `start` [s] on; the last one holds afterwards.
         period
-            [s].
+            Period [s].
         """
         return
 

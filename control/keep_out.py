@@ -1,4 +1,4 @@
-"""`Surroundings`: the tube that a platform should stay in, and the bodies that it should keep out of."""
+"""`Surroundings`: a tube and keep-out bodies for the platform."""
 
 from __future__ import annotations
 
@@ -26,16 +26,15 @@ class _Bodies(Part):
 
 
 class Surroundings:
-    """Write soft rows for the place of the platform at the end of each stage.
+    """Write soft constraints for the platform's position at the end of each stage.
 
-    One row keeps the frame inside the tube, and one for each body keeps the nearest of the platform's points, its frame
-    and its attachments, out of it: each on its side of a plane, which touches the tube or the body where the guess is
-    nearest.
+    One row keeps the frame inside the tube. One row for each body keeps the closest of the platform's points (frame and
+    attachments) outside. Each uses a plane that touches the tube or the body at the point closest to the guess.
 
     Attributes
     ----------
     rows
-        How many there are in each stage.
+        Number of rows in each stage.
 
     Raises
     ------
@@ -53,7 +52,7 @@ class Surroundings:
         self.rows = len(self._bodies) + (self._tube is not None)
 
     def write(self, horizon: Any, states: np.ndarray, wanted: np.ndarray, penalty: float) -> None:
-        """Write the rows about guessed states, with the cost of a metre beyond them [1/m]; both states (N + 1, n)."""
+        """Write the rows about guessed states, with the cost per metre of violation [1/m]; both states (N + 1, n)."""
         poses = states[1:, :6]
         index = 0
         if self._tube is not None:

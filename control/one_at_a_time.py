@@ -1,4 +1,4 @@
-"""`OneAtATime`: what one thread does, and a second one is refused meanwhile."""
+"""`OneAtATime`: a block that one thread runs at a time."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from ..base.errors import InputError
 
 
 class OneAtATime:
-    """A block of a controller's code that one thread runs at a time; a copy of it is free.
+    """Let only one thread at a time run a block of a controller; a copy is unlocked.
 
-    The steps of a controller follow each other in time: those of two threads would mix two robots in one memory.
+    The steps of a controller follow each other in time. Steps of two threads would mix two robots in one memory.
     """
 
     def __init__(self):

@@ -1,4 +1,4 @@
-"""`OpenLoop`: the plan as it is, whatever the sensors report."""
+"""`OpenLoop`: the plan without feedback."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .state import State
 
 
 class OpenLoop(Controller):
-    """Order the planned tensions and the planned motion of the carriers: what a controller has to be better than.
+    """Command the planned tensions and the planned motion of the carriers: a baseline for controllers.
 
     Parameters
     ----------
     robot
-        A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly: nothing
-        stays in the air without sensors.
+        A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly, because
+        flying requires feedback.
 
     Raises
     ------
     InputError
-        If the robot has carriers with thrusts of their own.
+        If the robot has flying carriers.
     """
 
     batches = True
@@ -50,14 +50,14 @@ class OpenLoop(Controller):
         Parameters
         ----------
         time, state
-            Do not matter, but for the leading dimension of the state.
+            Ignored, except for the leading dimension of the state.
         reference
             The plan at this time.
 
         Raises
         ------
         InputError
-            If state or reference are none, or an array of theirs does not have the shape of the robot's.
+            If state or reference are invalid, or one of their arrays has a wrong shape.
         """
         rows = rows_of(required("state", state, State))
         reference = as_floats(required("reference", reference, Reference), self.robot, rows)

@@ -1,4 +1,4 @@
-"""`Predictive`: tensions that are best over the next stages, with their limits and those of carriers."""
+"""`Predictive`: model predictive control with limits of tensions and carriers."""
 
 from __future__ import annotations
 
@@ -44,64 +44,63 @@ NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
 
 
 class Predictive(ComputedTorque):
-    """Control a robot by its motion over the next stages, with the limits of its tensions.
+    """Control a robot by model predictive control within its tension limits.
 
         min  sum of |x - x_ref|^2 + |u - u_ref|^2 over the stages     s.t.  the robot's dynamics,  t_min <= t <= t_max
 
-    Controls are tensions and accelerations of the carriers that may leave their reference, so that the problem has only
-    bounds and is always feasible. Each step linearises the dynamics about the last solution, shifted in time, and
-    solves one quadratic program (`solvers.horizon`): a real-time iteration. Disturbances are estimated as by
-    `ComputedTorque`, and are predicted to stay.
+    The controls are the tensions, and the accelerations of the carriers that may leave their reference, so the problem
+    has only bounds and is always feasible. Each step linearises the dynamics about the last solution, shifted in time,
+    and solves one quadratic program (`solvers.horizon`): a real-time iteration. Disturbances are estimated as by
+    `ComputedTorque` and predicted to be constant.
 
-    Each step is answered with the solution ("as planned"), or else with the last one, as long as it lasts ("shifted
-    plan"), or as a `ComputedTorque` with its own usual gains answers ("soft wrench", "hold"), which runs beside.
+    Each step uses the new solution (status "as planned"), or the last one while it lasts ("shifted plan"), or the
+    command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold").
 
-    The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. Where a tenth
-    of the weight is left unexplained, in the mean of some 50 ms, or there is no solution for that long, or noise of the
-    velocity requires more tension than limits permit, or carriers turn too late (core/control/turning.c), this
-    `ComputedTorque` controls the robot until `reset` ("not as modelled"). It does from the start, with a warning, where
-    the loop is unstable at home with carriers that turn before they accelerate: with cables that begin below their CoM.
+    The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. This
+    `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight is unexplained over about
+    50 ms, if there is no solution for that long, if noise of the velocity requires more tension than the limits permit,
+    or if carriers turn too late (core/control/turning.c). It controls the robot from the start, with a warning, if the
+    loop is unstable at home because carriers turn before they accelerate, as with cables that begin below their CoM.
 
     Parameters
     ----------
     robot
-        A `Robot`, the name of one in the library, or the path of a robot file. No carrier has more than three cables of
-        fixed length.
+        A `Robot`, the name of one in the library, or the path of a robot file. A carrier may have at most three cables
+        of fixed length.
     bandwidth
-        With which errors decay where no limit is near [rad/s], a number or one for each coordinate of the pose.
-        Default: 40, but less where carriers have to correct errors: 8 of teams with cables of fixed length, 6 of towing
-        robots with winches.
+        Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose. Default: 40,
+        but less if carriers correct errors: 8 for teams with cables of fixed length, 6 for towing robots with winches.
     stages, stage
-        How many there are, and how long each lasts [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may leave
-        their reference, which takes longer, and of 0.025 s where they have to correct errors.
+        Number of stages, and duration of each [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may leave their
+        reference, which is slower, and of 0.025 s if carriers correct errors.
     reach
-        How far carriers should leave their reference at most: position [m] and attitude [rad]. A weight, and no limit:
-        there a carrier costs as much as 5 % of the robot's weight in a tension. Less than 2 % of the cables' length
-        counts as that where these have fixed lengths. Default: they follow their reference, but where they correct
-        errors they may leave it by 6 % of the cables' length. One that flies and does not have to correct is moved by
-        the reaction of `ComputedTorque`, not by the solution.
+        Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft scale, not
+        a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's weight. With cables
+        of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables' length if carriers
+        correct errors. A flying carrier that does not correct errors is moved by the compensation of `ComputedTorque`,
+        not by the solution.
     carrier_bandwidth, carrier_acceleration
-        With which those return [rad/s], default: 2, but 6 where they correct, and their largest acceleration beside the
-        reference's [m/s^2 and rad/s^2].
+        Bandwidth with which these carriers return [rad/s] (default: 2, but 6 if carriers correct errors), and their
+        largest acceleration in addition to the reference's [m/s^2 and rad/s^2].
     tube
-        How far the platform should be from its reference at most [m]; default: no limit.
+        Largest distance of the platform from its reference [m] (default: no limit).
     keep_out
-        Bodies in {G} that the platform's frame and attachments should stay out of, as in a task's `keep_out`. Tube and
-        bodies are kept wherever tensions can, by exact penalties; the reference may pass through a body.
+        Bodies in {G} that the platform's frame and attachments should avoid, as in a task's `keep_out`. Exact penalties
+        enforce tube and bodies wherever the tensions allow. The reference may pass through a body.
     observer
-        Bandwidth of the estimates of disturbances [rad/s], 0: none; default: 60, but 20 where carriers correct.
+        Bandwidth of the estimates of disturbances [rad/s], 0: none. Default: 60, but 20 if carriers correct errors.
     rate, place, attitude, patience, tension_loop, tension_lag
         See `ComputedTorque`.
 
     Attributes
     ----------
     handed_over
-        When computed torque took over and why, a `HandOver`; default: it did not.
+        Time and reason of a hand-over to computed torque, a `HandOver`; None without one.
 
     Raises
     ------
     InputError
-        If an argument has a wrong value, or a carrier none or more than three cables of fixed length.
+        If an argument has a wrong value, or a carrier has no cable or more than three cables of fixed length.
     """
 
     batches = False
@@ -172,7 +171,7 @@ class Predictive(ComputedTorque):
             warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
 
     def _mobility(self, far: np.ndarray, flies: np.ndarray) -> tuple[Moved, np.ndarray]:
-        """Return how carriers move that may go as `far`, (c, 3) [m], and how far the coordinates of that may, (f,)."""
+        """Return the coordinates of carriers that may deviate by `far`, (c, 3) [m], and their largest deviations, (f,)."""
         # What is under way for longer than half of the stages would leave nothing to decide.
         delay = min(2.0 / self._attitude, self._times[-1] / 2), self._steps[0]
         if self.robot.fixed_lengths is None:
@@ -183,7 +182,7 @@ class Predictive(ComputedTorque):
         return moved, np.full(moved.count, max(far.max(), least))
 
     def _program(self, reaches: np.ndarray, returning: float) -> Horizon:
-        """Return the program of every step, with the costs that all share."""
+        """Return the program of all steps, with their common costs."""
         count, m, f = self._sizes[0], self.robot.m, self._moved.count
         A, B = self._at_home()
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
@@ -212,7 +211,7 @@ class Predictive(ComputedTorque):
         return A[0], B[0]
 
     def _ripple(self) -> np.ndarray | None:
-        """Return tensions that unit rates require, over their distance from limits at home, (m, 6) [s/m]."""
+        """Return the tensions that unit rates require, relative to their distance from limits at home, (m, 6) [s/m]."""
         low, high, _ = self._limits
         best = tensions_at(self.robot, self.robot.home, method="largest-margin")
         if best.tensions is None:
@@ -235,15 +234,15 @@ class Predictive(ComputedTorque):
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
-        """Receive the references of the times to come, which the stages look ahead to.
+        """Receive the future references for the prediction.
 
         Parameters
         ----------
         references
-            One for each period, from `start` [s] on; between them accelerations change evenly, and beyond the last one
-            they stay.
+            Reference of each period, from `start` [s] on. Accelerations are interpolated linearly, and constant after
+            the last one.
         period
-            [s].
+            Period [s].
 
         Raises
         ------
@@ -284,7 +283,7 @@ class Predictive(ComputedTorque):
         return command._replace(unexplained=unexplained)
 
     def _compare(self, time: float, dt: float, reference: Reference) -> None:
-        """Compare the motion with predictions, and hand over where it is another."""
+        """Compare the motion with the prediction, and hand over if they differ."""
         if not np.isfinite(self._problems.w).all():
             self._watch.interrupt()
             return
@@ -301,7 +300,7 @@ class Predictive(ComputedTorque):
 
     @staticmethod
     def _agree(sender: ComputedTorque, other: ComputedTorque) -> None:
-        """Let another controller of the same robot know what one has sent as if it were its own."""
+        """Tell another controller of the same robot the command that was sent, as if it were its own."""
         other._cables["last"], other._actuation[:] = sender._cables["last"], sender._actuation
         other._accelerations[:] = sender._accelerations
         other._platform["attitude"] = sender._platform["attitude"]
@@ -310,7 +309,7 @@ class Predictive(ComputedTorque):
     @property
     @override
     def problems(self) -> InPlace:
-        """Return the problem of the computed torque beside: wrench matrix, wrench and bounds of the tensions."""
+        """Return the problem of the parallel computed torque: wrench matrix, wrench and bounds of the tensions."""
         return self._beside.problems
 
     def _predict(self, time: float, dt: float, reference: Reference) -> np.ndarray | None:
@@ -366,7 +365,7 @@ class Predictive(ComputedTorque):
     def _shifted(
         self, time: float, start: np.ndarray, wanted: np.ndarray, planned: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return states and controls about which the dynamics are linear: those of the last solution, or a decay."""
+        """Return the states and controls for the linearisation: the last solution, or a decay of the error."""
         late, count = (time - self._solved) / self._steps[0], len(self._steps)
         if time - self._solved <= self._times[-1]:  # as where a command is taken from it
             first = np.minimum(np.arange(count + 1) + int(late), count)
@@ -383,7 +382,7 @@ class Predictive(ComputedTorque):
         return states, controls
 
     def _write_bounds(self, controls: np.ndarray, planned: np.ndarray) -> None:
-        """Write limits of tensions, as far as their rates let them go, and of the carriers' accelerations."""
+        """Write the limits of tensions, including their rate limits, and of the carriers' accelerations."""
         h, m, (low, high, _) = self._horizon, self.robot.m, self._limits
         h.u_min[:, :m], h.u_max[:, :m] = low, high
         if isfinite(self._solved):

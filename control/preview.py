@@ -1,4 +1,4 @@
-"""What a predictive controller looks ahead to: `Preview`, the references of its stages; `rows_at`, between others."""
+"""The future references of a predictive controller: `Preview`, one for each stage; `rows_at` interpolates."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was a
 
 
 class Preview:
-    """References of the times to come, at the beginning of each stage and at the end of the last.
+    """Future references, at the beginning of each stage and at the end of the last.
 
     Parameters
     ----------
     robot
-        Whose they are.
+        The robot.
     steps
-        How long stages last, (N,) [s].
+        Durations of the stages, (N,) [s].
     moved
         Coordinates of carriers that a solution moves.
     tensions
-        Those of a reference that has none, (m,) [N].
+        Tensions for a reference without tensions, (m,) [N].
     """
 
     def __init__(self, robot: Robot, steps: np.ndarray, moved: Moved, tensions: np.ndarray):
@@ -39,11 +39,11 @@ class Preview:
         self.reset()
 
     def reset(self) -> None:
-        """Forget what was announced."""
+        """Forget the announced references."""
         self._announced: tuple[float, float, tuple[np.ndarray, np.ndarray]] | None = None
 
     def follow(self, references: Sequence[Reference], period: float, start: float) -> None:
-        """Receive references, one for each period from `start` on [s].
+        """Receive references, one for each period, from `start` [s] on.
 
         Raises
         ------
@@ -63,7 +63,7 @@ class Preview:
     def rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, np.ndarray]:
         """Return motions (K, 3, 6 + 6 c + f) and tensions (K, m).
 
-        Motions are place, rate and acceleration of the platform, of all carriers and of the moved coordinates.
+        Motions are position, rate and acceleration of the platform, of all carriers and of the moved coordinates.
         """
         count, carriers = len(references), 6 * len(references[0][3])
         motions = np.empty((count, 3, 6 + carriers + self._moved.count))
@@ -79,7 +79,7 @@ class Preview:
         return motions, np.array(tensions, dtype=float)
 
     def moved_of(self, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """Return place, rate and acceleration of the moved coordinates in the first row, (3, f)."""
+        """Return position, rate and acceleration of the moved coordinates in the first row, (3, f)."""
         return rows[0][0, :, rows[0].shape[2] - self._moved.count :]
 
     def at(
@@ -87,10 +87,10 @@ class Preview:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return states (N + 1, n), carriers (N + 1, c, 12) and controls (N + 1, u) of the reference at all stages.
 
-        It is the one that was announced, if that has this reference now. Beyond it accelerations stay. The last result
-        is what the ramps of its accelerations add to states within each stage, (N, n): a control is held for a stage in
-        the model and for a period in fact, so that without them it would give the mean of the stage, half a stage
-        early.
+        The announced reference is used if it agrees with the current one; after its end accelerations are constant. The
+        last result is the effect of the change of its acceleration on the states within each stage, (N, n): the model
+        holds a control for a whole stage, the robot only for a period, so without it the control would be the mean over
+        the stage, half a stage early.
         """
         first = np.zeros(len(self._times), dtype=int)
         motions, tensions = self._announced_at(time, now) or rows_at(*now, self._times, first, 1.0)
@@ -106,7 +106,7 @@ class Preview:
         return states, carriers.swapaxes(1, 2).reshape(len(states), -1, 12), controls, ramps
 
     def _announced_at(self, time: float, now: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return motions and tensions at all stages as they were announced, None if that was another reference."""
+        """Return the announced motions and tensions at all stages, or None if the current reference differs."""
         if self._announced is None:
             return None
         start, period, (motions, tensions) = self._announced
@@ -119,29 +119,29 @@ class Preview:
 
 
 def turns(off: np.ndarray) -> np.ndarray:
-    """Return the whole turns that are nearest to differences of angles [rad]."""
+    """Return the multiples of a full turn closest to differences of angles [rad]."""
     return 2 * np.pi * np.rint(off / (2 * np.pi))
 
 
 def rows_at(
     motions: np.ndarray, tensions: np.ndarray, after: np.ndarray, before: np.ndarray, period: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return references at times between those that are known.
+    """Interpolate references.
 
-    Between two of them accelerations and tensions change evenly; beyond the last one accelerations stay.
+    Accelerations and tensions are interpolated linearly; after the last reference accelerations are constant.
 
     Parameters
     ----------
     motions
-        (K, 3, d), each place, rate and acceleration.
+        (K, 3, d), each position, rate and acceleration.
     tensions
         (K, m) [N].
     after
-        How long after a row each time is, (N,) [s].
+        Time since the preceding row, (N,) [s].
     before
-        The number of that row, (N,).
+        Index of that row, (N,).
     period
-        From one row to the next [s].
+        Time between rows [s].
     """
     motion, last = motions[before], tensions[before]
     if np.abs(after).max() <= ROUNDING * period:

@@ -1,4 +1,4 @@
-"""What controllers are set to and what they remember: the records of core/control/controller.h as NumPy dtypes.
+"""Settings and memory of controllers: the records of core/control/controller.h as NumPy dtypes.
 
 Units and meanings of the fields are explained there.
 """

@@ -1,4 +1,4 @@
-"""`Reference`: where a robot should be at one time, how it should move, and with which tensions."""
+"""`Reference`: the desired motion and tensions of a robot at one time."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from ..base.display import record
 
 
 class Reference(NamedTuple):
-    """A reference at one time. Its arrays may be without the leading dimension of a batch if it is the same for all.
+    """A reference at one time. If it is the same for a whole batch, its arrays may omit the leading dimension.
 
     Attributes
     ----------
     pose, velocity, acceleration
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6), and its time derivatives.
     carrier_pose, carrier_velocity, carrier_acceleration
-        The same of each carrier, (..., c, 6).
+        The same for each carrier, (..., c, 6).
     tensions
-        The planned tensions [N], (..., m); None if none are planned: the smallest inside the limits are best then.
+        Planned tensions [N], (..., m); None if none are planned; the smallest tensions are then preferred.
     """
 
     pose: np.ndarray

@@ -1,4 +1,4 @@
-"""`settings_of`: what a controller is set to, as the record that the core reads, from checked arguments."""
+"""`settings_of`: check the arguments of a controller and convert them to the record of the core."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Limits(NamedTuple):
 
 
 def limits_of(robot: Robot, rate: Any) -> Limits:
-    """Return the limits of a robot's tensions, with a largest rate for all or for each [N/s], or None."""
+    """Return the limits of a robot's tensions, with one largest rate, one for each cable [N/s], or None."""
     fastest = np.full(robot.m, np.inf) if rate is None else positive("rate", rate, robot.m)
     return Limits(np.asarray(robot.t_min), np.asarray(robot.t_max), fastest)
 
@@ -77,13 +77,13 @@ def settings_of(
 
 
 def set_reach(settings: np.ndarray, reach: np.ndarray) -> None:
-    """Set how far carriers may go off their reference to help the tensions, (c, 6) [m, rad]; zeros: they do not."""
+    """Set the largest deviation of carriers from their reference, (c, 6) [m, rad]; zeros: none."""
     settings["reach"][: len(reach)] = reach
     settings["reacts"] = reach.any()
 
 
 def reach_of(robot: Robot, reach: Any) -> np.ndarray:
-    """Return how far each coordinate of each carrier may go, (c, 6) [m, rad]."""
+    """Return the largest deviation of each coordinate of each carrier, (c, 6) [m, rad]."""
     far = as_array("reach", reach, (2,))
     if far.shape != (2,) or not ((far >= 0) & (far <= [1e3, 1.0])).all():
         raise InputError(f"reach must be a distance [m] and an angle up to 1 rad, got {shown(reach)}")

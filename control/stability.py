@@ -19,21 +19,21 @@ PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so lit
 
 
 def grows(controller: Controller, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
-    """Return whether an error at rest at home grows, with flying carriers that turn as they do and their own loops.
+    """Return whether a small error at rest at home grows in the closed loop, with the rotation of flying carriers.
 
-    The loop is closed around `Plant` after a small push in all coordinates, which the unstable motions of first order
-    soon dominate. So every state takes part: the attitudes of carriers, commands that are under way, observers.
+    The loop is closed around `Plant` after a small push in all coordinates, in which unstable modes soon dominate.
+    So all states are included: attitudes of carriers, delayed commands, observers.
 
     Parameters
     ----------
     controller
-        It is reset before and afterwards.
+        Controller; it is reset before and afterwards.
     robot
-        Its robot.
+        Robot of the controller.
     tensions
-        At rest at home, (m,) [N].
+        Tensions at rest at home, (m,) [N].
     bandwidth
-        With which errors of the pose decay [rad/s].
+        Bandwidth of the decay of pose errors [rad/s].
     """
     plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
     still = np.zeros_like(robot.carrier_home)

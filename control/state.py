@@ -1,4 +1,4 @@
-"""`State`: what sensors report of a robot at one time."""
+"""`State`: the measured state of a robot at one time."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class State(NamedTuple):
     pose, velocity
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6), and its time derivative.
     carrier_pose, carrier_velocity
-        The same of each carrier, (..., c, 6).
+        The same for each carrier, (..., c, 6).
     tensions
-        Measured tensions [N], (..., m); None if the robot has no sensors for them.
+        Measured tensions [N], (..., m); None if the robot has no tension sensors.
     time
-        When all of it was measured, on the clock of the steps [s]; default: now. The controllers of towline move an
-        older state on to the time of their step, with the commands that were sent since.
+        Time of the measurement on the clock of the steps [s] (default: now). The controllers of towline predict the
+        current state from an older one and the commands that were sent since.
     """
 
     pose: np.ndarray

@@ -1,4 +1,4 @@
-"""`TensionLoop`: tensions that are sent to winches so that sensors report those that are wanted."""
+"""`TensionLoop`: correct the commands to winches until sensors report the desired tensions."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 
 class TensionLoop:
-    """Add the integral of wanted less measured tensions to wanted ones, for winches that give others.
+    """Add the integral of the tension error to the desired tensions, for winches that deliver others.
 
         u = t + i,   di/dt = k (late t - t_measured)
 
-    with t late by as much as winches are. A command stays inside limits and rates, where the integral stands still.
+    with t delayed like the winches. A command stays inside limits and rates, at which the integral stops.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ class TensionLoop:
         dt
             Time since the last step [s].
         wanted
-            Tensions from now on, (N, m) [N].
+            Desired tensions from now on, (N, m) [N].
         before, measured
-            Tensions that were wanted when those were measured, (N, m) [N], and these; those that are no numbers, and
-            None, change nothing.
+            Desired tensions at the time of the measurement, (N, m) [N], and the measured ones; nan and None change
+            nothing.
         cut
-            Where cables count as cut, (N, m): these are sent what is wanted.
+            Cables that are treated as cut, (N, m): their commands are the desired tensions.
         """
         if self._sent is None:
             self._late = self._sent = wanted.copy()

@@ -1,4 +1,4 @@
-"""`Watch`: whether a robot moves as its model predicts; `HandOver`, when and why another controller took over."""
+"""`Watch`: compare a robot's motion with its model; `HandOver`: when and why another controller took over."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 BOUND = 0.1  # of the usual acceleration: the mean that is not predicted and permitted
-UNSTABLE = "small errors at home grow with predictions, whose model has no carriers that turn before they accelerate"
-LATE = "carriers turn nearly as late after their orders as makes their attitude loop unstable"
-LOUD = "noise of its measured rates requires more than the limits of tensions permit: lower bandwidth and observer"
+UNSTABLE = "small errors at home grow with predictions, whose model omits that carriers turn before they accelerate"
+LATE = "carriers turn so late that their attitude loop is nearly unstable"
+LOUD = "noise of the measured rates requires more than the tension limits permit: lower bandwidth and observer"
 WINDOW = 0.05  # [s], in which a motion is compared
 QUICK, LONG = 0.01, 0.1  # [s]: noise is quicker than what tensions correct, and how long it is heard
 OFTEN = 2.0  # standard deviations of noise have room: one command in twenty is cut off
@@ -26,9 +26,9 @@ class HandOver(NamedTuple):
     Attributes
     ----------
     time
-        Since when [s]; minus infinity: from the start.
+        Time [s]; minus infinity: from the start.
     reason
-        Why.
+        Reason.
     """
 
     time: float
@@ -36,25 +36,25 @@ class HandOver(NamedTuple):
 
 
 class Watch:
-    """Compare measured velocities with those that a model gives for the commands that were sent.
+    """Compare measured velocities with the model's prediction for the commands that were sent.
 
-    Over the last `WINDOW` the velocity should change by the integral of the accelerations that the model had for each
-    step, from its measured state and estimated disturbance and with its command. The mean of what is left, over the
-    window, is the acceleration that is unexplained. Neither a new plan nor a jump of the reference counts: both change
-    commands. Steps that are further apart than the window are not compared.
+    Over the last `WINDOW` the velocity should change by the integral of the model's accelerations for the measured
+    state, estimated disturbance and command of each step. The mean difference over the window is the unexplained
+    acceleration. New plans and jumps of the reference do not contribute, because they act through the commands. Steps
+    that are further apart than the window are not compared.
 
     Parameters
     ----------
     scale
-        Factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for those
-        that the platform does not have.
+        Factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for locked
+        coordinates.
     usual
-        Acceleration that the robot's scale of forces gives its platform [m/s^2]: `BOUND` times it is permitted, and a
-        step without any solution counts as it.
+        Acceleration of the platform by the robot's force scale [m/s^2]: `BOUND` times this is permitted, and a step
+        without a solution is treated as an unexplained acceleration of this size.
     ripple
-        Tensions that are commanded for unit rates of the pose, over how far tensions are from their limits,
-        (m, 6) [s/m, s/rad]. Noise of the rates makes commands that limits cut off, on one side more than on the other,
-        and `OFTEN` standard deviations beyond the limits are a reason to hand over. Default: whatever the noise.
+        Tensions commanded for unit rates of the pose, relative to the distance of tensions from their limits,
+        (m, 6) [s/m, s/rad]. The limits clip the effect of rate noise, more on one side than on the other, so `OFTEN`
+        standard deviations beyond the limits are a reason to hand over. Default: noise is ignored.
     """
 
     def __init__(self, scale: np.ndarray, usual: float, ripple: np.ndarray | None = None):
@@ -70,25 +70,25 @@ class Watch:
         self.interrupt()
 
     def interrupt(self) -> None:
-        """Forget all steps but how long there was no solution: the robot was not controlled, or not measured."""
+        """Forget all steps except the time without a solution: the robot was not controlled, or not measured."""
         self._left: deque[tuple[float, np.ndarray]] = deque()  # times, and velocities less what explains them
         self._explained, self._off = np.zeros(6), np.zeros(6)
         self._acceleration: np.ndarray | None = None
         self._trend: np.ndarray | None = None
 
     def explain(self, time: float, acceleration: np.ndarray, by_tensions: np.ndarray, solved: bool) -> None:
-        """Receive the acceleration of the pose, (6,), that the model gives for the command of now.
+        """Receive the model's acceleration of the pose, (6,), for the current command.
 
-        Another one of its tensions changes it by `by_tensions`, (6, m).
+        Its derivative with respect to the tensions is `by_tensions`, (6, m).
         """
         self._acceleration, self._by_tensions = acceleration, by_tensions
         if solved:
             self._solved = time
 
     def compare(self, time: float, dt: float, rate: np.ndarray, otherwise: np.ndarray) -> HandOver | None:
-        """Compare the rate of the pose now, (6,), and return why predictions are not to be used, or None.
+        """Compare the current rate of the pose, (6,), and return the reason not to use predictions, or None.
 
-        Since the last step tensions were `otherwise` than commanded, (m,) [N], as far as sensors know.
+        `otherwise` are the measured differences from the commanded tensions since the last step, (m,) [N].
         """
         if dt > WINDOW:
             self._solved = max(self._solved, time)
@@ -114,7 +114,7 @@ class Watch:
         return HandOver(time, f"{self.unexplained:.2g} m/s^2 of its acceleration are not as predicted")
 
     def _is_loud(self, ripple: np.ndarray, dt: float, left: np.ndarray) -> bool:
-        """Update the noise, what is left beside a line, and return whether it is too much."""
+        """Update the noise, the deviation from a straight line, and return whether it is too large."""
         if self._trend is None or dt > QUICK:
             self._trend, self._slope = left.copy(), np.zeros(6)
         share = min(dt / QUICK, 0.5)

@@ -1,4 +1,4 @@
-"""Costs of a predictive controller: `Weights`, from bandwidths, and `terminal`, of what follows the last stage."""
+"""Costs of a predictive controller: `Weights`, from bandwidths, and `terminal`, the cost after the last stage."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..models.robot import Robot
 
 
 class Usual(NamedTuple):
-    """The defaults of robots of one kind: bandwidths [rad/s], and how long a stage lasts [s]."""
+    """The defaults for one type of robot: bandwidths [rad/s], and the duration of a stage [s]."""
 
     bandwidth: float
     carrier_bandwidth: float
@@ -32,14 +32,14 @@ DISCOUNT = 0.95  # of the cost of each stage, if it does not settle without
 
 
 class Weights(NamedTuple):
-    """Weights of squares, of each stage.
+    """Weights of the squared errors of each stage.
 
     Attributes
     ----------
     states
-        Of errors of the pose and its rate and of carriers' places and rates, (n,).
+        Weights of the errors of pose and rate, and of the carriers' positions and rates, (n,).
     controls
-        Of tensions less those planned and of carriers' accelerations, (u,).
+        Weights of the deviations from planned tensions, and of the carriers' accelerations, (u,).
     """
 
     states: np.ndarray
@@ -49,26 +49,26 @@ class Weights(NamedTuple):
 def weights(
     robot: Robot, bandwidth: np.ndarray, reach: np.ndarray, carrier_bandwidth: float, duration: float, moved: np.ndarray
 ) -> Weights:
-    """Return the weights with which errors decay with the bandwidth, as far as tensions keep from their limits.
+    """Return the weights with which errors decay with the bandwidth while tensions are away from their limits.
 
-    A double integrator ddx = a with the cost w^4 x^2 + 2 w^2 dx^2 + a^2 decays with the double pole -w. The least
-    tensions for an acceleration a cost a' M (A A')^-1 M a, whose diagonal at home takes the place of a^2.
+    A double integrator ddx = a with the cost w^4 x^2 + 2 w^2 dx^2 + a^2 decays with the double pole -w. The smallest
+    tensions for an acceleration a cost a' M (A A')^-1 M a, whose diagonal at home replaces a^2.
 
     Parameters
     ----------
     robot
         The robot.
     bandwidth
-        w of each coordinate of the pose, (6,) [rad/s].
+        Bandwidth w of each coordinate of the pose, (6,) [rad/s].
     reach
-        How far each freed coordinate of a carrier may go, (f,) [m, rad].
+        Intended deviation of each freed coordinate of a carrier, (f,) [m, rad].
     carrier_bandwidth
-        With which those return [rad/s].
+        Bandwidth with which these return [rad/s].
     duration
-        Of a stage [s].
+        Duration of a stage [s].
     moved
-        Accelerations of the pose at home for units of the freed coordinates, (6, f). They take part in the least effort
-        where tensions do not control all degrees of freedom.
+        Accelerations of the pose at home per unit of the freed coordinates, (6, f). They contribute to the least effort
+        if tensions do not control all degrees of freedom.
     """
     dynamics, rest, mask = dynamics_of(robot), np.zeros(6), robot.dof_mask
     still = dynamics.required_wrench(robot.home, rest, rest)
@@ -89,7 +89,7 @@ def weights(
 
 
 def tensions_of(robot: Robot) -> np.ndarray:
-    """Return the least tensions for unit accelerations of the pose at rest at home, (m, 6) [N]."""
+    """Return the smallest tensions for unit accelerations of the pose at rest at home, (m, 6) [N]."""
     dynamics, rest, mask = dynamics_of(robot), np.zeros(6), robot.dof_mask
     still = dynamics.required_wrench(robot.home, rest, rest)
     M = np.stack([dynamics.required_wrench(robot.home, rest, unit) - still for unit in np.eye(6)], axis=1)
@@ -99,10 +99,10 @@ def tensions_of(robot: Robot) -> np.ndarray:
 
 
 def terminal(A: np.ndarray, B: np.ndarray, by: Weights) -> np.ndarray:
-    """Return the cost that follows the last stage if the dynamics x' = A x + B u stay, without limits, (n, n).
+    """Return the infinite-horizon LQR cost of the dynamics x' = A x + B u, (n, n), by the Riccati recursion.
 
-    By the Riccati recursion. It never settles for motions that controls do not reach, as the swing of a load with few
-    cables: then costs count less, the later they are.
+    The recursion does not converge for uncontrollable motions, such as the swing of a load with few cables. Costs are
+    then discounted over time.
     """
     for discount in (1.0, DISCOUNT):
         P, settled = _cost_to_go(np.sqrt(discount) * A, np.sqrt(discount) * B, by)
