@@ -294,7 +294,7 @@ class ComputedTorque(Controller):
         proof: tuple[np.ndarray, np.ndarray],
         alone: bool,
     ) -> Command:
-        """Return the command from tensions (N, m) and the carriers' reference, which compensating and flying ones leave."""
+        """Return the command from tensions (N, m) and the reference of carriers that do not compensate or fly."""
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
         if self._has_cut:
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it

@@ -171,7 +171,7 @@ class Predictive(ComputedTorque):
             warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
 
     def _mobility(self, far: np.ndarray, flies: np.ndarray) -> tuple[Moved, np.ndarray]:
-        """Return the coordinates of carriers that may deviate by `far`, (c, 3) [m], and their largest deviations, (f,)."""
+        """Return the carrier coordinates that may deviate by `far`, (c, 3) [m], and their largest deviations, (f,)."""
         # What is under way for longer than half of the stages would leave nothing to decide.
         delay = min(2.0 / self._attitude, self._times[-1] / 2), self._steps[0]
         if self.robot.fixed_lengths is None:

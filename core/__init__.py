@@ -1,7 +1,7 @@
 """The numeric core, in C: tension distribution, a robot's mechanics and motion, and the program of predictive control.
 
-Its functions work on the memory of arrays; what they take is in `_core.pyi` and the headers beside it. Packages above
-call them with arrays that they have checked.
+Its functions work on the memory of arrays; `_core.pyi` and the headers describe their arguments. Packages above call
+them with checked arrays.
 """
 
 # ruff: noqa: F401

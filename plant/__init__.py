@@ -1,4 +1,4 @@
-"""Forward time: what a robot does for commands of its cables and carriers, in wind, with cables that get slack."""
+"""Simulate a robot's response to commands of cables and carriers, with wind, slack cables and winches."""
 
 from .plant import History, Plant
 from .reading import Reading

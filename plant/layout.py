@@ -1,7 +1,7 @@
-"""Places of numbers in the rows that states and commands of a plant are; core/plant/plant.h has the same.
+"""Layout of the state and command arrays of a plant; core/plant/plant.h defines the same.
 
-A state is one row: a block for each body, the platform first and then the carriers, and then blocks of one number for
-each cable. The platform's block is that of its CoM, a carrier's that of its frame.
+A state is one row: a block for each body, the platform first and then the carriers, then blocks with one number for
+each cable. The block of the platform describes its CoM, the block of a carrier its frame.
 """
 
 # A body in a state: position [m], quaternion (w, x, y, z), velocity in {G} [m/s], rate in its own axes [rad/s].

@@ -45,12 +45,12 @@ def place(block: np.ndarray, pose: np.ndarray, velocity: np.ndarray, com: np.nda
 
 
 def given_or(name: str, value: Any, default: np.ndarray) -> np.ndarray:
-    """Return an argument as an array of numbers with the shape of its default behind those of a batch."""
+    """Return an argument as an array of numbers with the shape of its default after the batch dimensions."""
     return default if value is None else as_array(name, value, default.shape)
 
 
 def leading_of(vectors: dict[str, np.ndarray], tables: dict[str, np.ndarray]) -> tuple[int, ...]:
-    """Return the dimensions of the batch of vectors (..., n) and tables (..., c, n)."""
+    """Return the batch dimensions of vectors (..., n) and tables (..., c, n)."""
     shapes = {name: value.shape[:-1] for name, value in vectors.items()}
     return leading(shapes | {name: value.shape[:-2] for name, value in tables.items()})
 
@@ -58,7 +58,7 @@ def leading_of(vectors: dict[str, np.ndarray], tables: dict[str, np.ndarray]) ->
 def command_rows(
     batch: tuple[int, ...], parts: dict[str, np.ndarray], of_carriers: dict[str, np.ndarray], air: bool
 ) -> np.ndarray:
-    """Return commands as rows, (..., k), of what `Plant.command` takes by these names; without `air` wind is none."""
+    """Return commands as rows, (..., k), from the arguments of `Plant.command`; without `air` there is no wind."""
     cables, actuation = parts["cables"], of_carriers["actuation"]
     m, (count, actuators) = cables.shape[-1], actuation.shape[-2:]
     row = np.zeros((*batch, layout.COMMANDS + m + layout.CARRIER * count))

@@ -1,4 +1,4 @@
-"""`Periods`: a plant run one period after the other, in arrays of the caller's and without checks, for closed loops."""
+"""`Periods`: run a plant period by period, in arrays of the caller and without checks, for closed loops."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from .plant import Plant
 
 
 class Periods:
-    """Run many flights of a plant side by side."""
+    """Run many simulations of a plant in parallel."""
 
     def __init__(self, plant: Plant, period: float, substeps: int):
         self._record, self._settings = plant.record, plant.settings
         self._period, self._substeps = period, substeps
 
     def lose(self, carrier: int) -> None:
-        """Let the actuators of a carrier give nothing from the next period on, whatever they are commanded."""
+        """Disable the actuators of a carrier from the next period on."""
         self._record = self._record.copy()
         self._record["body"]["actuator"][1 + carrier] = 0
 

@@ -1,4 +1,4 @@
-"""`Plant`: a robot in forward time, with cables that get slack, winches, wind and disturbances."""
+"""`Plant`: simulate a robot with slack cables, winches, wind and disturbances."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ class History(NamedTuple):
     states
         (..., K, n).
     tensions
-        (..., K, m) [N], at each state, under the command that begins there; at the last, under the one that ends there.
+        (..., K, m) [N], at each state, for the command that begins there; at the last state, for the one that ends
+        there.
     """
 
     times: np.ndarray
@@ -48,29 +49,29 @@ class History(NamedTuple):
 
 
 class Plant:
-    """Simulate a robot: what it does for commands, step by step.
+    """Simulate a robot's response to commands, step by step.
 
-    A state is a row of numbers, (n,), and the only memory: `start` makes one, `read` reads it, `step` and `run` return
-    later ones. Arguments may have leading batch dimensions, which broadcast. The same arguments give the same bits.
+    The state is one array, (n,), and the plant keeps no other memory: `start` makes a state, `read` reads it, `step`
+    and `run` return later ones. Arguments may have leading batch dimensions, which broadcast. The same arguments give
+    the same bits.
 
     Parameters
     ----------
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
     drive
-        What cables are commanded: "lengths" [m], unstrained; "rates" of these [m/s]; "forces" [N], with which the
-        motors of winches pull; or "tensions" [N], whatever the motion. Without a winch in the robot's file, lengths and
-        rates are followed exactly: a length is reached, at constant rate, when its step ends. A winch follows them as a
-        servo loop inside its limits.
+        Type of the cable commands: unstrained "lengths" [m], "rates" of these [m/s], "forces" [N] of the winch motors,
+        or "tensions" [N]. Without a winch in the robot's file, lengths and rates are followed exactly: a length is
+        reached, at constant rate, at the end of its step. A winch follows them as a servo loop inside its limits.
     contacts
-        "located": steps end where a cable gets taut or slack, or a winch begins or ends to slip, so that the error
-        keeps its fourth order. "sampled": Runge-Kutta over the kinks, in a third of the time where there are many; for
-        elastic cables alone.
+        "located": steps end where a cable becomes taut or slack, or a winch begins or stops slipping, which keeps the
+        fourth order. "sampled": Runge-Kutta over the kinks, in a third of the time if there are many; for elastic
+        cables only.
     stiffness, damping
-        E A [N] and C [N s/m], a number or one for each cable, instead of those of the file. A cable without stiffness
-        never stretches: it holds its ends at most its length apart, and gets taut in an impact.
+        E A [N] and C [N s/m], a number or one for each cable, instead of the file's values. A cable without stiffness
+        does not stretch: it keeps the distance of its ends below its length, and becomes taut in an impact.
     carrier_bandwidth, winch_bandwidth
-        Of the servo loops of mobile carriers and of winches [rad/s]. Assumed: no robot file has them.
+        Bandwidths of the servo loops of mobile carriers and of winches [rad/s]. Robot files have no keys for them.
     tension_lag
         Time constant [s] with which tensions follow their commands; 0: exactly.
 
@@ -79,17 +80,17 @@ class Plant:
     robot
         The `Robot`.
     size
-        How many numbers a state has, n.
+        Length of a state, n.
     record
-        The robot as the numeric core reads it, with the plant's stiffness and damping; it cannot be written to.
+        The robot in the format of the numeric core, with the plant's stiffness and damping; read-only.
     settings
-        Drive, contacts and bandwidths as the numeric core reads them, of `packing.SETTINGS`.
+        Drive, contacts and bandwidths in the format of the numeric core, `packing.SETTINGS`.
 
     Raises
     ------
     InputError
-        If an argument has a wrong value, forces are commanded of cables without winches, or the robot has more cables
-        or carriers than the numeric core has room for. Every method raises it for a wrong shape or value.
+        If an argument has a wrong value, forces are commanded to cables without winches, or the robot has more cables
+        or carriers than the numeric core supports. Every method raises it for a wrong shape or value.
     """
 
     def __init__(
@@ -154,13 +155,13 @@ class Plant:
         Parameters
         ----------
         pose, velocity
-            Of the platform frame in {G} [m, rad], (..., 6), and its time derivative; default: at home, at rest.
+            Pose of the platform frame in {G} [m, rad], (..., 6), and its time derivative; default: at home, at rest.
         carrier_pose, carrier_velocity
-            The same of the carriers, (..., c, 6); velocities that a carrier cannot have are left out.
+            The same for the carriers, (..., c, 6); velocities of fixed coordinates are ignored.
         tensions
-            (..., m) [N]: elastic cables have the unstrained lengths that give these at rest.
+            Tensions at rest, (..., m) [N], which determine the unstrained lengths of elastic cables.
         lengths
-            Unstrained, (..., m) [m], instead of `tensions`; default: those without tension at the pose.
+            Unstrained lengths, (..., m) [m], instead of `tensions`; default: cables without tension at the pose.
 
         Raises
         ------
@@ -169,7 +170,7 @@ class Plant:
         """
         robot, count = self.robot, len(self.robot.carriers)
         if tensions is not None and lengths is not None:
-            raise InputError("lengths must be None where tensions are given, got both")
+            raise InputError("lengths must be None if tensions are given, got both")
         poses, velocities = given_or("pose", pose, robot.home), given_or("velocity", velocity, np.zeros(6))
         carriers = given_or("carrier_pose", carrier_pose, robot.carrier_home)
         moving = given_or("carrier_velocity", carrier_velocity, np.zeros((count, 6)))
@@ -209,22 +210,22 @@ class Plant:
         wind: Any = None,
         wrench: Any = None,
     ) -> np.ndarray:
-        """Pack what a plant is commanded during a step into rows, (..., k).
+        """Pack the commands for a step into rows, (..., k).
 
         Parameters
         ----------
         cables
             (..., m): lengths [m], rates [m/s], forces [N] or tensions [N], depending on the drive.
         actuation
-            Commands of the actuators of each carrier, in its order, (..., c, a): for a quadrotor thrust [N] and torques
-            about its axes [N m]. The plant cuts them at their limits. Default: zeros.
+            Commands to the actuators of each carrier, (..., c, a): for a quadrotor thrust [N] and torques
+            about its axes [N m]. The plant clips them to their limits. Default: zeros.
         carrier_pose, carrier_velocity, carrier_acceleration
-            Reference of the carriers at the beginning of the step, (..., c, 6). It moves on to that of the next command
-            of a `run`, or without one with this acceleration. Prescribed carriers are there; mobile ones follow it with
-            a lag of second order, inside their limits of speed and acceleration. Default: at home, at rest; of poses
-            without velocities or accelerations, those that the poses of a `run` have, see `samples`.
+            Reference of the carriers at the beginning of the step, (..., c, 6). It continues to the reference of the
+            next command of a `run`, or with this acceleration if there is none. Prescribed carriers follow it exactly;
+            mobile ones with a second-order lag, inside their limits of speed and acceleration. Default: at home, at
+            rest. Missing velocities and accelerations are derived from the poses of a `run`, see `samples`.
         wind
-            Velocity of the air in {G} [m/s], (..., 3); default: no air at all, also no drag of the motion.
+            Velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag.
         wrench
             Disturbance on the platform: force [N] and moment about the CoM [N m] in {G}, (..., 6).
 
@@ -263,8 +264,8 @@ class Plant:
         state, command, dt
             As in `run`.
         after
-            The next command, (..., k): carriers move on to its reference as in a `run`, and otherwise with constant
-            acceleration.
+            The next command, (..., k). Carriers then continue to its reference as in a `run`; without it their
+            acceleration is constant.
 
         Raises
         ------
@@ -283,7 +284,7 @@ class Plant:
         return self._run(state, rows, 1, dt, 1, 1, None).states[..., -1, :]
 
     def _step_one(self, state: np.ndarray, rows: np.ndarray, dt: float) -> np.ndarray | None:
-        """Step from one state, in a third of the time of `run`; return None for what that has to report."""
+        """Step from one state, in a third of the time of `run`; return None for errors that `run` reports."""
         if state.dtype != np.float64 or rows.dtype != np.float64:
             return None
         if not math.isfinite(np.vdot(state, state) + np.vdot(rows, rows)):
@@ -317,15 +318,15 @@ class Plant:
         keep
             Return the first state and every `keep`-th one after it.
         threads
-            How many threads share the rows of a batch; default: as many as there are processors, at most one for each
-            20 000 steps. The result does not depend on it.
+            Number of threads that share the rows of a batch; default: one per processor, at most one per 20 000 steps.
+            The result does not depend on it.
 
         Raises
         ------
         InputError
             If an argument has a wrong shape or value.
         SolverError
-            If the motion grows beyond all numbers, as it does for steps too long for stiff cables.
+            If the simulation diverges, for example because steps are too long for stiff cables.
         """
         rows = np.asarray(commands)
         if rows.ndim < 2 or not rows.shape[-2]:
@@ -367,13 +368,13 @@ class Plant:
         if not np.isfinite(history[:, -1]).all():
             raise SolverError(
                 f"the motion of {self.robot.name} grows beyond all numbers in steps of {period / substeps:g} s: use "
-                "more substeps, or stiffness where cables that do not stretch get lengths that no pose has"
+                f"more substeps, or a stiffness if cables that do not stretch get lengths that no pose has"
             )
         times = period * keep * np.arange(kept)
         return History(times, history.reshape(*batch, kept, -1), tensions.reshape(*batch, kept, -1))
 
     def read(self, states: np.ndarray) -> Reading:
-        """Return what `states`, (..., n), are: poses [m, rad], velocities, lengths."""
+        """Read `states`, (..., n): poses [m, rad], velocities, lengths."""
         return Reading(self.robot, as_array("states", states, (self.size,)))
 
     def cut(self, state: np.ndarray, cable: int) -> np.ndarray:
@@ -384,12 +385,12 @@ class Plant:
         state
             (..., n).
         cable
-            Its index, from 0.
+            Index of the cable, from 0.
         """
         return self._with_condition(state, cable, layout.CUT)
 
     def stick(self, state: np.ndarray, cable: int) -> np.ndarray:
-        """Return the state, (..., n) [m, rad, s], with a winch stuck at its cable's length. Arguments as in `cut`."""
+        """Return the state, (..., n) [m, rad, s], with a winch stuck at its current length. Arguments as in `cut`."""
         return self._with_condition(state, cable, layout.STUCK)
 
     def _with_condition(self, state: np.ndarray, cable: int, condition: float) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""`Reading`: what states of a plant are, in the coordinates of the house."""
+"""`Reading`: read states of a plant in towline's coordinates."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from . import layout
 
 
 def _rotation_of_products() -> np.ndarray:
-    """Return what makes the entries of R, (16, 9), of the products of two entries of a unit quaternion (w, x, y, z)."""
+    """Return the map from products of two entries of a unit quaternion (w, x, y, z) to the entries of R, (16, 9)."""
     of = np.zeros((4, 4, 3, 3))
     of[0, 0] = np.eye(3)
     for i in range(3):
@@ -28,7 +28,7 @@ _ROTATION = _rotation_of_products()
 
 
 class _Bodies:
-    """The motion of bodies, (..., 13) in a state, whose CoM has a place in their frame, (3,)."""
+    """The motion of bodies, (..., 13) in a state, with the position of their CoM in their frame, (3,)."""
 
     def __init__(self, blocks: np.ndarray, com: np.ndarray):
         self._blocks, self._com = blocks, com
@@ -69,7 +69,7 @@ class _Bodies:
 
 
 class Reading:
-    """Read states, (..., n): each quantity is computed when it is first used, with the same leading dimensions.
+    """Read states, (..., n). Each quantity is computed on first use, with the same leading dimensions.
 
     Parameters
     ----------
@@ -106,17 +106,17 @@ class Reading:
 
     @property
     def velocity(self) -> np.ndarray:
-        """Return its time derivative, (..., 6) [m/s, rad/s]; the angles have none at a pitch of 90 degrees."""
+        """Return its time derivative, (..., 6) [m/s, rad/s]; undefined for the angles at a pitch of 90 degrees."""
         return self._platform.velocity
 
     @property
     def rotation(self) -> np.ndarray:
-        """Return the platform's R, (..., 3, 3) [-]."""
+        """Return the rotation matrix of the platform, (..., 3, 3) [-]."""
         return self._platform.rotation
 
     @property
     def rate(self) -> np.ndarray:
-        """Return the platform's rate in its own axes, (..., 3) [rad/s]."""
+        """Return the angular velocity of the platform in its own axes, (..., 3) [rad/s]."""
         return self._platform.rate
 
     @property
@@ -131,17 +131,17 @@ class Reading:
 
     @property
     def carrier_rotation(self) -> np.ndarray:
-        """Return R of the carriers, (..., c, 3, 3) [-]."""
+        """Return the rotation matrices of the carriers, (..., c, 3, 3) [-]."""
         return self._carriers.rotation
 
     @property
     def carrier_rate(self) -> np.ndarray:
-        """Return the carriers' rates in their own axes, (..., c, 3) [rad/s]."""
+        """Return the angular velocities of the carriers in their own axes, (..., c, 3) [rad/s]."""
         return self._carriers.rate
 
     @property
     def lengths(self) -> np.ndarray:
-        """Return the unstrained lengths, (..., m) [m]; where tensions are commanded, the tensions [N]."""
+        """Return the unstrained lengths, (..., m) [m], or the tensions [N] if tensions are commanded."""
         return self._cable_block(layout.LENGTH)
 
     @property

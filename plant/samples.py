@@ -1,4 +1,4 @@
-"""Motion of carriers that commands leave free: from the poses that a sequence of commands has."""
+"""Derive missing velocities and accelerations of carriers from the poses of a sequence of commands."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from . import layout
 
 
 def complete(rows: np.ndarray, cables: int, carriers: int, period: float) -> np.ndarray:
-    """Return commands, (..., K, k), without the nan of velocities and accelerations that were not given.
+    """Return commands, (..., K, k), with values for the velocities and accelerations that are nan.
 
-    They are central differences of the poses, and of the velocities. Where these would be beyond `SUDDEN`, the
-    reference jumps from rest to rest. A single command is at rest.
+    They are central differences of the poses and of the velocities. Where these would exceed `SUDDEN`, the reference
+    jumps from rest to rest. A single command is at rest.
     """
     if rows.dtype.kind != "f" or not np.isnan(rows.sum()):
         return rows

@@ -1,1 +1,1 @@
-"""One instant of a robot: tensions, equilibria, and the robots of an uncertainty."""
+"""Statics of a robot: tensions at one instant, equilibria, and the effect of geometric uncertainty."""

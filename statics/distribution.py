@@ -1,4 +1,4 @@
-"""One instant of a robot as a tension problem: where models and solvers meet, and nothing else."""
+"""Build and solve the tension problem of a robot at one instant."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def tensions(
     backend: str | None = None,
     **options: Any,
 ) -> TensionSolution:
-    """Distribute the tensions of a robot at one instant, or prove that no tensions inside the limits do.
+    """Compute the tensions of a robot at one instant, or prove that none exist.
 
-    The robot supplies the degrees of freedom, the characteristic length that scales moments, and the tension limits.
+    The robot defines the degrees of freedom, the characteristic length that scales moments, and the tension limits.
 
     Parameters
     ----------
@@ -47,11 +47,11 @@ def tensions(
     pose, velocity, acceleration
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivatives, (6,); default: at rest.
     carrier_pose, carrier_velocity, carrier_acceleration
-        The same of each carrier, (c, 6); default: at home, at rest.
+        The same for each carrier, (c, 6); default: at home, at rest.
     wind
         Velocity of the air in {G} [m/s], (3,); default: no aerodynamic drag.
     t_ref
-        Tensions to stay near [N], a number or (m,); default: 0.
+        Preferred tensions [N], a number or (m,) (default: 0).
     method, backend, **options
         As for `towline.solve`.
 
@@ -80,7 +80,7 @@ def pose_problem(
     wind: ArrayLike | None = None,
     t_ref: ArrayLike | None = None,
 ) -> TensionProblem:
-    """State the tension problem of one instant; the arguments are those of `tensions`.
+    """Build the tension problem of one instant, with the arguments of `tensions`.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def pose_problem(
     short = np.flatnonzero(~(dynamics.cable_lengths(pose, carrier_pose) > COINCIDENT))
     if short.size:
         raise InputError(
-            f"pose must leave every cable a length, got one at which the ends of cable {short[0] + 1} coincide"
+            f"pose must keep the ends of every cable apart, got one at which the ends of cable {short[0] + 1} coincide"
         )
     w = dynamics.required_wrench(*motion.at_rest_by_default(), wind=wind)
     return wrench_problem(dynamics.robot, dynamics.wrench_matrix(pose, carrier_pose), w, t_ref=t_ref)
@@ -115,14 +115,14 @@ def wrench_problem(
     t_max: np.ndarray | None = None,
     t_ref: ArrayLike | None = None,
 ) -> TensionProblem:
-    """State the tension problem of a wrench matrix and a required wrench, in the robot's degrees of freedom and scale.
+    """Build the tension problem of a wrench matrix and a required wrench, in the robot's degrees of freedom and scale.
 
-    Wrench rows of coordinates that the platform does not have become zero.
+    Wrench rows of locked coordinates become zero.
 
     Parameters
     ----------
     robot
-        Supplies degrees of freedom, characteristic length and limits.
+        Defines degrees of freedom, characteristic length and limits.
     A
         (6, m), about the platform's CoM.
     w

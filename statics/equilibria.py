@@ -1,4 +1,4 @@
-"""Forward geometrico-statics: where the platform comes to rest for given cable lengths and carriers.
+"""Forward geometrico-statics: the equilibrium poses for given cable lengths and carriers.
 
 An inextensible cable holds the distance of its ends to at most its length and pulls only when it is straight. So the
 platform rests where its potential energy has a minimum among the poses that the cables allow,
@@ -12,7 +12,7 @@ Near a rest with all cables taut, Newton's method on the same conditions takes a
 
     [ K  -A ; -A^T  0 ] (delta ; t) = (m g ; L - l(q))
 
-with the stiffness K at constant tensions, and its matrix gives how the rest moves with the lengths.
+with the stiffness K at constant tensions. The same matrix gives the derivative of the pose by the lengths.
 
 Source: the energy form of the direct geometrico-static problem of Berti, Merlet and Carricato (2016).
 """
@@ -43,7 +43,7 @@ SAME = 1e-5  # poses nearer than this, in metres and radians times `Robot.length
 
 @dataclass(frozen=True)
 class Equilibrium(Displayed):
-    """A pose at which the platform rests stably.
+    """A stable equilibrium pose.
 
     Attributes
     ----------
@@ -52,13 +52,13 @@ class Equilibrium(Displayed):
     tensions
         (m,) [N], zero for slack cables.
     lengths
-        Distances of anchors and attachments, (m,) [m].
+        Distances between anchors and attachments, (m,) [m].
     energy
         Potential energy relative to the origin of {G} [J].
     residual
         |A t + m g| with moments over `Robot.length` [N].
     neutral
-        Whether some motion neither returns nor runs away: then it is one of a family of poses.
+        True if the equilibrium is neutral along some motion, that is, one of a family of poses.
     """
 
     pose: np.ndarray
@@ -70,7 +70,7 @@ class Equilibrium(Displayed):
 
     @property
     def slack(self) -> np.ndarray:
-        """Return the indices of cables that do not pull."""
+        """Return the indices of slack cables."""
         return np.flatnonzero(self.tensions < 1e-6 * max(self.tensions.max(initial=0.0), 1e-12))
 
 
@@ -82,16 +82,16 @@ def equilibria(
     Parameters
     ----------
     lengths
-        One length > 0 for each cable [m].
+        Length > 0 of each cable [m].
     carrier_pose
         (c, 6) in {G}; default: at home.
     starts
-        Number of starting poses to try: home, and random ones below and about it.
+        Number of initial poses to try: home, and random ones below and around it.
 
     Returns
     -------
     list
-        Solutions whose residual is below 1e-6 of the weight; empty if the lengths cannot hold the platform together.
+        Solutions with a residual below 1e-6 of the weight; empty if no pose has these lengths.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def equilibria(
 
 
 def rest_near(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:
-    """Return a stable rest near a pose, or None; by Newton's method if all cables are taut there, else by descent.
+    """Return a stable equilibrium near a pose, or None; by Newton's method if all cables are taut there, else by descent.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def rest_near(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np
 
 
 def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:
-    """Return the rest with all cables taut that Newton's method reaches, or None."""
+    """Return the equilibrium with all cables taut that Newton's method reaches, or None."""
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     n, m = len(rows), robot.m
     weight = robot.platform.mass * np.array([*robot.gravity, 0.0, 0.0, 0.0]) * robot.wrench_scale
@@ -168,9 +168,9 @@ def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.n
 
 
 def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> np.ndarray | None:
-    """Return how the CoM and a rotation vector in {G} move with the lengths at a rest, (6, m) [-, rad/m].
+    """Return the derivative of CoM and rotation vector in {G} by the lengths at an equilibrium, (6, m) [-, rad/m].
 
-    Carriers, (c, 6), stay. Slack cables have no effect. None where a motion is neutral: the lengths do not decide it.
+    Carriers, (c, 6), are fixed, and slack cables have no effect. None if a motion is neutral, that is, undetermined.
     """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     taut = np.setdiff1d(np.arange(robot.m), rest.slack)
@@ -206,7 +206,7 @@ def _displaced(pose: np.ndarray, twist: np.ndarray, com: np.ndarray) -> np.ndarr
 
 
 def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.ndarray) -> Equilibrium | None:
-    """Search for the rest pose from `start`, or return None; a saddle is left along its unstable motion."""
+    """Search for the equilibrium pose from `start`, or return None; it leaves saddles along their unstable motion."""
     key: Any = robot  # frozen, so it has a hash, unknown to a type checker
     dynamics, solver, rows = dynamics_of(robot), _energy_program(key), np.flatnonzero(robot.dof_mask)
     for _ in range(DESCENTS):
@@ -229,13 +229,13 @@ def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.
 
 
 def _unit(mode: np.ndarray, length: float) -> np.ndarray:
-    """Return a mode scaled so that it moves the platform by about its own size, at most by a radian."""
+    """Return a mode scaled to move the platform by about its own size, at most by a radian."""
     return mode / max(np.linalg.norm(mode[:3]) / length, np.linalg.norm(mode[3:]))
 
 
 @lru_cache(maxsize=16)
 def _energy_program(robot: Any) -> ca.Function:
-    """Return the program of a robot, with its carriers at home; others are its parameter."""
+    """Return the program of a robot; the carriers' poses are its parameter."""
     dynamics = dynamics_of(robot)
     carriers = ca.SX.sym("carriers", *robot.carrier_home.shape)
     rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]

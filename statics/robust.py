@@ -1,18 +1,18 @@
-"""Margins that hold for the robots of an uncertainty, to first order: where places of cables and tensions meet.
+"""Robust margins: the effect of geometric uncertainty on tensions, to first order.
 
-A robot whose cables are at other places by dp has another wrench matrix. The tensions t that the planned robot needs,
-A t = w, balance again with the least change
+A robot with cable parameters that differ by dp has another wrench matrix. The tensions t of the nominal robot,
+A t = w, balance again with the smallest correction
 
     t + dt      dt = -A^+ dA t = G dp      G = -A^+ d(A t)/dp
 
 So dt is normally distributed with the covariance G Sigma G^T, and t inside the limits less k sigma_i, of each cable,
-leaves t + dt inside the limits as long as |dt_i| <= k sigma_i. Two factors k belong to the share P of the robots for
-which that has to hold at all poses at once:
+leaves t + dt inside the limits as long as |dt_i| <= k sigma_i. There are two factors k with which this holds for the
+fraction P of the robots at all poses simultaneously:
 
 - any poses (`ellipsoid_factor`): the ellipsoid dp^T Sigma^-1 dp <= k^2 has P of the robots for k^2 = chi-square of r
   degrees of freedom, r the rank of Sigma, and in it |g . dp| <= k sqrt(g^T Sigma g) for whatever g (Scheffe);
 - a motion (`motion_factor`): along it the row of each cable, scaled to variance 1, is a curve of length L_i on the unit
-  sphere. By Rice's formula the chance that it exceeds k somewhere is at most 2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2).
+  sphere. Rice's formula bounds the probability that it exceeds k anywhere by 2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2).
   The sum over the cables is 1 - P. The factor is usually half of the first one, and never taken larger.
 
 Source: H. Scheffe, Biometrika 40, 1953; S. O. Rice, Bell System Technical Journal 24, 1945; D. Q. Naiman, Annals of
@@ -43,7 +43,7 @@ ROUNDING = 1e-9  # of the force scale, in comparisons of tensions
 
 
 def check_share(robot: Robot, share: object) -> float:
-    """Return the share of robots for which limits must hold, or raise InputError.
+    """Check and return the fraction of robots for which limits must hold.
 
     Raises
     ------
@@ -70,14 +70,14 @@ def uncertainty_of(robot: Robot) -> Uncertainty:
 
 
 class Spread:
-    """Compute how tensions at n places change with the robots of an uncertainty, to first order.
+    """Compute the first-order spread of tensions at n configurations due to geometric uncertainty.
 
     Parameters
     ----------
     robot
-        With an uncertainty.
+        Robot with an uncertainty.
     pose, carrier_pose
-        Of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
+        Poses of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
     rows
         Wrench rows that the cables balance; default: those of the coordinates that can move.
 
@@ -110,11 +110,11 @@ class Spread:
         return -self._inverse @ change
 
     def sigmas(self, tensions: ArrayLike) -> np.ndarray:
-        """Return the standard deviations of tensions (n, m) over the robots of the uncertainty, (n, m) [N]."""
+        """Return the standard deviations of tensions (n, m), (n, m) [N]."""
         return np.linalg.norm(self.changes(tensions), axis=2)
 
     def only(self, rows: ArrayLike) -> Spread:
-        """Return the same of some places, by their indices."""
+        """Return the same for some configurations, by their indices."""
         rows = _indices("rows", rows, len(self._inverse))
         part = object.__new__(Spread)
         part._cables, part._factor = self._cables, self._factor
@@ -123,10 +123,10 @@ class Spread:
 
 
 def _inverse(A: np.ndarray) -> np.ndarray:
-    """Return the inverse of least norm of matrices (n, rows, m), (n, m, rows).
+    """Return the minimum-norm inverse of matrices (n, rows, m), (n, m, rows).
 
-    What the cables do not span takes huge tensions, instead of none as in a pseudo-inverse: other robots need wrenches
-    there.
+    Directions that the cables do not span get huge tensions, not zero as in a pseudo-inverse, because other robots need
+    wrenches along them.
     """
     U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
     if A.shape[1] > A.shape[2]:
@@ -136,18 +136,18 @@ def _inverse(A: np.ndarray) -> np.ndarray:
 
 
 def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray:
-    """Return the standard deviations of tensions over the robots of an uncertainty, to first order, (n, m) [N].
+    """Return the first-order standard deviations of tensions due to geometric uncertainty, (n, m) [N].
 
     Parameters
     ----------
     robot
-        With an uncertainty.
+        Robot with an uncertainty.
     pose
-        Of the platform in {G} [m, rad], (n, 6).
+        Poses of the platform in {G} [m, rad], (n, 6).
     tensions
-        That the planned robot has there [N], (n, m).
+        Tensions of the nominal robot at these poses [N], (n, m).
     carrier_pose
-        Of the carriers, (n, c, 6); default: at home.
+        Poses of the carriers, (n, c, 6); default: at home.
 
     Raises
     ------
@@ -160,14 +160,14 @@ def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: Arr
 
 
 def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
-    """Return the factor k of standard deviations that a share of the robots keeps to at any poses, all at once.
+    """Return the factor k of standard deviations within which a fraction of the robots stays at all poses simultaneously.
 
     Parameters
     ----------
     uncertainty
-        Of a robot.
+        Uncertainty of a robot.
     share
-        Of the robots, above 0 and below 1.
+        Fraction of the robots, above 0 and below 1.
 
     Raises
     ------
@@ -180,14 +180,14 @@ def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
 
 
 def motion_factor(changes: ArrayLike, share: float) -> float:
-    """Return the factor k that a share of the robots keeps to along a motion, at all its times and cables.
+    """Return the factor k within which a fraction of the robots stays along a motion, at all times and for all cables.
 
     Parameters
     ----------
     changes
-        Of the tensions along each direction of the uncertainty, at dense times in order, (n, m, r) [N].
+        Changes of the tensions along each direction of the uncertainty, at dense times in order, (n, m, r) [N].
     share
-        Of the robots, above 0 and below 1.
+        Fraction of the robots, above 0 and below 1.
 
     Raises
     ------
@@ -232,12 +232,12 @@ def _chi(rank: int, share: float) -> float:
 
 
 class RobotShare(NamedTuple):
-    """Robots that were drawn, and which of them have tensions inside their limits at all poses.
+    """Sampled robots, and which of them have tensions inside their limits at all poses.
 
     Attributes
     ----------
     holds
-        Whether each robot has, (count,).
+        True for each robot that does, (count,).
     """
 
     holds: np.ndarray
@@ -246,7 +246,7 @@ class RobotShare(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Return the share of the robots that have tensions inside their limits at all poses."""
+        """Return the fraction of the robots that have tensions inside their limits at all poses."""
         return float(self.holds.mean())
 
 
@@ -258,24 +258,24 @@ def share_of_robots(
     count: int = 200,
     seed: int = 0,
 ) -> RobotShare:
-    """Draw robots from the uncertainty, and check at poses whether tensions inside the limits give the wrenches.
+    """Sample robots from the uncertainty, and check at poses whether tensions inside the limits give the wrenches.
 
-    It is no approximation: each robot has its own wrench matrices, and the exact solver decides.
+    This is exact: each robot has its own wrench matrices, and the exact solver decides.
 
     Parameters
     ----------
     robot
-        With an uncertainty.
+        Robot with an uncertainty.
     pose
-        Of the platform in {G} [m, rad], (n, 6).
+        Poses of the platform in {G} [m, rad], (n, 6).
     wrench
-        Required there, about the CoM in {G} [N, N m], (n, 6).
+        Required wrenches about the CoM in {G} [N, N m], (n, 6).
     carrier_pose
-        Of the carriers, (n, c, 6); default: at home.
+        Poses of the carriers, (n, c, 6); default: at home.
     count
-        How many robots.
+        Number of robots.
     seed
-        Of the random numbers.
+        Seed of the random numbers.
 
     Raises
     ------

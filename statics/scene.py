@@ -1,4 +1,4 @@
-"""`scene`: what figures draw in space of the dataset of a plan or a simulation, at given times."""
+"""`scene`: the 3-D scene of a plan or a simulation at given times."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ LONGEST = 100  # letters of the title
 
 
 def scene(robot: Robot, dataset: xr.Dataset, times: np.ndarray) -> Scene:
-    """Return the robot at the saved instants nearest to `times` [s], which are from the first instant on.
+    """Return the robot at the saved instants closest to `times` [s], counted from the first instant.
 
-    Nothing is interpolated: every instant that is drawn was audited, or simulated.
+    Nothing is interpolated: every drawn instant was audited or simulated.
     """
     saved = dataset["time"].to_numpy() - float(dataset["time"][0])
     rows = np.searchsorted((saved[1:] + saved[:-1]) / 2, times)

@@ -1,7 +1,7 @@
-"""The build backend: that of setuptools, which asks for a C compiler from the package index where there is none.
+"""The build backend: setuptools, plus a C compiler from the package index if the machine has none.
 
-The core needs a compiler. Where the machine has none, the package ziglang is one (`compiler.py`); it is large, so it is
-asked for only there.
+The core needs a compiler. If the machine has none, the package ziglang provides one (`compiler.py`). It is large, so it
+is requested only then.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ prepare_metadata_for_build_wheel = build_meta.prepare_metadata_for_build_wheel
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
-    """Return what a wheel is built with, a compiler among it if the machine has none."""
+    """Return the requirements to build a wheel, including a compiler if the machine has none."""
     wanted = compiler.required()  # first: what follows runs setup.py, in this process
     return wanted + build_meta.get_requires_for_build_wheel(config_settings)
 
