@@ -77,7 +77,7 @@ class Moved(ABC):
     def offsets(self, carriers: np.ndarray) -> np.ndarray | None:
         """Return the current deviation from the reference (c, 3, 6) and its rate, (2, c, 6), for `reaction`.
 
-        The default is None: each carrier follows commands at any position.
+        The default is None, because each carrier follows commands at any position.
         """
         return None
 

@@ -1,4 +1,4 @@
-"""What measurements show: the pose from cable lengths (`pose`) and the robot as built (`calibration`)."""
+"""Estimation from measurements: the pose from cable lengths (`pose`) and geometric calibration (`calibration`)."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any

@@ -160,7 +160,7 @@ def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: Arr
 
 
 def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
-    """Return the factor k of standard deviations within which a fraction of the robots stays at all poses simultaneously.
+    """Return the factor k of standard deviations within which a fraction of robots stays at all poses simultaneously.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ FAULTS = {
     "twice": "must have each column once, got l1 twice",
     "a gap": "must have columns l0 to l7 without a gap, got no l2",
     "nan": "l3 must be a finite number at sample 5, got nan",
-    "times": "times must rise from sample to sample, got 9.5 s and then 9.5 s at sample 20",
+    "times": "times must increase from sample to sample, got 9.5 s and then 9.5 s at sample 20",
     "no lengths": "must have columns l0, l1, ... of lengths, got x, y, z, roll, pitch, yaw",
     "part of a position": "must have all columns x, y, z or none of them, got x, y",
     "half a pose": "poses must have rows that are finite or nan as a whole, got both at sample 5",
@@ -231,7 +231,7 @@ def test_the_command_writes_a_robot_file(built, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert "residual of the lengths" in done.stdout
-    assert "no direction of the parameters is open" in done.stdout
+    assert "all directions of the parameters are observable" in done.stdout
     assert (tmp_path / "mine.yaml").exists()
 
 

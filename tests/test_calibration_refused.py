@@ -35,7 +35,7 @@ def slips(poses, readings):
         "lengths": (poses, 1e3 * readings, "the lengths look like millimetres read as metres"),
         "positions": (MM * poses, readings, "the positions look like millimetres read as metres"),
         "both": (MM * poses, 1e3 * readings, "lengths and positions look like millimetres read as metres"),
-        "backwards": (poses, -readings, "the lengths look counted the other way"),
+        "backwards": (poses, -readings, "the lengths seem to have the wrong sign"),
         "degrees": (poses * [1, 1, 1, *[180 / np.pi] * 3], readings, "the angles look like degrees read as radians"),
         "radians": (poses * [1, 1, 1, *[np.pi / 180] * 3], readings, "the angles look like radians read as degrees"),
         "inverse": (of_rotation(poses, turned.inv()), readings, "the orientations look inverted"),
@@ -118,13 +118,13 @@ def test_what_predicts_worse_than_the_file_is_not_written(tmp_path):
     )
     assert result.held_out.after > result.held_out.before
     assert result.held_out.best == ()
-    assert "samples left out fit worse than with the file's robot" in result.refused
+    assert "validation samples fit worse than with the file's robot" in result.refused
     assert "DO NOT USE THIS RESULT" in result.report()
     with pytest.raises(InputError, match="fit worse than with the file's robot"):
         result.save(tmp_path / "robot.yaml")
     automatic = calibrate(robot, Measurements(readings, poses, sigma=0.02), "auto")
     assert automatic.free == ()
-    assert automatic.refused.startswith("the file predicts samples left out as well")
+    assert automatic.refused.startswith("the file predicts validation samples as well")
     np.testing.assert_array_equal(automatic.robot.anchors, robot.anchors)
     assert "the file as it is" in automatic.report()
 
@@ -195,7 +195,7 @@ def test_conventions_of_angles_that_cannot_be_told_apart(name, seed):
         log = Measurements(lengths, given)
         said = doubt(robot, log)
         if said is not None:
-            assert text.removeprefix("the angles look ") in said or "which one cannot be told" in said
+            assert text.removeprefix("the angles look ") in said or "which cannot be determined" in said
             continue
         fitted = calibrate(robot, log, ("anchors", "attachments", "offsets"), outliers=False)
         assert fitted.noise < 1.1 * fitted.stated_sigma

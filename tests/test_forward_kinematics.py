@@ -343,7 +343,7 @@ def test_what_the_lengths_leave_open_is_undetermined():
     assert estimate.converged
     assert not estimate.determined
     assert not estimate.conditioned
-    with pytest.raises(InputError, match="gravity must not be zero where the lengths leave a motion open"):
+    with pytest.raises(InputError, match="gravity must not be zero if the lengths do not determine the pose"):
         pose_from_lengths(robot.model_copy(update={"gravity": (0.0, 0.0, 0.0)}), [1.0])
 
 

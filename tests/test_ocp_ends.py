@@ -93,7 +93,7 @@ def test_a_ball_about_an_end_blocks_it_exactly_if_the_platform_starts_inside(at_
     if blocks:
         missing = 0.4 - np.linalg.norm(points - centre, axis=2).min()
         assert planned.audit.excess[0].value == pytest.approx(-missing, abs=1e-5)
-        assert "keep_out of platform" in planned.report().splitlines()[0]
+        assert "platform is " in planned.report().splitlines()[0]
 
 
 @settings(max_examples=25, deadline=None)

@@ -310,7 +310,7 @@ def test_the_planner_goes_around_what_is_in_its_way(kind, tmp_path):
     at_end = LINE | {"path": LINE["path"] | {"end": centre.tolist()}, "limits": {"keep_out": [place]}}
     blocked = plan(robot, at_end)
     assert blocked.status.value == "infeasible"
-    assert "keep_out of platform outside part" in blocked.report().splitlines()[0]
+    assert "inside the keep-out region 'part'" in blocked.report().splitlines()[0]
 
 
 @settings(max_examples=5, deadline=None)

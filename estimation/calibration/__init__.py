@@ -1,4 +1,4 @@
-"""The robot as built: which parameters explain the measured lengths of its cables, and how certain they are."""
+"""Geometric calibration: robot parameters from measured cable lengths, with their covariance."""
 
 from .calibration import Calibration
 from .cross_validation import Compared, HeldOut

@@ -1,4 +1,4 @@
-"""`Calibration`: the robot as measurements show it, with its file, figures and report."""
+"""`Calibration`: a calibrated robot, with its file, figures and report."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Calibration(CalibrationData, Drawn, Reported):
-    """The result of `calibrate`; its numbers are those of `CalibrationData`."""
+    """The result of `calibrate`: the numbers of `CalibrationData`, with files, figures and report."""
 
     def _headline(self) -> str:
         return headline(self)
@@ -32,12 +32,12 @@ class Calibration(CalibrationData, Drawn, Reported):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save the robot as a robot file (YAML) atomically, and return the path.
 
-        A result that should not be used (`refused`) is not saved; `robot.save` saves it all the same.
+        A result that should not be used (`refused`) is not saved. `robot.save` saves it nevertheless.
 
         Parameters
         ----------
         path
-            Of the file; one of the same name is replaced.
+            Path of the file; an existing file is overwritten.
 
         Raises
         ------
@@ -45,15 +45,15 @@ class Calibration(CalibrationData, Drawn, Reported):
             If the result is refused, or the file cannot be written.
         """
         if self.refused is not None:
-            raise InputError(f"calibration must be one to use, to be saved, got one refused: {self.refused}")
+            raise InputError(f"calibration must not be refused to be saved, got one refused: {self.refused}")
         from ...models.parsing import save_yaml
 
         return save_yaml(self.robot, path, "path")
 
     def figures(self) -> dict[str, Figure]:
-        """Draw residuals before and after, anchors with ellipsoids, and standard deviations: by name, to show or save.
+        """Draw residuals before and after, anchors with error ellipsoids, and standard deviations, by name.
 
-        Anchors are drawn if the measurements determine all of them.
+        Anchors are drawn if all of them are observable.
         """
         from .drawings import drawings
 

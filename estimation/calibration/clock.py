@@ -1,4 +1,4 @@
-"""A first value of the clock offset: the sum of squares has valleys where motions repeat, so many values are tried."""
+"""An initial value of the clock offset: repeating motions cause local minima, so many values are tried."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ SMOOTH = 0.1  # error of a pose between others, as a share of how far poses are 
 
 
 def begin_with_clock(model: Model, length: float) -> State:
-    """Return the state to begin with: at each clock offset tried, the other parameters are fitted in one step.
+    """Return the initial state: for each clock offset, the other parameters are fitted in one step.
 
-    Tried are offsets within a second, and about the one with which cable speeds correlate best if that is larger. The
-    length is that of the cables [m].
+    Offsets within a second are tried, and around the one with the best correlation of cable speeds if it is larger.
+    `length` is the length of the cables [m].
     """
     few = _thinned(model)
     without = _without_clock(few)
@@ -46,9 +46,9 @@ def begin_with_clock(model: Model, length: float) -> State:
 
 
 def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:
-    """Return whether every other pose follows from its neighbours: poses of a motion have a meaning between samples.
+    """Return whether every other pose follows from its neighbours, so that poses can be interpolated.
 
-    They do not if the platform was moved from pose to pose, or stood still.
+    It is false if the platform was moved from pose to pose, or did not move.
     """
     assert measurements.times is not None
     position, rotation, known = measured_poses(robot, measurements)
@@ -64,13 +64,13 @@ def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:
 
 
 def _without_clock(model: Model) -> Model:
-    """Return the model whose clock offset does not vary."""
+    """Return the model with a fixed clock offset."""
     groups = tuple(group for group in model.parameters.groups if group != "clock")
     return replace(model, parameters=replace(model.parameters, groups=groups))
 
 
 def _by_cable_speeds(model: Model) -> float:
-    """Return the clock offset [s], up to half the record, with which cable speeds correlate best."""
+    """Return the clock offset [s], up to half the record, with the best correlation of cable speeds."""
     given, track = model.measurements, model.track
     assert given.times is not None
     assert track is not None
@@ -100,7 +100,7 @@ def _by_cable_speeds(model: Model) -> float:
 
 
 def _cost_at(model: Model, clock: float, length: float) -> float:
-    """Return the mean square of the readings' residuals after one step of the parameters; inf with few poses left."""
+    """Return the mean square of the readings' residuals after one step of the parameters; inf with too few poses."""
     state = model.begin()
     state.x[model.parameters.clock] = clock
     residuals, derivatives = model.linearised(state)
@@ -116,7 +116,7 @@ def _cost_at(model: Model, clock: float, length: float) -> float:
 
 
 def _thinned(model: Model) -> Model:
-    """Return the model of few enough samples, whose poses are still those of the whole track."""
+    """Return the model with fewer samples, but with poses of the whole track."""
     count = len(model.measurements)
     rows = np.unique(np.linspace(0, count - 1, MOST_SAMPLES).astype(int)) if count > MOST_SAMPLES else np.arange(count)
     assert model.track is not None

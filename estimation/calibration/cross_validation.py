@@ -1,7 +1,7 @@
-"""Measurements left out decide whether more parameters help: a small residual of those that were fitted proves nothing.
+"""Cross-validation: a small residual of the training samples does not prove that more parameters help.
 
-The record is cut into blocks in time, every other one is fitted, and the lengths of the rest are predicted, with poses
-estimated again where they were not measured; then the halves change places.
+The record is cut into blocks in time, every other block is fitted, and the lengths of the others are predicted (unknown
+poses are estimated again). Then the two halves are swapped.
 """
 
 from __future__ import annotations
@@ -52,10 +52,10 @@ NESTED: tuple[tuple[str, ...], ...] = (
 
 
 class Compared(NamedTuple):
-    """A set of parameters, and the root mean square of its residuals fitted and left out [m].
+    """A parameter set, and the root mean square of its training and validation residuals [m].
 
-    With poses that were not measured both are divided by the share of the lengths' errors that shows in residuals. Inf
-    if half of the samples do not determine the parameters, or a fit did not converge.
+    With unknown poses both are corrected for the part of the errors that the poses absorb. Inf if half of the samples
+    do not determine the parameters, or a fit did not converge.
     """
 
     free: tuple[str, ...]
@@ -65,18 +65,18 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True)
 class HeldOut(Displayed):
-    """The errors with which parameters predict measurements that were left out.
+    """Errors of cross-validation.
 
     Attributes
     ----------
     before
-        Root mean square of the residuals left out with the file's parameters [m].
+        Root mean square of the residuals with the file's parameters [m].
     after
-        The same with the parameters found from the other half [m].
+        The same with the parameters estimated from the other half [m].
     sets
-        The smaller sets of parameters, none at first: the file. The set itself is the last.
+        The parameter sets, from the empty set (the file) to the full set.
     best
-        The smallest set whose error left out is at most 2 % above the smallest error of all.
+        The smallest set with an error at most 2 % above the smallest error of all.
     """
 
     before: float
@@ -108,9 +108,9 @@ def compare(
     prior: dict[str, float],
     clock: float = 0.0,
 ) -> HeldOut:
-    """Return how well sets of parameters within `free` predict what was left out; arguments are checked.
+    """Cross-validate the parameter sets within `free`; arguments are checked.
 
-    Measurements are without slips, weights (m, N) are 0 for wrong readings, and a clock offset is near `clock` [s].
+    Measurements are without slips, weights (m, N) are 0 for outliers, and a clock offset is near `clock` [s].
     """
     sets = [one for one in NESTED if set(one) < set(free) - {"clock"}]
     sets = [(*one, "clock") if one and "clock" in free else one for one in sets]
@@ -120,16 +120,16 @@ def compare(
 
 
 def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[str, ...]:
-    """Return the smallest set of parameters that predicts measurements left out nearly as well as any set.
+    """Return the smallest parameter set whose cross-validation error is close to the best.
 
-    The sets are none (the file), offsets alone, anchors, both, and these with attachments, scales and pulley radii;
-    with a clock offset where times and poses of a motion were measured. With `outliers`, slips and wrong readings are
-    removed first.
+    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales and pulley radii;
+    with a clock offset if times and poses of a motion were measured. With `outliers`, slips and outliers are removed
+    first.
 
     Raises
     ------
     InputError
-        If the measurements are too few even for the offsets.
+        If there are too few measurements even for the offsets.
     """
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
     check_enough(robot, measurements, ("offsets",), {})
@@ -184,7 +184,7 @@ def _compare(
 def _predict(
     whole: Model, free: tuple[str, ...], prior: dict[str, float], clock: float, fitted: np.ndarray, left: np.ndarray
 ) -> tuple[float, float] | None:
-    """Return the mean squares [m^2] fitted and left out; None with too few samples, or if no fit converged."""
+    """Return the mean squares [m^2] of training and validation; None with too few samples, or if no fit converged."""
     if not (len(fitted) and len(left)):
         return None
 
@@ -212,7 +212,7 @@ def _predict(
 
 
 def _mean_square(model: Model, state: State) -> float:
-    """Return the mean square of the lengths' residuals [m^2], corrected for what unknown poses absorb."""
+    """Return the mean square of the lengths' residuals [m^2], corrected for the part that unknown poses absorb."""
     used = model.weights * model.inside(state) > 0
     squares = float((lengths_of(model, state).T[used] ** 2).sum())
     unknown = int(np.isinf(model.pose_sigmas).sum())
@@ -220,6 +220,6 @@ def _mean_square(model: Model, state: State) -> float:
 
 
 def poses_fitted(model: Model, robot: Robot) -> tuple[Model, State]:
-    """Return the model without parameters that vary, and the poses that fit the lengths best with a robot's file."""
+    """Return the model without free parameters, and the poses that fit the lengths best with a robot's file."""
     nothing = replace(model, parameters=Parameters(robot, ()), prior={})
     return nothing, fit_from(nothing, nothing.begin(), length_of(robot))[0].state

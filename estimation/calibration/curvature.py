@@ -1,12 +1,12 @@
-"""`curvature`: second derivatives of the lengths by the poses, of which the usual normal equations know nothing.
+"""`curvature`: second derivatives of the lengths by the poses, which the usual normal equations neglect.
 
 Where two poses with the same lengths are about to merge, first derivatives say little about how far to go, and one such
 sample would make all steps of a fit short. With u the unit vector along a cable of length L and a the arm R b of its
-attachment, a shift d and a turn w change the length, beside the first derivative, by half of
+attachment, the second-order change of the length by a shift d and a rotation w is half of
 
     v' (I - u u') v / L + (u . w) (a . w) - (u . a) w'w        v = d + w x a
 
-as of a cable between points; that of a pulley hardly differs.
+as for a cable between points; with a pulley it hardly differs.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`next_poses`: which poses to measure next, so that the parameters become certain soonest (D-optimal design)."""
+"""`next_poses`: the most informative poses to measure next (D-optimal design)."""
 
 from __future__ import annotations
 
@@ -36,28 +36,29 @@ def next_poses(
     free: str | Sequence[str] = ("anchors", "offsets"),
     measured: bool = True,
 ) -> np.ndarray:
-    """Choose the poses to measure next, (count, 6) [m, rad], one after the other; one may come twice.
+    """Choose the poses to measure next, (count, 6) [m, rad]; a pose may be chosen twice.
 
-    Each is the one after which the ellipsoid of the parameters' errors has the smallest volume.
+    It greedily adds the pose that shrinks the parameters' error ellipsoid most.
 
     Parameters
     ----------
     robot
-        A robot, its name or its file: nothing was measured so far. Or a `Calibration`, whose measurements count.
+        A robot, its name or its file if nothing was measured so far, or a `Calibration`, whose measurements are
+        included.
     candidates
         Poses to choose from, (k, 6) [m, rad]. Default: random ones with angles up to 0.3 rad at which tensions inside
         their limits hold the platform at rest.
     count
-        How many to choose.
+        Number of poses.
     free
-        The parameters to find, as in `calibrate`; those of a `Calibration` are its own. A clock offset is left out.
+        Parameters to estimate, as in `calibrate`; default: those of a `Calibration`. A clock offset is ignored.
     measured
-        Whether poses will be measured, or only the lengths.
+        True if poses will be measured, False if only lengths.
 
     Raises
     ------
     InputError
-        If an argument is wrong, or there are no candidates.
+        If an argument is wrong, or no candidate exists.
     """
     if isinstance(robot, Calibration):
         calibration, chosen, groups = robot, robot.robot, robot.free
@@ -83,7 +84,7 @@ def next_poses(
 
 
 def _rows(robot: Robot, groups: tuple[str, ...], poses: np.ndarray, measured: bool) -> np.ndarray:
-    """Return the derivatives of the lengths by the parameters, less what unknown poses absorb, (k, m, p) [1/m]."""
+    """Return the derivatives of lengths by parameters, minus the part that unknown poses absorb, (k, m, p) [1/m]."""
     lengths = np.ones((len(poses), robot.m))
     model = Model(Parameters(robot, groups), Measurements(lengths, poses), {}, np.ones((robot.m, len(poses))))
     state = model.begin()
@@ -113,7 +114,7 @@ def _projected(model: Model, state: State) -> np.ndarray:
 
 
 def _so_far(calibration: Calibration | None, robot: Robot, groups: tuple[str, ...]) -> np.ndarray:
-    """Return the information so far [1/m^2], (p, p), and a little of all parameters, so that it has an inverse."""
+    """Return the information so far [1/m^2], (p, p), plus a small regularisation that makes it invertible."""
     reach = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
     size = int(Parameters(robot, groups).varies.sum())
     start = np.eye(size) / reach**2

@@ -26,9 +26,9 @@ KINDS = {  # of the parameters of a cable that are lengths, by the end of their 
 
 
 def drawings(result: CalibrationData) -> dict[str, Figure]:
-    """Draw residuals before and after, anchors with their ellipsoids, and how well each parameter is known.
+    """Draw residuals before and after, anchors with error ellipsoids, and the standard deviation of each parameter.
 
-    Ellipsoids are drawn if the measurements determine all anchors.
+    Ellipsoids are drawn if all anchors are observable.
     """
     times = result.measurements.times
     drawn = {"residuals": pictures.residuals(result.residuals_before, result.residuals, times)}

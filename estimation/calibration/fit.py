@@ -1,7 +1,7 @@
 """`fit`: damped least squares (Levenberg and Marquardt) over parameters and poses.
 
-Without a prior some directions of the parameters may be open. A very weak prior about the file's values decides there
-and nowhere else: the change from the file is the smallest there is (inner constraints).
+Without a prior some directions of the parameters may be unobservable. A very weak prior about the file's values fixes
+only these: the change from the file is the smallest possible (inner constraints).
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ RELATIVE = 1e-13  # of an eigenvalue to the largest, below which it is rounding
 
 
 class Fit(NamedTuple):
-    """The state with the least sum of squares.
+    """The state with the smallest sum of squares.
 
     Attributes
     ----------
     cost
-        The sum.
+        Sum of squares.
     converged
-        Whether no step makes it notably smaller.
+        True if no step reduces it notably.
     steps
-        Steps tried.
+        Number of steps tried.
     """
 
     state: State
@@ -50,29 +50,29 @@ class Fit(NamedTuple):
 def unobservable_below(eigenvalues: np.ndarray, length: float) -> float:
     """Return the eigenvalue of the normal equations [1/m^2] below which a direction counts as unobservable.
 
-    An eigenvalue is 1 / sigma^2 of its direction. If sigma is longer than the cables, the data leave the direction open
-    as far as the derivatives mean anything. Rounding makes eigenvalues of 1e-16 of the largest from those that are 0.
+    An eigenvalue is 1 / sigma^2 of its direction. If sigma exceeds the cable length, the direction is unobservable
+    within the validity of the linearisation. Rounding turns zero eigenvalues into 1e-16 of the largest.
 
     Parameters
     ----------
     eigenvalues
         [1/m^2], (p,).
     length
-        Of the cables [m].
+        Length of the cables [m].
     """
     return max(1 / length**2, RELATIVE * float(eigenvalues.max(initial=0.0)))
 
 
 def held(S: np.ndarray, length: float) -> np.ndarray:
-    """Return normal equations with so weak a prior about the file's values that only open directions feel it."""
+    """Return normal equations with a weak prior about the file's values that affects only unobservable directions."""
     weak = max(WEAK / length**2, WEAKEST * float(np.diag(S).max(initial=0.0)))
     return S + weak * np.eye(len(S))
 
 
 def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enough: float = 0.0) -> Fit:
-    """Minimise the sum of squares from `state` on; `length` is that of the cables [m].
+    """Minimise the sum of squares, starting from `state`; `length` is the length of the cables [m].
 
-    It ends where the decrease to expect is below a share `enough` of the sum; 0: where no step helps.
+    It ends when the expected decrease is below the fraction `enough` of the sum; 0: when no step helps.
     """
     scale = metric(model)
     varies = model.parameters.varies
@@ -126,10 +126,10 @@ def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enou
 
 
 class _Damping:
-    """Levenberg and Marquardt's damping: a factor times the largest value so far of each diagonal element.
+    """Levenberg-Marquardt damping: a factor times the largest value so far of each diagonal element.
 
-    A share of the element itself would not damp where a derivative is nearly zero: steps there would all be rejected
-    (More, in MINPACK). The factor follows the ratio of the decrease to the expected one (Nielsen).
+    With the current element instead, parameters with nearly zero derivatives would not be damped, and all steps would
+    be rejected (More, in MINPACK). The factor follows the ratio of the actual to the expected decrease (Nielsen).
     """
 
     def __init__(self) -> None:
@@ -138,24 +138,24 @@ class _Damping:
 
     @property
     def added(self) -> Diagonals | None:
-        """Return what is added to the diagonals, or None for nothing."""
+        """Return the damping of the diagonals, or None without damping."""
         if self._largest is None or self.factor == 0:
             return None
         return Diagonals(*(self.factor * part for part in self._largest))
 
     def see(self, diagonals: Diagonals) -> None:
-        """Take note of diagonals without damping."""
+        """Update the largest diagonals so far."""
         known = self._largest or diagonals
         self._largest = Diagonals(*(np.maximum(*pair) for pair in zip(known, diagonals, strict=True)))
 
     def accept(self, ratio: float) -> None:
-        """Change the factor after a step that was taken, by the ratio of its decrease to the expected one."""
+        """Update the factor after an accepted step, by the ratio of the actual to the expected decrease."""
         self.factor *= 0.1 if ratio > GOOD else min(max(1 / 3, 1 - (2 * ratio - 1) ** 3), 2.0)
         self.factor *= self.factor > LEAST
         self._growth = 2.0
 
     def reject(self) -> None:
-        """Enlarge the factor after a step that was not taken, ever faster."""
+        """Increase the factor after a rejected step, ever faster."""
         self.factor = max(LEAST, self._growth * self.factor)
         self._growth *= 2
 
@@ -163,9 +163,9 @@ class _Damping:
 def _step(
     equations: NormalEquations, away: np.ndarray, length: float, damped: bool, at_best: bool
 ) -> tuple[np.ndarray, float]:
-    """Return the step (p,) and the decrease of the sum of squares to expect.
+    """Return the step (p,) and the expected decrease of the sum of squares.
 
-    Poses that are `at_best` for the parameters have nothing to gain, whatever their first derivatives promise.
+    Poses that are already optimal for the parameters (`at_best`) contribute no decrease.
     """
     of_poses = 0.0 if equations.y is None or at_best else float(np.vdot(equations.y, equations.y))
     if not equations.b.size:

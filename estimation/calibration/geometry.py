@@ -1,4 +1,4 @@
-"""Lengths of cables and their derivatives, by the numeric core, of a robot whose numbers vary."""
+"""Cable lengths and their derivatives by the numeric core, for varying parameters of a robot."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Runs(NamedTuple):
     Attributes
     ----------
     lengths
-        From the anchor over the pulley to the attachment [m], (m, N).
+        Lengths from the anchor over the pulley to the attachment [m], (m, N).
     directions
-        In {G}, along the cable towards the attachment, (m, N, 3).
+        Unit vectors in {G} along the cable towards the attachment, (m, N, 3).
     by_geometry
         Derivatives of the length by the anchor in its carrier's frame (3), the attachment in the platform's (3) and the
         radius of the pulley, (m, N, 7) [-].
@@ -32,13 +32,13 @@ class Runs(NamedTuple):
 
 
 def runs(robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> Runs:
-    """Return how the cables run with the carriers at home and the platform at positions (N, 3) and rotations (N, 3, 3).
+    """Return the cable geometry with the carriers at home and the platform at positions (N, 3) and rotations (N, 3, 3).
 
     Parameters
     ----------
     table
-        `Parameters.table`: anchors, attachments and, as the last of its columns, radii, which replace those of the
-        robot, (m, 9). No cable is tangent to a radius below 0.
+        `Parameters.table`: anchors, attachments and, in its last column, radii, which replace the values of the robot,
+        (m, 9). No cable is tangent to a negative radius.
     """
     record, m, count = record_of(robot).copy(), robot.m, len(position)
     cables = record["cable"][:m]

@@ -48,16 +48,17 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
     ----------
     path
         CSV with a header such as `t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], ..., tension0 [N]`; or
-        NetCDF, as from `Measurements.save`, a flight of `simulate`, or with variables named like these columns. Empty
-        fields and nan of a pose are poses that were not measured.
+        NetCDF from `Measurements.save` or a simulation, or with variables named like these columns. Empty
+        fields or nan mark poses that were not measured.
     sigma
-        Standard deviations as for `Measurements`; default: those that `Measurements.save` has written, or else its own.
+        Standard deviations as for `Measurements`; default: those of the file if `Measurements.save` wrote it, otherwise
+        the defaults of `Measurements`.
 
     Raises
     ------
     InputError
         If the file cannot be read, a column has no or an unknown unit, a length, tension or time is missing, or times
-        do not rise: one line that names the file.
+        do not increase.
     """
     file = file_path("log", path, "the path of a CSV or NetCDF file")
     where = printable(str(file))
@@ -76,7 +77,7 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
 
 
 def _begins(file: Path) -> bytes:
-    """Return the first bytes of a file, none if it cannot be read: `read_bytes` says why."""
+    """Return the first bytes of a file; none if it cannot be read (`read_bytes` then reports why)."""
     try:
         with file.open("rb") as stream:
             return stream.read(8)
@@ -191,16 +192,16 @@ def _attributes(of: Any) -> dict[str, Any]:
 
 
 def _floats(values: np.ndarray) -> np.ndarray:
-    """Return values as they can be computed with: a damaged file may hold nan that raise a signal."""
+    """Return values that are safe to compute with: a damaged file may contain signalling nan."""
     with np.errstate(invalid="ignore"):
         numbers = values.astype(float, copy=False)
         return np.add(numbers, 0.0, out=numbers)
 
 
 def _as_towline_writes(arrays: dict[str, tuple[np.ndarray, dict[str, Any]]], stated: dict[str, Any]) -> dict[str, Any]:
-    """Return the arguments of `Measurements` from a file of it or of a flight, which has no standard deviations.
+    """Return the arguments of `Measurements` from its own file, or from a simulation without standard deviations.
 
-    Lengths of a flight are those under tension, so its tensions are left out.
+    Lengths of a simulation are those under tension, so its tensions are ignored.
     """
     known = {"cable_lengths": ("lengths", LENGTHS), "tensions": ("tensions", FORCES), "time": ("times", TIMES)}
     result: dict[str, Any] = {"sigma": dict(stated)} if stated else {}

@@ -1,4 +1,4 @@
-"""`Measurements`: what was measured beside a robot: cable lengths, and poses, tensions and times where known."""
+"""`Measurements`: measured cable lengths of a robot, and poses, tensions and times if known."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Sigma(NamedTuple):
     Attributes
     ----------
     lengths
-        Of each reading, after its scale [m].
+        Standard deviation of each reading, after scaling [m].
     position
-        Of measured positions, along each axis [m]; 0: exact.
+        Standard deviation of measured positions, along each axis [m]; 0: exact.
     rotation
-        Of measured orientations, about each axis [rad]; 0: exact.
+        Standard deviation of measured orientations, about each axis [rad]; 0: exact.
     """
 
     lengths: float = SIGMA
@@ -45,23 +45,23 @@ class Sigma(NamedTuple):
 
 
 class Measurements(Displayed):
-    """Hold N samples of a robot's cable lengths, with poses, tensions and times where they were measured.
+    """Store N samples of a robot's cable lengths, with poses, tensions and times if they were measured.
 
     Parameters
     ----------
     lengths
-        Readings of the lengths [m], (N, m): each is the length from anchor to attachment up to offset and scale.
+        Readings of the lengths [m], (N, m): the lengths from anchor to attachment up to offset and scale.
     poses
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (N, 6), or positions alone, (N, 3). Rows of
         nan were not measured. Default: no pose was measured.
     orientations
-        Of the platform where `poses` are positions, or None as beside an inertial sensor: (roll, pitch, yaw) [rad],
-        (N, 3), or quaternions in the order (x, y, z, w), (N, 4). Rows of nan were not measured.
+        Orientations of the platform if `poses` are positions or None: (roll, pitch, yaw) [rad], (N, 3), or quaternions
+        (x, y, z, w), (N, 4). Rows of nan were not measured.
     tensions
-        Of the cables [N], (N, m): cables with a stiffness are longer under them than their readings. Default: not
-        measured, no cable stretches.
+        Cable tensions [N], (N, m), used to correct elastic elongation of cables with a stiffness. Default: not
+        measured, no elongation.
     times
-        Of the samples [s], (N,), rising; a clock offset requires them.
+        Times of the samples [s], (N,), increasing; a clock offset requires them.
     sigma
         Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m] and `rotation` [rad].
         Default: 1 mm, and poses that are exact.
@@ -168,7 +168,7 @@ class Measurements(Displayed):
 
 
 def check_measurements(robot: Robot, measurements: object) -> Measurements:
-    """Return measurements of a robot, or raise InputError if they are none, or of another number of cables."""
+    """Check measurements of a robot; raise InputError if they are invalid or have another number of cables."""
     given = required("measurements", measurements, Measurements)
     if given.m != robot.m:
         raise InputError(
@@ -180,7 +180,7 @@ def check_measurements(robot: Robot, measurements: object) -> Measurements:
 def measured_poses(robot: Robot, measurements: Measurements) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the positions (N, 3), rotations (N, 3, 3) and which coordinates were measured, (N, 6) of bool.
 
-    Coordinates that were not measured are those of home.
+    Coordinates that were not measured have their values at home.
     """
     count, home = len(measurements), robot.home
     poses = np.full((count, 6), np.nan) if measurements.poses is None else measurements.poses.copy()
@@ -255,7 +255,8 @@ def _rising(times: Any, count: int) -> np.ndarray:
     if falling.size:
         row = int(falling[0])
         raise InputError(
-            f"times must rise from sample to sample, got {array[row]:.9g} s and then {array[row + 1]:.9g} s at sample "
+            f"times must increase from sample to sample, got {array[row]:.9g} s and then {array[row + 1]:.9g} s at "
+            f"sample "
             f"{row + 1}"
         )
     return array

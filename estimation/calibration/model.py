@@ -5,12 +5,12 @@ With the reading y of a cable, its length l at the pose, offset o, scale s and t
     e = (f l - o - s y) / sigma                      if all poses were measured
     e = (s0 / s (f l - o) - s0 y) / sigma            if any pose is unknown
 
-The second is in the units of the reading: the first would shrink with the robot, and a robot without size would fit
-best. With poses that are known the first is a linear regression, which readings that hardly change do not determine. f
-is 1 unless tensions were measured: 1 / (1 + t / (E A)), since readings are of the cable without strain.
+The second is in the units of the reading. The first would shrink with the robot, so a robot of zero size would fit
+best. With known poses the first is a linear regression, which readings that hardly change do not determine. f is 1, or
+1 / (1 + t / (E A)) if tensions were measured, because readings refer to the unstrained cable.
 
-The pose of sample k is that measured at t_k + clock, or one to start from, changed by a shift and a small turn in {G},
-which vary where the pose was measured with an error, and where it was not measured.
+The pose of sample k is the pose measured at t_k + clock, or an initial one, plus a translation and a small rotation in
+{G}. These increments are unknowns if the pose was measured with an error or not at all.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class State(NamedTuple):
     x
         Parameters, (P,).
     shift, turn
-        By which poses differ from those to begin with, in {G}: (N, 3) [m], (N, 3, 3).
+        Increments of the poses from their initial values, in {G}: (N, 3) [m], (N, 3, 3).
     """
 
     x: np.ndarray
@@ -48,7 +48,7 @@ class State(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Differences in their standard deviations: of readings (m, N), poses (N, 6) and parameters (P,)."""
+    """Differences divided by their standard deviations: readings (m, N), poses (N, 6) and parameters (P,)."""
 
     readings: np.ndarray
     poses: np.ndarray
@@ -73,11 +73,11 @@ class Derivatives(NamedTuple):
     Attributes
     ----------
     cables
-        By the nine parameters of the own cable, (m, N, 9).
+        Derivatives by the nine parameters of the cable itself, (m, N, 9).
     others
-        By clock offset and slips, (m, N, 1 + slips).
+        Derivatives by clock offset and slips, (m, N, 1 + slips).
     poses
-        By shift and turn of the own sample, (m, N, 6).
+        Derivatives by shift and rotation of the sample itself, (m, N, 6).
     arms, lengths
         R b of each cable (m, N, 3) [m], and its length (m, N) [m].
     """
@@ -91,18 +91,18 @@ class Derivatives(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model(Displayed):
-    """Measurements of a robot, and what varies to explain them.
+    """Measurements of a robot, and the unknowns that explain them.
 
     Attributes
     ----------
     weights
-        1 for each reading that counts, 0 for one that is left out, (m, N).
+        1 for each reading that is used, 0 for one that is left out, (m, N).
     start
-        Poses to begin with where none was measured, (N, 6) [m, rad]; default: home.
+        Initial poses where none was measured, (N, 6) [m, rad]; default: home.
     track
-        Of measured poses over time; default: the clock offset is 0.
+        Measured poses over time; default: the clock offset is 0.
     upright
-        Standard deviation of orientations that were not measured about those to begin with [rad]; inf: anything.
+        Standard deviation of unmeasured orientations about their initial values [rad]; inf: none.
     """
 
     parameters: Parameters
@@ -119,7 +119,7 @@ class Model(Displayed):
         return self.parameters.robot
 
     def with_parameters(self, parameters: Parameters) -> Model:
-        """Return the model with other parameters that vary."""
+        """Return the model with other free parameters."""
         return replace(self, parameters=parameters)
 
     @cached_property
@@ -159,7 +159,7 @@ class Model(Displayed):
         return 1 / (1 + np.maximum(tensions.T, 0.0) * np.array(by)[:, None])
 
     def begin(self) -> State:
-        """Return the parameters of the file, at the poses to begin with."""
+        """Return the parameters of the file, at the initial poses."""
         count = len(self.measurements)
         return State(self.parameters.first.copy(), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)))
 
@@ -169,7 +169,7 @@ class Model(Displayed):
         return position + state.shift, state.turn @ rotation
 
     def inside(self, state: State) -> np.ndarray:
-        """Return which samples have a pose at their time, (N,) of bool: a clock offset may leave the record."""
+        """Return which samples have a pose at their time, (N,) of bool: a clock offset may exceed the record."""
         if self.track is None:
             return np.ones(len(self.measurements), dtype=bool)
         return self.track.inside(state.x[self.parameters.clock])
@@ -181,7 +181,7 @@ class Model(Displayed):
 
     @cached_property
     def _begun(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions (N, 3) [m] and rotations (N, 3, 3) as measured, or to begin with where they were not."""
+        """Return the measured, or else the initial, positions (N, 3) [m] and rotations (N, 3, 3)."""
         position, rotation, known = self._given
         if self.start is not None and not known.all():
             place, turned = ~known[:, 0], ~known[:, 3]
@@ -252,7 +252,7 @@ class Model(Displayed):
         return result
 
     def lengths(self, state: State) -> np.ndarray:
-        """Return the lengths of the cables that the readings mean, (N, m) [m]."""
+        """Convert the readings to cable lengths, (N, m) [m]."""
         table = self.parameters.table(state.x)
         unstrained = table[:, 6:7] + self._slips(state.x) + table[:, 7:8] * self.measurements.lengths.T
         return (unstrained / self._stretch).T

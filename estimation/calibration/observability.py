@@ -1,9 +1,9 @@
-"""`Observability`: what the measurements determine of the parameters, and by name what they do not.
+"""`Observability`: the observable directions of the parameters, and the names of the unobservable ones.
 
-A direction of the parameters is open where poses can move along without any length changing (a gauge, as that of {G}
-itself if no pose was measured), or where the measured poses differ too little. Gauges are known by their generators:
-each is tried on the normal equations, since pulleys with given axes, locked coordinates and parameters that do not vary
-exclude some. What is left is named by the parameters that it changes most.
+A direction of the parameters is unobservable if poses can move along without any length changing (a gauge, such as the
+choice of {G} if no pose was measured), or if the measured poses differ too little. Gauges have known generators. Each
+is tested on the normal equations, because pulleys with given axes, locked coordinates and fixed parameters exclude
+some. Other directions are named by the parameters that they change most.
 """
 
 from __future__ import annotations
@@ -29,18 +29,19 @@ AXES = "xyz"
 
 @dataclass(frozen=True, eq=False)
 class Observability(Displayed):
-    """The directions that measurements determine.
+    """Observable and unobservable directions of the parameters.
 
     Attributes
     ----------
     covariance
-        Of the parameters that vary, in metres, (p, p); none along open directions.
+        Covariance of the free parameters, in metres, (p, p); zero along unobservable directions.
     sigmas
-        Of the directions [m], (p,), inf along open ones; the directions are the columns of `directions`, (p, p).
+        Standard deviations of the directions [m], (p,), inf along unobservable ones; the directions are the columns of
+        `directions`, (p, p).
     determined
-        Which of the parameters have no part in an open direction, (p,) of bool.
+        True for parameters without a part in an unobservable direction, (p,).
     open
-        The open directions, as text.
+        Names of the unobservable directions.
     """
 
     covariance: np.ndarray
@@ -53,16 +54,16 @@ class Observability(Displayed):
 def observability(
     S: np.ndarray, parameters: Parameters, state: State, scale: np.ndarray, length: float
 ) -> Observability:
-    """Return what normal equations determine.
+    """Return the observability of normal equations.
 
     Parameters
     ----------
     S
-        Matrix of the parameters that vary, in metres, (p, p) [1/m^2].
+        Matrix of the free parameters, in metres, (p, p) [1/m^2].
     scale
-        What each parameter is multiplied by to be a length, (P,).
+        Factors that convert parameters to lengths, (P,).
     length
-        Of the cables [m].
+        Length of the cables [m].
     """
     values, vectors = np.linalg.eigh(S)
     fixed = values > unobservable_below(values, length)
@@ -74,7 +75,7 @@ def observability(
 
 
 def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarray) -> tuple[str, ...]:
-    """Return a text for each column of N, (p, d): gauges first."""
+    """Return a name for each column of N, (p, d), gauges first."""
     names: list[str] = []
     rest = N
     varies = parameters.varies
@@ -97,13 +98,13 @@ def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarra
 
 
 def _across(vector: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis of all directions across a vector (d,), (d, d - 1)."""
+    """Return an orthonormal basis of the complement of a vector (d,), (d, d - 1)."""
     basis: np.ndarray = np.linalg.qr(np.column_stack([vector, np.eye(len(vector))]))[0]
     return basis[:, 1 : len(vector)]
 
 
 def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the gauges that there may be: text, and changes of all parameters, (P,)."""
+    """Yield the possible gauges: name, and changes of all parameters, (P,)."""
     table = parameters.table(state.x)
     turned, placed = parameters.carriers
     anchors = placed + np.einsum("mij,mj->mi", turned, table[:, :3])
@@ -131,7 +132,7 @@ def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.
     size = state.x.copy()
     size[parameters.clock] = 0.0
     parameters.table(size)[:, :3] = np.einsum("mji,mj->mi", turned, anchors - middle)
-    yield "the size of everything: no length is known for certain", size
+    yield "the overall scale: no length is known for certain", size
     for i in range(len(anchors)):
         for axis, unit in zip(AXES, np.eye(3), strict=True):
             rows = np.zeros_like(anchors)
@@ -140,7 +141,7 @@ def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.
 
 
 def _by_parameters(rest: np.ndarray, parameters: Parameters, state: State) -> list[str]:
-    """Return a text for each direction, by the parameters that it changes most: few in each, by pivots."""
+    """Return a name for each direction, from the few parameters that it changes most."""
     if not rest.shape[1]:
         return []
     from scipy.linalg import qr

@@ -1,9 +1,9 @@
-"""Wrong readings and slipped winches, by statistical tests of the residuals (data snooping).
+"""Outliers and slipped winches, by statistical tests of the residuals (data snooping).
 
-With unknown poses an error of one reading spreads over the residuals of its sample. The part of it that stays in its
-own residual is the redundancy r of the reading, between 0 and 1; the residual divided by sigma sqrt(r) is normal, and
-the reading with the largest of a sample is the wrong one (Baarda). A slip changes the offset of a cable from one sample
-on; the test is that of an additional parameter, for every cable and sample at once by cumulative sums.
+With unknown poses an error of one reading spreads over the residuals of its sample. The fraction that stays in its own
+residual is the redundancy r of the reading, between 0 and 1. The residual divided by sigma sqrt(r) is normally
+distributed, and the largest of a sample marks the outlier (Baarda). A slip changes the offset of a cable from one
+sample on. Cumulative sums test this additional parameter for every cable and sample at once.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ BY_CHANCE = 0.3  # of which the ratio of variances may exceed 1 where residuals 
 
 
 class Outlier(NamedTuple):
-    """A wrong reading: cable and sample, from 0, and by how much it is off [m]."""
+    """An outlier: cable and sample, from 0, and its error [m]."""
 
     cable: int
     sample: int
@@ -81,11 +81,11 @@ def _project(model: Model, state: State) -> _Projected:
 
 
 def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
-    """Return how many times larger variances of parameters are since neighbouring residuals are alike; at least 1.
+    """Return the factor by which autocorrelation increases the variances of the parameters; at least 1.
 
-    With g_b the sum of J'e over block b of the record, the parameters have the covariance S^-1 (sum g_b g_b') S^-1,
-    whatever the residuals inside a block have to do with each other; for independent ones it is excess^2 S^-1. Returned
-    is the ratio of the two, as the mean over all directions: single ones would need many more blocks.
+    With g_b the sum of J'e over block b of the record, the parameters have the covariance S^-1 (sum g_b g_b') S^-1 for
+    any correlation inside blocks, and excess^2 S^-1 for independent residuals. The result is the ratio of the two as a
+    mean over all directions, because single directions would need many more blocks.
     """
     found = _project(model, state)
     count = found.residuals.shape[1]
@@ -102,7 +102,7 @@ def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess:
 
 
 def find_outliers(model: Model, state: State) -> list[Outlier]:
-    """Return readings that do not belong to the others, at most one of a sample."""
+    """Return outliers, at most one per sample."""
     found = _project(model, state)
     seen = found.redundancy > SMALLEST_REDUNDANCY
     if not seen.any():
@@ -125,9 +125,9 @@ def find_outliers(model: Model, state: State) -> list[Outlier]:
 
 
 def _attributed(model: Model, state: State, sample: int) -> Outlier:
-    """Return which reading of a sample is wrong: that without which a pose fits the others best.
+    """Return the wrong reading of a sample: the one whose removal gives the best fit.
 
-    A large error moves an unknown pose so far that the residuals there do not show whose it is.
+    A large error moves an unknown pose so far that the residuals do not show which reading is wrong.
     """
     m, parameters = model.robot.m, Parameters(model.robot, ())
     lengths = model.measurements.lengths[sample].copy()
@@ -194,7 +194,7 @@ def find_slip(model: Model, state: State, length: float) -> Slip | None:
 
 
 def _correlation(residuals: np.ndarray) -> float:
-    """Return over how many samples residuals (N,) are alike: 1 + 2 times the sum of their first autocorrelations."""
+    """Return the correlation length of residuals (N,) in samples: 1 + 2 times the sum of autocorrelations."""
     count = len(residuals)
     lagged = np.fft.irfft(np.abs(np.fft.rfft(residuals, 2 * count)) ** 2)[: count // 4 + 1]
     if not lagged[0] > 0:
@@ -205,7 +205,7 @@ def _correlation(residuals: np.ndarray) -> float:
 
 
 def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
-    """Return whether residuals change at the sample by a good part of `size`, which is large beside their scatter."""
+    """Return whether residuals change at the sample by a large part of `size`, compared with their scatter."""
     window = slice(max(sample - WINDOW, 0), sample), slice(sample, sample + WINDOW)
     before, after = (np.median(found.residuals[cable, part]) for part in window)
     kept = float(np.median(found.redundancy[cable, max(sample - WINDOW, 0) : sample + WINDOW]))
@@ -216,7 +216,7 @@ def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
 
 
 def _without_poses(model: Model, found: _Projected, cable: int) -> np.ndarray:
-    """Return the derivatives of one cable's residuals by the parameters, less what the poses absorb, (N, p) [1/m]."""
+    """Return the derivatives of one cable's residuals by the parameters, minus the poses' part, (N, p) [1/m]."""
     parameters, derivatives = model.parameters, found.derivatives
     width = derivatives.cables.shape[2]
     full = np.zeros((derivatives.cables.shape[1], parameters.count))

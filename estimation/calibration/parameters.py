@@ -1,4 +1,4 @@
-"""Parameters of a calibration: their names, their values of a robot, and the robot of their values.
+"""Parameters of a calibration: their names, and conversion from and to a robot.
 
 The vector x has nine numbers for each cable, in this order, then the clock offset, then one number for each slip:
 
@@ -31,14 +31,14 @@ SMALLEST_PRIOR = 1e-9
 
 @dataclass(frozen=True)
 class Parameters(Displayed):
-    """The parameters of a robot's calibration: which there are, and which of them vary.
+    """The parameters of a robot's calibration, free and fixed.
 
     Attributes
     ----------
     robot
-        Whose file has the values to begin with.
+        Robot with the initial values.
     groups
-        Those that vary, in the order of `GROUPS`.
+        Free groups, in the order of `GROUPS`.
     slips
         Cable and first sample of each slip.
     """
@@ -49,7 +49,7 @@ class Parameters(Displayed):
 
     @property
     def count(self) -> int:
-        """Return the number of all parameters, those that vary and those that do not."""
+        """Return the number of all parameters, free and fixed."""
         return OF_CABLE * self.robot.m + 1 + len(self.slips)
 
     @property
@@ -59,7 +59,7 @@ class Parameters(Displayed):
 
     @cached_property
     def varies(self) -> np.ndarray:
-        """Return which parameters vary, (count,) of bool."""
+        """Return which parameters are free, (count,) of bool."""
         flags = np.zeros((self.robot.m, OF_CABLE), dtype=bool)
         for group in self.groups:
             flags[:, COLUMNS.get(group, ())] = True
@@ -105,12 +105,12 @@ class Parameters(Displayed):
         Parameters
         ----------
         covariance
-            Of the parameters that vary, (p, p); default: the robot has no uncertainty.
+            Covariance of the free parameters, (p, p); default: the robot has no uncertainty.
 
         Raises
         ------
         InputError
-            If the values are not those of a robot.
+            If no robot can have these values.
         """
         data = self.robot.model_dump(mode="json")
         before = self.table(self.first)
@@ -137,7 +137,7 @@ class Parameters(Displayed):
 
 
 def check_free(robot: Robot, free: object) -> tuple[str, ...]:
-    """Return the groups of parameters that vary, in the order of `GROUPS`, or raise InputError."""
+    """Return the free groups of parameters, in the order of `GROUPS`, or raise InputError."""
     given = (free,) if isinstance(free, str) else free
     if not isinstance(given, Sequence) or not given or any(not isinstance(name, str) for name in given):
         raise InputError(f"free must be 'auto' or some of {', '.join(GROUPS)}, got {shown(free)}")

@@ -1,13 +1,14 @@
-"""`doubt`: slips in a log that a fit would hide in wrong parameters, found before it.
+"""`doubt`: detect input errors of a log before the fit, which would hide them in wrong parameters.
 
 With the right order of cables, units and convention of angles, the difference between a cable's length at the measured
-poses and its reading hardly changes: it is the offset, and what a displaced anchor makes of it. So other readings of
-the log are tried, and the order of the cables is that of the smallest differences (an assignment problem). A slip is
-named if the differences become much smaller without it. Where they are as small as was stated, nothing is tried.
+poses and its reading hardly changes: it is the offset plus the effect of a displaced anchor. So other interpretations
+of the log are tried, with the order of cables that has the smallest differences (an assignment problem). An error is
+named if the differences become much smaller without it. If they are already as small as the stated standard deviation,
+nothing is tried.
 
-Conventions of angles differ by little where the platform turns by little. With e the differences as the log is given
-and e' those of another convention, of variance s^2, the sum of e^2 - e'^2 is |e - e'|^2 if the other is right, and has
-the standard deviation 2 s |e - e'| (a likelihood ratio). Conventions that cannot be told apart are named together.
+Conventions of angles differ little if the platform turns little. With e the differences of the given log and e' those
+of another convention, of variance s^2, the sum of e^2 - e'^2 is |e - e'|^2 if the other is right, and has the standard
+deviation 2 s |e - e'| (a likelihood ratio). Conventions that cannot be distinguished are named together.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ ANGLES = ("roll", "pitch", "yaw")
 
 
 class _Reading(NamedTuple):
-    """A way to read the log: the slip that it would be, as text, the poses, and the factor of the readings."""
+    """An interpretation of the log: the error that it corrects, the poses, and the factor of the readings."""
 
     slip: str
     position: np.ndarray
@@ -49,7 +50,7 @@ class _Reading(NamedTuple):
 
 
 def doubt(robot: Robot, measurements: Measurements) -> str | None:
-    """Return the slip that the log seems to have, in one line, or None if there is none."""
+    """Return the probable input error of the log, in one line, or None."""
     parameters = Parameters(robot, ())
     table = parameters.table(parameters.first)
     position, rotation, known = measured_poses(robot, measurements)
@@ -96,13 +97,13 @@ def doubt(robot: Robot, measurements: Measurements) -> str | None:
 
 
 def _root_mean_square(e: np.ndarray) -> float:
-    """Return the size of differences, wrong readings shortened."""
+    """Return the size of differences, with a bound on outliers."""
     limit = LONG_TAIL * float(np.median(np.abs(e)))
     return float(np.sqrt((np.clip(e, -limit, limit) ** 2).mean()))
 
 
 def _likelier(e: np.ndarray, other: np.ndarray) -> float:
-    """Return by how many standard deviations the differences `other` are likelier than e, both (m, N)."""
+    """Return by how many standard deviations the differences `other` are more likely than e, both (m, N)."""
     if not np.isfinite(other).all():
         return -np.inf
     limit = LONG_TAIL * float(np.median(np.abs(other)))
@@ -112,7 +113,7 @@ def _likelier(e: np.ndarray, other: np.ndarray) -> float:
 
 
 def _likeliest(e: np.ndarray, turns: list[tuple[np.ndarray, float, str]]) -> tuple[np.ndarray, float, str] | None:
-    """Return the likeliest convention of angles if it is much likelier than that given, named with its equals."""
+    """Return the convention of angles that is much more likely than the given one, with its equivalents."""
     best: tuple[np.ndarray, float, str] | None = None
     for turn in turns:
         if _likelier(e if best is None else best[0], turn[0]) > (SIGNIFICANT if best is None else 0.0):
@@ -121,12 +122,12 @@ def _likeliest(e: np.ndarray, turns: list[tuple[np.ndarray, float, str]]) -> tup
         return None
     equals = [text for other, _, text in turns if text != best[2] and _likelier(other, best[0]) < TOLD_APART]
     if len(equals) > 1:
-        return (*best[:2], "the angles look like those of another convention, which one cannot be told")
+        return (*best[:2], "the angles seem to have another convention, which cannot be determined")
     return (*best[:2], best[2] + "".join(f", or {text.removeprefix('the angles look ')}" for text in equals))
 
 
 def _too_large(robot: Robot, readings: np.ndarray) -> str | None:
-    """Return the slip if readings (N, m) change more than any cable of the robot can, or None."""
+    """Return the error if readings (N, m) change more than any cable of the robot can, or None."""
     length = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
     change = float(np.median(np.ptp(readings, axis=0)))
     if change <= LARGEST * length:
@@ -138,7 +139,7 @@ def _too_large(robot: Robot, readings: np.ndarray) -> str | None:
 
 
 def _ways(first: _Reading, angles: np.ndarray | None) -> Iterator[_Reading]:
-    """Yield ways to read the log, as it is given first."""
+    """Yield interpretations of the log, the given one first."""
     yield first
     position, rotation = first.position, first.rotation
     for factor, unit in FACTORS.items():
@@ -146,7 +147,9 @@ def _ways(first: _Reading, angles: np.ndarray | None) -> Iterator[_Reading]:
         yield _Reading(f"the positions look like {unit} read as metres", factor * position, rotation)
         both = f"lengths and positions look like {unit} read as metres"
         yield _Reading(both, factor * position, rotation, factor)
-    yield _Reading("the lengths look counted the other way, as if their scales were negative", position, rotation, -1.0)
+    yield _Reading(
+        "the lengths seem to have the wrong sign, as if their scales were negative", position, rotation, -1.0
+    )
     if angles is None or not np.ptp(angles, axis=0).any():
         return
     whole = Rotation.from_matrix(rotation)
@@ -174,9 +177,9 @@ def _ways(first: _Reading, angles: np.ndarray | None) -> Iterator[_Reading]:
 
 
 def _left(robot: Robot, parameters: Parameters, reading: _Reading, y: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return what is left of cable i's length less the reading of column j, for the columns (m, k), (m, k, N) [m].
+    """Return the differences between the length of cable i and column j, for the columns (m, k), (m, k, N) [m].
 
-    An offset is taken away, and with enough samples displacements of anchor and attachment.
+    An offset is subtracted and, with enough samples, displacements of anchor and attachment.
     """
     run = runs(robot, parameters.table(parameters.first), reading.position, reading.rotation)
     explained = [np.ones((*run.lengths.shape, 1))]
@@ -202,7 +205,7 @@ def _sizes(apart: np.ndarray) -> tuple[float, float, np.ndarray]:
 
 
 def _and(slip: str, columns: np.ndarray, order: np.ndarray) -> str:
-    """Return a slip, and which columns of the log belong to the cables."""
+    """Return an input error, and the columns of the log that belong to the cables."""
     moved = np.flatnonzero(columns != order)
     if not moved.size:
         return slip

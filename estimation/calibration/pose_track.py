@@ -1,4 +1,4 @@
-"""`PoseTrack`: measured poses as a smooth motion, read at times that a clock offset shifts."""
+"""`PoseTrack`: measured poses as a smooth motion, evaluated at times shifted by a clock offset."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ WIDEST = 5.0  # median times between measured poses; the motion inside a longer 
 class PoseTrack:
     """Interpolate poses over time by cubic splines of position and quaternion.
 
-    They are smoothed first, by parabolas through five neighbours: interpolated between samples, poses as measured would
-    have half the variance that they have at them, and a clock offset of half a sample would fit best for that alone.
+    They are first smoothed by parabolas through five neighbours. Without smoothing, poses between samples would have
+    half the variance of the samples, and a clock offset of half a sample would fit best for that reason alone.
 
     Parameters
     ----------
     times
-        Rising, (N,) [s].
+        Increasing, (N,) [s].
     position, rotation
         (N, 3) [m], (N, 3, 3).
     known
@@ -42,13 +42,13 @@ class PoseTrack:
         self._last: tuple[float, tuple[np.ndarray, ...]] | None = None
 
     def at_samples(self, rows: np.ndarray) -> PoseTrack:
-        """Return the same motion, read at the times of some samples (k,)."""
+        """Return the same motion, evaluated at the times of some samples (k,)."""
         other = copy(self)
         other._times, other._last = self._times[rows], None
         return other
 
     def inside(self, clock: float) -> np.ndarray:
-        """Return which samples lie between measured poses near enough, after the shift, (N,) of bool."""
+        """Return which samples lie between sufficiently close measured poses after the shift, (N,) of bool."""
         shifted = self._times + clock
         after = np.clip(np.searchsorted(self._measured, shifted), 1, len(self._measured) - 1)
         near = self._measured[after] - self._measured[after - 1] <= self._widest
@@ -60,7 +60,7 @@ class PoseTrack:
         Parameters
         ----------
         clock
-            By which the times of the poses are ahead of those of the lengths [s].
+            Time by which the clock of the poses is ahead of the clock of the lengths [s].
         """
         if self._last is None or self._last[0] != clock:
             self._last = clock, self._at(np.clip(self._times + clock, *self._span))
@@ -78,7 +78,7 @@ class PoseTrack:
 
 
 def _smooth(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return values (n, d) replaced by parabolas of least squares through each and its four nearest neighbours."""
+    """Smooth values (n, d) by least-squares parabolas through each and its four nearest neighbours."""
     count = len(times)
     if count < NEIGHBOURS:
         return values

@@ -1,7 +1,7 @@
 """Products of tall matrices, block by block: each block is small enough for BLAS to keep it on one thread.
 
-On many threads such products are hardly faster, wait for processors that other programs use, and differ in their last
-bits from machine to machine.
+With many threads such products are hardly faster, wait for busy processors, and differ in their last bits between
+machines.
 """
 
 from __future__ import annotations
@@ -24,6 +24,6 @@ def inner(A: np.ndarray, B: np.ndarray) -> np.ndarray:
 
 
 def onto(A: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """Return A M of a tall A (n, p) and M (p, q), (n, q)."""
+    """Multiply a tall matrix A (n, p) by M (p, q) in blocks, (n, q)."""
     block = max(ONE_THREAD // max(M.size, 1), 1)
     return np.concatenate([A[start : start + block] @ M for start in range(0, len(A), block)] or [A @ M])

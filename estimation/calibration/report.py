@@ -23,7 +23,7 @@ HELPS = 1.05  # by which errors left out must be larger before a smaller set is 
 
 
 def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = tuple) -> Report:
-    """Return how well lengths fit, the parameters, and what is not determined."""
+    """Return the residuals, the parameters and the unobservable directions."""
     residual = f"{_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)"
     about, _, summary = headline(result).partition(": ")
     parts: list[Part] = [
@@ -72,14 +72,17 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         return []
     held_out = result.held_out
     if not np.isfinite(held_out.after):
-        return ["too few samples, or no convergence: half of them do not determine these parameters to confirm them"]
+        return ["too few samples, or no convergence: half of the samples do not determine these parameters"]
     lines = [f"on samples left out {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
     fitted = held_out.sets[-1].fitted
     if not held_out.best:
-        return lines if held_out.after > held_out.before else [*lines, "the file predicts samples left out as well"]
+        return (
+            lines if held_out.after > held_out.before else [*lines, "the file predicts validation samples equally well"]
+        )
     if set(held_out.best) < set(result.free):
         lines.append(
-            f"{', '.join(held_out.best)} alone predict samples left out as well: the other parameters do not help"
+            f"{', '.join(held_out.best)} alone predict validation samples equally well: the other parameters do not "
+            f"help"
         )
     elif held_out.after > 1.5 * fitted:
         lines.append(f"fitted samples have {_mm(fitted)}: too few samples for so many parameters, measure more")
@@ -96,8 +99,8 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.alike > 1:
         lines.append(
-            "residuals of neighbouring samples are alike, since the model is not complete: the sigmas below are "
-            f"larger by {quantity(result.alike**0.5, digits=2)}"
+            "residuals are autocorrelated, because the model is incomplete: the sigmas below are larger by "
+            "{quantity(result.alike**0.5, digits=2)}"
         )
     return lines
 
@@ -161,6 +164,6 @@ def _of_open(result: CalibrationData) -> list[Part]:
 
 def _directions(texts: tuple[str, ...]) -> list[Part]:
     if not texts:
-        return ["no direction of the parameters is open"]
+        return ["all directions of the parameters are observable"]
     title = f"the measurements leave {len(texts)} directions open, along which the file's values are kept:"
     return [Section(title, [("", text) for text in texts])]

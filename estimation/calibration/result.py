@@ -1,4 +1,4 @@
-"""`CalibrationData`: the robot as measurements show it, and how certain that is, as numbers."""
+"""`CalibrationData`: the numbers of a calibrated robot, with their covariance."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FAR = 5.0  # standard deviations of the prior
 class Parameter(NamedTuple):
     """One parameter: its name, value, standard deviation and change from the robot's file, all in `unit`.
 
-    Sigma is inf if the measurements do not determine the parameter.
+    Sigma is inf if the parameter is unobservable.
     """
 
     name: str
@@ -49,11 +49,11 @@ class CalibrationData(Displayed):
     Attributes
     ----------
     free
-        The groups of parameters that were found.
+        Groups of estimated parameters.
     prior
-        Their standard deviations about the file's values, where given.
+        Standard deviations about the file's values, if given.
     doubt
-        A slip that the log seems to have, such as cables in another order or degrees read as radians, or None.
+        A probable input error of the log, such as cables in another order or degrees read as radians, or None.
     """
 
     _solved: Solved
@@ -71,26 +71,26 @@ class CalibrationData(Displayed):
 
     @property
     def converged(self) -> bool:
-        """Return whether no other values near these fit notably better."""
+        """Return whether the fit is a local minimum."""
         return self._solved.fit.converged
 
     @cached_property
     def refused(self) -> str | None:
         """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
 
-        The log seems to have a slip, the fit did not converge, or samples left out fit worse than with the file's
-        robot.
+        The log probably has an input error, the fit did not converge, or validation samples fit worse than with the
+        file's robot.
         """
         if self.doubt is not None:
             return self.doubt
         if not self.converged:
             return f"the fit did not converge in {self._solved.fit.steps} steps"
         if not self.free:
-            return "the file predicts samples left out as well as any parameters would: there is nothing to change"
+            return "the file predicts validation samples as well as any parameters would: there is nothing to change"
         held_out = self.held_out
         if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
             before, after = (quantity(1e3 * error, "mm", digits=3) for error in (held_out.before, held_out.after))
-            return f"samples left out fit worse than with the file's robot: {after}, {before} with the file"
+            return f"validation samples fit worse than with the file's robot: {after}, {before} with the file"
         return None
 
     @property
@@ -103,7 +103,7 @@ class CalibrationData(Displayed):
 
     @property
     def file(self) -> Robot:
-        """Return the robot of the file, from which the calibration began."""
+        """Return the robot before the calibration."""
         return self._solved.model.robot
 
     @property
@@ -136,16 +136,16 @@ class CalibrationData(Displayed):
     def covariance(self) -> np.ndarray:
         """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s].
 
-        Directions that the measurements do not determine have none. It is multiplied where residuals are larger than
-        stated, or alike in neighbouring samples (`noise`, `alike`).
+        It is zero along unobservable directions. It is scaled up if residuals are larger than stated or autocorrelated
+        (`noise`, `alike`).
         """
         return covariance_of(self._solved) * self._inflation
 
     @cached_property
     def information(self) -> np.ndarray:
-        """Return the matrix of the normal equations, priors included, (p, p), of parameters as lengths.
+        """Return the normal matrix, priors included, with parameters as lengths, (p, p) [1/m^2].
 
-        Its unit is [1/m^2]; it is smaller where the covariance is larger, by `noise` and `alike`.
+        It is scaled down by the factors `noise` and `alike` that scale the covariance up.
         """
         model = self._solved.model
         return state_equations(model, self._solved.fit.state, metric(model)).S / self._inflation
@@ -160,32 +160,32 @@ class CalibrationData(Displayed):
 
     @property
     def noise(self) -> float:
-        """Return the standard deviation of a length that the residuals show [m]; nan without redundancy."""
+        """Return the standard deviation of a length estimated from the residuals [m]; nan without redundancy."""
         return self._noise[0] * self.stated_sigma
 
     @property
     def stated_sigma(self) -> float:
-        """Return the standard deviation of a length that was stated with the measurements [m]."""
+        """Return the stated standard deviation of a length [m]."""
         return self._solved.model.measurements.sigma.lengths
 
     @property
     def alike(self) -> float:
-        """Return the factor of the covariance for neighbouring residuals that are alike; 1 if they are independent."""
+        """Return the factor of the covariance for autocorrelated residuals; 1 if they are independent."""
         return self._noise[1]
 
     @property
     def identifiable(self) -> tuple[str, ...]:
-        """Return the names of the parameters that the measurements determine."""
+        """Return the names of the observable parameters."""
         return tuple(parameter.name for parameter in self.parameters if np.isfinite(parameter.sigma))
 
     @property
     def not_identifiable(self) -> tuple[str, ...]:
-        """Return what the measurements do not determine, one text for each direction of the parameters."""
+        """Return the unobservable directions of the parameters, one name for each."""
         return self._solved.observability.open
 
     @cached_property
     def residuals(self) -> np.ndarray:
-        """Return the residuals of the lengths of the calibrated robot, (N, m) [m], wrong readings included."""
+        """Return the residuals of the lengths of the calibrated robot, (N, m) [m], outliers included."""
         return lengths_of(self._solved.model, self._solved.fit.state)
 
     @cached_property
@@ -196,12 +196,12 @@ class CalibrationData(Displayed):
 
     @property
     def residual_before(self) -> float:
-        """Return the root mean square of `residuals_before` without wrong readings [m]."""
+        """Return the root mean square of `residuals_before` without outliers [m]."""
         return self._rms(self.residuals_before)
 
     @property
     def residual_after(self) -> float:
-        """Return the root mean square of `residuals` without wrong readings [m]."""
+        """Return the root mean square of `residuals` without outliers [m]."""
         return self._rms(self.residuals)
 
     @property
@@ -216,13 +216,13 @@ class CalibrationData(Displayed):
 
     @cached_property
     def poses(self) -> np.ndarray:
-        """Return the poses of the platform at the times of the lengths, (N, 6) [m, rad], measured or found."""
+        """Return the poses of the platform at the times of the lengths, (N, 6) [m, rad], measured or estimated."""
         position, rotation = self._solved.model.poses(self._solved.fit.state)
         return np.hstack([position, points.angles(rotation)])
 
     @property
     def outliers(self) -> tuple[Outlier, ...]:
-        """Return the readings that were left out."""
+        """Return the outliers, which the fit excludes."""
         return self._solved.outliers
 
     @property
@@ -237,16 +237,16 @@ class CalibrationData(Displayed):
 
     @property
     def clock(self) -> float:
-        """Return by how much the clock of the poses is ahead of that of the lengths [s]; 0 if it is not free."""
+        """Return the time by which the poses' clock is ahead of the lengths' clock [s]; 0 if it is fixed."""
         return float(self._solved.fit.state.x[self._solved.model.parameters.clock])
 
     @cached_property
     def held_out(self) -> HeldOut:
-        """Return how well these parameters, and smaller sets, predict measurements that were left out."""
+        """Return the cross-validation of these parameters and of smaller sets."""
         return compare(self._solved.model.robot, *cleaned(self._solved), self.free, dict(self.prior), self.clock)
 
     def lengths(self, readings: ArrayLike) -> np.ndarray:
-        """Return the lengths of the cables [m], (..., m), that readings (..., m) mean; after the last slip.
+        """Convert winch readings (..., m) to cable lengths [m], (..., m), with the offsets after the last slip.
 
         Raises
         ------
@@ -264,7 +264,7 @@ class CalibrationData(Displayed):
         return offsets + table[:, 7] * values
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as plain data, as `towline calibrate --json` prints it."""
+        """Return the result as plain data, the output of `towline calibrate --json`."""
         return {
             "robot": self.file.name,
             "converged": self.converged,

@@ -1,4 +1,4 @@
-"""`calibrate`: find the parameters of a robot that explain measurements."""
+"""`calibrate`: estimate robot parameters from measurements."""
 
 from __future__ import annotations
 
@@ -23,33 +23,32 @@ def calibrate(
     prior: Mapping[str, float] | None = None,
     outliers: bool = True,
 ) -> Calibration:
-    """Find the parameters of a robot with which its cables have the measured lengths.
+    """Estimate the robot parameters that best explain measured cable lengths.
 
-    Poses that were measured exactly are kept, poses measured with an error may move within it, and poses that were not
-    measured are found along with the parameters. Carriers are at home.
+    Exactly measured poses are fixed, poses measured with an error may move within it, and unmeasured poses are
+    estimated along with the parameters. Carriers are at home.
 
     Parameters
     ----------
     robot
-        A `Robot`, the name of one in the library, or the path of a robot file: the values to begin with.
+        A `Robot`, the name of one in the library, or the path of a robot file, with the initial values.
     measurements
         `Measurements` of the robot, or from `read_measurements`.
     free
-        What to find, some of anchors, attachments, offsets (of the lengths), scales (of the lengths), radii (of the
-        pulleys) and clock (by how much the clock of the poses is ahead of that of the lengths). Default: anchors and
-        offsets, and the clock if times and poses of a motion were measured. Or "auto": the smallest set that predicts
-        measurements left out nearly as well as any (`select`), none if that is the file.
+        Parameters to estimate, some of anchors, attachments, offsets (of the lengths), scales (of the lengths), radii
+        (of the pulleys) and clock (time by which the clock of the poses is ahead of the clock of the lengths). Default:
+        anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the smallest set
+        whose cross-validation error is close to the best (`select`), which may be empty.
     prior
         Standard deviations about the file's values by the names of `free`, [m], of scales [1], of the clock [s], such
-        as {"anchors": 0.02}. Default: none; what the measurements do not determine changes as little as possible.
+        as {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
     outliers
-        Whether to look for wrong readings, which are left out, and for slipped winches, whose cable gets another offset
-        from there on.
+        True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after the slip.
 
     Raises
     ------
     InputError
-        If an argument is wrong, the measurements are of another number of cables, or they are fewer than what to find.
+        If an argument is wrong, the number of cables differs, or there are fewer measurements than unknowns.
     """
     chosen = as_robot(robot)
     given = check_measurements(chosen, measurements)

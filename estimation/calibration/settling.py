@@ -1,4 +1,4 @@
-"""`settled`: poses that fit best with parameters as they are, each by steps of its own length."""
+"""`settled`: fit poses with fixed parameters, each with its own step length."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ SHORTER = 0.25  # of the last step of a pose that fitted worse
 
 
 def settled(model: Model, state: State, negligible: float) -> State:
-    """Return the state with poses that fit better; a decrease of a sample's sum of squares may be negligible."""
+    """Return the state with better poses, until the decrease of each sample's sum of squares is negligible."""
     share = np.ones(len(state.shift))
     residuals, derivatives = model.linearised(state)
     for _ in range(MOST_STEPS):

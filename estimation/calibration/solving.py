@@ -1,4 +1,4 @@
-"""`solve`: fit the parameters of a robot to measurements, without wrong readings and with the slips of winches."""
+"""`solve`: fit the parameters of a robot to measurements, excluding outliers and modelling slips of winches."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_SLIPS = 8
 
 
 class Solved(NamedTuple):
-    """A fit, with wrong readings, slips, and which parameters the measurements determine."""
+    """A fit, with outliers, slips and observability."""
 
     model: Model
     fit: Fit
@@ -38,14 +38,14 @@ class Solved(NamedTuple):
 
 
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
-    """Return the parameters that are found by default: the clock offset among them if a motion was measured."""
+    """Return the default free parameters, with the clock offset if a motion was measured."""
     groups = ("anchors", "offsets", "clock")
     known = measurements.times is not None and is_enough(robot, measurements, ("clock",))
     return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
 
 
 def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:
-    """Return whether the measurements are enough for these parameters, without a prior."""
+    """Return whether there are enough measurements for these parameters without a prior."""
     try:
         check_enough(robot, measurements, groups, {})
     except InputError:
@@ -56,7 +56,7 @@ def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...])
 def solve(
     robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float], outliers: bool
 ) -> Solved:
-    """Fit, leave wrong readings out and model slips, until there are no more; arguments are checked."""
+    """Fit, remove outliers and model slips, until there are no more; arguments are checked."""
     model = model_of(robot, measurements, groups, prior)
     length = length_of(robot)
     state = begin_with_clock(model, length) if "clock" in groups else model.begin()
@@ -101,7 +101,7 @@ def model_of(
     prior: dict[str, float],
     start: np.ndarray | None = None,
 ) -> Model:
-    """Return the model of checked arguments; `start` are poses (N, 6) to begin with, default: level ones."""
+    """Return the model of checked arguments; `start` are initial poses (N, 6), default: level ones."""
     parameters = Parameters(robot, groups)
     weights = np.ones((robot.m, len(measurements)))
     model = Model(parameters, measurements, prior, weights)
@@ -129,12 +129,14 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     if "clock" in groups:
         known = measured_poses(robot, measurements)[2][:, robot.dof_mask > 0].all(axis=1)
         if measurements.times is None:
-            raise InputError("measurements.times must be given to find a clock offset, got none")
+            raise InputError("measurements.times must be given to estimate a clock offset, got none")
         if known.sum() < 4:
-            raise InputError(f"measurements.poses must have at least 4 rows to find a clock offset, got {known.sum()}")
+            raise InputError(
+                f"measurements.poses must have at least 4 rows to estimate a clock offset, got {known.sum()}"
+            )
         if measurements.times[-1] - measurements.times[0] <= 2 * CLOCK_RANGE / 10:
             raise InputError(
-                f"measurements.times must span more than {CLOCK_RANGE / 5:g} s to find a clock offset, got "
+                f"measurements.times must span more than {CLOCK_RANGE / 5:g} s to estimate a clock offset, got "
                 f"{measurements.times[-1] - measurements.times[0]:g} s"
             )
     model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements))))
@@ -151,9 +153,9 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
 
 
 def noise_of(solved: Solved) -> tuple[float, float, int]:
-    """Return by how much residuals exceed their sigmas, the factor of `alike`, and the redundancy.
+    """Return the ratio of residuals to their sigmas, the factor `alike`, and the redundancy.
 
-    The first is the root of the sum of squares over the redundancy: readings less all that was found with them.
+    The first is the square root of the sum of squares over the redundancy: number of readings minus number of unknowns.
     """
     model, state = solved.model, solved.fit.state
     used = int((model.weights * model.inside(state) > 0).sum())
@@ -168,7 +170,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
-    """Return the measurements without their slips, and the weights (m, N): 0 of wrong readings."""
+    """Return the measurements without their slips, and the weights (m, N): 0 for outliers."""
     model, x = solved.model, solved.fit.state.x
     parameters, given = model.parameters, model.measurements
     lengths = given.lengths.copy()

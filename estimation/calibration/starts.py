@@ -1,8 +1,8 @@
-"""Where a fit begins if poses were not measured, and poses that it left in another valley.
+"""The start of a fit without measured poses, and poses that it left in a wrong local minimum.
 
-A small platform whose readings are without their offsets seems turned by a right angle, and a fit from there ends in a
-wrong valley. So the platform is level first: its orientation is taken as measured to be that of home, roughly, lengths
-as less certain, and parameters stay near the file. Then all of that is released.
+Without its offsets, a small platform seems rotated by a right angle, and a fit from there ends in a wrong local
+minimum. So a first fit treats the orientation as roughly measured at its value at home, lengths as less certain, and
+parameters as close to the file. The second fit drops these assumptions.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ LARGEST_SHARE = 0.1  # of readings that may be left out; more are no exceptions
 
 
 def fit_from(model: Model, state: State, length: float, outliers: bool = False) -> tuple[Fit, np.ndarray]:
-    """Minimise the sum of squares, from level poses if none were measured; `length` is that of the cables [m].
+    """Minimise the sum of squares, from level poses if none were measured; `length` is the length of the cables [m].
 
-    Returned are the fit and the weights (m, N) of its readings: with `outliers` it is without those that look wrong
-    from the beginning, since parameters and poses that follow them would hide them.
+    It returns the fit and the weights (m, N) of its readings. With `outliers`, readings that look wrong in the first
+    fit are excluded, because parameters and poses that adapt to them would hide them.
 
-    The state has parameters to begin with, and the poses of `model.begin()`.
+    The state has initial parameters, and the poses of `model.begin()`.
     """
     if not np.isinf(model.pose_sigmas).any():
         return fit(model, state, length), model.weights
@@ -69,9 +69,9 @@ def fit_from(model: Model, state: State, length: float, outliers: bool = False) 
 
 
 def level_poses(robot: Robot, lengths: np.ndarray, offsets: bool) -> np.ndarray:
-    """Return poses (N, 6) [m, rad] with the orientation of home whose lengths are nearest to `lengths` (N, m) [m].
+    """Return poses (N, 6) [m, rad] with the orientation at home and lengths closest to `lengths` (N, m) [m].
 
-    With unknown `offsets`, lengths count from home at the first sample if that fits better.
+    With unknown `offsets`, lengths are relative to home at the first sample if that fits better.
     """
     problem, weights = problem_of(robot), np.ones(robot.m)
 
@@ -94,7 +94,7 @@ def _lengths(robot: Robot, poses: np.ndarray) -> np.ndarray:
 
 
 def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:
-    """Return the model with level poses, rough lengths and parameters near the file, and where to begin."""
+    """Return the model with level poses, rough lengths and parameters near the file, and its initial state."""
     given = model.measurements.sigma
     sigma = {**given._asdict(), "lengths": max(given.lengths, ROUGH)}
     near = {name: share * length for name, share in NEAR_THE_FILE.items()} | {"scales": SCALES}
@@ -111,7 +111,7 @@ def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:
 
 
 def _elsewhere(model: Model, state: State) -> State | None:
-    """Return the state with poses that fit clearly better where some fit badly, or None if there are none."""
+    """Return the state with clearly better poses for samples that fit badly, or None without such poses."""
     unknown = np.isinf(model.pose_sigmas).any(axis=1)
     spare = (model.weights > 0).sum(axis=0) - int((model.robot.dof_mask > 0).sum())
     squares = (model.residuals(state).readings ** 2).sum(axis=0)

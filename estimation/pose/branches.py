@@ -1,8 +1,8 @@
-"""`branches`: all poses of the platform whose cables have the given lengths.
+"""`branches`: all poses of the platform with the given cable lengths.
 
-Six cables of a six-coordinate platform have up to 40 such poses, those of nist-robocrane most often eight; with more
-cables one remains, and others whose lengths differ by less than the noise. There is no method that lists them all in
-milliseconds: descents from attitudes spread evenly over SO(3) list those that many starts lead to, which are most.
+With six cables and six coordinates there are up to 40 such poses, for nist-robocrane most often eight. With more
+cables one remains, and others whose lengths differ by less than the noise. No method lists them all in milliseconds.
+Descents from attitudes spread evenly over SO(3) find most of them.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ def branches(
     starts: int = 512,
     seed: int = 0,
 ) -> list[PoseEstimate]:
-    """List the poses whose cable lengths fit measured ones.
+    """List the poses with cable lengths that fit measured ones.
 
-    First come those in which the cables can hold the weight at rest, as they do while lengths are measured, and among
-    them, as among the others, those that are turned least from home.
+    Poses in which the cables can hold the weight at rest come first, since measured cables are taut. Within both groups
+    the poses are sorted by their rotation from home.
 
     Parameters
     ----------
     lengths, carrier_pose, sigma
         As in `pose_from_lengths`, for one pose.
     starts
-        Number of poses to start from. Some of the poses may be missed, fewer the more starts there are. Where gravity
-        decides, the poses are rests, which have starts of their own.
+        Number of initial poses. Some poses may be missed; more starts miss fewer. If gravity determines the pose, the
+        results are equilibria, which have separate starts.
     seed
-        Of the starts.
+        Seed of the starts.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""`PoseEstimate`: the pose that fits measured cable lengths best, and how far it can be trusted."""
+"""`PoseEstimate`: the pose that fits measured cable lengths best, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ class PoseEstimate(Displayed):
     pose
         (x, y, z, roll, pitch, yaw) of the platform frame in {G}, (..., 6) [m, rad].
     residuals
-        Length of each cable at that pose less its measured length, (..., m) [m].
+        Length of each cable at that pose minus its measured length, (..., m) [m].
     converged
-        Whether the search ended at a minimum of the residuals, (...).
+        True if the search ended at a minimum of the residuals, (...).
     sigma
         Standard deviations of the measured lengths, (m,) [m].
     carrier_pose
-        Of the carriers, (c, 6) or (..., c, 6), or None for those at home.
+        Poses of the carriers, (c, 6) or (..., c, 6), or None if they are at home.
     ambiguous
-        Whether the search met another pose that may be the true one, (...): it fits, or would by a test at 0.01 %, even
-        if cables cannot hold it with the file's CoM and load. None of an estimate with a start, the one nearby.
+        True if the search found another pose that may be the true one, (...): it passes the fit test at the 0.01 %
+        level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
     by_gravity
-        Whether the lengths alone leave the pose open, and the platform is at rest under its weight, (...).
+        True if the lengths alone do not determine the pose, and gravity fixes it, (...).
     """
 
     def __init__(
@@ -95,10 +95,10 @@ class PoseEstimate(Displayed):
 
     @property
     def consistent(self) -> Any:
-        """Return whether the residuals are what noise of `sigma` explains, by a chi-square test at 1 %, (...).
+        """Return whether the residuals are consistent with noise of `sigma`, by a chi-square test at 1 %, (...).
 
-        With no more cables than coordinates nearly all lengths belong to some pose, and the test decides nothing;
-        lengths with which the platform rests are consistent.
+        With no more cables than coordinates nearly all lengths fit some pose, and the test is meaningless. Lengths with
+        an equilibrium are consistent.
         """
         cost = np.sum(np.square(self.residuals / self.sigma), axis=-1)
         fits = cost <= largest_cost(self.robot.m - int(self.robot.dof_mask.sum()))
@@ -108,7 +108,7 @@ class PoseEstimate(Displayed):
     def covariance(self) -> np.ndarray:
         """Return the covariance of x, y, z and a small rotation in {G}, (..., 6, 6) [m^2, m rad, rad^2].
 
-        It is zero for coordinates that cannot move, and infinite where the lengths leave some motion open.
+        It is zero for coordinates that cannot move, and infinite if some motion is undetermined.
         """
         if self._covariance is not None:
             return self._covariance
@@ -124,15 +124,15 @@ class PoseEstimate(Displayed):
 
     @property
     def determined(self) -> Any:
-        """Return whether the lengths decide the pose, or lengths and gravity where `by_gravity`, (...)."""
+        """Return whether the lengths determine the pose, or lengths and gravity if `by_gravity`, (...)."""
         return np.isfinite(self.covariance).all(axis=(-2, -1))
 
     @cached_property
     def conditioned(self) -> Any:
         """Return whether the covariance can be trusted, (...): the lengths are nearly linear about the pose.
 
-        It is False where the standard deviation of an angle exceeds 5 degrees, or where two standard deviations away,
-        along any principal axis of the covariance, half of the change of the lengths is not linear.
+        It is False if the standard deviation of an angle exceeds 5 degrees, or if, two standard deviations away along
+        any principal axis of the covariance, half of the change of the lengths is nonlinear.
         """
         covariance = self.covariance
         finite = np.asarray(np.isfinite(covariance).all(axis=(-2, -1)))
@@ -156,9 +156,9 @@ class PoseEstimate(Displayed):
         return held.reshape(self.pose.shape[:-1]) if self.pose.ndim > 1 else bool(held[0])
 
     def suspects(self) -> np.ndarray:
-        """Return each residual in its own standard deviations, (..., m); the largest is that of the likeliest error.
+        """Return residuals over their standard deviations, (..., m); the largest marks the most likely wrong reading.
 
-        It is 0 for a cable that no other checks.
+        It is 0 for a cable without redundancy.
         """
         J = self._weighted_gradient()  # (..., m, 6)
         hat = np.einsum("...ij,...jk,...lk->...il", J, np.linalg.pinv(np.swapaxes(J, -1, -2) @ J), J)
@@ -193,7 +193,7 @@ class PoseEstimate(Displayed):
 
 
 def largest_cost(redundancy: int, false_alarm: float = FALSE_ALARM) -> float:
-    """Return the sum of squared errors, in standard deviations, that noise exceeds in a share of measurements."""
+    """Return the quantile of the sum of squared errors, in standard deviations, for a fraction of measurements."""
     if redundancy <= 0:
         return EXACT**2
     from scipy.special import chdtri

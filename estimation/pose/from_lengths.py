@@ -32,21 +32,21 @@ def pose_from_lengths(
 ) -> PoseEstimate:
     """Estimate the pose of the platform from the lengths of its cables: forward kinematics.
 
-    It minimises the squared errors of the lengths by Levenberg and Marquardt's method, with rotations as increments on
-    SO(3). Where the lengths leave a motion open, as with parallel cables or few of them, the estimate
-    is the pose in which the platform rests under its weight, see `models.statics`.
+    The Levenberg-Marquardt method minimises the squared errors of the lengths, with rotations as increments on SO(3).
+    If the lengths do not determine the pose, as with parallel cables or few of them, the result is the equilibrium
+    pose, see `statics.equilibria`.
 
     Parameters
     ----------
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
     lengths
-        Measured lengths of taut cables, from anchor to attachment, over the pulley where there is one, (..., m) [m].
+        Measured lengths of taut cables, from anchor to attachment, over the pulley if there is one, (..., m) [m].
     start
-        Pose to start from, (..., 6) [m, rad], as the last one of a stream: the estimate is the minimum nearest to it.
-        Default: a search that needs none; where several poses fit, `branches` lists them.
+        Initial pose, (..., 6) [m, rad], such as the last one of a stream: the estimate is the minimum near it.
+        Default: a search without a start. If several poses fit, `branches` lists them.
     carrier_pose
-        Of the carriers in {G}, (..., c, 6); default: at home.
+        Poses of the carriers in {G}, (..., c, 6); default: at home.
     sigma
         Standard deviations of the lengths [m], one number or (m,).
 
@@ -114,7 +114,7 @@ def checked_sigma(sigma: ArrayLike, m: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _equal(sigma: float, m: int) -> np.ndarray:
-    """Return the same standard deviation for all cables, kept for the next call of a stream."""
+    """Return the same standard deviation for all cables, cached for the next call of a stream."""
     deviations = np.full(m, sigma)
     deviations.flags.writeable = False
     return deviations

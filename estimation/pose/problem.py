@@ -1,4 +1,4 @@
-"""A robot's forward kinematics with its carriers in one place, or in one place for each pose: descents in the core."""
+"""A robot's forward kinematics with common carrier poses, or one set per platform pose: descents in the core."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ OPEN = 1e-6  # of the gradient of the lengths, a singular value that is zero, re
 
 
 class Problem(NamedTuple):
-    """The geometry of a robot with its carriers in one place, or in one place for each pose.
+    """The geometry of a robot with common carrier poses, or one set per platform pose.
 
     Attributes
     ----------
     record
-        The robot as the core reads it.
+        The robot in the format of the core.
     carriers
         Poses of the carriers, (c, 6), or (N, c, 6) for N poses of the platform.
     free
         1 for coordinates that move, else 0, (6,).
     home
-        Pose of the platform to start from, (6,) [m, rad].
+        Initial pose of the platform, (6,) [m, rad].
     m
         Number of cables.
     freedoms
-        How many coordinates move.
+        Number of coordinates that move.
     open
-        Whether the lengths leave a motion open at home, as parallel cables do, so that gravity decides.
+        True if the lengths do not determine the pose at home, as with parallel cables, so that gravity does.
     """
 
     record: np.ndarray
@@ -58,18 +58,18 @@ class Problem(NamedTuple):
         damping: float,
         free: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the poses nearest to `poses` that fit measured lengths best, the errors there, and where that is so.
+        """Descend from `poses` to the poses that fit measured lengths best.
 
         Parameters
         ----------
         lengths
             (N, m) [m].
         weights
-            Of each cable's error, (m,).
+            Weight of each cable's error, (m,).
         poses
-            (N, 6), from where to descend.
+            Initial poses, (N, 6).
         damping
-            Lambda of the first step: 0 from nearby.
+            Lambda of the first step; 0 if the initial pose is close.
         free
             1 for coordinates that move in this descent; default: all that the platform has.
 
@@ -85,9 +85,9 @@ class Problem(NamedTuple):
     def descend_from_afar(
         self, lengths: np.ndarray, weights: np.ndarray, poses: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what `descend` does, from poses that are not nearby.
+        """Descend like `descend`, from distant poses.
 
-        Weights that are far apart make a narrow curved valley, in which a descent stops: it begins with `milder` ones.
+        Very different weights cause a narrow curved valley, in which a descent stops, so it begins with `milder` ones.
         """
         mild = self.milder(weights)
         if (mild < weights).any():
@@ -95,7 +95,7 @@ class Problem(NamedTuple):
         return self.descend(lengths, weights, poses, DAMPING)
 
     def milder(self, weights: np.ndarray) -> np.ndarray:
-        """Return weights, (m,), with none far above those of the cables that are needed to decide the pose."""
+        """Return weights, (m,), limited relative to those of the cables that are needed to determine the pose."""
         return np.minimum(weights, MILD * np.sort(weights)[max(self.m - self.freedoms, 0)])
 
 

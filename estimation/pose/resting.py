@@ -1,4 +1,4 @@
-"""Poses from lengths of robots with fewer cables than coordinates: where the platform rests under its weight."""
+"""Poses from lengths for robots with fewer cables than coordinates: equilibrium poses."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ def open_estimates(
     carriers: np.ndarray | None,
     sigma: np.ndarray,
 ) -> PoseEstimate:
-    """Return the estimates of a robot whose lengths leave a motion open at home, or everywhere.
+    """Return the estimates of a robot whose lengths do not determine the pose at home, or anywhere.
 
-    Where there are enough lengths and they decide the pose well, it is theirs; elsewhere it is the rest.
+    If the lengths determine the pose well, the estimate is that pose, otherwise the equilibrium.
 
     Parameters
     ----------
     problem, lengths, starts
-        As for a descent: (N, m) and (N, 6), or None for starts of its own.
+        As for a descent: (N, m) and (N, 6), or None for default starts.
     carriers
-        (c, 6) or (N, c, 6), in {G}, or None for those at home.
+        (c, 6) or (N, c, 6), in {G}, or None for carriers at home.
     sigma
         (m,) [m].
 
     Raises
     ------
     InputError
-        If the robot has no gravity and too few cables: the lengths alone do not decide.
+        If the robot has no gravity and too few cables, so that the pose is undetermined.
     """
     places = np.broadcast_to(
         robot.carrier_home if carriers is None else carriers, (len(lengths), *robot.carrier_home.shape)
@@ -46,7 +46,7 @@ def open_estimates(
     if robot.m < problem.freedoms:
         if robot.weight == 0.0:
             raise InputError(
-                f"gravity must not be zero where the lengths leave a motion open, as the {robot.m} cables of robot "
+                f"gravity must not be zero if the lengths do not determine the pose, as the {robot.m} cables of robot "
                 f"{robot.name!r} do for {problem.freedoms} coordinates"
             )
         rests = _rests(robot, problem, lengths, starts, places, sigma)
@@ -75,7 +75,7 @@ def _rests(
     carriers: np.ndarray,
     sigma: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return poses (N, 6), errors (N, m) [m], where there is a rest (N,), and covariances (N, 6, 6)."""
+    """Return poses (N, 6), errors (N, m) [m], whether an equilibrium exists (N,), and covariances (N, 6, 6)."""
     near = starts
     if near is None:
         near = problem.descend_from_afar(lengths, 1.0 / sigma, np.tile(problem.home, (len(lengths), 1)))[0]
@@ -96,7 +96,7 @@ def _rests(
 
 
 def _covariance(robot: Robot, rest: Equilibrium, carriers: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Return the covariance of the platform frame and a small rotation, (6, 6), infinite where a motion is neutral."""
+    """Return the covariance of the platform frame and a small rotation, (6, 6), infinite if a motion is neutral."""
     moves = per_length(robot, rest, carriers)
     if moves is None:
         return np.full((6, 6), np.inf)

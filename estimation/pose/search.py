@@ -1,10 +1,10 @@
 """Poses from lengths without a start: descents from several attitudes until one fits.
 
-A level platform with the given lengths is often near the true one, and home often is, so these come first; those that
-do not fit exactly continue from the level platform turned by 45 and 90 degrees about one axis. Of several poses that
-fit the likeliest is taken, if angles from home are spread by 30 degrees. With as many cables as coordinates many poses
-fit, so that six cables continue from turns about oblique axes; a pose in which the cables can hold the weight comes
-before those in which they cannot, which make it ambiguous all the same, since CoM and load are not exact.
+The level platform with the given lengths, and home, are often close to the true pose, so the search starts there. Rows
+that do not fit exactly continue from the level platform turned by 45 and 90 degrees about one axis. If several poses
+fit, the most likely one is returned, with a standard deviation of 30 degrees of angles about home. With as many cables
+as coordinates many poses fit, so six cables continue from turns about oblique axes. Poses in which the cables can hold
+the weight are preferred. The others still make the result ambiguous, because CoM and load are not exact.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MISFIT = 1e12  # beyond the score of any pose that fits
 def search(
     robot: Robot, problem: Problem, lengths: np.ndarray, sigma: np.ndarray, carrier_pose: np.ndarray | None
 ) -> _Best:
-    """Return poses (N, 6), errors (N, m) in standard deviations, and where they are minima or ambiguous, (N,).
+    """Return poses (N, 6), errors (N, m) in standard deviations, and whether they are minima and ambiguous, (N,).
 
     Arguments are those of `pose_from_lengths`, with lengths (N, m).
     """
@@ -54,9 +54,9 @@ class _Best:
     poses, errors, ended
         As `search` returns them.
     ambiguous
-        Where another pose fits too, held by the cables or not, (N,).
+        True if another pose fits too, held by the cables or not, (N,).
     left
-        The problems that are to be searched on.
+        Rows that need a further search.
     """
 
     def __init__(self, robot: Robot, problem: Problem, count: int):
@@ -71,7 +71,7 @@ class _Best:
     def offer(
         self, rows: np.ndarray, poses: np.ndarray, errors: np.ndarray, ended: np.ndarray, carriers: np.ndarray | None
     ) -> None:
-        """Keep the poses of `rows` that are better than those so far."""
+        """Keep the poses of `rows` that are better than the previous ones."""
         cost = np.sum(errors**2, axis=1)
         fits = ended & (cost <= self._most)
         # The true pose may be one that hardly fits, or one that is not held with the file's CoM and load.
@@ -97,7 +97,7 @@ class _Best:
 
 
 def level_platform(problem: Problem, lengths: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the places, (N, 6), at which the platform has about these lengths with the attitude of home."""
+    """Return the poses, (N, 6), with approximately these lengths at the attitude of home."""
     straight = problem.free.copy()
     straight[3:] = 0.0
     home = np.broadcast_to(problem.home, (len(lengths), 6))
@@ -105,7 +105,7 @@ def level_platform(problem: Problem, lengths: np.ndarray, weights: np.ndarray) -
 
 
 def _starts(problem: Problem, level: np.ndarray):
-    """Yield starting poses, (N, 6) each, the likeliest first."""
+    """Yield initial poses, (N, 6) each, the most likely first."""
     yield level
     yield np.broadcast_to(problem.home, level.shape)
     for turn in TURNS:

@@ -1,4 +1,4 @@
-"""In which poses the cables can hold the weight at rest: lengths are measured of cables that are taut."""
+"""Poses in which the cables can hold the weight at rest, since measured cables are taut."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ PULL = 0.03  # of the weight: a pose is off by the noise of its lengths, and so 
 
 
 def taut(robot: Robot, poses: np.ndarray, carrier_pose: np.ndarray | None) -> np.ndarray:
-    """Return where tensions of at least zero hold the weight at rest, (N,), for poses (N, 6)."""
+    """Return whether non-negative tensions hold the weight at rest, (N,), for poses (N, 6)."""
     if robot.weight == 0.0:
         return np.ones(len(poses), bool)
     dynamics, still = dynamics_of(robot), np.zeros(6)

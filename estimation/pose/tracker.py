@@ -18,7 +18,7 @@ from .from_lengths import SIGMA, checked_lengths, checked_sigma, one_pose, pose_
 
 
 class PoseTracker(Displayed):
-    """Follow a platform: each estimate starts from the one before, and a search begins where that does not fit.
+    """Track a platform: each estimate starts from the previous one, and a search starts if the result does not fit.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class PoseTracker(Displayed):
     pose
         The last pose that fits its lengths, (6,), or None.
     searches
-        How often it had to search.
+        Number of searches.
 
     Raises
     ------
@@ -48,7 +48,7 @@ class PoseTracker(Displayed):
         self.pose = None if start is None else finite_array("start", start, (6,)).copy()
 
     def update(self, lengths: ArrayLike, carrier_pose: ArrayLike | None = None) -> PoseEstimate:
-        """Return the estimate of the next lengths, (m,) [m], with carriers at `carrier_pose`, (c, 6), or at home.
+        """Return the estimate for the next lengths, (m,) [m], with carriers at `carrier_pose`, (c, 6), or at home.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class PoseTracker(Displayed):
     def follow(self, lengths: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray:
         """Return the poses, (N, 6), of a stream of lengths (N, m).
 
-        Carriers are at `carrier_pose`, (N, c, 6), or (c, 6) if they stay; default: at home.
+        Carriers are at `carrier_pose`, (N, c, 6), or (c, 6) if they do not move; default: at home.
 
         Raises
         ------

@@ -22,7 +22,7 @@ class Excess(Displayed):
     about
         "cable 3", "quad1", "platform".
     time
-                Instant [s]; None if the limit does not refer to one.
+        Instant [s]; None if the limit does not refer to one.
     value, bound
         The value and its bound, in `unit`; nan if there is no value.
         unit
