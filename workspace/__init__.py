@@ -1,7 +1,7 @@
-"""Which poses are reachable: conditions, evaluated at 10^3 to 10^9 places of platform and carriers.
+"""Workspaces: conditions, evaluated at 10^3 to 10^9 configurations of platform and carriers.
 
-Conditions stand alone or are joined by & and |. `sample` evaluates them, `boundary` makes a mesh of where they
-hold, `hints` takes a first look.
+Conditions can be joined by & and |. `sample` evaluates them, `boundary` computes a mesh of the region where they hold,
+`hints` takes a first look.
 """
 
 from . import conditions

@@ -22,12 +22,12 @@ MOST_CELLS = 512  # along an edge: 10^8 poses at once
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Displayed):
-    """Triangles, counter-clockwise when looked at from outside.
+    """Triangles, counter-clockwise when seen from outside.
 
     Attributes
     ----------
     vertices
-        In {G}, (n, 3) [m].
+        Vertices in {G}, (n, 3) [m].
     faces
         Indices of vertices, (k, 3); empty if the workspace is.
     """
@@ -73,7 +73,7 @@ def boundary(
     cells
         Cells along the longest edge of the box. The mesh is accurate to about half the size of a cell.
     attitude
-        (roll, pitch, yaw) [rad]; default: that of home.
+        (roll, pitch, yaw) [rad]; default: the attitude at home.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def boundary(
 
 
 def boundary_of_values(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
-    """Compute the surface where values on a grid, positive inside, cross zero; it is closed at the faces of the box.
+    """Compute the zero level set of values on a grid, positive inside; it is closed at the faces of the box.
 
     Parameters
     ----------

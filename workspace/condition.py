@@ -1,7 +1,7 @@
-"""Conditions that make a place part of a workspace: `Condition`, and conditions joined by & and |.
+"""Conditions on configurations: `Condition`, and conditions joined by & and |.
 
-A condition is data: it does not change, compares by value, and goes to JSON and back by its `kind`, so that it can be
-written into a result, a checkpoint or a message to another machine.
+A condition is data: it is immutable, compares by value, and is converted to JSON and back by its `kind`, so that it can
+be written into a result, a checkpoint or a message to another machine.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ LEAST_SHARE = 1e-9  # of robots that must fulfil a condition, or that need not
 
 
 class Condition(Part, ABC):
-    """A property of a place that holds or does not. A condition of your own has a `kind` and `evaluate`.
+    """A condition on configurations. A condition of your own defines `kind` and `evaluate`.
 
     Attributes
     ----------
     kinds
-        The registry: every condition by its kind, from when its class is defined.
+        The registry: every defined condition by its kind.
     takes_every_row
-        Whether it takes a cable for each degree of freedom: with fewer it holds nowhere.
+        True if it needs a cable for each degree of freedom: with fewer it holds nowhere.
     """
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
@@ -43,7 +43,7 @@ class Condition(Part, ABC):
             Condition.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
 
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return where the condition holds among n places, (n,) of bool; False where a number is not finite.
+        """Return whether the condition holds at each of n configurations, (n,); False if a number is not finite.
 
         Raises
         ------
@@ -60,7 +60,7 @@ class Condition(Part, ABC):
 
     @abstractmethod
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return where the condition holds among places of finite numbers, (n,) of bool.
+        """Return whether the condition holds at each configuration (finite numbers), (n,) of bool.
 
         Raises
         ------
@@ -69,19 +69,19 @@ class Condition(Part, ABC):
         """
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return how far each place is from fulfilling the condition, (n,): zero exactly where it holds.
+        """Return a distance to fulfilment, (n,), zero exactly where the condition holds.
 
-        The number has a unit of the condition's own and falls towards the places that fulfil it, for searches; here it
-        is 1 where the condition does not hold. Numbers of the places must be finite.
+        Its unit depends on the condition, and it decreases towards fulfilment, which searches use. The default is 1
+        where the condition does not hold. The configurations must be finite.
         """
         return np.where(self.holds(robot, places), 0.0, 1.0)
 
     def why_nowhere(self, robot: Robot) -> str | None:
-        """Return why the condition holds nowhere, or at isolated poses only, whatever the region; None if it may."""
+        """Return why the condition holds nowhere, or at isolated poses only, in any region; otherwise None."""
         return too_few_cables(robot) if self.takes_every_row else None
 
     def for_robots(self, robust: float) -> Condition:
-        """Return the condition for a share `robust` of the robots of an uncertainty; without such a key it is the same.
+        """Return the condition for a fraction `robust` of the uncertain robots; unchanged without such a key.
 
         Raises
         ------
@@ -92,16 +92,16 @@ class Condition(Part, ABC):
         return self.model_copy(update={"robust": share}) if "robust" in type(self).model_fields else self
 
     def __and__(self, other: Condition) -> AllOf:
-        """Return the condition that both hold."""
+        """Combine two conditions: both must hold."""
         return AllOf(kind="all", conditions=(*_parts(self, AllOf), *_parts(other, AllOf)))
 
     def __or__(self, other: Condition) -> AnyOf:
-        """Return the condition that at least one of the two holds."""
+        """Combine two conditions: at least one must hold."""
         return AnyOf(kind="any", conditions=(*_parts(self, AnyOf), *_parts(other, AnyOf)))
 
 
 def condition_from(data: Any) -> Condition:
-    """Make a condition from its data: a mapping, as `model_dump` returns it or as a file has it.
+    """Create a condition from its data: a mapping as returned by `model_dump` or read from a file.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def condition_from(data: Any) -> Condition:
 
 
 def for_robots(condition: Condition, share: float | None) -> Condition:
-    """Return a condition for a share of the robots of an uncertainty, or as it is if `share` is None.
+    """Return a condition for a fraction of the uncertain robots, or unchanged if `share` is None.
 
     Raises
     ------
@@ -138,31 +138,32 @@ AnyCondition = Annotated[SerializeAsAny[Condition], BeforeValidator(condition_fr
 
 
 class TensionCondition(Condition, ABC):
-    """A condition about tensions inside their limits, which can be required of the robots of an uncertainty."""
+    """A condition about tension limits, which can be required for uncertain robots."""
 
     robust: Share | None = Field(
         default=None,
-        description="share of the robots of the robot's `uncertainty` for which the condition must hold, to first "
-        "order, at all accepted places at once, such as 0.95; default: the robot is as its file has it",
+        description="fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the "
+        "condition must hold, to first order, at all accepted configurations simultaneously; default: the "
+        "nominal robot only",
     )
 
 
 class AllOf(Condition):
-    """All of some conditions hold. Each is evaluated only where those before it hold."""
+    """All conditions hold. Each is evaluated only where the previous ones hold."""
 
     kind: Literal["all"] = "all"
-    conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions that all must hold")
+    conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions that must all hold")
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         """Return where all hold, (n,) of bool."""
         return _one_by_one(self.conditions, robot, places, undecided=True)
 
     def for_robots(self, robust: float) -> Condition:
-        """Return all conditions for a share `robust` of the robots."""
+        """Return all conditions for a fraction `robust` of the robots."""
         return AllOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the sum of the shortfalls x, each as a share of 1: x / (1 + x)."""
+        """Return the sum of the shortfalls x, each mapped to x / (1 + x)."""
         return np.sum([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
 
     def why_nowhere(self, robot: Robot) -> str | None:
@@ -171,7 +172,7 @@ class AllOf(Condition):
 
 
 class AnyOf(Condition):
-    """At least one of some conditions holds. Each is evaluated only where none before it holds."""
+    """At least one condition holds. Each is evaluated only where no previous one holds."""
 
     kind: Literal["any"] = "any"
     conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions of which one must hold")
@@ -181,11 +182,11 @@ class AnyOf(Condition):
         return _one_by_one(self.conditions, robot, places, undecided=False)
 
     def for_robots(self, robust: float) -> Condition:
-        """Return the alternatives for a share `robust` of the robots."""
+        """Return the alternatives for a fraction `robust` of the robots."""
         return AnyOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the smallest of the shortfalls x, as a share of 1: x / (1 + x)."""
+        """Return the smallest of the shortfalls x, mapped to x / (1 + x)."""
         return np.min([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
 
     def why_nowhere(self, robot: Robot) -> str | None:

@@ -1,7 +1,7 @@
-"""Count accepted samples chunk by chunk, in whatever process: `Counter`.
+"""Count accepted samples chunk by chunk, in any process: `Counter`.
 
-The result for the same samples is the same to the last bit whichever process computes it. Chunks whose flags are known
-already, from a checkpoint, are counted again without evaluating the condition.
+The result does not depend on the process, to the last bit. Chunks with known flags, from a checkpoint, are counted
+again without evaluating the condition.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Counter(Displayed):
     sampler
         None if the points of each chunk are given.
     keep
-        Which samples are kept: accepted, all or none.
+        Samples that are kept: accepted, all or none.
     samples
-        Of the run, the maximum.
+        Maximum number of samples of the run.
     """
 
     condition: Condition
@@ -43,14 +43,14 @@ class Counter(Displayed):
     samples: int
 
     def chunk(self, counts: Counts, units: np.ndarray, known: bytes | None, keep: bool) -> bytes:
-        """Add the points of a chunk (n, d) to counts; return which of them are accepted, one bit a sample.
+        """Add the points of a chunk (n, d) to counts; return which of them are accepted, one bit per sample.
 
         Parameters
         ----------
         known
-            The bits where they are known already.
+            Known bits, if any.
         keep
-            Whether samples are kept and not only counted.
+            True to keep samples, not only count them.
         """
         places, exists = self.domain.places(units)
         if known is None:
@@ -76,15 +76,15 @@ def count(
     first
         Number of the first chunk.
     known
-        Of each chunk: its bits where they are known already, else None.
+        Known bits of each chunk, else None.
     points
-        Of each chunk: points of the unit cube (n, d); default: the sampler's.
+        Points of each chunk in the unit cube (n, d); default: the sampler's.
     keep
-        Whether samples are kept and not only counted.
+        True to keep samples, not only count them.
 
     Returns
     -------
-    The counts, and of each chunk which samples are accepted, one bit a sample.
+    The counts, and which samples of each chunk are accepted, one bit per sample.
     """
     counter = shared.counter
     counts, flags = Counts(counter.domain), []
@@ -100,7 +100,7 @@ def count(
 
 
 class Shared:
-    """A counter for all jobs of a run: pickled once for those of other processes, and not at all for this one's."""
+    """A counter for all jobs of a run: pickled once for other processes, and not at all for this one."""
 
     def __init__(self, counter: Counter) -> None:
         self.counter = counter

@@ -1,4 +1,4 @@
-"""`Counts`: how many samples were tried and accepted, where, and the first of them; counts of more can be added."""
+"""`Counts`: numbers of tried and accepted samples per cell, and the first samples; counts can be added."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ RESOLUTION = 32  # cells along each axis
 
 
 class Counts:
-    """Numbers of samples so far. They are added in the order of the samples, so that nothing depends on timing.
+    """Numbers of samples so far. They are added in the order of the samples, so the result does not depend on timing.
 
     Attributes
     ----------
@@ -21,13 +21,13 @@ class Counts:
         Number of samples.
     cells
         Samples tried and accepted in each cell of the box of positions, (2, nx, ny, nz); an axis along which the box
-        has no thickness has one cell. Samples without a place are in no cell.
+        has no thickness has one cell. Samples without a valid configuration are in no cell.
     low, high
-        Bounds of the accepted positions, (3,) [m]; infinite where there are none.
+        Bounds of the accepted positions, (3,) [m]; infinite if there are none.
     samples, flags
-        Arrays of the samples that are kept, (n, k) as `Domain.numbers` returns them, and of whether each was accepted.
+        Arrays of the samples that are kept, (n, k) as returned by `Domain.numbers`, and True for each accepted one.
     left
-        How many samples more may be kept.
+        Number of further samples that may be kept.
     """
 
     def __init__(self, domain: Domain, points_max: int = sys.maxsize):
@@ -44,7 +44,7 @@ class Counts:
         return int(self.cells[1].sum())
 
     def count(self, domain: Domain, places: Places, exists: np.ndarray, held: np.ndarray) -> None:
-        """Count samples by their places, whether there is such a place, and whether it is accepted, (n,) of bool."""
+        """Count samples from their configurations and two flags (n,): valid, and accepted."""
         position = places.pose[:, :3]
         index = _cell(position, domain, self.cells.shape[1:])
         for cells, some in zip(self.cells, (index[exists], index[held]), strict=True):
@@ -55,7 +55,7 @@ class Counts:
         self.tried += len(places)
 
     def keep(self, samples: np.ndarray, flags: np.ndarray) -> None:
-        """Keep samples (n, k) and whether each was accepted (n,), as many as there may still be."""
+        """Keep samples (n, k) and their flags (n,), up to the storage limit."""
         self.samples.append(samples[: self.left])
         self.flags.append(flags[: self.left])
         self.left -= len(self.samples[-1])
@@ -70,7 +70,7 @@ class Counts:
 
 
 def _cell(position: np.ndarray, domain: Domain, cells: tuple[int, ...]) -> np.ndarray:
-    """Return the index of the cell that each position is in, (n,); positions outside of the box go to its border."""
+    """Return the index of the cell of each position, (n,); positions outside the box are moved to its border."""
     low, high = domain.box
     index = np.zeros(len(position), dtype=np.int32)
     for axis, count in enumerate(cells):

@@ -1,4 +1,4 @@
-"""The dataset of a run, counts with names and units, samples, volume and boundary; and the files that it goes to."""
+"""The dataset of a run (counts, samples, volume and boundary with names and units), and its files."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def dataset(counts: Counts, domain: Domain, keep: str, method: str, refinement: 
 def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
     """Save a result of `sample` atomically: as NetCDF, or as a Zarr folder if the path ends in .zarr.
 
-    `xarray.load_dataset` reads the one, `xarray.open_zarr` the other (extra `cluster`). Attributes of the run, such as
-    the seconds it took, are left out: equal results are equal NetCDF files.
+    `xarray.load_dataset` reads the former, `xarray.open_zarr` the latter (extra `cluster`). Attributes of the run, such
+    as its duration, are left out, so that equal results are equal NetCDF files.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def _boundary(domain: Domain, refinement: Refinement) -> dict[str, Any]:
     upper, _ = domain.places(refinement.cells + refinement.edges)
     edges = np.zeros(len(domain.low))
     edges[domain.varying] = domain.extent * refinement.edges
-    about = {"units": "m", "long_name": "centres of the smallest cells, which the boundary passes through"}
+    about = {"units": "m", "long_name": "centres of the smallest cells, through which the boundary passes"}
     return {
         "boundary": (("cell", "axis"), (corners.pose[:, :3] + upper.pose[:, :3]) / 2, about),
         "cell_edges": (("axis",), edges[:3], {"units": "m", "long_name": "edges of the smallest cells"}),
@@ -113,17 +113,17 @@ def _volume(counts: Counts, domain: Domain, method: str, refinement: Refinement 
     if refinement is not None:
         ends = refinement.inside, refinement.inside + refinement.mixed
         value = refinement.estimate
-        about = "lowest and highest, if the first cells miss nothing"
+        about = "lower and upper bound, if the first cells miss nothing"
     elif domain.position_from_lengths:
         value = np.count_nonzero(counts.cells[1]) / counts.cells[1].size
-        about = "no interval: positions are not uniform; the volume is that of the cells reached"
+        about = "no interval: positions are not uniform; this is the volume of the cells reached"
     else:
         value = counts.accepted / counts.tried
         about = "no interval: a grid is not random; it can be off by half a layer of cells along the boundary"
         if method != "grid":
             ends = share_interval(counts.accepted, counts.tried)
             about = f"{100 * LEVEL:g} % confidence interval of Clopper and Pearson"
-            about += "; for sobol the error is usually smaller" * (method == "sobol")
+            about += "; with sobol the error is usually smaller" * (method == "sobol")
     unit = {"units": domain.measure_unit}
     return {
         "volume": ((), domain.measure * value, unit),

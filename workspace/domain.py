@@ -1,4 +1,4 @@
-"""`Domain`: a region for one robot: which quantities vary, and the places that points of the unit cube stand for."""
+"""`Domain`: a region for one robot, and the map from points of the unit cube to configurations."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
 
 @dataclass(frozen=True)
 class Domain(Displayed):
-    """Ranges of the quantities that describe a place.
+    """Ranges of the quantities that describe a configuration.
 
     Attributes
     ----------
     low, high
-        Ends of position, attitude, carriers' positions and cable lengths, in this order, (k,) [m, rad]. With
-        `position_from_lengths` those of the position are of a box that contains every position the lengths allow.
+        Limits of position, attitude, carriers' positions and cable lengths, in this order, (k,) [m, rad]. With
+        `position_from_lengths` the position's limits are a box that contains every position the lengths allow.
     position_from_lengths
-        Whether the position follows from three cable lengths.
+        True if three cable lengths determine the position.
     """
 
     robot: Robot
@@ -118,18 +118,18 @@ class Domain(Displayed):
 
     @property
     def numbers_kept(self) -> int:
-        """Return how many numbers `numbers` returns of a place."""
+        """Return the number of columns of `numbers`."""
         return 3 + 3 * self.attitude_varies + 3 * len(self.robot.carriers) * self.carriers_vary
 
     def numbers(self, places: Places) -> np.ndarray:
-        """Return what differs between places: position, and attitude and carriers' positions if they vary, (n, k)."""
+        """Return position, and attitude and carriers' positions if they vary, for each configuration, (n, k)."""
         parts = [places.pose if self.attitude_varies else places.pose[:, :3]]
         if self.carriers_vary:
             parts.append(places.carriers[:, :, :3].reshape(len(places), -1))
         return np.hstack(parts) if len(parts) > 1 else parts[0]
 
     def places(self, units: np.ndarray) -> tuple[Places, np.ndarray]:
-        """Return the places that points of the unit cube stand for, and whether there is such a place.
+        """Map points of the unit cube to configurations.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class Domain(Displayed):
 
         Returns
         -------
-        Places, and (n,) of bool: false where three cables of those lengths do not meet, where the pose is that of home.
+        Configurations, and (n,) of bool: False where three cables of these lengths do not meet; the pose there is home.
         """
         count, carriers = len(units), len(self.robot.carriers)
         values = np.empty((count, len(self.low)))
@@ -158,7 +158,7 @@ class Domain(Displayed):
 
 
 def _carrier_boxes(robot: Robot, region: Region) -> dict[str, Box]:
-    """Return the boxes of the carriers that may move, by name."""
+    """Return the boxes of the moving carriers, by name."""
     if region.carriers == "home":
         return {}
     if region.carriers == "reach":

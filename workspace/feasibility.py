@@ -1,7 +1,7 @@
-"""Decide at which places tensions inside their limits give the required wrenches, for many places at once.
+"""Decide at which configurations tensions inside their limits give the required wrenches, for many at once.
 
-The wrench rows are those of the coordinates that can move, moments divided by `Robot.length`, so that all are in
-newtons. A few thousand places are processed at a time: their matrices stay in the processor's cache.
+The wrench rows are those of the coordinates that can move, with moments divided by `Robot.length`, so that all are in
+newtons. A few thousand configurations are processed at a time, so that their matrices stay in the cache.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ ONLY_EXACT = 0.01  # of the force scale
 
 
 def rest_wrench(robot: Robot) -> np.ndarray:
-    """Return the wrench that holds the platform at rest, anywhere: against its weight, about the CoM, (6,) [N, N m]."""
+    """Return the wrench that balances the weight of the platform, about the CoM, (6,) [N, N m]."""
     return dynamics_of(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))
 
 
@@ -38,7 +38,7 @@ def scaled(robot: Robot, wrenches: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def wrench_matrices(robot: Robot, places: Places, rows: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
-    """Yield slices of a few thousand places, and their wrench matrices (k, rows, m) [N per N]."""
+    """Yield slices of a few thousand configurations, and their wrench matrices (k, rows, m) [N per N]."""
     dynamics = dynamics_of(robot)
     scale = robot.wrench_scale[rows]
     for start in range(0, len(places), PLACES_AT_ONCE):
@@ -54,16 +54,16 @@ def wrench_matrices(robot: Robot, places: Places, rows: np.ndarray) -> Iterator[
 def feasible(
     robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None, robust: float | None = None
 ) -> np.ndarray:
-    """Return where tensions inside their limits give every one of some wrenches, (n,) of bool.
+    """Return whether tensions inside their limits give all of some wrenches, (n,) of bool.
 
     Parameters
     ----------
     wrenches
-        (k, 6) for all places or (k, n, 6), about the CoM in {G} [N, N m].
+        (k, 6) for all configurations or (k, n, 6), about the CoM in {G} [N, N m].
     rows
-        Wrench rows to give; default: those of the coordinates that can move.
+        Wrench rows to balance; default: those of the coordinates that can move.
     robust
-        Share of the robots of an uncertainty whose tensions must exist; default: the robot is as its file has it.
+        Fraction of the uncertain robots for which tensions must exist; default: the nominal robot only.
     """
     rows = wrench_rows(robot) if rows is None else rows
     tightened = None if robust is None else Tightened(robot, robust, rows)
@@ -87,10 +87,10 @@ def feasible(
 def shortfall(
     robot: Robot, places: Places, wrenches: np.ndarray, rows: np.ndarray | None = None, robust: float | None = None
 ) -> np.ndarray:
-    """Return a lower bound of the distance of wrenches (k, 6) from the available wrench set, the largest, (n,) [N].
+    """Return the largest distance of wrenches (k, 6) from the available wrench set, as a lower bound, (n,) [N].
 
-    It is the shortfall of the batch solver's certificates: zero exactly where `feasible` is true. Where only the robots
-    of an uncertainty have no tensions, of which there must be a share `robust`, it is 1 % of the force scale.
+    It is the shortfall of the batch solver's certificates: zero exactly where `feasible` is true. If the nominal robot
+    has tensions but the fraction `robust` of the uncertain robots does not, it is 1 % of the force scale.
     """
     check_places(robot, places)
     rows = wrench_rows(robot) if rows is None else rows

@@ -16,17 +16,17 @@ MOST = 1_000_000  # positions
 def hints(dynamics: Dynamics, count: int = 400, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Draw random positions about home, and check at each whether tensions inside the limits hold the platform at rest.
 
-    The positions are uniform in the box of home and anchors, at the attitude of home. `sample` computes the workspace
-    itself, with volumes and conditions.
+    The positions are uniform in the box of home and anchors, at the attitude of home. `sample` computes workspaces with
+    volumes and other conditions.
 
     Parameters
     ----------
     dynamics
-        Of the robot.
+        Dynamics of the robot.
     count
-        How many positions.
+        Number of positions.
     seed
-        Of the random positions.
+        Seed of the random positions.
 
     Returns
     -------

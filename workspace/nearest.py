@@ -1,4 +1,4 @@
-"""Search for the feasible pose that is nearest to one that is not."""
+"""Search for the feasible pose closest to an infeasible one."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ NEAREST = 1e-4  # of the size, in the first round
 def nearest_feasible(
     robot: Robot, condition: Condition, pose: np.ndarray, carriers: np.ndarray, size: float
 ) -> np.ndarray | None:
-    """Return the pose nearest to `pose` at which a condition holds, to a few per cent of the distance, or None.
+    """Return the pose closest to `pose` at which a condition holds, to a few per cent of the distance, or None.
 
-    The search samples poses; it may miss a feasible set that is thin or has several parts. Distances are metres, and
-    radians times `Robot.length`.
+    The search samples poses and may miss a feasible set that is thin or has several parts. Distances are in metres,
+    with radians multiplied by `Robot.length`.
 
     Parameters
     ----------
     pose, carriers
-        (6,) and (c, 6) in {G} [m, rad]. Carriers stay.
+        (6,) and (c, 6) in {G} [m, rad]. Carriers are fixed.
     size
-        How far to search [m].
+        Search radius [m].
     """
     rng, free = np.random.default_rng(0), robot.dof_mask.astype(bool)
     unit = np.where(np.arange(6) < 3, 1.0, 1.0 / robot.length) * free
 
     def holding(poses: np.ndarray) -> np.ndarray:
-        """Return those of some poses at which the condition holds, the nearest first."""
+        """Return the poses at which the condition holds, the closest first."""
         places = Places(poses, np.broadcast_to(carriers, (len(poses), *carriers.shape)))
         there = poses[condition.evaluate(robot, places)]
         return there[np.argsort(distances(there))]

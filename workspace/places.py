@@ -1,4 +1,4 @@
-"""Where the platform and its carriers are, many times: `Places`."""
+"""Configurations of platform and carriers: `Places`."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from ..models import Robot
 
 @dataclass(frozen=True, eq=False)
 class Places(Displayed):
-    """Poses of platform and carriers, n times.
+    """n configurations: poses of platform and carriers.
 
     Attributes
     ----------
     pose
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (n, 6).
     carriers
-        The same of each carrier, (n, c, 6).
+        The same for each carrier, (n, c, 6).
     """
 
     pose: np.ndarray  # (n, 6)
@@ -30,9 +30,9 @@ class Places(Displayed):
 
     @classmethod
     def at_home(cls, robot: Robot, pose: ArrayLike) -> Places:
-        """Return the places of poses (n, 6) or (6,) in {G} [m, rad] with every carrier at home.
+        """Return the configurations of poses (n, 6) or (6,) in {G} [m, rad] with every carrier at home.
 
-        A pose with a number that is not finite is a place where no condition holds.
+        At a pose with a number that is not finite no condition holds.
 
         Raises
         ------
@@ -49,7 +49,7 @@ class Places(Displayed):
         return len(self.pose)
 
     def only(self, rows: np.ndarray | slice) -> Places:
-        """Return the places of some rows: indices, flags (n,) or a slice.
+        """Return the configurations of some rows: indices, flags (n,) or a slice.
 
         Raises
         ------
@@ -64,7 +64,7 @@ class Places(Displayed):
 
 
 def check_places(robot: Robot, places: Places) -> None:
-    """Check that these are a robot and places of it; raise InputError if they are not."""
+    """Check that these are a robot and its configurations; otherwise raise InputError."""
     parts = {"pose": required("places", places, Places).pose, "carriers": places.carriers}
     n, carriers = np.shape(places.pose)[:1], len(required("robot", robot, Robot).carriers)
     for (name, value), shape in zip(parts.items(), ((*n, 6), (*n, carriers, 6)), strict=True):

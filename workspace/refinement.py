@@ -1,7 +1,7 @@
-"""Adaptive refinement of the boundary: cells whose corners differ are halved along each axis, level by level.
+"""Adaptive refinement of the boundary: cells with differing corners are halved along each axis, level by level.
 
-The corners of all cells lie on a lattice, twice as fine on each level; those that are known are not evaluated again.
-A cell whose corners agree is taken to be all inside or all outside: what is thinner than the first cells can be missed.
+The corners of all cells lie on a lattice, twice as fine on each level; known corners are not evaluated again. A cell
+with equal corners is treated as all inside or all outside, so parts thinner than the first cells can be missed.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ class Refinement:
     Attributes
     ----------
     inside, mixed
-        Share of the box in cells whose corners are all accepted, and in those whose corners differ.
+        Fractions of the box in cells with all corners accepted, and in cells with differing corners.
     estimate
-        Share of the box that is accepted: of each mixed cell the share of its corners.
+        Accepted fraction of the box, with the fraction of accepted corners for each mixed cell.
     cells
         Lower corners of the mixed cells as points of the unit cube, (n, d).
     edges
@@ -39,7 +39,7 @@ class Refinement:
 
     def __init__(self, domain: Domain, samples: int, size: float | None):
         if domain.position_from_lengths or (domain.varying >= 3).any():
-            raise InputError("region must have positions only that vary with method adaptive, got one with others")
+            raise InputError("region must vary in positions only with method adaptive, got other quantities")
         if size is not None:
             number("size", size, SMALLEST, LARGEST, also=" [m], or None")
         whole_number("samples with method adaptive", samples, 1, MOST)
@@ -89,7 +89,7 @@ class Refinement:
         return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(self._count + 1)))
 
     def _hits(self, cells: np.ndarray) -> np.ndarray:
-        """Return how many corners of cells (n, d) are accepted, (n,)."""
+        """Return the number of accepted corners of cells (n, d), (n,)."""
         return self._flags[np.searchsorted(self._known, self._keys(cells))].sum(axis=1, dtype=np.int8)
 
     def _halve(self, cells: np.ndarray) -> np.ndarray:

@@ -27,16 +27,16 @@ class AngleBox(Part):
 
 
 class Region(Part):
-    """Describe where to sample. A quantity with equal ends is constant: a slice is a box without thickness.
+    """Describe the region to sample. A quantity with equal ends is constant: a slice is a box without thickness.
 
-    Samples are uniform in each quantity that varies, independent of each other.
+    Samples are uniform and independent in each varying quantity.
     """
 
     position: Box | None = Field(
         default=None, description="of the platform frame in {G} [m]; default: a box about home and anchors"
     )
     attitude: Vector3 | AngleBox | None = Field(
-        default=None, description="(roll, pitch, yaw) or a box of them [rad]; default: that of home"
+        default=None, description="(roll, pitch, yaw) or a box of them [rad]; default: the attitude at home"
     )
     carriers: Literal["home", "reach"] | dict[Name, Box] = Field(
         default="home",
@@ -63,7 +63,7 @@ def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray,
     Parameters
     ----------
     carriers
-        Boxes that carriers may be in, by name; the others are at home.
+        Boxes of carriers, by name; the others are at home.
     """
     corners = [robot.home_anchors, robot.home[None, :3]]
     for index, carrier in enumerate(robot.carriers):

@@ -1,9 +1,9 @@
-"""Tensions for the robots of an uncertainty: limits tightened, place by place, by what these robots' tensions differ.
+"""Robust feasibility: tension limits tightened by the tension spread, configuration by configuration.
 
-The differences depend on the tensions. So the tensions of the robot of the file come first, then those inside limits
-that are tightened by their differences, and so on. A place is accepted if the tensions of one of these rounds stay
-inside the limits with their own differences: then a solution is known, however it came about. For a robot with more
-cables than needed the rounds may miss a solution, which makes the result smaller, never too large.
+The spread depends on the tensions, so the limits are tightened iteratively: first for the tensions of the nominal
+robot, then for the tensions inside the tightened limits, and so on. A configuration is accepted if the tensions of one
+iteration keep their own spread from the limits. For a robot with more cables than needed the iteration may miss a
+solution, so the result may be too small, but never too large.
 """
 
 from __future__ import annotations

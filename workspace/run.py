@@ -1,4 +1,4 @@
-"""`sample`: evaluate a condition at 10^3 to 10^9 places of a robot."""
+"""`sample`: evaluate a condition at 10^3 to 10^9 configurations of a robot."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ def sample(
     execution: Execution | None = None,
     **options: Unpack[ExecutionOptions],
 ) -> xr.Dataset:
-    """Sample the places where a condition holds.
+    """Sample the configurations at which a condition holds.
 
-    The result is the same to the last bit for every number of workers. Memory does not grow with the number of samples:
-    beyond `points_max` of them only counts are kept.
+    The result does not depend on the number of workers, to the last bit. Memory does not grow with the number of
+    samples, because beyond `points_max` samples only counts are kept.
 
     Parameters
     ----------
@@ -70,20 +70,20 @@ def sample(
     method
         random; sobol (low discrepancy); grid; adaptive: cells whose corners differ are halved.
     seed
-        Of the random streams, and of the scrambling of sobol.
+        Seed of the random streams, and of the scrambling of sobol.
     size
-        Of adaptive: edge below which cells are not halved any more [m]; default: as small as the samples allow.
+        Smallest cell edge of the adaptive method [m]; default: as small as the number of samples permits.
     keep
-        Which samples the dataset contains: accepted, all or none.
+        Samples in the dataset: accepted, all or none.
     points_max
-        Maximum number of samples that it contains, the first ones in the order of the samples.
+        Maximum number of samples in the dataset; the first ones are kept.
     robust
-        Share of the robots of the robot's `uncertainty`, such as 0.95: with that probability the robot that was built
-        fulfils the conditions about tension limits at all accepted places, to first order. It is the same as `robust`
-        in each of these conditions; others are not affected.
+        Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the conditions about
+        tension limits hold at all accepted configurations, to first order. It sets the key `robust` of these
+        conditions; others are not affected.
     execution
-        Where samples are evaluated and stored, see `Execution`. Its `progress` is called with (samples done, samples in
-        total, samples accepted); the total is an upper bound for adaptive.
+        Workers and checkpoint, see `Execution`. Its `progress` is called with (samples done, samples in total, samples
+        accepted); the total is an upper bound for adaptive.
     options
         Fields of `Execution` by their names, which replace its own.
 
@@ -91,28 +91,27 @@ def sample(
     -------
     Dataset with the variables
         position (point, axis) [m]
-            Of the samples kept; attitude (point, angle) [rad] and carrier_position (point, carrier, axis) [m] where
-            those vary; accepted (point) if all samples are kept.
+            Positions of the samples kept; attitude (point, angle) [rad] and carrier_position (point, carrier, axis) [m]
+            if they vary; accepted (point) if all samples are kept.
         tried, reached (x, y, z)
             Samples in each of 32 x 32 x 32 cells of the box of positions, and those of them that were accepted.
         bounds (end, axis) [m]
-            Of the accepted positions; nan where there are none.
+            Bounds of the accepted positions; nan if there are none.
         volume, volume_interval (end) [m^3]
-            Share of accepted samples times the volume of the box, with the interval of Clopper and Pearson at 95 %. It
-            is the mean over everything that varies beside the position, and an area or a length if the box has no
+            Accepted fraction of the samples times the volume of the box, with the 95 % interval of Clopper and Pearson.
+            It is the mean over all other varying quantities, and an area or a length if the box has no
             thickness along some axes. With `lengths` it is the volume of the cells reached, without an interval; a grid
-            has no interval either. Adaptive: from the cells that lie inside, to these and those that the boundary
-            passes through.
+            has no interval either. Adaptive: the interval from the cells inside to the cells inside or on the boundary.
         boundary (cell, axis) [m], cell_edges (axis) [m]
-            Of adaptive: centres of the smallest cells with corners that differ, and their edges.
+            Adaptive method only: centres of the smallest cells with differing corners, and their edges.
 
     Its attributes are the arguments, `samples` and `accepted`, and of this run `seconds` and `poses_per_s`.
 
     Raises
     ------
     InputError
-        If an argument is wrong, the region is empty, the checkpoint cannot be written, is damaged or of another run, or
-        there is no such scheduler. No file has been changed then.
+        If an argument is wrong, the region is empty, the checkpoint cannot be written, is damaged or belongs to another
+        run, or the scheduler does not exist. No file is changed then.
     SolverError
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
@@ -165,7 +164,7 @@ def sample(
 
 
 class _Run:
-    """Count chunk after chunk: those that the checkpoint has are counted from it, the others are appended to it."""
+    """Count chunk after chunk: chunks in the checkpoint are read from it, the others are appended to it."""
 
     def __init__(
         self,
@@ -180,7 +179,7 @@ class _Run:
         self._chunk = 0
 
     def count(self, refinement: Refinement | None) -> None:
-        """Count all samples: the sampler's, or those of one level of a refinement after the other."""
+        """Count all samples: the sampler's, or those of a refinement, level by level."""
         if refinement is None:
             for _ in self.flags(self._total):
                 pass
@@ -213,7 +212,7 @@ class _Run:
                 self._progress(self._counts.tried, self._total, self._counts.accepted)
 
     def _jobs(self, samples: int, points: np.ndarray | None) -> Iterator[tuple[Any, ...]]:
-        """Yield the arguments of `count`, a few chunks each: all workers have jobs, and sending them is cheap."""
+        """Yield the arguments of `count`, a few chunks each, so that all workers have jobs at low cost."""
         first, chunks = self._chunk, chunks_of(samples)
         together = min(LARGEST_JOB, max(1, chunks // 64))
         for start in range(0, chunks, together):
@@ -224,7 +223,7 @@ class _Run:
 
 
 def _header(robot: Robot, requested: dict[str, Any]) -> dict[str, Any]:
-    """Return everything that the flags depend on."""
+    """Return everything on which the flags depend."""
     import scipy
 
     data = hashlib.sha256(robot.model_dump_json().encode()).hexdigest()

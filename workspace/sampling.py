@@ -1,7 +1,7 @@
-"""Samplers: points of the unit cube in chunks, each chunk by itself, so that any process can compute any chunk.
+"""Samplers: points of the unit cube in independent chunks, so that any process can compute any chunk.
 
 Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and chunk. Sobol's sequence (scipy's) is
-scrambled by the seed and advanced to where the chunk begins. A grid has the midpoints of equal cells.
+scrambled by the seed and advanced to the start of the chunk. A grid has the midpoints of equal cells.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Sampler(Displayed):
 
 
 def chunks_of(samples: int) -> int:
-    """Return the number of chunks that samples make."""
+    """Return the number of chunks for a number of samples."""
     return -(-samples // CHUNK)
 
 
@@ -89,7 +89,7 @@ def cells_of(extent: np.ndarray, most: int) -> tuple[int, ...]:
 
 
 class _Sobol:
-    """Chunks of Sobol's sequence, scrambled; advancing is cheap, going back starts again from the first point."""
+    """Chunks of a scrambled Sobol sequence; advancing is cheap, going back restarts from the first point."""
 
     def __init__(self, dimension: int, seed: int):
         from scipy.stats import qmc

@@ -1,4 +1,4 @@
-"""Convert the counts of a workspace to a surface coloured by capacity margin, which planes along the axes cut open."""
+"""Convert the counts of a workspace to a surface coloured by capacity margin, with cutting planes along the axes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Surface(Displayed):
     axes
         Coordinates of the grid's points along each axis of {G} [m].
     shares
-        The share of accepted samples at each point of the grid.
+        Accepted fraction of the samples at each point of the grid.
     margins
         Capacity margin at rest at each point of the grid with attitude and carriers at home [N], at least 0.
     """
@@ -85,8 +85,8 @@ class Surface(Displayed):
 def surface(dataset: xr.Dataset, robot: Robot, within: float = np.inf) -> Surface | None:
     """Return the surface of a dataset of `workspace.sample`; None if it has none.
 
-    It has none if it is flat, if it has no usable counts or cells, if a coordinate of a cell is above `within` [m], and
-    if nowhere half of the samples are accepted.
+    It has none if it is flat, if it has no usable counts or cells, if a coordinate of a cell is above `within` [m], or
+    if no cell has at least half of its samples accepted.
 
     Cells are joined into blocks that have enough samples. The surface encloses the blocks in which at least half of the
     samples are accepted, or any sample if attitudes or carriers vary.
@@ -136,7 +136,7 @@ def _has_counts(dataset: xr.Dataset, within: float) -> bool:
 
 
 def _varies(dataset: xr.Dataset, robot: Robot) -> bool:
-    """Return whether attitudes or carriers of the samples vary; the region of a file states it without samples."""
+    """Return whether attitudes or carriers of the samples vary, from the region of a file if it has no samples."""
     if "attitude" in dataset or "carrier_position" in dataset:
         return True
     try:
@@ -149,7 +149,7 @@ def _varies(dataset: xr.Dataset, robot: Robot) -> bool:
 def _boundary(shares: np.ndarray, axes: list[np.ndarray], ends: np.ndarray) -> Mesh:
     """Return the surface where half of the samples are accepted, closed at the faces of the box of all samples.
 
-    `ends` (3, 2) are those of the box [m].
+    `ends` (3, 2) are the limits of the box [m].
     """
     edges = np.array([axis[1] - axis[0] for axis in axes])
     low, high = (np.array([axis[end] for axis in axes]) for end in (0, -1))

@@ -1,4 +1,4 @@
-"""Position of a platform on three cables whose attitude and cable lengths are given."""
+"""Position of a platform on three cables with given attitude and cable lengths."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ def three_cable_pose(robot: Robot, attitude: np.ndarray, carriers: np.ndarray, l
     Parameters
     ----------
     robot
-        With three cables whose anchors are points.
+        Robot with three cables whose anchors are points.
     attitude
         (roll, pitch, yaw) of the platform, (n, 3) [rad].
     carriers
         Poses in {G}, (n, c, 6) [m, rad].
     lengths
-        (3,) of all places or (n, 3) [m].
+        (3,) for all configurations or (n, 3) [m].
 
     Returns
     -------
-    In {G}, (n, 3) [m]; nan where the cables do not meet.
+    Positions in {G}, (n, 3) [m]; nan where the cables do not meet.
     """
     turned = np.concatenate([np.zeros_like(attitude), attitude], axis=1)
     centres = anchors(robot, carriers) - attachments(robot, turned)  # (n, 3, 3)

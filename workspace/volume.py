@@ -25,11 +25,11 @@ class Volume(Displayed):
     Attributes
     ----------
     value
-        Estimate, share of the samples times the box.
+        Estimate: accepted fraction of the samples times the volume of the box.
     low, high
         Ends of the interval.
     level
-        Probability that such an interval covers the true volume, at least.
+        Lower bound of the probability that such an interval covers the true volume.
     accepted, samples
         Numbers of samples it was computed from.
     """
@@ -58,7 +58,7 @@ def volume(accepted: int, samples: int, box: float, level: float = LEVEL) -> Vol
     box
         Volume of the box.
     level
-        Of confidence, between 0 and 1.
+        Confidence level, between 0 and 1.
 
     Raises
     ------

@@ -165,5 +165,5 @@ def _of_open(result: CalibrationData) -> list[Part]:
 def _directions(texts: tuple[str, ...]) -> list[Part]:
     if not texts:
         return ["all directions of the parameters are observable"]
-    title = f"the measurements leave {len(texts)} directions open, along which the file's values are kept:"
+    title = f"{len(texts)} unobservable directions, along which the file's values are kept:"
     return [Section(title, [("", text) for text in texts])]

@@ -1,4 +1,4 @@
-"""Conditions on places, one a file; each is evaluated at many places at once."""
+"""Conditions on configurations, one per file; each is evaluated at many configurations at once."""
 
 from .dynamic import Dynamic
 from .equilibrium_posture import EquilibriumPosture

@@ -1,12 +1,12 @@
 """Equilibrium posture, the third of paper C's conditions: at a position, an attitude at which the platform rests.
 
-Attitude (roll, pitch, yaw) and tensions are solved for together, from six equations
+Attitude (roll, pitch, yaw) and tensions are the unknowns of six equations
 
     S (A(x, theta) t - w) = 0,      S: moments divided by `Robot.length`
 
-by Newton's method from the level platform. With three cables there are six unknowns. With more, each step is the one of
-least norm, tensions in units of the weight, and the resulting attitude is checked for tensions inside the limits. Where
-the drive keeps the cables' lengths, the position is unknown too, and l_i(x, theta) = L_i are three more equations.
+solved by Newton's method from the level platform. With three cables there are six unknowns. With more, each step has
+least norm, with tensions in units of the weight, and the resulting attitude is checked for tensions inside the limits.
+If the drive keeps the cable lengths, the position is unknown too, and l_i(x, theta) = L_i are three more equations.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ AT_ONCE = 4096
 
 
 class EquilibriumPosture(Condition):
-    """At the position of the place, there is an attitude at which tensions inside the limits hold the platform at rest.
+    """An attitude exists at the position at which tensions inside the limits hold the platform at rest.
 
-    The attitude of the place is ignored. Newton's method searches for one attitude, starting from level: where the
-    condition does not hold, the search ended without one, which proves nothing. With the drive fixed-length the
-    position is unknown too, and starts at that of the place: `postures` returns the resulting pose.
+    The attitude of the configuration is ignored. Newton's method searches for one attitude, starting from level. If the
+    search fails, the condition is false, which proves nothing. With the drive fixed-length the position is
+    unknown too, and starts from the given one: `postures` returns the resulting pose.
     """
 
     kind: Literal["equilibrium-posture"] = "equilibrium-posture"
@@ -75,7 +75,7 @@ class EquilibriumPosture(Condition):
 
 
 def _solve(robot: Robot, pose: np.ndarray, tensions: np.ndarray, carriers: np.ndarray) -> None:
-    """Change pose (n, 6) and tensions (n, m) in place to those of a balance, or to nan."""
+    """Change pose (n, 6) and tensions (n, m) in place to a balance, or to nan."""
     wrench = rest_wrench(robot)
     unknown = slice(3 if robot.fixed_lengths is None else 0, 6)
     turned = 3 - unknown.start
@@ -98,7 +98,7 @@ def _solve(robot: Robot, pose: np.ndarray, tensions: np.ndarray, carriers: np.nd
 
 
 def _least_norm(jacobian: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Return x (n, k) of least norm with J x = error, nan where J (n, rows, k) has not full rank."""
+    """Return x (n, k) of least norm with J x = error, nan where J (n, rows, k) is rank-deficient."""
     if jacobian.shape[1] < jacobian.shape[2]:
         turned = jacobian.transpose(0, 2, 1)
         return (turned @ _least_norm(jacobian @ turned, error)[..., None])[..., 0]
@@ -120,7 +120,7 @@ def _balance(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return residuals (n, k), in units of weight and length, and their Jacobians (n, k, k or more).
 
-    The Jacobian is for (position where lengths are fixed, attitude, tensions in units of the weight).
+    The Jacobian is by (position if lengths are fixed, attitude, tensions in units of the weight).
     """
     dynamics, scale = dynamics_of(robot), robot.wrench_scale / robot.weight
     A = dynamics.wrench_matrix(pose, carriers) * scale[:, None]

@@ -1,9 +1,9 @@
 """Exists placement: somewhere in the reach boxes of the mobile carriers a condition holds.
 
-Half of the placements tried are points of a scrambled Sobol sequence in the product of the boxes. The others are ever
-smaller steps from the best of them, each kept if the shortfall of the condition is smaller after it. Points and steps
-are the same for every place, so that the result for a place depends on nothing else. It is one-sided: a placement
-proves that the condition holds; a search without a result proves nothing.
+Half of the tried placements are points of a scrambled Sobol sequence in the product of the boxes. The others are ever
+smaller steps from the best of them, each kept if it reduces the shortfall of the condition. Points and steps are the
+same for every configuration, so the result does not depend on other configurations. It is one-sided: a placement proves
+that the condition holds, but a search without a result proves nothing.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ LARGEST_STEP, SMALLEST_STEP = 0.5, 0.02  # of a box, or of all turns
 
 
 class ExistsPlacement(Condition):
-    """A condition holds for the carriers as they are, or for another placement of the mobile ones in their reach boxes.
+    """A condition holds for the given carriers, or for another placement of the mobile ones in their reach boxes.
 
     With the drive fixed-length the carriers are placed at their cables' lengths from the attachments. With the drive
     variable-length mobile carriers keep their positions.
@@ -66,7 +66,7 @@ class ExistsPlacement(Condition):
         return held
 
     def for_robots(self, robust: float) -> Condition:
-        """Return the condition with the one that must hold for a share `robust` of the robots."""
+        """Return the condition whose inner one must hold for a fraction `robust` of the robots."""
         return self.model_copy(update={"condition": self.condition.for_robots(robust)})
 
     def why_nowhere(self, robot: Robot) -> str | None:
@@ -74,7 +74,7 @@ class ExistsPlacement(Condition):
         return self.condition.why_nowhere(robot)
 
     def _search(self, robot: Robot, mobile: list[int], places: Places) -> np.ndarray:
-        """Return for which places the search ends with a placement, (n,) of bool."""
+        """Return whether the search finds a placement, (n,) of bool."""
         points, steps = _placements(3 * len(mobile) + 3, self.tries, self.seed)
         least = np.full(len(places), np.inf)
         best = np.zeros((len(places), points.shape[1]))
@@ -90,7 +90,7 @@ class ExistsPlacement(Condition):
         return least == 0
 
     def _shortfall(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> np.ndarray:
-        """Return the shortfall of the condition, (n,); more than that where the carriers do not fit."""
+        """Return the shortfall of the condition, (n,), plus a penalty where the carriers do not fit."""
         placed, beyond = self._place(robot, mobile, places, shares)
         shortfall = MISPLACED * (1.0 + beyond)
         fits = np.flatnonzero(beyond == 0)
@@ -99,7 +99,7 @@ class ExistsPlacement(Condition):
         return shortfall
 
     def _place(self, robot: Robot, mobile: list[int], places: Places, shares: np.ndarray) -> tuple[Places, np.ndarray]:
-        """Return places with the carriers at `shares` (n, d) of their boxes, and by how much they misfit, (n,) [m]."""
+        """Return configurations with the carriers at `shares` (n, d) of their boxes, and their misfit, (n,) [m]."""
         pose, carriers = places.pose.copy(), places.carriers.copy()
         if self.turn:
             pose[:, 3:] += self.turn * (2.0 * shares[:, -3:] - 1.0) * robot.dof_mask[3:]
@@ -142,8 +142,8 @@ def _more_than_rounding(distance: np.ndarray) -> np.ndarray:
 def _placements(dimensions: int, tries: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Return points that fill the unit cube evenly, and steps from the best of them, (k, dimensions) each.
 
-    Every other point is at a corner of the boxes: where a condition barely holds, carriers are at the ends of their
-    reach. The last three numbers, the angles of the platform, stay inside.
+    Every other point is at a corner of the boxes, because carriers are at the ends of their reach where a condition
+    barely holds. The last three numbers, the angles of the platform, stay inside.
     """
     from scipy.stats import qmc
 

@@ -1,7 +1,7 @@
 """Force balance, the first of paper C's conditions: the three rows of force, without the moments.
 
-Three cables balance all six rows exactly only at a set of postures without volume, so the paper's step (d) would reject
-every sample. Its prisms are those of the forces alone.
+Three cables balance all six rows exactly only on a set of measure zero, so the paper's step (d) would reject every
+sample. Its prisms follow from the forces alone.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Capacity margin: how much further wrench the cables can balance in any direction, at rest."""
+"""Capacity margin: the additional wrench that the cables can balance in every direction, at rest."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ class Margin(Condition):
         return self.margins(robot, places) >= self.above
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return how much the margin is below the value, (n,) [N]."""
+        """Return the amount by which the margin is below the value, (n,) [N]."""
         return np.maximum(self.above - self.margins(robot, places), 0.0)
 
     def margins(self, robot: Robot, places: Places) -> np.ndarray:
         """Return signed distances of the wrench at rest from the boundary of the available wrench set, (n,) [N].
 
-        Inside, they are positive and those of `solvers.capacity_margin`, also for a set without volume. Outside, they
-        are negative and bounds: the distance is at least as large, and equal where a facet is nearest.
+        Inside, they are positive and equal to `solvers.capacity_margin`, also for a flat set. Outside, they are
+        negative bounds: the distance is at least as large, and equal if a facet is closest.
         """
         check_places(robot, places)
         rows = wrench_rows(robot)

@@ -20,7 +20,7 @@ _RHO = 1e10  # weight of the wrench error relative to the tensions: so large tha
 class WrenchWithTolerance(Condition):
     """Tensions inside the limits balance the weight up to a tolerance of |(force, moment / length)| [N].
 
-    `length` is `Robot.length`, the largest distance of an attachment from the CoM.
+    `length` is `Robot.length`, the largest distance from the CoM to an attachment.
     """
 
     kind: Literal["wrench-with-tolerance"] = "wrench-with-tolerance"
@@ -30,11 +30,11 @@ class WrenchWithTolerance(Condition):
         return self.error(robot, places) <= self.tolerance
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return how much the error exceeds the tolerance, (n,) [N]."""
+        """Return the amount by which the error exceeds the tolerance, (n,) [N]."""
         return np.maximum(self.error(robot, places) - self.tolerance, 0.0)
 
     def error(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the smallest wrench error that tensions inside the limits leave, (n,) [N]; infinite without any."""
+        """Return the smallest wrench error of tensions inside the limits, (n,) [N]; infinite if there are none."""
         check_places(robot, places)
         rows = wrench_rows(robot)
         w = scaled(robot, rest_wrench(robot), rows)
