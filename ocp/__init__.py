@@ -1,4 +1,4 @@
-"""Trajectories that keep every tension inside its limits: tasks, the planner, its audit, and plans; time laws."""
+"""Plan motions that keep every tension inside its limits: tasks, the planner, its audit, plans and time laws."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -17,5 +17,5 @@ __all__ = ["MotionStatus", "Plan", "Planner", "Sweep", "Task", "plan", "read_tas
 if not TYPE_CHECKING:  # a type checker would accept any name
 
     def __getattr__(name: str) -> Any:
-        """Return what a former name stands for."""
+        """Return the object of a former name."""
         return moved_name("ocp", name)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Plan(PlanData, Filmed, Reported):
-    """A planned motion and its audit; its numbers are those of `PlanData`."""
+    """A planned motion and its audit: the numbers of `PlanData`, with files, figures and report."""
 
     def _headline(self) -> str:
         return headline(self)
@@ -59,9 +59,9 @@ class Plan(PlanData, Filmed, Reported):
         return save_netcdf(trajectory(self), check_ending("file", file_path("file", file), ".nc"))
 
     def figures(self) -> dict[str, Figure]:
-        """Draw what `plot` saves, by name: `path`, `views`, `tensions`, ...; to show in a notebook.
+        """Draw the figures of `plot` by name: `path`, `views`, `tensions`, ...; to show in a notebook.
 
-        A figure without content is left out, as in `plot`.
+        Figures without content are left out, as in `plot`.
         """
         from .reports.drawings import drawings
 

@@ -1,9 +1,9 @@
-"""Plan a motion inside the tension limits from a robot and a task, or give the reason why none exists: `plan`.
+"""Plan a motion inside the tension limits for a robot and a task, or report why none exists: `plan`.
 
-The planner works in stages, and ends with the first that decides:
+The planner works in stages and stops at the first that decides:
 
-1. ends and path (`infeasible_ends`): what is impossible whatever the planner chooses, proven at once;
-2. durations (`durations`) and timing (`time_law`), if the duration alone is free: which durations are possible;
+1. ends and path (`infeasible_ends`): tasks that can be ruled out before planning;
+2. durations (`durations`) and timing (`time_law`), if the duration alone is free: feasible durations;
 3. a path past obstacles (`global_path`), where the usual guess exceeds a limit at rest: the next stages start from it;
 4. easier programs to start the next one from: linear distances from obstacles (`linear`) and, for teams, more time
    and fewer steps (`homotopy`);
@@ -70,12 +70,12 @@ def plan(
 ) -> Plan:
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
-    The platform follows the task's path, exactly or inside a tube; the carriers hold, move as given, or are free inside
-    their limits. What the planner may choose it chooses by inverse-dynamics transcription and IPOPT
-    (`program`). A plan is called feasible only by its audit on a dense grid (`audit`).
+    The platform follows the task's path, exactly or inside a tube. The carriers hold, move as given, or are free inside
+    their limits. Free quantities are chosen by inverse-dynamics transcription and IPOPT (`program`). Only the audit on
+    a dense grid (`audit`) decides that a plan is feasible.
 
-    Where the duration alone is free, the time law along the path is too: the path's own law, stretched, competes
-    with the fastest one (`time_along`, if the extra `timing` is installed), and the task's objective decides.
+    If the duration alone is free, so is the time law along the path: the path's own time law, stretched, competes with
+    the fastest one (`time_along`, if the extra `timing` is installed), and the task's objective decides.
 
     Parameters
     ----------
@@ -86,35 +86,35 @@ def plan(
     progress
         Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
     start
-        Where to start: a plan of the same robot for a similar task, or a path for the platform (or a mapping
-        with its keys) in the frame of the task's path. Default: a guess of the planner's own.
+        Initial guess: a plan of the same robot for a similar task, or a path for the platform (or a mapping with its
+        keys) in the frame of the task's path. Default: the planner's guess.
     initial
         The measured state from which the motion starts, instead of the task's `initial`: an `Initial`, a mapping with
         its keys, or a `control.State`.
     robust
-        Share of the robots of the robot's `uncertainty`, such as 0.95, instead of the task's: to first order, this
-        share has tensions inside their limits at all times of the plan. It takes a few plans, each with limits
-        tightened by what tensions differ in the one before.
+        Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, instead of the task's: to first
+        order, this fraction has tensions inside their limits at all times of the plan. The planner iterates, with
+        limits tightened by the tension spread of the previous plan.
 
     Returns
     -------
     Plan
-        With status `feasible`; or `infeasible` if no motion that the task allows is possible, proven by the certificate
+        With status `feasible`; or `infeasible` if no motion that the task allows is feasible, proven by the certificate
         or by a limit that all exceed; or `not-found`, with the certificate at the worst time of the closest motion
-        known, or with the limits that this exceeds. `Plan.stages` record the steps, `Plan.infeasible_spans` when
-        tensions do not exist, `Plan.relaxations` what would do: a duration, or looser limits.
+        known, or with the limits that it exceeds. `Plan.stages` records the stages, `Plan.infeasible_spans` the times
+        without tensions, and `Plan.relaxations` suggests feasible variations: a duration, or looser limits.
 
     Raises
     ------
     InputError
-        If the task or the start is not valid or does not fit the robot; one line naming the field and the value.
+        If the task or the start is invalid or does not fit the robot.
     """
     with heeding():
         return Planner(robot, task, initial, robust).plan(progress, start)
 
 
 class Planner(Displayed):
-    """Plan one task, any number of times: programs, solvers and the last solution, to start from, are kept.
+    """Plan similar tasks repeatedly, reusing programs and the last solution.
 
     Parameters
     ----------
@@ -150,10 +150,11 @@ class Planner(Displayed):
 
     @property
     def interrupted(self) -> Plan | None:
-        """Return the best attempt of a call of `plan` that was interrupted, audited; None if there is none.
+        """Return the audited best attempt of an interrupted call of `plan`, or None.
 
         The attempt is the best motion of the solver that met all constraints at its nodes, or one that was audited
-        before: `feasible` states whether its audit passed. It costs an audit, which the interrupt did not wait for.
+        before; `feasible` is the result of its audit. The audit runs on first access, since the interrupt does not
+        wait.
         """
         search = self._search
         plan = None if search is None else search.best_of_interrupted()
@@ -163,7 +164,7 @@ class Planner(Displayed):
         return plan if self._share is None else judged(plan, self.scenario.robot, self._share)
 
     def plan(self, progress: Progress | None = None, start: Plan | AnyPath | dict[str, Any] | None = None) -> Plan:
-        """Plan; from `start`, else from the last solution, else from a guess.
+        """Plan the task, starting from `start`, the last solution or a guess.
 
         Raises
         ------
@@ -184,7 +185,7 @@ class Planner(Displayed):
         return plan
 
     def _plan_again(self, first: Search, scenario: Scenario, start: Deviation | None) -> Plan:
-        """Plan another scenario in the time that is left of the first search."""
+        """Plan another scenario in the remaining time of the first search."""
         self._search = search = Search(scenario, {}, first.progress, first.seconds_left)
         return replace(_climb(search, start, None), stages=tuple(search.stages))
 
@@ -195,29 +196,29 @@ class Planner(Displayed):
         settle: float = 1.0,
         progress: Progress | None = None,
     ) -> Plan:
-        """Plan the rest of the motion from where the robot is; it ends where and when the motion of `plan` does.
+        """Replan the remainder of the motion from a measured state; it ends at the same pose and time.
 
         The new plan starts with the measured pose and velocity of the platform, and of carriers that the planner moves.
-        Its path is the rest of the task's, plus what the robot is off its last plan: that decays, so the platform is
-        back on its path or in its tube after `settle`. If the state has tensions, the plan starts with them, and with
-        the acceleration that they give; else with the acceleration of the last plan. Times of the new plan start at 0,
-        at `time` of the whole motion.
+        Its path is the remainder of the task's path plus the current tracking error, which decays to zero within
+        `settle`. If the state contains tensions, the plan starts with them and the acceleration that they cause;
+        otherwise with the acceleration of the last plan. Times of the new plan start at 0, at `time` of the whole
+        motion.
 
         Parameters
         ----------
         state
             A `control.State`, or an `Initial` or a mapping with its keys.
         time
-            Since the start of the motion of `plan` [s]: not earlier than that of the last call that led to a plan.
+            Time since the start of the motion of `plan` [s], not earlier than in the last successful call.
         settle
-            How long the offset decays [s]; at most, what is left.
+            Time within which the tracking error decays [s], limited to the remaining time.
         progress
             As for `plan`.
 
         Returns
         -------
         Plan
-            As of `plan`. One that is not feasible does not count: the next call continues from the plan before.
+            As for `plan`. If it is not feasible, the next call continues from the previous feasible plan.
 
         Raises
         ------
@@ -227,7 +228,7 @@ class Planner(Displayed):
         """
         check_progress(progress)
         if self._flown is None:
-            raise InputError("replan must be called after a plan that is feasible, got none")
+            raise InputError("replan must be called after a feasible plan, got none")
         if isinstance(self._flown, Plan):
             self._flown = Replanner(self._flown, partial(_climb, last=None))
         with heeding():
@@ -256,11 +257,11 @@ def _climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation]
 
 
 def _fixed_motion(search: Search) -> Plan:
-    """Plan a task that leaves only the tensions free: each instant is a tension-distribution problem of its own.
+    """Plan a task with free tensions only: each instant is a separate tension-distribution problem.
 
-    Some tensions keep the limits on tension rates and on the forces at the carriers, and others do not. Where only
-    these limits are exceeded, the program searches for tensions that keep them; and for cheaper ones where the
-    objective weighs more than their sum of squares, which is least at each instant.
+    If only limits on tension rates or on the forces at carriers are exceeded, the program searches for tensions
+    that keep them. If the objective weighs more than the sum of squared tensions, it also searches for cheaper
+    ones.
     """
     start = time.perf_counter()
     audit = search.audit_motion(search.scenario, None)
@@ -301,7 +302,7 @@ def _message(left: Durations | None) -> str:
 
 
 def _blocked(search: Search) -> Plan | None:
-    """Return the proof that no motion of the task is possible, if its ends or its path show it; else None."""
+    """Return the proof that the task is infeasible, if its ends or its path show it; otherwise None."""
     span = search.scenario.duration_range
     slowest = search.scenario if span is None else search.scenario.lasting(span.max)
     with search.stage("ends and path") as stage:
@@ -319,9 +320,9 @@ def _blocked(search: Search) -> Plan | None:
 
 
 def _time_law(search: Search) -> tuple[Plan | None, bool]:
-    """Plan a motion whose time law alone is free by the fastest law; return also whether the path's own law may do.
+    """Plan a motion with only the time law free; return also whether the path's own time law may be feasible.
 
-    The plan is feasible, or proves that no time law is; it is None if neither is known.
+    The plan is feasible, or proves that no time law is; otherwise it is None.
     """
     scenario, span = search.scenario, search.scenario.duration_range
     if span is None:
@@ -383,7 +384,7 @@ def _again(search: Search, mesh: Mesh, motion: Deviation) -> Plan | None:
 
 
 def _closest(search: Search, reason: str) -> Plan:
-    """Return the best plan; if it is not feasible, with the limits that its motion keeps if they are looser."""
+    """Return the best plan, with relaxations if it is not feasible."""
     plan = search.best(reason)
     if plan.feasible:
         return plan

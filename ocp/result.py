@@ -1,4 +1,4 @@
-"""`PlanData`: a planned motion and its audit as numbers, which reports and figures read; the face is `Plan`."""
+"""`PlanData`: the numbers of a planned motion and its audit, which reports and figures use; see `Plan`."""
 
 from __future__ import annotations
 
@@ -41,33 +41,32 @@ class PlanData(Displayed):
     Attributes
     ----------
     scenario
-        The robot and the task, laid out.
+        The robot and the task.
     status
         See `MotionStatus`.
     deviation
-        What the planner chose: the free coordinates and the tensions at the nodes; None if the task fixes the motion.
+        Planned free coordinates and tensions at the nodes; None if the task fixes the motion.
     audit
         The dense evaluation that decides whether the plan is feasible.
     build_s, solve_s
         Wall time to build and to solve the nonlinear programs [s], over all attempts; 0 if none was solved.
     reason
-        If the status is `not-found`: why the search ended.
+        If the status is `not-found`: the reason why the search ended.
     iterations, message
-        Of the last run of the solver: its iterations, and its own message.
+        Iterations and message of the last run of the solver.
     iterates
-        Rows of (iteration, objective, infeasibility) of all runs of the solver, in order: where the iteration falls
-        back to 0 another run begins.
+        Rows of (iteration, objective, infeasibility) of all runs of the solver, in order; each run starts at 0.
     stages
-        The steps of the planner, in order, with their messages and times.
+        The stages of the planner, in order, with their messages and times.
     objective
-        Value of the objective that the solver reached, where it solved a program; a plan without one has None.
+        Final value of the solver's objective; None if no program was solved.
     robust
-        How the tensions differ between the robots of the uncertainty; None unless the task requires it.
+        Tension spread due to geometric uncertainty; None unless the task requires it.
     offers
         Computes `relaxations`.
     law
-        The fastest time law along the path, or where there is none, with the limits that are active along it; None for
-        other plans than those of `time_along`.
+        Result of `time_along`: the fastest time law along the path with its active limits, or the point where none
+        exists; None for other plans.
     """
 
     scenario: Scenario
@@ -87,7 +86,7 @@ class PlanData(Displayed):
     law: FastestLaw | None = field(default=None, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what a pickle holds: the relaxations, which are computed now, rather than what computes them."""
+        """Return the state for a pickle, with computed relaxations."""
         return {**self.__dict__, "offers": partial(tuple, self.relaxations)}
 
     def _picture(self) -> str:
@@ -96,27 +95,27 @@ class PlanData(Displayed):
 
     @property
     def feasible(self) -> bool:
-        """Return whether the audit confirms every tension limit, and every other limit of task and robot."""
+        """Return whether the audit confirms every limit of task and robot."""
         return self.status is MotionStatus.FEASIBLE
 
     @property
     def duration(self) -> float:
-        """Return how long the motion lasts [s]; where a path has no time law, that is of one that shows the path."""
+        """Return the duration of the motion [s]; without a time law, of a motion that only shows the path."""
         return self.scenario.duration
 
     @property
     def tension_min(self) -> float | None:
-        """Return the smallest audited tension [N]; None if at some time there are none."""
+        """Return the smallest audited tension [N]; None if no tensions exist at some time."""
         return float(self.audit.tensions.min()) if np.isfinite(self.audit.tensions).all() else None
 
     @property
     def tension_max(self) -> float | None:
-        """Return the largest audited tension [N]; None if at some time there are none."""
+        """Return the largest audited tension [N]; None if no tensions exist at some time."""
         return float(self.audit.tensions.max()) if np.isfinite(self.audit.tensions).all() else None
 
     @property
     def margin(self) -> float | None:
-        """Return the smallest distance of any tension from its limits [N]; None if at some time there are none."""
+        """Return the smallest distance of any tension from its limits [N]; None if no tensions exist at some time."""
         tensions, t_min = self.audit.tensions, self.scenario.t_min_at(self.audit.times)
         inside = np.minimum(tensions - t_min, self.scenario.robot.t_max - tensions)
         return float(inside.min()) if np.isfinite(inside).all() else None
@@ -128,10 +127,10 @@ class PlanData(Displayed):
 
     @cached_property
     def waypoint_distance(self) -> WaypointDistance | None:
-        """Return the largest distance at which the motion passes a waypoint, and which; None for a path without.
+        """Return the waypoint that the motion passes at the largest distance; None for a path without waypoints.
 
-        Straight legs round their points by up to `blend`, and in a tube the motion may leave them farther. It is
-        measured on the motion.
+        It is measured on the motion. Straight legs round their points by up to `blend`, and in a tube the distance may
+        be larger.
         """
         scenario, audit = self.scenario, self.audit
 
@@ -150,19 +149,19 @@ class PlanData(Displayed):
 
     @property
     def certificate(self) -> Certificate | None:
-        """Return the proof with the largest shortfall, with its time and wind; None for a feasible plan.
+        """Return the certificate with the largest shortfall, with its time and wind; None for a feasible plan.
 
-        None also if tensions exist throughout and only other limits are exceeded (`audit.excess`). The direction is in
-        {G}; `wind` is set for a task with a box of winds.
+        It is also None if tensions exist throughout and only other limits are exceeded (`audit.excess`). The direction
+        is in {G}; `wind` is set for a task with a box of winds.
         """
         return None if self.feasible else self.audit.certificate
 
     @cached_property
     def relaxations(self) -> tuple[Relaxed, ...]:
-        """Return, if not feasible, fields of tasks near this one that are feasible, as far as the planner knows some.
+        """Return feasible variations of an infeasible task; may be empty.
 
-        Those with the same plan have to change together. They are computed when they are first used, which can take
-        longer than the plan: programs are solved for them in the time that its limit left.
+        Relaxations with the same plan apply only together. They are computed on first use, which can take longer than
+        the plan: programs are solved for them in the time that the task's limit left.
         """
         return tuple(self.offers())
 
@@ -173,9 +172,9 @@ class PlanData(Displayed):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Return what a person should know of the motion before a robot follows it, a sentence each.
+        """Return facts to know before a robot follows the motion, a sentence each.
 
-        A motion with warnings can be feasible: no limit of the task or the robot forbids what they are about.
+        A motion with warnings can be feasible: no limit of the task or the robot forbids them.
         """
         audit, scenario = self.audit, self.scenario
         some = slice(None, None, max(len(audit.times) // MOST_WARNED, 1))
@@ -194,7 +193,7 @@ class PlanData(Displayed):
         return summaries(self.scenario, self.audit)
 
     def share_of_robots(self, count: int = 200, seed: int = 0) -> RobotShare:
-        """Draw robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
+        """Sample robots from the uncertainty, and check whether each has tensions inside its limits along the motion.
 
         Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
         own wrench matrices, and the exact solver decides.
@@ -202,9 +201,9 @@ class PlanData(Displayed):
         Parameters
         ----------
         count
-            How many robots.
+            Number of robots.
         seed
-            Of the random numbers.
+            Seed of the random numbers.
 
         Raises
         ------
@@ -218,7 +217,7 @@ class PlanData(Displayed):
         return share_of_robots(scenario.robot, motion.pose, w, carriers.pose, count, seed)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `towline plan --json` prints, ready for JSON; numbers that do not exist are None."""
+        """Return the output of `towline plan --json`, ready for JSON; missing numbers are None."""
         return {
             "feasible": self.feasible,
             "status": self.status.value,
@@ -248,16 +247,16 @@ class PlanData(Displayed):
 
 @dataclass(frozen=True)
 class Relaxed(Displayed):
-    """A feasible task near the one that was requested, and its plan.
+    """A feasible variation of the requested task, and its plan.
 
     Attributes
     ----------
     name, unit
-        The field of the task that differs, described if it has no name of its own, and its unit.
+        Field of the task that differs, or a description, and its unit.
     requested, possible
-        Its value in the task, and the nearest value for which a feasible plan is known.
+        Value in the task, and the closest value with a known feasible plan.
     plan
-        The plan of that task.
+        The plan of the varied task.
     """
 
     name: str

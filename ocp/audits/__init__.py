@@ -1,1 +1,1 @@
-"""The audit of every motion: evaluated again, densely, by code that is not the nonlinear program."""
+"""The audit: every motion is evaluated again on a dense grid, by code independent of the nonlinear program."""

@@ -1,7 +1,7 @@
-"""The audit: a planned motion evaluated again, densely.
+"""The audit: a planned motion, evaluated again on a dense grid.
 
-Inverse dynamics in {G} and the exact tension solver evaluate every instant on its own, by code that the nonlinear
-program does not use. `tensions` has the tensions and the violation, `checks` all other limits.
+Inverse dynamics in {G} and the exact tension solver evaluate each instant separately, by code that the nonlinear
+program does not use. `tensions` computes tensions and violation, `checks` all other limits.
 """
 
 from __future__ import annotations
@@ -34,31 +34,30 @@ class Audit(Displayed):
     rate
         Instants per second [Hz].
     times, motion, carriers, tensions
-        The dense grid, the motion in {G} on it and the audited tensions (n, m) [N], nan where there are none.
+        The dense grid, the motion in {G} on it and the audited tensions (n, m) [N], nan where none exist.
     tensions_unlimited
         The tensions of least norm without limits, (n, m) [N]. Negative: the cable would have to push.
     violation
-        Distance of the required wrench from those that the cables can give [N], the largest from each time to the
-        next; rounding errors where the tensions exist.
+        Distance of the required wrench from the available wrench set [N], the largest from each time to the
+        next; rounding errors where tensions exist.
     tolerance
         The largest violation that passes [N].
     tracking_error
         Distance from the path at each time [m].
     excess
-        Other limits that are exceeded (those of `limits`, ends, fixed lengths, ...), empty if none.
+        Other limits that are exceeded (`limits`, ends, fixed lengths, ...); may be empty.
     soft_excess
-        Soft limits that are exceeded, empty if none.
+        Soft limits that are exceeded; may be empty.
     limited
-        What each of the scenario's limits bounds, (n, k) in its unit, in their order.
+        Values of the scenario's limited quantities, (n, k) in the unit of each limit, in their order.
     certificate
-        The certificate with the largest shortfall, with its time, and its wind if the task has a box of winds; None if
-        there is none.
+        The certificate with the largest shortfall, with its time, and its wind if the task has a box of winds, or None.
     drift
-        Where the planned tensions alone would take the platform; None for robots that can follow any motion exactly,
-        for motions with loads or on the ground, and where there are no tensions.
+        Error of an open-loop simulation with the planned tensions; None for robots that can follow any motion exactly,
+        for motions with loads or on the ground, and where no tensions exist.
     supports
-        The forces of the ground on each support point, (n, s) [N], zero where the platform hangs; None for a task
-        without ground.
+        Ground forces at each support point, (n, s) [N], zero while the platform hangs; None for a task without
+        ground.
     """
 
     rate: float
@@ -79,12 +78,12 @@ class Audit(Displayed):
 
     @property
     def passed(self) -> bool:
-        """Return whether nothing is violated anywhere."""
+        """Return whether the motion keeps all limits."""
         return bool(self.violation.max() <= self.tolerance) and not self.excess
 
     @property
     def worst(self) -> int:
-        """Return the index of the time with the largest violation; of a plan that passed, with the largest rounding."""
+        """Return the index of the time with the largest violation, or with the largest rounding error."""
         return int(self.violation.argmax())
 
     def to_dict(self) -> dict[str, Any]:
@@ -111,12 +110,12 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     Parameters
     ----------
     to_show
-        Whether the motion is known to be impossible, and only shown: at the samples of the output, without its drift.
+        True for a motion that is known to be infeasible and only shown: at the output times, without its drift.
 
     Raises
     ------
     InputError
-        If somewhere a cable has no length.
+        If a cable has zero length somewhere.
     """
     intervals = scenario.output_samples * (1 if to_show else _audits_per_output(scenario))
     times = np.linspace(0.0, scenario.duration, intervals + 1)
@@ -125,7 +124,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     exceeded = excesses(seen, seen.values) + came_too_near(seen, seen.values)
     beyond, at = seen.beyond
     if beyond > TOLERANCE:
-        why = "wrench error of tensions inside their limits less the margin"
+        why = "wrench error of tensions inside their limits, reduced by the margin"
         exceeded.append(Excess("tensions", "platform", at, beyond, 0.0, "N", "exactly", why))
     soft = {limit.name for limit in scenario.limits if limit.soft is not None}
     hangs = not (scenario.phases.carry or scenario.phases.rest)
@@ -170,6 +169,6 @@ def other_tensions_exist(scenario: Scenario, audit: Audit) -> bool:
 
 
 def _audits_per_output(scenario: Scenario) -> int:
-    """Return how many audited instants each sample of the output stands for: the saved instants are audited ones."""
+    """Return the number of audited instants per output sample: saved instants are audited ones."""
     intervals = max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS)
     return max(int(np.ceil(intervals / scenario.output_samples - 1e-9)), 1)

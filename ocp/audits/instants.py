@@ -1,4 +1,4 @@
-"""`Instants`: all that an audit finds at some instants: the motion, its tensions, and what limits bound."""
+"""`Instants`: the results of an audit at some instants: motion, tensions, and values of limited quantities."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def joined(some: Instants, others: Instants) -> Instants:
 def _limited(
     scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, tensions: np.ndarray, off_path: np.ndarray
 ) -> list[np.ndarray]:
-    """Return what each limit bounds over time, (n, k), in its unit."""
+    """Return the values of the limited quantities over time, (n, k), in their units."""
     limits = scenario.limits
     values = limits.along(motion, carriers, tensions, off_path)
     return [limit.over(times, its) for limit, its in zip(limits, values, strict=True)]

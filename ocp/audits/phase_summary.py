@@ -20,7 +20,7 @@ class PhaseSummary(NamedTuple):
     load
         The mass that the platform carries [kg].
     tension_min, tension_max
-        Smallest and largest audited tension [N]; None if at some time there are none, or none were evaluated.
+        Smallest and largest audited tension [N]; None if none exist at some time, or none were evaluated.
     reaction_max
         The largest sum of the forces of the ground [N]; None for a phase without ground, or without tensions.
     """

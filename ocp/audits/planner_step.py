@@ -11,9 +11,9 @@ class PlannerStep(NamedTuple):
     Attributes
     ----------
     name
-        What was computed: "ends and path", "timing", "nonlinear program, 100 steps".
+        Name of the stage: "ends and path", "timing", "nonlinear program, 100 steps".
     message
-        Its result, as text with units; empty if it has no result worth a line.
+        Result as text with units; may be empty.
     seconds
         Wall time [s].
     """

@@ -1,4 +1,4 @@
-"""`RobustMargin`: how the tensions along a plan differ between the robots of an uncertainty."""
+"""`RobustMargin`: the spread of tensions along a plan due to geometric uncertainty."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from .tensions import TOLERANCE
 
 @dataclass(frozen=True)
 class RobustMargin(Displayed):
-    """The differences of tensions between the robots of the uncertainty, along a plan, to first order.
+    """The first-order spread of tensions along a plan due to geometric uncertainty.
 
     Attributes
     ----------
     share
-        Of the robots that must have tensions inside their limits at all times.
+        Fraction of the robots that must have tensions inside their limits at all times.
     factor
-        Standard deviations that this share keeps to (`robust.motion_factor`).
+        Number of standard deviations for this fraction (`robust.motion_factor`).
     reach
-        By how much the tensions of these robots differ at most, at each audited time, (n, m) [N].
+        Tension spread: largest deviation of the tensions of these robots at each audited time, (n, m) [N].
     tightened
-        By how much the limits of the program were tightened, (m,) [N].
+        Reduction of the limits in the program, (m,) [N].
     violation
-        How far tensions less their reach are outside of the limits less the task's margin, (n, m) [N]; 0: inside.
+        Violation of the limits, reduced by the task's margin, with the spread, (n, m) [N]; 0: inside.
     """
 
     share: float
@@ -37,11 +37,11 @@ class RobustMargin(Displayed):
 
     @property
     def holds(self) -> bool:
-        """Return whether the share of the robots keeps all limits, to first order."""
+        """Return whether the fraction of the robots keeps all limits, to first order."""
         return bool(self.violation.max() <= TOLERANCE)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return share, factor, and by cable the largest reach and what limits were tightened by, for JSON."""
+        """Return share, factor, and for each cable the largest spread and the reduction of its limits, for JSON."""
         return {
             "share": self.share,
             "factor": self.factor,

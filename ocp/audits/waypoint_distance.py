@@ -1,4 +1,4 @@
-"""`waypoint_distance`: how far a motion passes from the waypoints of its path, which rounds them or leaves a tube."""
+"""`waypoint_distance`: the distance at which a motion passes the waypoints of its path."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ class Nearest(NamedTuple):
     Attributes
     ----------
     point
-        Its name in the path: `points[2]`.
+        Name of the waypoint in the path: `points[2]`.
     distance
-        From the waypoint to the nearest place of the motion before the next waypoint and after the last one, [m] of
-        positions, [rad] of attitudes.
+        Smallest distance of the motion from the waypoint, between the previous and the next waypoint, [m] for
+        positions, [rad] for attitudes.
     time
-        When the motion is nearest [s].
+        Time of this distance [s].
     """
 
     point: str
@@ -44,7 +44,7 @@ class WaypointDistance(NamedTuple):
     attitude: Nearest
 
     def describe(self) -> str:
-        """Return both in one line: of what is not passed exactly."""
+        """Return both in one line, except those that are passed exactly."""
         parts = ((self.position, "mm"), (self.attitude, "mrad"))
         said = [nearest.describe(unit) for nearest, unit in parts if nearest.distance > EXACT]
         return f"passed at up to {' and '.join(said)}" if said else "passed exactly"

@@ -1,4 +1,4 @@
-"""Costs of a motion, one class each: what the objective of a task sums. `Cost` is the base of them all."""
+"""Costs of a motion, one class each: the terms of a task's objective. `Cost` is their base class."""
 
 from .cost import Cost, CostState, RateCost
 

@@ -1,8 +1,8 @@
-"""`Cost`: what a plan makes small, averaged over the motion.
+"""`Cost`: a quantity that a plan minimises, averaged over the motion.
 
-A cost is one formula, `values`, of everything that there is at one instant (`CostState`). The objective of a task is
-the mean over time of sum (values / amount)^2 over all its costs. So `amount` is what adds one (Bryson's rule), and a
-larger one makes a cost less important.
+A cost is one formula, `values`, of the state at one instant (`CostState`). The objective of a task is the mean over
+time of sum (values / amount)^2 over all its costs. So `amount` adds 1 to the objective (Bryson's rule), and a larger
+amount makes a cost less important.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from ..limits.state import Body, State
 
 @dataclass(frozen=True)
 class CostState(State):
-    """Everything that there is at one instant, in {G}, and what the planner chooses for the whole motion.
+    """The state at one instant, in {G}, and the quantities that the planner chooses for the whole motion.
 
     Attributes
     ----------
     offsets
-        The motions of the platform and of each carrier relative to those that the task gives: the platform's path, in
+        Motions of the platform and of each carrier relative to those that the task gives: the platform's path, in
         the path's axes; the carrier's path, `around`, or home. They are zero in coordinates that are not free.
     duration
-        Of the whole motion, (1, 1) [s].
+        Duration of the motion, (1, 1) [s].
     margin
-        The least distance of all planned tensions from their limits, beyond the task's `margin`, (1, 1) [N]; zero
+        Smallest distance of all planned tensions from their limits, beyond the task's `margin`, (1, 1) [N]; zero
         unless the objective rewards it.
     """
 
@@ -42,18 +42,18 @@ class Cost(ABC):
     Parameters
     ----------
     amount
-        Default: that of the class.
+        Amount (default: that of the class).
 
     Attributes
     ----------
     name
-        Its name in messages.
+        Name in messages.
     unit
-        The unit of values and amount.
+        Unit of values and amount.
     amount
-        The value that adds one to the objective.
+        Value that adds 1 to the objective.
     squared
-        False: the values themselves add up, not their squares, so that negative ones are a reward.
+        False to sum the values themselves instead of their squares, so negative values are a reward.
     """
 
     name: str = "cost"
@@ -71,4 +71,4 @@ class Cost(ABC):
 
 
 class RateCost(Cost):
-    """A cost of how fast `values` change: programs take their differences from point to point, per second."""
+    """A cost of the rates of change of `values`: programs use their differences from point to point, per second."""

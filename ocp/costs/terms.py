@@ -1,4 +1,4 @@
-"""The costs that the `objective` of a task file can have."""
+"""The costs in the `objective` of a task file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Tension(Cost):
 
 
 class TensionRate(RateCost):
-    """Penalise changes of each tension."""
+    """Penalise the rate of each tension."""
 
     name, unit = "tension_rate", "N/s"
 

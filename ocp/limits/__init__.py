@@ -1,4 +1,4 @@
-"""Limits of a motion, one class each: what stays between which bounds. `Limit` is the base of them all."""
+"""Limits of a motion, one class each: values and their bounds. `Limit` is their base class."""
 
 from .distance import Distance, Pair
 from .limit import Angle, Hull, Limit, Magnitude, Rate

@@ -1,4 +1,4 @@
-"""Limits of the cables: how fast they run, how long they are, and how near they come to one another."""
+"""Limits of the cables: speeds, lengths, and distances between cables."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def names(robot: Robot) -> tuple[str, ...]:
 
 
 class CableSpeed(Limit):
-    """Limit the rate of each cable's length, as of a winch."""
+    """Limit the rate of each cable's length, that is, the speed of its winch."""
 
     name, unit = "cable_speed", "m/s"
 

@@ -1,4 +1,4 @@
-"""Limits of the carriers: how they move, where they stay, and how near they come to one another."""
+"""Limits of the carriers: motion, positions, and distances between carriers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limits of the efforts that a motion and the cables require of carriers: of a quadrotor thrust and torque."""
+"""Limits of the actuator efforts of carriers: for a quadrotor thrust and torque."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .state import State
 
 
 def efforts(robot: Robot, index: int) -> list[CarrierEffort]:
-    """Return the limits of what carrier `index` must do; none if its motion is imposed on it."""
+    """Return the effort limits of carrier `index`; none if its motion is imposed."""
     zero = ca.DM.zeros(6)
     required = robot.carriers[index].required_effort(zero, zero, zero, zero, np.array(robot.gravity))
     return [CarrierEffort(robot, index, which, effort) for which, effort in enumerate(required)]

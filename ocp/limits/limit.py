@@ -1,9 +1,9 @@
 """`Limit`: values that stay between bounds along a whole motion, and the forms that program, audit and figure use.
 
-A limit is one formula, `values`, of everything that there is at one instant (`State`). The program keeps it at its
-nodes and, if the limit has a `Hull`, at the Bernstein points of each interval, so that it holds between the nodes too.
-The audit and the figures evaluate the same formula densely. Subclasses for vectors (`Magnitude`), angles (`Angle`) and
-rates of change (`Rate`) derive from the formula what a program can differentiate and what a person reads.
+A limit is one formula, `values`, of the state at one instant (`State`). The program imposes it at its nodes and, if the
+limit has a `Hull`, at the Bernstein points of each interval, so that it also holds between the nodes. The audit and the
+figures evaluate the same formula on a dense grid. Subclasses for vectors (`Magnitude`), angles (`Angle`) and rates of
+change (`Rate`) derive differentiable rows and readable values from the formula.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ROUNDING = 1e-3  # of a bound: a norm is rounded by so much at zero, where it ha
 
 
 class Hull(NamedTuple):
-    """The only part of a motion that a convex limit is about.
+    """The only part of a motion on which a convex limit depends.
 
     The values have to be a linear expression of it (of a `Magnitude` the vector, of an `Angle` the cosine up to 90
     degrees), so that the convex hull of the Bernstein points bounds them over a whole interval. While such a limit is
@@ -40,9 +40,9 @@ class Hull(NamedTuple):
     order
         0: the pose, 1: the velocity, 2: the acceleration.
     coordinates
-        Those that the values depend on: 0 to 5 for x, y, z, roll, pitch, yaw.
+        Coordinates on which the values depend: 0 to 5 for x, y, z, roll, pitch, yaw.
     at_ends
-        Whether points at the ends of an interval have rows; False where bounds of the unknowns do the same.
+        True if points at the ends of an interval have rows; False if bounds of the unknowns do the same.
     """
 
     carrier: int | None
@@ -65,27 +65,27 @@ class Limit(ABC):
     Attributes
     ----------
     name
-        Its name in tasks, audits, reports and figures.
+        Name in tasks, audits, reports and figures.
     unit
-        The unit of values and bounds.
+        Unit of values and bounds.
     labels
-        What each value is about, (k,): "cable 3", "quad1".
+        Subject of each value, (k,): "cable 3", "quad1".
     low, high
-        The bounds of each value; infinite: no bound.
+        Bounds of each value; infinite: no bound.
     scale
-        A typical size in this unit: programs divide by it, and the audit's tolerance is a part of it.
+        Typical size in this unit: programs divide by it, and the audit's tolerance is proportional to it.
     soft
-        The excess that adds one to the objective, or None if the limit is hard. A task's `limits.soft` sets it by name.
+        Excess that adds 1 to the objective, or None if the limit is hard. A task's `limits.soft` sets it by name.
     hull
         The part of the motion on which it depends, if it is convex: it then holds between the nodes too.
     shown
-        Whether figures have curves of it and reports name it.
+        True if figures and reports show it.
     per_metre
-        How much a value can change while each point of the platform moves by at most one metre and all else stays;
-        infinite if that is not known. Of a distance it is one. With it the planner proves that a place is in the way.
+        Largest change of a value while each point of the platform moves by at most one metre and all else is fixed;
+        infinite if unknown, 1 for a distance. With it the planner proves that an obstacle blocks the way.
     thickness
-        Of a distance from a place, how thin this is [m]: between two nodes a motion may jump over what is thinner than
-        a step, so the program keeps the distance on the way between them. Infinite: it is no place.
+        For a distance from a keep-out region, its thickness [m]. A motion may jump over a thin region between two
+        nodes, so the program also constrains the distance between them. Infinite for other limits.
     """
 
     name: str = "limit"
@@ -148,7 +148,7 @@ class Limit(ABC):
 
     @property
     def tolerance(self) -> float:
-        """Return how far beyond the bounds the audit accepts values, in their unit."""
+        """Return the audit's tolerance beyond the bounds, in the unit of the values."""
         return self.scale * (EQUATION_TOLERANCE if self.is_equation and self.hull is None else TOLERANCE)
 
     @property
@@ -172,7 +172,7 @@ class Limit(ABC):
         return 0.0 if self.soft is None else self.scale / self.soft
 
     def softened(self, amount: float | None) -> Self:
-        """Return the limit as soft, by the excess that adds one to the objective; None leaves it as it is."""
+        """Return the limit as a soft one, with the excess that adds 1 to the objective; None leaves it unchanged."""
         if amount is None:
             return self
         soft = copy(self)
@@ -250,7 +250,7 @@ class Angle(Limit):
 
 
 class Rate(Limit):
-    """A limit of how fast `values` change: the program takes their differences from point to point."""
+    """A limit of the rates of change of `values`: the program uses their differences from point to point."""
 
     @override
     def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
-"""Limits of distances from places: by how much platform, carriers and cables stay outside.
+"""Limits of distances from keep-out regions for platform, carriers and cables.
 
-A place that moves with the platform is its body: then the limits have names of their own.
+A region that moves with the platform is its body, and its limits have separate names.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CORNER = 0.25  # of the thickness of a place: a motion that is deeper in it betw
 
 
 class _Outside(Distance):
-    """Keep out of a place.
+    """Keep out of a region.
 
     Parameters
     ----------

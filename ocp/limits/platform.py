@@ -1,4 +1,4 @@
-"""Limits of the platform: how fast it moves, accelerates and turns, how far it tilts, and where it stays."""
+"""Limits of the platform: speed, acceleration, angular velocity, tilt and position."""
 
 from __future__ import annotations
 

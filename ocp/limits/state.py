@@ -1,4 +1,4 @@
-"""`State`: everything that a limit may be about, at one instant, as CasADi symbols."""
+"""`State`: the state at one instant, as CasADi symbols, on which a limit may depend."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ class Body(NamedTuple):
 
 @dataclass(frozen=True)
 class State(Displayed):
-    """Everything that there is at one instant, in {G}.
+    """The state at one instant, in {G}.
 
     Attributes
     ----------
     platform
-        The motion of the platform.
+        Motion of the platform.
     carriers
-        That of each carrier.
+        Motion of each carrier.
     tensions
         (m, 1) [N].
     off_path

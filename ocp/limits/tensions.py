@@ -1,4 +1,4 @@
-"""Limits of the tensions beside t_min and t_max: how far inside these they stay, and how fast they change."""
+"""Limits of the tensions besides t_min and t_max: margin and rates."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .state import State
 
 
 class Margin(Limit):
-    """Keep each tension so far inside its limits. Only soft: a hard margin bounds the tensions themselves."""
+    """Keep each tension inside its limits by a margin. Only soft: a hard margin bounds the tensions themselves."""
 
     name, unit = "margin", "N"
 
@@ -27,7 +27,7 @@ class Margin(Limit):
 
 
 class TensionRate(Rate):
-    """Limit how fast each tension changes."""
+    """Limit the rate of each tension."""
 
     name, unit = "tension_rate", "N/s"
 

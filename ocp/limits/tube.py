@@ -1,4 +1,4 @@
-"""Limits of the tube: how far the platform may be from its path."""
+"""Limits of the tube: the distance of the platform from its path."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class TubePosition(Magnitude):
 
 
 class TubeAttitude(Limit):
-    """Limit how far one angle of the platform is from its path."""
+    """Limit the deviation of one angle of the platform from its path."""
 
     name, unit = "tube.attitude", "rad"
 

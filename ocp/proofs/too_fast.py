@@ -1,4 +1,4 @@
-"""Prove limits on speeds and accelerations exceeded whatever the planner chooses: `too_fast`.
+"""Prove that every motion exceeds limits on speeds and accelerations: `too_fast`.
 
 From one time to another, a body moves at least as far as its places are apart, less its permitted distances from them.
 Its mean speed, from which its largest one follows, is at least this distance divided by the time; its largest

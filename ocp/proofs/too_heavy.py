@@ -1,4 +1,4 @@
-"""Prove a load heavier than the cables, or the carriers, can hold, whatever the planner chooses: `too_heavy`.
+"""Prove that a load is too heavy for the cables or the carriers: `too_heavy`.
 
 From one rest of the platform to another the mean of its acceleration is zero, so the mean of the force on it is its
 weight with its load. No cable gives more than its largest tension in any direction, and no actuator more than its

@@ -1,4 +1,4 @@
-"""`limited`: what a plan limits beside the tensions, as curves over time with their bounds."""
+"""`limited`: the limited quantities of a plan, except tensions, as curves over time with their bounds."""
 
 from __future__ import annotations
 

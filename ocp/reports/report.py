@@ -27,7 +27,7 @@ def headline(plan: PlanData) -> str:
 
 
 def decisive(plan: PlanData) -> str:
-    """Return what decided the result, in one line."""
+    """Return the decisive fact of the result, in one line."""
     because = f"{plan.reason}; closest motion: " if plan.reason else ""
     return f"{because}{_of_the_motion(plan)}"
 

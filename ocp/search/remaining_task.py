@@ -1,4 +1,4 @@
-"""Lay out what is left of a planned motion for a robot that is off it: `remainder`."""
+"""Set up the remainder of a planned motion for a robot with a tracking error: `remainder`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ..tasks.task import FreeBase, GivenBase
 
 
 class Remainder(NamedTuple):
-    """The rest of a motion.
+    """The remainder of a motion.
 
     Attributes
     ----------

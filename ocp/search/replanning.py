@@ -1,4 +1,4 @@
-"""Plan the rest of a motion from where the robot is, again and again: `Replanner`."""
+"""Replan the remainder of a motion from measured states: `Replanner`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RESERVE = 1e-4  # of the weight, from the tension limits: between nodes motions 
 
 
 class Replanner:
-    """Plan what is left of a motion.
+    """Replan the remainder of a motion.
 
     One program with parameters serves all calls: references, start and length change, and each starts from the last
     solution and its multipliers.

@@ -1,4 +1,4 @@
-"""Solve one scenario's programs and audit the solutions, one after the other, and record them: `Search`."""
+"""Solve the programs of a scenario, audit the solutions, and record them: `Search`."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""Plan for the robots of an uncertainty: limits tightened by what tensions differ between these, until that suffices.
+"""Plan for uncertain geometry: tighten the tension limits by the tension spread until it suffices.
 
-The tensions of a robot whose cables are at other places differ from the planned ones (`towline.statics.robust`). By
-how much depends on the plan, so there are rounds: plan, compute the largest difference for each cable along the plan,
-tighten the limits of the cable by that, and plan again from there, until the tensions leave their limits in no audited
-instant of the requested share of the robots. Differences grow with the tensions, and the limits are tightened by a
-little more.
+The tensions of a robot with other anchors and attachments differ from the planned ones (`towline.statics.robust`). The
+spread depends on the plan, so the planner iterates: plan, compute the largest spread of each cable along the plan,
+tighten its limits by this, and plan again from there, until the requested fraction of the robots keeps the limits at
+all audited instants. The spread grows with the tensions, so the limits are tightened by a little more.
 """
 
 from __future__ import annotations
@@ -58,7 +57,7 @@ def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation |
         by = f"limits tightened by up to {quantity(tightened[cable], 'N')} (cable {cable + 1})"
         narrow = np.flatnonzero(robot.t_min + tightened + task.margin > robot.t_max - tightened - task.margin)
         if narrow.size:
-            reason = f"tensions of the robots differ by more than the limits of cable {narrow[0] + 1} are apart"
+            reason = f"the tension spread exceeds the range of the limits of cable {narrow[0] + 1} are apart"
             break
         again = climb(lay_out(_tightened(robot, tightened), task), plan.deviation)
         stages += [PlannerStep(f"for {quantity(100 * share, '%')} of the robots", by, 0.0), *again.stages]
@@ -68,7 +67,7 @@ def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation |
             break
         plan = judged(again, robot, share)
     else:
-        reason = f"tensions of the robots still differ by too much after {ROUNDS} rounds"
+        reason = f"the tension spread is still too large after {ROUNDS} rounds"
     failed = plan.robust is not None and not plan.robust.holds
     return replace(
         plan,

@@ -21,11 +21,11 @@ class Cases:
     Attributes
     ----------
     robot, task
-        Without variation.
+        Robot and task without variation.
     axes
         The varied fields and their values.
     shape
-        How many values each axis has.
+        Number of values of each axis.
     """
 
     def __init__(self, robot: Robot, task: Task, axes: tuple[Axis, ...]):
@@ -51,7 +51,7 @@ class Cases:
         return ", ".join(f"{axis.field.key} = {axis.texts[index]}" for axis, index in places)
 
     def case(self, number: int) -> tuple[Robot, Task]:
-        """Return robot and task of a combination, checked as files are.
+        """Return robot and task of a combination, validated like a robot and task file.
 
         Raises
         ------
@@ -92,6 +92,6 @@ class Cases:
                 raise InputError(f"{error} (with {self.described(number)})") from None
 
     def units(self) -> tuple[str, ...]:
-        """Return the unit of each varied field; empty where it has none."""
+        """Return the unit of each varied field; empty without a unit."""
         robot, task = self.case(0)
         return tuple(axis.field.unit(robot if axis.field.of_robot else task) for axis in self.axes)

@@ -50,8 +50,8 @@ class _Result(NamedTuple):
 
 
 _RESULTS = (
-    _Result("status", "", "feasible, infeasible, not-found, or failed: planning ended with an error"),
-    _Result("reason", "", "why the plan is not feasible"),
+    _Result("status", "", "feasible, infeasible, not-found, or failed: planning raised an error"),
+    _Result("reason", "", "reason why the plan is not feasible"),
     _Result("cost", "1", "objective of the task, of feasible plans"),
     _Result("duration", "s", "duration of the motion"),
     _Result("margin", "N", "smallest distance of any tension from its limits"),
@@ -71,7 +71,7 @@ class Sweep(Displayed, Reported):
     cases
         The combinations: robot, task and varied fields.
     rows
-        What is kept of each plan, in the order of the combinations, the last field fastest.
+        Results of each plan, in the order of the combinations, the last field fastest.
     """
 
     cases: Cases
@@ -89,12 +89,12 @@ class Sweep(Displayed, Reported):
 
     @property
     def feasible(self) -> int:
-        """Return how many plans are feasible."""
+        """Return the number of feasible plans."""
         return self.counts[MotionStatus.FEASIBLE]
 
     @property
     def counts(self) -> Counter[str]:
-        """Return how many plans have each status."""
+        """Return the number of plans with each status."""
         return Counter(row.status for row in self.rows)
 
     @cached_property
@@ -102,7 +102,7 @@ class Sweep(Displayed, Reported):
         """Return the table: one dimension for each varied field, `task.margin` for `margin`; units as attributes.
 
         Variables: plan (its number, see `plan`), status, reason, cost, duration [s], margin [N], tension_max [N],
-        iterations, seconds [s]. Numbers that do not exist are nan.
+        iterations, seconds [s]. Missing numbers are nan.
         """
         return self._contents.dataset()
 
@@ -133,27 +133,27 @@ class Sweep(Displayed, Reported):
         return np.array(values).reshape(self.cases.shape)
 
     def plan(self, index: int) -> Plan:
-        """Plan combination `index` of the table again, from 0, for all that the table does not have.
+        """Recompute plan `index` (from 0) to get its full result.
 
         Raises
         ------
         InputError
-            If there is no such plan, or planning ends with an error as it did before.
+            If there is no such plan, or planning raises an error again.
         """
         return plan(*self.cases.case(whole_number("index", index, 0, len(self.rows) - 1)))
 
     def save(self, file: str | os.PathLike[str]) -> tuple[Path, Path]:
-        """Save the table as NetCDF, and beside it as CSV with the suffix .csv; return both paths.
+        """Save the table as NetCDF, and as CSV with the suffix .csv; return both paths.
 
         Raises
         ------
         InputError
-            If a file cannot be written, or ends in .csv, the name of the other one.
+            If a file cannot be written, or `path` ends in .csv (reserved for the second file).
         """
         path = file_path("file", file)
         beside = path.with_suffix(".csv")
         if beside == path:
-            raise InputError(f"file must be a NetCDF file, beside which the CSV is written, got {path}")
+            raise InputError(f"file must be a NetCDF file (.nc), got {path}")
         check_writable(beside)
         save_netcdf(self._contents, path)
         with whole_file(beside) as temporary:
@@ -173,7 +173,7 @@ class Sweep(Displayed, Reported):
         return stream.getvalue()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `towline plan --vary --json` prints, ready for JSON; numbers that do not exist are None."""
+        """Return the output of `towline plan --vary --json`, ready for JSON; missing numbers are None."""
 
         def existing(value: Any) -> Any:
             return None if isinstance(value, float) and math.isnan(value) else value
@@ -195,7 +195,7 @@ class Sweep(Displayed, Reported):
         }
 
     def figure(self) -> Figure:
-        """Draw cost, margin and, where it is not a varied field, duration over the varied fields.
+        """Draw cost, margin and, unless it is varied, duration over the varied fields.
 
         One field: curves. Two: maps. Three: maps for each value of the third. Plans that are not feasible are marked.
 

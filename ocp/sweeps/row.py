@@ -1,4 +1,4 @@
-"""`Row`: the results of one plan in the table of a sweep; `plan_case` plans it, in whatever process."""
+"""`Row`: the results of one plan in the table of a sweep; `plan_case` computes it, in any process."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ FAILED = "failed"  # the status of a plan that ended with an error, beside those
 
 
 class Row(NamedTuple):
-    """The results of one plan in the table of a sweep; numbers that do not exist are nan.
+    """The results of one plan in the table of a sweep; missing numbers are nan.
 
     Attributes
     ----------
     status
-        See `MotionStatus`; or `failed`, if planning ended with an error.
+        See `MotionStatus`; or `failed` if planning raised an error.
     reason
-        Why it is not feasible, in one line; empty if it is.
+        Reason why it is not feasible, in one line; empty if it is.
     cost
-        The task's objective, of a feasible plan.
+        The task's objective, for a feasible plan.
     duration
-        [s].
+        Duration [s].
     margin
-        The smallest distance of any tension from its limits [N].
+        Smallest distance of any tension from its limits [N].
     tension_max
-        The largest tension [N].
+        Largest tension [N].
     iterations
-        Of the last run of the solver.
+        Iterations of the last run of the solver.
     seconds
         Wall time to plan [s].
     """

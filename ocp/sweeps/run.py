@@ -1,4 +1,4 @@
-"""`sweep`: plan a task for all combinations of some values, on processes or a cluster, and resume where it stopped."""
+"""`sweep`: plan a task for all combinations of some values, on processes or a cluster, with resumption."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def sweep(
 ) -> Sweep:
     """Plan a task for all combinations of some values of its fields.
 
-    Each plan starts from the planner's own guess, so that no plan depends on another one. All combinations are checked
-    before the first is planned. An infeasible plan is an answer; a plan that ends with an error is a row with the
-    status `failed`.
+    Each plan starts from the planner's guess, so no plan depends on another. All combinations are checked before the
+    first is planned. An infeasible plan is a valid result; a plan that raises an error is a row with the status
+    `failed`.
 
-    The table is the same for every number of workers, but for wall times, as long as no plan is stopped by its
-    `time_limit`. Processes use one thread each; so does this one, with `workers=1`, if `OMP_NUM_THREADS` is 1 before
-    towline is imported. With more threads the last digits of some plans differ.
+    Except for wall times, the table does not depend on the number of workers, as long as no plan is stopped by its
+    `time_limit`. Processes use one thread each. With `workers=1` set `OMP_NUM_THREADS` to 1 before towline is imported
+    for the same result, because with more threads the last digits of some plans differ.
 
     Parameters
     ----------
@@ -61,17 +61,17 @@ def sweep(
     task
         A `Task`, a mapping with its keys, or the path of a YAML file.
     vary
-        Lists of values by dotted keys of a task file: `{"margin": [0, 5, 10], "scheme": ["linear", "spline"]}`.
-        Keys that begin with `robot.` are those of the robot file: `robot.platform.mass`. Items of lists have numbers
-        from 0 on, `limits.keep_out[0].radius`; without a number all items are meant, `robot.cables.t_max`.
+        Lists of values by dotted keys of a task file: `{"margin": [0, 5, 10], "scheme": ["linear", "spline"]}`. Keys
+        that begin with `robot.` are keys of the robot file: `robot.platform.mass`. Items of lists are numbered from 0,
+        `limits.keep_out[0].radius`; a key without a number means all items, `robot.cables.t_max`.
     workers
-        Processes of this machine, each using one processor; 1: this process.
+        Number of processes on this machine, with one thread each; 1: this process.
     scheduler
         Address of a Dask scheduler whose workers are used instead (extra `cluster`).
     checkpoint
-        File to which each plan's row is appended as soon as it is there.
+        File to which each plan's row is appended as soon as it is computed.
     resume
-        Whether to continue the checkpoint if the file exists. It must be of the same sweep.
+        True to continue the checkpoint if the file exists. It must belong to the same sweep.
     keep
         Folder in which to save every plan as NetCDF, named by its number; default: plans are not saved.
     progress
@@ -86,8 +86,8 @@ def sweep(
     ------
     InputError
         Before anything is planned, if an argument or a combination of values is wrong, the checkpoint cannot be
-        written, is damaged or of another sweep, or there is no such scheduler. Later, if the checkpoint or a plan of
-        `keep` can no longer be written; the checkpoint can be resumed.
+        written, is damaged or belongs to another sweep, or the scheduler does not exist. Later, if the checkpoint or a
+        plan of `keep` can no longer be written; the checkpoint can be resumed.
     SolverError
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
@@ -137,7 +137,7 @@ def _jobs(cases: Cases, known: set[int], folder: Path | None) -> Iterator[tuple[
 
 
 def _header(cases: Cases, folder: Path | None) -> dict[str, Any]:
-    """Return everything that the rows depend on."""
+    """Return everything on which the rows depend."""
     robot, task = cases.robot, cases.task
     versions = {"towline": __version__, "casadi": ca.CasadiMeta.version(), "numpy": np.__version__}
     return {

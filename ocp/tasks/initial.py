@@ -1,4 +1,4 @@
-"""`Initial` and `Final`: the states that a motion starts from, as measured on a robot that moves, and ends in."""
+"""`Initial` and `Final`: the measured state from which a motion starts, and the state in which it ends."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Initial(Part):
-    """The state at the start of a motion, in {G}: it replaces what `tube.ends` and `base.ends` require there."""
+    """The state at the start of a motion, in {G}; it overrides `tube.ends` and `base.ends` there."""
 
     pose: Pose = Field(description="(x, y, z, roll, pitch, yaw) of the platform [m, rad]")
     velocity: Pose = Field(default=STILL, description="their time derivatives [m/s, rad/s]")
@@ -29,8 +29,8 @@ class Initial(Part):
     )
     tensions: tuple[Finite, ...] | None = Field(
         default=None,
-        description="of each cable [N]; those outside the limits count as the limit. With them the cables give the "
-        "acceleration at the start. Default: as the planner chooses",
+        description="of each cable [N], clipped to the limits; they determine the acceleration at the start. Default: "
+        "as the planner chooses",
     )
 
     def of(self, owner: int | None) -> Iterator[tuple[int, Pose]]:
@@ -46,7 +46,7 @@ class Initial(Part):
 
 
 class Final(Part):
-    """The state at the end of a motion, in {G}: what is given replaces what `tube.ends` and `base.ends` require."""
+    """The state at the end of a motion, in {G}; given fields override `tube.ends` and `base.ends`."""
 
     pose: Pose | None = Field(default=None, description="of the platform [m, rad]; default: as tube.ends requires")
     velocity: Pose | None = Field(default=None, description="its time derivative; default: at rest, if pose is given")

@@ -30,7 +30,7 @@ def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, An
     Raises
     ------
     InputError
-        Naming the field of the task that does not fit, its value and what would.
+        Naming the field of the task that does not fit, its value and the accepted values.
     """
     check_task(robot, task)
     task = with_timing(robot, task)

@@ -1,4 +1,4 @@
-"""`Phase`: a part of a task with a path, a load, and perhaps the ground under it."""
+"""`Phase`: a part of a task with a path, a load and, optionally, the ground under it."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Load(Part):
 
 
 class Ground(Part):
-    """Ground under the platform, or under what it carries: vertical forces that only push, without friction."""
+    """Ground under the platform or its load: vertical forces that only push, without friction."""
 
     support: tuple[Vector3, ...] | None = Field(
         default=None,
@@ -48,24 +48,24 @@ class Ground(Part):
         "level with the lowest",
     )
     slack: bool = Field(
-        default=False, description="whether cables may be slack: their tensions then have the lower limit 0"
+        default=False, description="true if cables may be slack: their tensions then have the lower limit 0"
     )
 
 
 class Phase(Part):
-    """A part of a task: a path, what the platform carries along it, and whether that rests on the ground."""
+    """A part of a task: a path, the load, and the ground."""
 
     name: Name
-    path: SinglePath | None = Field(default=None, description="default: rest where the phase before ends")
+    path: SinglePath | None = Field(default=None, description="default: rest at the end of the previous phase")
     duration: Positive | None = Field(default=None, description="[s], at least 0.01; default: the path's own")
-    load: Load | None = Field(default=None, description="carried beside the platform; default: nothing")
+    load: Load | None = Field(default=None, description="load fixed to the platform; default: none")
     ground: Ground | None = Field(
-        default=None, description="the platform rests on the ground, or what it carries does; default: it hangs"
+        default=None, description="the platform or its load rests on the ground; default: it hangs"
     )
 
 
 def path_of(phases: Sequence[Phase]) -> SequencePath:
-    """Return the paths of phases one after the other.
+    """Return the paths of phases as a sequence.
 
     Raises
     ------

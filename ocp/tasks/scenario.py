@@ -35,7 +35,7 @@ MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 @dataclass(frozen=True)
 class Scenario(Displayed):
-    """A robot and its task, with what follows from both.
+    """A robot and its task, with the quantities that follow from both.
 
     Attributes
     ----------

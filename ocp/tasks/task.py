@@ -1,4 +1,4 @@
-"""`Task`: what to plan: a path for the platform, what the carriers may do, limits, and the objective."""
+"""`Task`: the path of the platform, the motion of the carriers, limits, and the objective."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ class Tube(Part):
         default=None,
         description="free: anywhere in the tube; rest: position on the path at start and end, without speed and "
         "acceleration (with few cables or fixed lengths angular acceleration is free); exact: no deviation of "
-        "position and speed there, whatever the acceleration; default: rest if a path of another kind than rest goes "
-        "from rest to rest and no carrier moves as given, else free",
+        "position and velocity there, with free acceleration; default: rest if the path (other than kind rest) starts "
+        "and ends at rest and no carrier moves as given, otherwise free",
     )
     waypoints: Literal["free", "exact"] = Field(
         default="free",
-        description="exact: the platform passes through the points of a path of kind waypoints, "
-        "even where that path rounds them",
+        description="exact: the platform passes through the points of a path of kind waypoints, even if the path "
+        "rounds them",
     )
 
     @property
@@ -59,15 +59,15 @@ class Tube(Part):
 
     @property
     def turn(self) -> float:
-        """Return how far each angle may leave the path's [rad]."""
+        """Return the largest deviation of each angle from the path [rad]."""
         return FREE_TURN if self.attitude == "free" else self.attitude
 
 
 class HoldBase(Part):
-    """Carriers that stay in place."""
+    """Carriers that hold their positions."""
 
     kind: Literal["hold"]
-    poses: dict[Name, Pose] = Field(default={}, description="where, by carrier, in {G} [m, rad]; others at home")
+    poses: dict[Name, Pose] = Field(default={}, description="poses by carrier, in {G} [m, rad]; others at home")
 
 
 class GivenBase(Part):
@@ -82,7 +82,7 @@ class FreeBase(Part):
 
     kind: Literal["free"]
     around: dict[Name, AnyPath] = Field(
-        default={}, description="by carrier, the motion in {G} from which its offset counts; default: rest at home"
+        default={}, description="by carrier, the reference motion in {G} for its offset; default: rest at home"
     )
     acceleration_max: Positive | None = Field(default=None, description="[m/s^2]")
     speed_max: Positive | None = Field(default=None, description="[m/s]")
@@ -106,10 +106,10 @@ AnyBase = Annotated[HoldBase | GivenBase | FreeBase, Field(discriminator="kind")
 
 
 class Objective(Part):
-    """Weigh the terms of the cost: each number is the amount of its quantity that adds one (Bryson's rule).
+    """Weights of the cost terms: each number is the amount of its quantity that adds 1 (Bryson's rule).
 
     The cost is the mean over time of sum |quantity / number|^2, so a larger number makes a term less important. A term
-    applies only where its quantity is free to choose.
+    applies only if its quantity is free.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
@@ -128,11 +128,11 @@ class Objective(Part):
     )
     tension_rate: Positive | None = Field(default=None, description="rate of each tension [N/s]; default: no cost")
     time: Positive | None = Field(
-        default=None, description="duration that adds one to the cost, not squared [s]; default: no cost"
+        default=None, description="duration that adds 1 to the cost, not squared [s]; default: no cost"
     )
     margin: Positive | None = Field(
         default=None,
-        description="smallest distance of any tension from its limits that reduces the cost by one, not squared [N]; "
+        description="smallest distance of any tension from its limits that reduces the cost by 1, not squared [N]; "
         "default: no reward",
     )
     own: SkipJsonSchema[tuple[Cost, ...]] = Field(
@@ -160,7 +160,7 @@ class Task(Part):
 
     name: Name = "task"
     path: AnyPath = Field(
-        default=cast(Any, None), description="path of the platform; of a task with phases: that of its phases"
+        default=cast(Any, None), description="path of the platform; with phases: the sequence of their paths"
     )
     phases: tuple[Phase, ...] | None = Field(
         default=None, min_length=1, description="instead of path and duration: parts of the motion, with their loads"
@@ -170,23 +170,24 @@ class Task(Part):
     )
     base: AnyBase = Field(
         default=HoldBase(kind="hold"),
-        description="what the carriers do: hold (stay), given (follow paths) or free (move as the planner chooses)",
+        description="motion of the carriers: hold (stay), given (follow paths) or free (the planner chooses)",
     )
     tube: Tube = Tube()
     initial: Initial | None = Field(
-        default=None, description="measured state from which a robot that moves starts; default: as `ends` require"
+        default=None, description="measured initial state of a moving robot; default: as `ends` require"
     )
     final: Final | None = Field(default=None, description="state in which the motion ends; default: as `ends` require")
     margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
     robust: Share | None = Field(
         default=None,
-        description="share of the robots of the robot's `uncertainty` whose tensions must stay inside their limits "
-        "less the margin, to first order, such as 0.95; default: the robot is as its file has it",
+        description="fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, whose tensions "
+        "must stay inside their limits, reduced by the margin, to first order; default: the nominal robot "
+        "only",
     )
     wind: Vector3 | WindBox | None = Field(
         default=None,
         description="wind on the platform, constant, in {G} [m/s], or a range {min, max}: tensions exist for every "
-        "wind velocity in the range, and the planned tensions are those for its middle; default: no aerodynamic "
+        "wind velocity in the range, and the planned tensions refer to its middle; default: no aerodynamic "
         "forces; [0, 0, 0] is still air, with drag on a moving platform",
     )
     limits: TaskLimits = TaskLimits()
@@ -199,8 +200,8 @@ class Task(Part):
     objective: Objective = Objective()
     time_limit: Positive = Field(
         default=600.0,
-        description="time for the whole search [s]; after it the best motion so far is audited and taken. A step that "
-        "is under way is finished",
+        description="time for the whole search [s]; the best motion so far is then audited and returned. An operation "
+        "in progress is finished first",
     )
     output_rate: Positive = Field(
         default=100.0, description="samples per second of the saved trajectory, all of them audited [1/s]"
@@ -229,7 +230,7 @@ class Task(Part):
 
     @override
     def model_copy(self, **options: Any) -> Self:
-        """Return a copy, by `options` of pydantic; its `path` is that of its phases, if it has some."""
+        """Return a copy, with `options` of pydantic; with phases, its `path` is the sequence of their paths."""
         copy = super().model_copy(**options)
         if copy.phases is not None:
             object.__setattr__(copy, "path", path_of(copy.phases))
@@ -242,7 +243,7 @@ class Task(Part):
         Raises
         ------
         InputError
-            In mode "json", as for a file, if the task has limits or costs of its own, which only Python can hold.
+            In mode "json", as for a file, if the task has limits or costs defined in Python.
         """
         for key, own in (("limits", self.limits.own), ("objective", self.objective.own)):
             if own and options.get("mode") == "json":
@@ -255,7 +256,7 @@ class Task(Part):
         return fields
 
     def in_file(self) -> Task:
-        """Return the task without the limits and costs that only Python can hold."""
+        """Return the task without the limits and costs that are defined in Python."""
         if not (self.limits.own or self.objective.own):
             return self
         objective = self.objective.model_copy(update={"own": ()})
@@ -267,13 +268,13 @@ class Task(Part):
         Raises
         ------
         InputError
-            If the file cannot be written, or the task has limits or costs of its own, which only Python can hold.
+            If the file cannot be written, or the task has limits or costs defined in Python.
         """
         return save_yaml(self, file)
 
     @property
     def seconds(self) -> float:
-        """Return the duration of the motion [s]; of a range its geometric mean, where the planner starts.
+        """Return the duration of the motion [s]; for a range its geometric mean, from which the planner starts.
 
         Raises
         ------
@@ -294,7 +295,7 @@ def read_task(task: Task | dict[str, Any] | str | os.PathLike[str]) -> Task:
     Raises
     ------
     InputError
-        If the task is not valid; one line that names the field, what is accepted and the value.
+        If the task is invalid; the message names the field, the accepted values and the value.
     """
     if isinstance(task, Task):
         return task

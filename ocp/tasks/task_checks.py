@@ -26,7 +26,7 @@ TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on t
 
 
 def check_task(robot: Robot, task: Task) -> None:
-    """Check what a task says of frame, tensions, wind and times.
+    """Check frame, tensions, wind and times of a task.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def check_task(robot: Robot, task: Task) -> None:
 
 
 def check_scenario(scenario: Scenario) -> None:
-    """Check what a task fixes at its ends and bounds on the way, once it is laid out.
+    """Check ends and bounds of a task after it is laid out.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def _check_frame(robot: Robot, task: Task, where: str) -> None:
 
 
 def check_margin(robot: Robot, task: Task) -> None:
-    """Refuse a margin that leaves a cable no tension.
+    """Refuse a margin that exceeds half the tension range of a cable.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def check_margin(robot: Robot, task: Task) -> None:
 
 
 def _check_wind(robot: Robot, task: Task, where: str) -> None:
-    """Refuse wind on a robot without `aero`, and a box of winds where other tensions are another motion."""
+    """Refuse wind for a robot without `aero`, and a box of winds if the motion depends on the tensions."""
     if task.wind is not None and robot.platform.aero is None:
         raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
     if not isinstance(task.wind, WindBox):
@@ -109,8 +109,8 @@ def _check_robust(robot: Robot, task: Task, where: str) -> None:
         raise InputError(f"{where}: robust {missing}, as {robot.name!r} is, got {task.robust:g}")
     if robot.m < len(robot.platform.dof):
         raise InputError(
-            f"{where}: robust must be left out for a robot with fewer cables than degrees of freedom, since each such "
-            f"robot moves otherwise, got {task.robust:g} for {robot.name!r}"
+            f"{where}: robust must be left out for a robot with fewer cables than degrees of freedom, because its "
+            f"motion depends on its geometry, got {task.robust:g} for {robot.name!r}"
         )
     if isinstance(task.wind, WindBox):
         raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with robust, got a box")

@@ -1,4 +1,4 @@
-"""`TaskLimits`: what a task limits beside the tensions: speeds, cables, distances, places to keep out of."""
+"""`TaskLimits`: the limits of a task besides tensions: speeds, cables, distances, keep-out regions."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ THINNEST = 1e-5  # [m] of a place: distances are rounded by a tenth of it where 
 
 
 class KeepOut(Part):
-    """The base of all places to keep out of: by how much platform, carriers and cables stay outside.
+    """The base of all keep-out regions: the clearances of platform, carriers and cables.
 
-    The platform counts as its CoM and its attachments, a cable as the line between its ends. The distance of a carrier
-    that can move is that of its origin: by default it keeps the radius of its body away, so that the rotors of a
-    quadrotor do not touch the place; a number replaces the radius. A place in the frame of the platform moves with it:
-    this keeps the platform's own body clear of cables and carriers, by limits named cable_platform_clearance and
-    carrier_platform_clearance. Cables end at their attachments, so such a body must leave these outside.
+    The platform is represented by its CoM and its attachments, a cable by the line between its ends, and a moving
+    carrier by its origin. The default clearance of a carrier is the radius of its body, so that the rotors of a
+    quadrotor do not touch the region; a number replaces the radius. A region in the frame of the platform moves with it
+    and keeps the platform's body clear of cables and carriers, by the limits cable_platform_clearance and
+    carrier_platform_clearance. Cables end at their attachments, so such a body must not contain these.
     """
 
     name: str = Field(default="obstacle", min_length=1, max_length=60)
@@ -53,8 +53,8 @@ class KeepOut(Part):
     platform: Distance = 0.0
     carriers: NonNegative | Literal["radius"] | None = Field(
         default="radius",
-        description="least distance of the origins of carriers that can move [m]; radius: that of each one's body, "
-        "such as a quadrotor with its rotors; null: no limit",
+        description="least distance of the origins of moving carriers [m]; radius: the radius of each body, such as a "
+        "quadrotor with its rotors; null: no limit",
     )
     cables: Distance = 0.0
 
@@ -85,7 +85,7 @@ class Block(KeepOut, shapes.Block):
 
 
 class ConvexMesh(KeepOut, shapes.ConvexMesh):
-    """A convex body with plane faces to keep out of, as an STL file or the points that it is the hull of."""
+    """A convex body with plane faces to keep out of: an STL file, or the hull of points."""
 
 
 AnyKeepOut = Annotated[Sphere | Capsule | Block | ConvexMesh, Field(discriminator="kind")]
@@ -97,14 +97,16 @@ class TaskLimits(Part):
     Attributes
     ----------
     soft :
-        By name of a limit, the excess that adds one to the objective, in the limit's unit; twice the excess adds four.
+        By name of a limit, the excess that adds 1 to the objective, in the limit's unit; twice the excess adds 4.
         The task's `margin` and carriers' own limits can be soft too: carrier_speed, carrier_acceleration, carrier_tilt,
         carrier_turn_acceleration, carrier_reach, thrust, torque.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
-    cable_speed: Positive | None = Field(default=None, description="rate of every cable's length, as of a winch [m/s]")
+    cable_speed: Positive | None = Field(
+        default=None, description="rate of every cable's length, the speed of its winch [m/s]"
+    )
     cable_length: Range | None = Field(default=None, description="range of every cable's length [m]")
     tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
     platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
@@ -119,23 +121,23 @@ class TaskLimits(Part):
         default=None, description="box in {G} in which the platform frame's origin stays [m]"
     )
     carrier_speed: Positive | None = Field(
-        default=None, description="speed of every carrier that moves, beside the robot file's [m/s]"
+        default=None, description="speed of every moving carrier, in addition to the robot file's limit [m/s]"
     )
     carrier_acceleration: Positive | None = Field(
-        default=None, description="acceleration of every carrier that moves, beside the robot file's [m/s^2]"
+        default=None, description="acceleration of every moving carrier, in addition to the robot file's limit [m/s^2]"
     )
     cable_clearance: Positive | None = Field(
         default=None, description="least distance of cables that share neither anchor nor attachment [m]"
     )
     carrier_separation: Positive | Literal["radius"] | None = Field(
         default=None,
-        description="least distance of the origins of carriers [m]; radius: of those with bodies, such as quadrotors, "
-        "the radii of both together",
+        description="least distance of the origins of carriers [m]; radius: the sum of the radii of both bodies, such "
+        "as quadrotors",
     )
     keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="places to keep out of")
     soft: dict[str, Positive] = Field(
         default={},
-        description="by the name of a limit, the excess that adds one to the objective; twice the excess adds four",
+        description="by the name of a limit, the excess that adds 1 to the objective; twice the excess adds 4",
     )
     own: SkipJsonSchema[tuple[Limit, ...]] = Field(
         default=(), exclude=True, description="limits of your own, in Python alone (docs/adding-a-limit.md)"
@@ -157,7 +159,7 @@ class TaskLimits(Part):
         return self
 
     def without_own(self) -> TaskLimits:
-        """Return what a file can have: the limits without those of `own`."""
+        """Return the limits for a file, without `own`."""
         names = {limit.name for limit in self.own}
         kept = {name: amount for name, amount in self.soft.items() if name not in names}
         return self.model_copy(update={"own": (), "soft": kept})

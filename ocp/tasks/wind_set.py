@@ -1,4 +1,4 @@
-"""A box of winds, and the few of them that decide whether tensions exist for all.
+"""A box of winds, and the few extreme winds that decide whether tensions exist for all.
 
 The air pushes the platform alone: carriers and cables feel no wind here. With V = wind - velocity of the CoM the force
 (`models.wind`) is, per half the pressure area, X = C_d V_x |V_x|, Y = C_d V_y |V_y|, Z = C_l (V_x^2 + V_y^2); V_z plays

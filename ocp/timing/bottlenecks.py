@@ -1,6 +1,6 @@
-"""Find what keeps a time law from being faster, stretch by stretch: `bottlenecks`.
+"""Find the active limits along the fastest time law: `bottlenecks`.
 
-Along the fastest law some limit is always reached: a speed, a carrier's acceleration, or tensions, where the needed
+Along the fastest time law some limit is always active: a speed, a carrier's acceleration, or tensions, where the needed
 wrench lies on a facet of the available wrench set and the cables across that facet are at their limits.
 """
 
@@ -22,16 +22,16 @@ PULLS = 1e-6  # of the largest pull along a facet's normal: less lies in the fac
 
 
 class Bottleneck(NamedTuple):
-    """A stretch of the path and the limit that is reached all along it.
+    """A stretch of the path and the limit that is active on it.
 
     Attributes
     ----------
     start, end
         Fractions s of the path.
     seconds
-        How long the motion takes there.
+        Time that the motion takes there.
     limit
-        What is at its limit: "t_max of cables 2, 5", "speed of platform".
+        The active limit: "t_max of cables 2, 5", "speed of platform".
     """
 
     start: float

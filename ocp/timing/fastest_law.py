@@ -1,4 +1,4 @@
-"""`FastestLaw`: the fastest time law along a path, or where along the path there is none."""
+"""`FastestLaw`: the fastest time law along a path, or the point where none exists."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ SHOWN = 10.0  # [s], of a path without a time law: how long the motion lasts tha
 
 @dataclass(frozen=True, eq=False)
 class FastestLaw(Displayed):
-    """The fastest time law along a path, or where along the path there is none.
+    """Result of `time_along`: the fastest time law, or the point where none exists.
 
     Attributes
     ----------
     parametrised
         The robot and the geometry that was timed.
     limits
-        The limits beside those of the tensions.
+        The limits besides those of the tensions.
     margin
-        How far every tension stays inside its limits [N].
+        Distance of every tension from its limits [N].
     s
         Grid, (n,), the fraction of the path's own time, from 0 to 1.
     sd
@@ -37,13 +37,12 @@ class FastestLaw(Displayed):
     at
         Without a law: s of the certificate, or where the search ended.
     certificate
-        If infeasible: proof that at `at` no tensions inside their limits give the wrench that the path needs, whatever
-        the speed and acceleration; at the ends, for the platform to rest there. It is that of `problem`, and the one
-        with the largest shortfall along the grid.
+        If infeasible: proof that at `at` no tensions inside their limits give the required wrench at any speed and
+        acceleration (at the ends: at rest). It belongs to `problem` and has the largest shortfall along the grid.
     problem
-        The tension problem at `at` for the speed and acceleration that come nearest; at the ends, for rest.
+        The tension problem at `at` for the speed and acceleration that are closest to feasible; at the ends, for rest.
     blocked
-        All grid points s at which there is such a proof.
+        All grid points s with such a proof.
     """
 
     parametrised: ParametrisedPath
@@ -58,25 +57,25 @@ class FastestLaw(Displayed):
 
     @property
     def exists(self) -> bool:
-        """Return whether there is a law; the audit of the plan decides whether it is feasible."""
+        """Return whether a time law exists; the audit of the plan decides whether it is feasible."""
         return not np.isnan(self.sd).any()
 
     @cached_property
     def path(self) -> TimedPath:
-        """Return the platform's path with the time law; without one, with a law that shows the path in 10 s."""
+        """Return the platform's path with the time law; without one, with a time law that shows the path in 10 s."""
         return self.timed(self.parametrised.path)
 
     @cached_property
     def carrier_paths(self) -> dict[int, AnyPath]:
-        """Return the paths of the carriers, those that move with the same time law, by the index of the carrier."""
+        """Return the paths of the carriers by their index; moving ones have the same time law."""
         moving, paths = self.parametrised.moving, self.parametrised.carriers
         return {index: self.timed(path) if index in moving else path for index, path in paths.items()}
 
     @cached_property
     def bottlenecks(self) -> list[Bottleneck]:
-        """Return the stretches of the path on each of which one limit keeps the motion from being faster, in order.
+        """Return the stretches of the path, in order, with the active limit of each.
 
-        The list is empty without a law.
+        The list is empty without a time law.
         """
         return bottlenecks(self.parametrised, self.limits, self.margin, self.path) if self.exists else []
 

@@ -49,17 +49,16 @@ COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer g
 def time_along(
     robot: Robot | str | os.PathLike[str], task: Task | dict[str, Any] | str | os.PathLike[str], *, grid: int = 200
 ) -> Plan:
-    """Find the fastest motion along a task's path, from rest to lasting rest, with every tension inside its limits.
+    """Find the fastest motion along a task's path, from standstill to standstill, with every tension inside its limits.
 
-    Only the geometry of the path matters, not its own time law. Legs rest at their points where the path has a corner
-    there (`blend: 0`), turns back or dwells; the time that it dwells is part of the duration. Circles end after the
-    task's duration by their own rate, or after one turn; any other duration is ignored. Carriers rest or follow given
-    paths, walked with the same s as the platform's.
+    Only the geometry of the path matters, not its own time law. Straight legs stop at corners (`blend: 0`), reversals
+    and dwells; the dwell times are part of the duration. Circles end after the task's duration at their own rate, or
+    after one turn; any other duration is ignored. Carriers rest or follow given paths with the same parameter s.
 
-    Of the task's limits those named in `KNOWN_LIMITS` hold, and the robot file's of mobile carriers that move. The
-    tension limits, less the task's margin, are the facets of the available wrench set. The time law is that of TOPP-RA
-    (H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE
-    T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there. The extra `timing` installs it.
+    The task's limits in `KNOWN_LIMITS` apply, and the robot file's limits of moving mobile carriers. The tension
+    limits, reduced by the task's margin, are the facets of the available wrench set. TOPP-RA computes the time law (H.
+    Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE T-RO
+    34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there. The extra `timing` installs it.
 
     Parameters
     ----------
@@ -68,22 +67,22 @@ def time_along(
     task
         A `Task`, a mapping with its keys, or the path of a YAML file, as for `plan`.
     grid
-        Intervals to start with, from 10 to `MOST_INTERVALS`; the audit may double them.
+        Initial number of intervals, from 10 to `MOST_INTERVALS`; the audit may double it.
 
     Returns
     -------
     Plan
-        Audited as every plan is. Its task has the time law in it, so `plan` audits the same motion again; `law` has the
-        limit that is active at each part of the path (`bottlenecks`). If infeasible, at `law.at` no tensions inside
-        their limits give the wrench that the path needs, whatever the speed and acceleration; at the ends, for the
-        platform to rest there. The motion is then one that shows the path in 10 s. If not-found, every place of the
-        grid allows some speed, but no law joins them, or none that passes the audit.
+        Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law` contains
+        the active limit on each part of the path (`bottlenecks`). If infeasible, no tensions inside their limits give
+        the required wrench at `law.at` at any speed and acceleration (at the ends: at rest). The motion then only
+        shows the path, in 10 s. If not-found, every grid point allows some speed, but no time law connects them, or
+        none passes the audit.
 
     Raises
     ------
     InputError
-        If an argument is not valid, the task does not fit the robot or requires what a time law along a path cannot
-        do, or nothing limits the speed; in one line.
+        If an argument is invalid, the task does not fit the robot or has keys that a time law along a path does not
+        support, or nothing limits the speed.
     SolverError
         If toppra is not installed; the message contains the command that installs it.
     """

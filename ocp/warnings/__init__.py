@@ -1,1 +1,1 @@
-"""Warnings of what a motion does that no limit of the task forbids, each a sentence."""
+"""Warnings about a motion that no limit of the task forbids, each a sentence."""

@@ -36,7 +36,7 @@ def into_places(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.nd
                 sentence = f"the centre of {name} {comes} {limit.called!r} at t = {seen.times[row]:.3f} s"
                 wide = f", inside the radius of its body, {quantity(radius, 'm', 3)}"
                 meetings.append((float(radius - values[row, column]), sentence + wide))
-    return _worst(meetings, "carriers: radius, the default of a place, keeps all of it outside")
+    return _worst(meetings, "carriers: radius, the default, keeps the whole body outside")
 
 
 def into_each_other(seen: Instants) -> list[str]:

@@ -9,5 +9,5 @@ from .short_cables import short_cables
 
 
 def warnings(seen: Instants) -> tuple[str, ...]:
-    """Return what a person should know of a motion before a robot follows it, a sentence each."""
+    """Return facts to know before a robot follows a motion, a sentence each."""
     return (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))

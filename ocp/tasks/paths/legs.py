@@ -1,7 +1,7 @@
 """Overlapped straight legs: a path through points that stays inside their box and near to the lines between them.
 
-Leg k carries the pose from point k to point k + 1 by the law phi from rest to rest (`leg_law`). Each leg starts
-before the one before it has ended, so that the path does not rest at its points but passes them at a distance:
+Leg k moves the pose from point k to point k + 1 by the time law phi from rest to rest (`leg_law`). Consecutive legs
+overlap in time, so the path rounds its points instead of stopping at them:
 
     x(t) = p_0 + sum_k phi((t - t_k) / tau_k) d_k.
 
@@ -13,7 +13,7 @@ mean of three successive points: it lies in the box of the points. Where one leg
 path passes their common point at the distance r |u_b - u_a|, with u the unit vectors along the legs, and nowhere is it
 farther from the legs. Attitudes are R_k exp(phi_k w_k) exp(phi_k+1 w_k+1), with w the shortest rotations.
 
-Lengths are those of positions and rotations together, where a radian counts as a metre.
+Lengths combine positions and rotations, with 1 rad equal to 1 m.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Legs(Displayed):
         (n,), the times at which it passes them [s]; default: any duration, all legs with the same
         peak acceleration.
     dwell
-        (n,), how long it rests at each [s].
+        (n,), dwell time at each [s].
     """
 
     points: np.ndarray
@@ -128,7 +128,7 @@ class Legs(Displayed):
         return 1.0 if self.times is not None else (duration - self.dwell.sum()) / self._between.sum()
 
     def knots(self, duration: float) -> np.ndarray:
-        """Return when the path passes its points, (n,) [s]; where it dwells, when it arrives."""
+        """Return the times at which the path passes its points, (n,) [s]; the arrival times for points with dwell."""
         if self.times is not None:
             return self.times
         return np.concatenate([[0.0], np.cumsum(self._between * self.scale(duration) + self.dwell[:-1])])

@@ -1,4 +1,4 @@
-"""`ReturnPath`: the rest of a path for a robot that is off it: the offset decays, then the path is followed."""
+"""`ReturnPath`: the remainder of a path plus a decaying offset, for a robot with a tracking error."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class ReturnPath(PathBase):
-    """The rest of a path from `start` on, plus an offset that decays to zero as a polynomial of degree 5.
+    """The remainder of a path from `start` on, plus an offset that decays to zero as a polynomial of degree 5.
 
-    `Planner.replan` makes such.
+    `Planner.replan` creates such paths.
     """
 
     kind: Literal["return"]

@@ -1,4 +1,4 @@
-"""`SequencePath`: paths one after the other."""
+"""`SequencePath`: a sequence of paths."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Piece(Part):
 
 
 class SequencePath(PathBase):
-    """Paths one after the other: each begins with the pose, speed and acceleration with which the one before ends."""
+    """A sequence of paths: each begins with the pose, velocity and acceleration at the end of the previous one."""
 
     kind: Literal["sequence"]
     parts: tuple[Piece, ...] = Field(min_length=1, description="paths in the frame of the sequence, with durations")
@@ -100,7 +100,7 @@ class SequencePath(PathBase):
 
 
 def lasting(path: SinglePath, duration: float | None) -> float:
-    """Return how long a path of a sequence lasts [s].
+    """Return the duration of a path of a sequence [s].
 
     Raises
     ------

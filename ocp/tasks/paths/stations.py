@@ -1,4 +1,4 @@
-"""`Stations`: the poses that a path was given to pass, which it may round."""
+"""`Stations`: the waypoints of a path, which it may round."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 
 
 class Stations(NamedTuple):
-    """The poses that a path was given to pass, in order.
+    """The waypoints of a path, in order.
 
     Attributes
     ----------
     names
-        As in the path's file: `points[2]`.
+        Names as in the path's file: `points[2]`.
     times
-        When the path passes each, or arrives where it dwells, (n,) [s]; nan where that is not known.
+        Time at which the path passes each, or the arrival time with dwell, (n,) [s]; nan if unknown.
     poses
         (n, 6) in the frame of the path [m, rad].
     """

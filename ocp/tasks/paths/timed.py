@@ -19,11 +19,11 @@ from .waypoints import WaypointPath
 
 
 class TimedPath(PathBase):
-    """A path with a time law of its own: d2s/dt2 is constant between the given points of it, then it rests at its end.
+    """A path with its own time law: d2s/dt2 is constant between the given points; at the end the path stops.
 
-    Where ds/dt is zero it can dwell.
+    It can dwell where ds/dt is zero.
 
-    `time_along` makes such.
+    `time_along` creates such paths.
     """
 
     kind: Literal["timed"]
@@ -34,7 +34,8 @@ class TimedPath(PathBase):
     s: tuple[Finite, ...] = Field(min_length=2, description="from 0 to 1, increasing")
     speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
     dwell: tuple[NonNegative, ...] | None = Field(
-        default=None, description="how long the path rests at each s [s]; zero where its speed is not; default: nowhere"
+        default=None,
+        description="how long the path stops at each s [s]; must be zero where its speed is not; default: nowhere",
     )
 
     @model_validator(mode="after")

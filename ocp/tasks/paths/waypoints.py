@@ -36,13 +36,13 @@ def _or_file(schema: dict[str, Any]) -> None:
 
 
 class WaypointPath(PathBase):
-    """Straight legs through given poses, each from rest to rest, where each leg starts before the last one has ended.
+    """Straight legs through given poses; consecutive legs overlap in time.
 
-    The path stays inside the box of its points and passes them at a distance of at most `blend`; where it turns back,
-    where it dwells, and everywhere if `blend` is 0, it rests at them. Attitudes turn on the shortest way: from 3.1 to
-    -3.1 rad is a turn of 0.08 rad. In lengths a radian counts as a metre.
+    The path stays inside the box of its points and passes them at a distance of at most `blend`. It stops at a point
+    where it reverses or dwells, and at all points if `blend` is 0. Attitudes turn the shortest way: from 3.1 to -3.1
+    rad is a turn of 0.08 rad. When path length is measured, 1 rad counts as 1 m.
 
-    As a `spline` it is a curve of degree 5 from rest to rest that goes exactly through the points, and leaves their
+    As a `spline` it is a curve of degree 5 from rest to rest that passes exactly through the points but may leave their
     box.
     """
 
@@ -58,18 +58,18 @@ class WaypointPath(PathBase):
     )
     blend: NonNegative | None = Field(
         default=None,
-        description="of legs: largest distance from the points [m]; 0: rest at each; default: 1 % of the span of the "
+        description="for legs: largest distance from the points [m]; 0: stop at each; default: 1 % of the span of the "
         "points",
     )
     times: tuple[Finite, ...] | None = Field(
         default=None,
-        description="when the path passes each point, from 0 on, increasing [s]; default: spread over "
-        "the duration so that all legs reach the same peak acceleration, of a spline by the square roots of the "
-        "distances",
+        description="time at which the path passes each point, from 0 on, increasing [s]; default: spread over the "
+        "duration so that all legs have the same peak acceleration; for a spline by the square roots of "
+        "the distances",
     )
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
-        description="of legs: how long the path rests at each point [s]; included in the duration; default: no rest",
+        description="for legs: how long the path stops at each point [s]; included in the duration; default: no stop",
     )
 
     @model_validator(mode="before")
@@ -104,8 +104,8 @@ class WaypointPath(PathBase):
             turned = [abs(remainder(b - a, 2 * np.pi)) for a, b in zip(before[3:], after[3:], strict=True)]
             if before[:3] == after[:3] and max(turned) < SAME and self.times is None:
                 raise ValueError(
-                    f"points[{index + 1}] must differ from points[{index}] unless there are times; to rest at a "
-                    "point, write dwell; whole turns are none"
+                    f"points[{index + 1}] must differ from points[{index}] unless there are times; to stop at a "
+                    f"point, write dwell; full turns are ignored"
                 )
         if self.dwell is not None:
             self._check_dwell(self.dwell)
@@ -159,7 +159,7 @@ class WaypointPath(PathBase):
         return shape.at(np.asarray(times, dtype=float), duration)
 
     def knots(self, duration: float) -> np.ndarray:
-        """Return the times at which the path passes its points [s]; where it dwells, at which it arrives."""
+        """Return the times at which the path passes its points [s]; the arrival times for points with dwell."""
         return self._spline.knots(duration) if self.shape == "spline" else self._legs.knots(duration)
 
     @property
@@ -176,13 +176,13 @@ class WaypointPath(PathBase):
         return Stations(names, self.knots(duration), np.array(self.points))
 
     def missed(self, duration: float) -> np.ndarray:
-        """Return how far the points are from the path at its knots, (n, 6) [m, rad]."""
+        """Return the distances of the points from the path at its knots, (n, 6) [m, rad]."""
         missed = np.array(self.points) - self.at(self.knots(duration), duration).pose
         missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
         return missed
 
     def outside(self) -> np.ndarray:
-        """Return how far the path leaves the box of its points along x, y and z, (3,) [m]."""
+        """Return the distance by which the path leaves the box of its points along x, y and z, (3,) [m]."""
         duration = self.natural_duration or self.resting + 1.0
         place = self.at(np.linspace(0.0, duration, LOOKS), duration).pose[:, :3]
         points = np.array(self.points)[:, :3]
