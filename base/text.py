@@ -30,7 +30,7 @@ def quantity(value: Number, unit: str = "", digits: int = DIGITS) -> str:
     unit
         Written after the number, with another prefix if the number is very small or very large (default: no unit).
     digits
-        How many significant digits a rounded number has at most; trailing zeros are left out.
+        Largest number of significant digits of a rounded number; trailing zeros are left out.
     """
     if value is None or math.isnan(value):
         return NO_VALUE

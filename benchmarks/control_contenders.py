@@ -187,7 +187,7 @@ class Sparse:
         return np.concatenate(entries)[self._order]
 
     def right(self, program: Program) -> Array:
-        """Return the right side of the dynamics' rows, (N n,)."""
+        """Return the right-hand side of the dynamics equations, (N n,)."""
         right = -program.c.copy()
         if self.offset == 0:
             right[0] -= program.A[0] @ program.start

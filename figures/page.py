@@ -25,7 +25,7 @@ class Link(NamedTuple):
 
 
 def page(title: str, word: str, summary: str, colour: str, parts: Iterable[str]) -> str:
-    """Return the page.
+    """Assemble the HTML page.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Robots as data, and their mechanics as CasADi Functions. This package knows no solver.
+"""Robots as data, and their mechanics as CasADi Functions. This package is independent of the solvers.
 
 Each name below loads its module when it is first used, so that reading a robot file does not load CasADi.
 """

@@ -1,6 +1,6 @@
 """Winds over time: constant, paper F's trapezoid with noise, and Dryden turbulence; velocities of the air in {G}.
 
-Each is a function of times and gives (n, 3) in [m/s]. Random parts are seeded: the same seed gives the same wind.
+Each is a function of times and returns (n, 3) in [m/s]. Random parts are seeded: the same seed gives the same wind.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def trapezoid(
     if (np.diff(places) < 0).any() or places[-1] > 1:
         raise InputError(f"corners must be four rising numbers from 0 to 1, got {corners!r}")
     if (np.diff(times) < 0).any():
-        raise InputError("times must rise, got times that fall")
+        raise InputError("times must increase, got times that decrease")
     noise = float(_numbers("noise", [noise], 1, 0.0)[0])
     share = (times - times[0]) / max(times[-1] - times[0], 1e-12)
     envelope = np.interp(share, places, [0.0, 1.0, 1.0, 0.0])
@@ -89,7 +89,7 @@ def dryden(
         raise InputError(f"mean must be a wind [m/s] with a horizontal part, got {tuple(mean)!r}")
     steps = np.diff(times)
     if len(steps) and not (steps.min() > 0 and np.ptp(steps) < 1e-6 * steps.mean()):
-        raise InputError("times must rise in equal steps, got unequal ones")
+        raise InputError("times must increase in equal steps, got unequal ones")
     rng = np.random.default_rng(seed)
     gusts = np.empty((len(times), 3))
     for axis in range(3):

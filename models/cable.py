@@ -30,9 +30,9 @@ class Pulley(Part):
 
 
 class Winch(Part):
-    """A winch as its cable feels it: an inertia that the motor's force and the tension accelerate, inside limits."""
+    """A winch reduced to its cable: an inertia that the motor's force and the tension accelerate, inside limits."""
 
-    inertia: Positive = Field(description="of rotor, gear and drum, as a mass on the cable [kg]")
+    inertia: Positive = Field(description="inertia of rotor, gear and drum, as an equivalent mass on the cable [kg]")
     friction: NonNegative = Field(default=0.0, description="dry friction, as a force on the cable [N]")
     speed_max: Positive = Field(description="largest speed of the cable [m/s]")
     force_max: Positive = Field(description="largest force of the motor on the cable [N]")
@@ -41,8 +41,8 @@ class Winch(Part):
 class Encoder(Part):
     """The reading of a winch: the length from anchor to attachment is offset + scale * reading."""
 
-    offset: Finite = Field(default=0.0, description="length of the cable where the reading is 0 [m]")
-    scale: Finite = Field(default=1.0, description="length for each unit of the reading [m], not 0")
+    offset: Finite = Field(default=0.0, description="length of the cable at reading 0 [m]")
+    scale: Finite = Field(default=1.0, description="metres of cable per unit of reading, not 0")
 
     @field_validator("scale")
     @classmethod
@@ -60,18 +60,17 @@ class Cable(Part):
     attachment: Vector3 = Field(description="B_i in the platform frame [m]")
     t_min: NonNegative = Field(description="smallest tension [N]; above zero keeps the cable taut")
     t_max: Positive = Field(description="largest tension [N]")
-    stiffness: Positive | None = Field(default=None, description="E A [N]; default: the cable does not stretch")
+    stiffness: Positive | None = Field(default=None, description="E A [N]; default: inextensible")
     damping: NonNegative | None = Field(default=None, description="C [N s/m]")
     length: Positive | None = Field(
-        default=None,
-        description="[m], where the drive is fixed-length; default there: from anchor to attachment at home",
+        default=None, description="[m], for the drive fixed-length; default: from anchor to attachment at home"
     )
     pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
     winch: Winch | None = Field(
-        default=None, description="what moves the cable, for simulation; default: its length follows commands exactly"
+        default=None, description="winch of the cable, for simulation; default: its length follows commands exactly"
     )
     encoder: Encoder | None = Field(
-        default=None, description="what the winch reports, for calibration; default: the length itself [m]"
+        default=None, description="reading of the winch, for calibration; default: the length itself [m]"
     )
 
     @model_validator(mode="after")

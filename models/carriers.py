@@ -1,7 +1,7 @@
-"""Carriers: the bodies that hold the anchors of cables, each kind a class that answers all questions about itself.
+"""Carriers: the bodies that hold the anchors of cables, one class for each type.
 
-No other file depends on the kind of a carrier. A further kind is a subclass of `Carrier` with a field `kind`: robots
-and robot files take it as soon as the class is defined. Coordinates are counted as in a pose: 0 to 5 are x, y, z, roll,
+No other file depends on the type of a carrier. A new type is a subclass of `Carrier` with a field `kind`: robots and
+robot files accept it as soon as the class is defined. Coordinates are numbered as in a pose: 0 to 5 are x, y, z, roll,
 pitch and yaw.
 """
 
@@ -49,7 +49,7 @@ POSITION, TILT, YAW = (0, 1, 2), (3, 4), (5,)
 class Carrier(Part):
     """A body that holds anchors. The anchors of its cables are fixed in its frame.
 
-    This base describes a carrier that never moves. A kind of its own overrides what differs.
+    This base describes a carrier that never moves. Subclasses override the members that differ.
     """
 
     tows: ClassVar[bool] = False  # by cables without winches, unless the robot's file has winches or states its drive
@@ -61,7 +61,7 @@ class Carrier(Part):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **options: Any) -> None:
-        """Make robots take the kind that the subclass names."""
+        """Register the subclass by its kind."""
         super().__pydantic_init_subclass__(**options)
         for kind in get_args(cls.model_fields["kind"].annotation):
             known = _KINDS.get(kind, cls)
@@ -71,7 +71,7 @@ class Carrier(Part):
             json_schema.cache_clear()
 
     def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
-        """Return the coordinates in which it can move with a drive of the robot; the others stay as at home."""
+        """Return the coordinates in which it can move with a drive of the robot; the others stay at home."""
         return ()
 
     def planned_coordinates(self, drive: Drive, tilts: bool = True) -> tuple[int, ...]:
@@ -95,7 +95,7 @@ class Carrier(Part):
 
     @property
     def confined(self) -> bool:
-        """Return whether its place is bounded: it has a reach, or never moves. Others follow the platform anywhere."""
+        """Return whether the carrier's position is bounded."""
         return not self.moves or self.motion_limits.reach is not None
 
     @property
@@ -104,9 +104,9 @@ class Carrier(Part):
         return None
 
     def body_radius(self, anchors: np.ndarray) -> float:
-        """Return the radius [m] of the ball about its origin that holds its body, from its anchors (k, 3) [m]; 0: none.
+        """Return the radius [m] of the ball about its origin that contains its body, with anchors (k, 3) [m].
 
-        It keeps this far from places to keep out of, and figures, films and viewer draw it so large.
+        This is its default clearance from keep-out regions, and its size in figures, films and the viewer.
         """
         return 0.0
 
@@ -163,7 +163,7 @@ class Carrier(Part):
 
     @property
     def drawing(self) -> Drawing:
-        """Return what figures and viewer draw of it."""
+        """Return its drawing for figures and viewer."""
         reach = self.motion_limits.reach
         return Drawing(self.moves, not self.keeps_attitude, () if reach is None else (reach,))
 
@@ -178,7 +178,7 @@ class GroundCarrier(Carrier):
 
 
 class PrescribedCarrier(Carrier):
-    """A base whose motion is given from outside and disturbs the platform (paper F's quadrotor)."""
+    """A carrier with imposed motion that disturbs the platform (paper F's quadrotor)."""
 
     kind: Literal["prescribed"]
 
@@ -188,12 +188,12 @@ class PrescribedCarrier(Carrier):
 
 
 class MobileCarrier(Carrier):
-    """A robot end that moves inside a reach box (paper C): a point, its orientation stays as at home."""
+    """A robot end that moves inside a reach box (paper C): a point with the constant orientation of its home."""
 
     tows: ClassVar[bool] = True
 
     kind: Literal["mobile"]
-    reach: Box = Field(description="where the carrier's origin may be, in {G} [m]")
+    reach: Box = Field(description="box of positions of the carrier's origin, in {G} [m]")
     speed_max: Positive = Field(description="[m/s]")
     acceleration_max: Positive = Field(description="[m/s^2]")
 
@@ -215,7 +215,7 @@ class MobileCarrier(Carrier):
 
 
 class QuadrotorCarrier(Carrier):
-    """A flying robot that feels its cables: rigid body, thrust along its z axis, torques about its axes.
+    """A flying robot with reaction from its cables: rigid body, thrust along its z axis, torques about its axes.
 
     Its frame sits in its CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
     """
@@ -236,8 +236,9 @@ class QuadrotorCarrier(Carrier):
     acceleration_max: Positive = Field(default=10.0, description="[m/s^2]; for planners")
     radius: Positive | None = Field(
         default=None,
-        description="of the ball about its CoM that holds its rotors [m]; default: 0.3 m times the root of its mass in "
-        "kg (rotors of equal disc loading), at least as far as its anchors are from its z axis",
+        description="radius of the ball about its CoM that contains its rotors [m]; default: 0.3 m times the square "
+        "root of its mass in kg (common disc loading), but at least the distance of its anchors from its "
+        "z axis",
     )
 
     @model_validator(mode="after")

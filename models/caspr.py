@@ -1,4 +1,4 @@
-"""A CASPR robot folder as a towline robot, and what of it cannot be expressed.
+"""Convert a CASPR robot folder to a towline robot, and note what cannot be expressed.
 
 CASPR (D. Lau et al.) describes a robot by two XML files: NAME_bodies.xml has the links, NAME_cables.xml has one or more
 sets of cables. One link that moves freely, in space or in a plane, is a platform; link 0 is the ground. With the joint

@@ -23,15 +23,16 @@ class Diagnosis(Displayed):
     Attributes
     ----------
     rank
-        Of the wrench matrix at home.
+        Rank of the wrench matrix at home.
     rank_level, rank_tilted
         Largest rank among seeded random poses about home, unrotated and rotated.
     singular_values
-        Of the wrench matrix's rows that count, at home with moments divided by `Robot.length`, largest first.
+        Singular values of the balanced rows of the wrench matrix at home, moments divided by `Robot.length`,
+        descending.
     lengths
         Cable lengths at home [m].
     reason
-        Why the rank is below the platform's degrees of freedom, empty if it is not.
+        Reason for a rank below the platform's degrees of freedom, otherwise empty.
     warnings
         Sentences about numbers that are valid but implausible.
     """

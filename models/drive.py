@@ -1,4 +1,4 @@
-"""What moves a robot whose file does not state its `drive`: winches or carriers, and which lengths cables keep."""
+"""The default `drive` of a robot, and the lengths of cables of fixed length."""
 
 from __future__ import annotations
 

@@ -39,12 +39,12 @@ def _dynamics_of(robot: Any) -> Dynamics:
 
 
 class Dynamics(Displayed):
-    """Compute what a motion needs and what the cables can give, for one robot.
+    """Compute the kinematics and dynamics of one robot, for arrays and CasADi expressions.
 
-    Everything is in {G}; `relative` has the form of paper F, in the frame {A} of a single carrier. Arguments may have
-    leading batch dimensions, which broadcast, and give arrays. If `pose` is a CasADi SX or MX, the result is one too.
+    Everything is in {G}; `relative` has the form of paper F, in the frame {A} of a single carrier. Arrays may have
+    leading batch dimensions, which broadcast. If `pose` is a CasADi SX or MX, the result is one too.
 
-    Arrays are evaluated by the numeric core where it has the quantity and room for the robot, else by CasADi.
+    The numeric core evaluates arrays if it supports the quantity and the size of the robot, otherwise CasADi.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Dynamics(Displayed):
     Attributes
     ----------
     functions
-        The CasADi Functions by name, with named inputs and outputs, to build on.
+        The CasADi Functions by name, with named inputs and outputs.
 
     Raises
     ------
@@ -151,11 +151,11 @@ class Dynamics(Displayed):
         carrier_acceleration: Array | None = None,
         wind: Array | None = None,
     ) -> Array:
-        """Return the wrench w that the cables have to give so that the platform moves as stated: A t = w.
+        """Return the required wrench w of a motion, with A t = w.
 
-        It is force [N] and moment about the CoM [N m], in {G}, (..., 6): inertia and velocity terms less gravity and
-        wind. In {G} the carriers act on the platform only through A, so their motion does not enter w; it is checked,
-        so that one call serves this form and `relative`, where it is the disturbance D_B.
+        It is force [N] and moment about the CoM [N m], in {G}, (..., 6): inertia and velocity terms minus gravity and
+        wind. The carrier motion does not enter w; the argument exists for symmetry with `relative`, where it causes the
+        disturbance D_B.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class Dynamics(Displayed):
         carrier_pose, carrier_velocity, carrier_acceleration
             The same of each carrier, (..., c, 6); default: at home and at rest.
         wind
-            Velocity of the air in {G} [m/s], (..., 3); default: no air at all, also no drag of the motion.
+            Velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class Dynamics(Displayed):
 
     @one_array
     def carried_wrench(self, pose: Array, velocity: Array, acceleration: Array, load: Array) -> Array:
-        """Return the wrench that a load fixed to the platform needs beside `required_wrench`, (..., 6), in {G}.
+        """Return the wrench that a load fixed to the platform needs in addition to `required_wrench`, (..., 6), in {G}.
 
         It is force [N] and moment about the platform's CoM [N m], weight included.
 
@@ -262,7 +262,7 @@ class Dynamics(Displayed):
 
         Returns
         -------
-        A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2 per N]. The tensions stay as they are when
+        A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2 per N]. The tensions are constant when
         the platform moves; for elastic cables see `stiffness`.
         """
         state = {"pose": pose, "velocity": velocity, "tensions": tensions, "carrier_pose": carrier_pose}
@@ -283,7 +283,7 @@ class Dynamics(Displayed):
         tensions
             (..., m) [N].
         elastic
-            True: the cables stretch, each needs its `stiffness`; False: their tensions stay, only geometry counts.
+            True: elastic cables, each with its `stiffness`; False: constant tensions, only the geometry changes.
 
         Raises
         ------
@@ -310,9 +310,9 @@ class Dynamics(Displayed):
         Parameters
         ----------
         pose, tensions, carrier_pose
-            An equilibrium: (6,), (m,) [N] and (c, 6). Cables with zero tension are slack and do not count.
+            An equilibrium: (6,), (m,) [N] and (c, 6). Cables with zero tension are slack and are ignored.
         elastic
-            False: inextensible cables, which leave 6 - rank motions, or no motion if they hold the platform fast.
+            False: inextensible cables, which permit 6 - rank motions, or none.
 
         Raises
         ------

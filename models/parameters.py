@@ -1,4 +1,4 @@
-"""Names of the numbers that place a robot's cables, as `cables[2].anchor.x`: read, checked and changed by name.
+"""Names of the geometric parameters of cables, such as `cables[2].anchor.x`.
 
     cables[i].anchor.x  .y  .z            of the anchor in the frame of its carrier [m]
     cables[i].attachment.x  .y  .z        of the attachment in the platform frame [m]

@@ -47,16 +47,14 @@ class Platform(Part):
     com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")
     home: Pose | None = Field(
         default=None,
-        description="pose in {G} to start from and to diagnose at [m, rad]; default: level, amid or below the anchors",
+        description="initial and reference pose in {G} [m, rad]; default: level, amid or below the anchors",
     )
     dof: tuple[Coordinate, ...] = Field(
         default=COORDINATES,
         min_length=1,
-        description="coordinates that can move; a point mass has x, y, z. The cables balance only the rows of these",
+        description="coordinates that can move; a point mass has x, y, z. The cables balance only these rows",
     )
-    aero: Aero | None = Field(
-        default=None, description="how the air pushes the platform; default: without it no wind can be given"
-    )
+    aero: Aero | None = Field(default=None, description="aerodynamic data of the platform; required for wind")
 
     @field_validator("dof")
     @classmethod

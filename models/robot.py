@@ -1,4 +1,4 @@
-"""A robot as data: one platform, the carriers that hold its cables, and the cables. Only checks are computed.
+"""A robot as data: one platform, the carriers that hold its cables, and the cables.
 
 SI units throughout: metres, kilograms, seconds, newtons, radians. {G} is the global frame (down is where
 gravity points), the platform frame sits on the platform, a carrier frame on each carrier. Poses are (x, y, z, roll,
@@ -36,24 +36,25 @@ def _without_default(schema: dict[str, Any]) -> None:
 class Robot(DisplayedRobot):
     """A cable robot: one platform, carriers, cables. Frozen; built by `load` or by `Robot.model_validate`.
 
-    The arrays below are what computations read; each has one row per cable or carrier, in the order of the file.
+    Computations use the arrays below; each has one row per cable or carrier, in the order of the file.
     """
 
     name: Name
-    source: str = Field(min_length=1, description="where the numbers come from, and which are assumed")
+    source: str = Field(min_length=1, description="source of the numbers, and which of them are assumed")
     gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="in {G} [m/s^2]")
     drive: Drive = Field(
         default=cast(Any, None),
         json_schema_extra=_without_default,
-        description="what moves (paper C). fixed-length: the carriers, each cable keeps its length; "
-        "variable-length: the winches, mobile carriers stay at home; both: carriers and winches. Default: fixed-length "
+        description="what moves the platform (paper C). fixed-length: the carriers, with cables of constant length; "
+        "variable-length: the winches, with mobile carriers at home; both: carriers and winches. Default: "
+        "fixed-length "
         "if all cables hang from quadrotors or mobile carriers and none has a winch, an encoder or a pulley; else both",
     )
     platform: Platform
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1)
     cables: tuple[Cable, ...] = Field(min_length=1)
     uncertainty: Uncertainty | None = Field(
-        default=None, description="how well numbers of the cables are known; default: they count as exact"
+        default=None, description="uncertainty of anchors, attachments and pulley radii; default: exact"
     )
 
     @model_validator(mode="after")
@@ -92,12 +93,12 @@ class Robot(DisplayedRobot):
         return self
 
     def parameter_values(self, names: Iterable[str]) -> np.ndarray:
-        """Return numbers of the cables by name, as `cables[2].anchor.x` or `cables[2].pulley.radius`, (p,) [m].
+        """Return cable parameters by name, such as `cables[2].anchor.x` or `cables[2].pulley.radius`, (p,) [m].
 
         Raises
         ------
         InputError
-            If `names` is no list of names, or the robot has no such number.
+            If `names` is no list of names, or the robot has no such parameter.
         """
         try:
             listed = None if isinstance(names, str) else list(names)
@@ -110,12 +111,12 @@ class Robot(DisplayedRobot):
         return np.array([numbers[one.part][one.cable, one.axis] for one in found])  # (p,)
 
     def with_parameters(self, values: Mapping[str, float]) -> Robot:
-        """Return the robot with other numbers of its cables [m], by the names of `parameter_values`.
+        """Return the robot with other cable parameters [m], by the names of `parameter_values`.
 
         Raises
         ------
         InputError
-            If `values` is no mapping, the robot has no such number, or a value is not possible.
+            If `values` is no mapping, the robot has no such parameter, or a value is impossible.
         """
         data = self.model_dump()
         cables = [dict(cable) for cable in data["cables"]]
@@ -131,19 +132,19 @@ class Robot(DisplayedRobot):
         return Robot.model_validate({**data, "cables": cables})
 
     def drawn(self, count: int, seed: int = 0) -> tuple[Robot, ...]:
-        """Draw robots whose numbers differ from the file's as its `uncertainty` states; each one is known exactly.
+        """Sample robots from the `uncertainty` of the file; the samples themselves are exact.
 
         Parameters
         ----------
         count
-            How many.
+            Number of robots.
         seed
-            Of the random numbers: the first robots are the same ones whatever the count.
+            Seed of the random numbers; the first robots do not depend on the count.
 
         Raises
         ------
         InputError
-            If the robot has no uncertainty, an argument is wrong, or so large an error is drawn that no robot has it.
+            If the robot has no uncertainty, an argument is wrong, or a sample is geometrically invalid.
         """
         whole_number("count", count, 1, 1_000_000)
         whole_number("seed", seed, 0, 2**63 - 1)
@@ -210,7 +211,7 @@ class Robot(DisplayedRobot):
 
     @property
     def fixed_lengths(self) -> np.ndarray | None:
-        """Return the lengths that the drive keeps, (m,) [m], or None if winches change them."""
+        """Return the constant cable lengths, (m,) [m], or None if winches change them."""
         if self.drive != "fixed-length":
             return None
         return np.array([cable.length for cable in self.cables], dtype=float)
@@ -222,7 +223,7 @@ class Robot(DisplayedRobot):
 
     @property
     def carrier_radius(self) -> np.ndarray:
-        """Return the radii of the balls about the carriers' origins that hold their bodies, (c,) [m]; 0: a point."""
+        """Return the radii of the balls about the carriers' origins that contain their bodies, (c,) [m]; 0: a point."""
         anchors, owner = self.anchors, self.carrier_of_cable
         return np.array([each.body_radius(anchors[owner == i]) for i, each in enumerate(self.carriers)])  # (c,)
 
@@ -253,7 +254,7 @@ class Robot(DisplayedRobot):
 
     @property
     def dof_mask(self) -> np.ndarray:
-        """Return 1 for the wrench rows that the cables have to balance, 0 for coordinates that cannot move, (6,)."""
+        """Return 1 for the wrench rows that the cables must balance, 0 for coordinates that cannot move, (6,)."""
         return np.array([float(name in self.platform.dof) for name in COORDINATES])  # (6,)
 
     @property
@@ -263,16 +264,16 @@ class Robot(DisplayedRobot):
 
     @property
     def force_scale(self) -> float:
-        """Return a force [N] as a scale for others: the weight, or without gravity the mean of the largest tensions."""
+        """Return the characteristic force [N]: the weight, or without gravity the mean of the largest tensions."""
         return self.weight or float(self.t_max.mean())
 
     @property
     def wrench_scale(self) -> np.ndarray:
-        """Return the factors that bring a wrench to newtons, (6,): 1 for forces [-], 1 / `length` for moments [1/m]."""
+        """Return the factors that convert a wrench to newtons, (6,): 1 for forces, 1 / `length` for moments [1/m]."""
         return np.repeat([1.0, 1.0 / self.length], 3)  # (6,)
 
     @property
     def length(self) -> float:
-        """Return the length that scales moments to forces [m]: the largest distance of an attachment from the CoM."""
+        """Return the characteristic length [m]: the largest distance from the CoM to an attachment."""
         arms = np.linalg.norm(self.attachments - np.array(self.platform.com), axis=1)
         return float(arms.max()) if arms.max() > 0 else 1.0

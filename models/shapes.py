@@ -1,4 +1,4 @@
-"""Bodies in space as data: what cables, platform and carriers must keep away from."""
+"""Bodies in space as data, which cables, platform and carriers must avoid."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Tension distribution: which tensions, inside their limits, give a wrench, or proof that none do.
+"""Tension distribution: compute tensions inside their limits that give a wrench, or prove that none exist.
 
-Plain NumPy arrays in and out; this package knows no robot. State a `TensionProblem`, call `solve`, read the
-`TensionSolution`, or give arrays to `solve_batch`; an infeasible problem comes with a `Certificate`. `Horizon`
-solves the quadratic programs of predictive controllers, stage by stage.
+This package works on plain NumPy arrays and is independent of robots. Build a `TensionProblem` and call `solve`, or
+pass arrays to `solve_batch`. An infeasible problem has a `Certificate`. `Horizon` solves the quadratic programs of
+predictive controllers.
 """
 
 from .batch import BatchSolution, solve_batch

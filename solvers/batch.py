@@ -31,29 +31,29 @@ BEYOND_THE_CORE = "python"  # the back end that is reported for sizes that it do
 
 @dataclass(frozen=True, eq=False)
 class BatchSolution(Displayed):
-    """The answers to a batch of problems, `...` being its leading dimensions.
+    """The solutions of a batch of problems with leading dimensions `...`.
 
     Attributes
     ----------
     tensions :
-        Tensions [N], shape (..., m), inside the limits to the last bit; nan where there are none.
+        Tensions [N], shape (..., m), inside the limits to the last bit; nan where none exist.
     code :
         Status of each row as a small integer, shape (...); `statuses[code]` is the `Status`.
     residual :
         Wrench error |S (A t - w)| [N], shape (...); nan without tensions.
     direction :
-        Wrench direction that proves w out of reach, where it is, shape (..., n), scaled as that of a `Certificate`;
-        nan elsewhere. Every one was verified. It is a direction along which the shortfall is more than the tolerance,
-        not always the one along which it is largest: that is `solution(index).certificate`.
+        Verified wrench direction that proves infeasibility, shape (..., n), scaled as in `Certificate`; nan for
+        feasible rows. Along it the shortfall exceeds the tolerance, but it is not always the largest possible one,
+        which `solution(index).certificate` has.
     shortfall, support :
         d . w - h(d) [N] and h(d) [N] along that direction, shape (...); nan elsewhere.
     time :
         Wall time of the call [s].
     problem :
-        A, w, t_min, t_max, t_ref, weights and length, broadcast. Views of what was given, where that was an array of
-        float64: not to be changed as long as `solution` may be called.
+        A, w, t_min, t_max, t_ref, weights and length, broadcast. Float64 arrays are views of the arguments: do not
+        change them as long as `solution` may be called.
     rho :
-        As it was given.
+        As given.
     backend :
         "lanes" or "c", see `solve_batch`; "python" for sizes that the C core does not take.
     """
@@ -85,7 +85,7 @@ class BatchSolution(Displayed):
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Return where the tensions can be used as they are, shape (...)."""
+        """Return where the tensions are usable, shape (...)."""
         return self.code == 0
 
     @cached_property
@@ -94,14 +94,14 @@ class BatchSolution(Displayed):
         return np.array([status.value for status in STATUSES])[self.code]
 
     def count(self) -> dict[Status, int]:
-        """Return how many rows have each status, for those that occur."""
+        """Return the number of rows with each status that occurs."""
         numbers = np.bincount(self.code.ravel(), minlength=len(STATUSES))
         return {status: int(number) for status, number in zip(STATUSES, numbers, strict=True) if number}
 
     def solution(self, index: int | tuple[int, ...]) -> TensionSolution:
-        """Solve one row again by itself, for its certificate and all else that a `TensionSolution` has.
+        """Solve one row again as a single problem, for its full `TensionSolution`.
 
-        With the method "active-set", or "soft-wrench" if `rho` was given; `index` picks it, a number or a tuple.
+        The method is "active-set", or "soft-wrench" if `rho` was given; `index` is a number or a tuple.
 
         Raises
         ------
@@ -131,17 +131,18 @@ def solve_batch(
     threads: int | None = None,
     backend: str | None = None,
 ) -> BatchSolution:
-    """Distribute the tensions of many problems, each as `solve` does with the method "active-set".
+    """Compute the tensions of many problems, each like `solve` with the method "active-set".
 
-    Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. A row whose numbers are no problem
-    (NaN, t_min > t_max, a weight that is not positive) has the status "invalid" and the others are solved.
+    Leading dimensions broadcast as in NumPy. The ranks may differ inside a batch. An invalid row (NaN, t_min > t_max, a
+    weight that is not positive) has the status "invalid", and the others are solved.
 
-    The C core solves some rows at a time, in the lanes of the processor's vectors, and those of which lanes are not
-    sure one by one. `solve` takes the rows of which the core is not sure either: they lie near the boundary of the
-    available wrench set or of the rank cut. Statuses are those of `solve`, and so are tensions but for rounding.
-    Neither the other rows, nor their number, nor that of threads changes a bit of a row's result.
+    The C core solves several rows at a time in the lanes of vector registers, and rows with an uncertain result one by
+    one. `solve` solves rows that are still uncertain, near the boundary of the available wrench set or of the rank
+    tolerance. Statuses are equal to those of `solve`, and so are tensions up to rounding. The result of a row does not
+    depend on the other rows or on the number of threads, to the last bit.
 
-    The core takes up to 6 wrench rows and 32 cables. `solve` takes all rows of larger problems, some 0.2 ms each.
+    The core supports up to 6 wrench rows and 32 cables. `solve` solves all rows of larger problems, at about 0.2 ms
+    each.
 
     Parameters
     ----------
@@ -152,26 +153,25 @@ def solve_batch(
     t_min, t_max :
         Tension limits [N], shape (..., m) or one number.
     t_ref :
-        Tensions to stay near [N], shape (..., m) or one number; None = 0.
+        Preferred tensions [N], shape (..., m) or one number; None = 0.
     weights :
         Weights of the cables, shape (..., m) or one number; None = 1.
     length :
         Characteristic length [m], shape (...); None = 1 m.
     rho :
-        Weight of the squared wrench error beside the squared tensions, as in the method "soft-wrench", 1e-12 to 1e12:
-        every row that is a problem gets tensions, and those whose wrench is not the required one are "inaccurate".
-        None = the wrench must be met.
+        Weight of the squared wrench error relative to the squared tensions, as in the method "soft-wrench", 1e-12 to
+        1e12: every valid row gets tensions, and rows with a wrench error are "inaccurate". None = exact wrench.
     threads :
-        How many threads share the rows; None = one for each 2000 rows, at most as many as there are processors. The
+        Number of threads that share the rows; None = one for each 2000 rows, at most the number of processors. The
         result does not depend on it.
     backend :
-        "lanes" as stated above, or "c" for rows one by one from the first on, by the method of `solve`: for tests, and
-        for bits that are those of `solve`. None = "lanes".
+        "lanes" as described above, or "c" for rows one by one with the method of `solve`: for tests, and for results
+        equal to `solve` in every bit. None = "lanes".
 
     Raises
     ------
     InputError
-        If an argument has a wrong type or its shape does not fit the others.
+        If an argument has a wrong type or shape.
     """
     start = time.perf_counter()
     if threads is not None:

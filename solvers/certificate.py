@@ -1,7 +1,6 @@
-"""Proof that no tensions inside their limits give a wrench: `Certificate`, and `certify`, which finds the sharpest one.
+"""Proof that no tensions inside their limits give a wrench: `Certificate`, and `certify`, which computes the sharpest.
 
-The wrenches that a robot can give, {A t : t_min <= t <= t_max}, are a convex set, the available wrench set. Along any
-direction d it reaches no farther than its support value
+The available wrench set {A t : t_min <= t <= t_max} is convex. Its extent along any direction d is the support value
 
     h(d) = max { d . A t : t_min <= t <= t_max } = sum_i max(d . a_i t_min_i, d . a_i t_max_i)
 
@@ -44,33 +43,33 @@ class CertificateText(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Certificate(Displayed):
-    """A wrench direction along which the required wrench lies beyond everything that the cables can give.
+    """A wrench direction along which the required wrench exceeds everything that the cables can give.
 
     Attributes
     ----------
     direction :
-        d, shape (n,), in terms of the wrench rows of A as they are: d . w and d . A t are in newtons. With six rows its
-        force entries are numbers, its moment entries are in 1/m, and |(d_force, length * d_moment)| = 1. With
-        any other number of rows |d| = 1.
+        d, shape (n,), for unscaled wrench rows: d . w and d . A t are in newtons. With six rows its force entries are
+        dimensionless, its moment entries are in 1/m, and |(d_force, length * d_moment)| = 1. With any other number of
+        rows |d| = 1.
     support :
         h(d) [N]: the maximum that tensions inside the limits can give along d.
     demand :
-        d . w [N]: what is required along d.
+        d . w [N]: the required wrench along d.
     shortfall :
         demand - support [N], positive. If `binding` is not empty it is the distance from w to the available wrench set
         in the norm |(force, moment / length)|; if it is empty (singular), the distance from w to the range of A.
     at_max, at_min :
         Indices of the cables that could give more along d only by exceeding t_max, or by falling below t_min.
     closest :
-        Tensions inside the limits whose wrench is nearest to w [N], shape (m,).
+        Tensions inside the limits with the wrench closest to w [N], shape (m,).
     length :
         The characteristic length [m] of the problem.
     time :
-        Of a motion: the instant [s] at which w is required. None for a single problem.
+        For a motion: the instant [s] at which w is required. None for a single problem.
     span :
-        Of a motion: start and end [s] of the time around `time` during which no tensions give the required wrench.
+        For a motion: start and end [s] of the time around `time` without tensions for the required wrench.
     wind :
-        Of a motion in a box of winds: the velocity of the air [m/s] in {G} at which w is required.
+        For a motion in a box of winds: the velocity of the air [m/s] in {G} at which w is required.
     """
 
     direction: Array  # (n,)
@@ -107,8 +106,8 @@ class Certificate(Displayed):
     def verify(self, problem: TensionProblem) -> bool:
         """Check from the problem's data alone that this certificate proves it infeasible.
 
-        Nothing is believed but the direction: support, demand and binding cables are computed again and compared.
-        False means that it proves nothing, not that the problem is feasible.
+        Only the direction is trusted; support, demand and binding cables are recomputed and compared. False means that
+        the certificate proves nothing; the problem may still be infeasible.
         """
         required("problem", problem, TensionProblem)
         if self.direction.shape != (problem.n,) or self.closest.shape != (problem.m,):
@@ -129,9 +128,9 @@ class Certificate(Displayed):
     def text(self, up: ArrayLike | None = None) -> CertificateText:
         """Return direction, needed, available, short by and limits as text; cables are counted from 1.
 
-        Of six wrench rows the direction is given by a force and a moment, together of length one: "force (0.84, 0.49,
-        0.23)". A force or a moment below 0.05 is left out. Moments are divided by `length`; where one takes part the
-        text states it.
+        With six wrench rows the direction is a force and a moment, together of length one: "force (0.84, 0.49,
+        0.23)". A force or a moment below 0.05 is omitted. Moments are divided by `length`, which the text gives if the
+        direction has a moment.
 
         Parameters
         ----------
@@ -159,9 +158,9 @@ class Certificate(Displayed):
         )
 
     def describe(self, up: ArrayLike | None = None) -> str:
-        """Describe the certificate in two lines: along what direction, needed, available, short by, and which limits.
+        """Describe the certificate in two lines: direction, needed, available, short by, and limits.
 
-        Of a motion, time, span and wind come first. `up` is as in `text`.
+        For a motion, time, span and wind come first. `up` is as in `text`.
         """
         text = self.text(up)
         when = "" if self.time is None else f"at t = {self.time:.3f} s"
@@ -190,7 +189,7 @@ class Certificate(Displayed):
         return text
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain lists and numbers, ready for JSON; time, span and wind only where they are set."""
+        """Return plain lists and numbers, ready for JSON; time, span and wind only if they are set."""
         motion = {"time": self.time, "span": self.span, "wind": self.wind}
         return {
             "direction": self.direction.tolist(),

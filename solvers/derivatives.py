@@ -1,4 +1,4 @@
-r"""How the optimal tensions change with the problem: `sensitivity`, and `derivatives` with respect to everything.
+r"""Derivatives of the optimal tensions: `sensitivity` to the wrench, and `derivatives` by all data.
 
 With the cables H held at their limits and the others, F, free, the optimum is weighted least squares,
 

@@ -65,7 +65,7 @@ class Residuals(NamedTuple):
 
 
 class Horizon(Displayed):
-    r"""Problems of one size, to be written into its arrays, solved, and written again.
+    r"""Solve problems of one size: write the data into its arrays, and call `solve`.
 
     $$
     \min \; \sum_{k=0}^{N-1} \tfrac12 \begin{bmatrix} x_k \\ u_k \end{bmatrix}^\top
@@ -77,14 +77,14 @@ class Horizon(Displayed):
     subject to $x_{k+1} = A_k x_k + B_k u_k + c_k$ from a given $x_0$, $u_{\min,k} \le u_k \le u_{\max,k}$ and
     $C_k x_k + D_k u_k \le d_k + s_k$, $s_k \ge 0$. It is feasible for any data.
 
-    A predictive controller solves such a problem at each step. All arrays are parts of the memory on which the core
-    works (`core/horizon`): nothing is copied, allocated or checked. Where a number is not finite or the cost is not
-    convex, the controls are still finite and inside their bounds, and the solution is not converged.
+    A predictive controller solves such a problem at each step. All arrays are views of the memory of the core
+    (`core/horizon`): nothing is copied, allocated or checked. If a number is not finite or the cost is not convex, the
+    controls are still finite and inside their bounds, and the solution has not converged.
 
     Parameters
     ----------
     N, n, m, rows :
-        How many stages, states, controls, and soft rows of a stage (p).
+        Numbers of stages, states, controls, and soft rows of a stage (p).
 
     Attributes
     ----------
@@ -101,15 +101,15 @@ class Horizon(Displayed):
     C, D, d :
         Soft rows, shapes (N, p, n), (N, p, m) and (N, p).
     penalty, square :
-        Linear and quadratic cost of breaking each soft row, not negative, shape (N, p). A linear one that is larger
-        than the multiplier which the row has as a constraint keeps it exactly.
+        Linear and quadratic cost of violating each soft row, not negative, shape (N, p). A linear cost above the
+        multiplier of the row as a hard constraint enforces it exactly.
     states, controls :
-        The solution, shapes (N + 1, n) and (N, m). Controls never break their bounds, and states are what they lead to.
+        The solution, shapes (N + 1, n) and (N, m). Controls are always inside their bounds, and states follow from
+        them.
     multipliers :
-        See `Multipliers`. `solve(warm=True)` begins with these, and with states and controls.
+        See `Multipliers`. `solve(warm=True)` starts from these, and from states and controls.
     tolerance, iterations_max :
-        When to stop: the largest residual of a solution that has converged, and the largest number of iterations. At
-        first 1e-8 and 50.
+        Largest residual of a converged solution, and largest number of iterations. Default: 1e-8 and 50.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-r"""How far the required wrench is from the boundary of the available wrench set: `capacity_margin`.
+r"""The distance of the required wrench from the boundary of the available wrench set: `capacity_margin`.
 
 The available wrench set is a zonotope, the sum of one segment per cable. Each of its facets is parallel to rank - 1
 columns of A, so the normals are among the directions d orthogonal to rank - 1 columns, and the facet lies at the

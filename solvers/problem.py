@@ -22,15 +22,15 @@ _NO_ENTRY = 1e-6  # Entries of a null-space vector below this have no sign of th
 
 @dataclass(frozen=True, eq=False)
 class TensionProblem(Displayed):
-    r"""Tensions nearest to reference tensions that give a wrench inside the tension limits.
+    r"""Find the tensions closest to reference tensions that give a wrench inside the tension limits.
 
     $$
     \min\limits_t \; \sum_i \omega_i (t_i - t_{\text{ref},i})^2
     \quad \text{s.t.} \quad A t = w, \; t_{\min} \le t \le t_{\max}
     $$
 
-    The arrays are copied, converted to float64 and set read-only. Entries smaller than 1e-50 count as 0, limits beyond
-    1e50 as infinite.
+    The arrays are copied, converted to float64 and set read-only. Entries smaller than 1e-50 are set to 0, and limits
+    beyond 1e50 are infinite.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ class TensionProblem(Displayed):
         Tension limits [N], shape (m,) or one number for all cables. Equal limits fix a tension; t_min may be -inf and
         t_max +inf.
     t_ref :
-        Tensions to stay near [N], shape (m,) or one number; they need not lie inside the limits. default: 0, for
-        the least norm.
+        Preferred tensions [N], shape (m,) or one number, inside or outside the limits. Default: 0, for the least
+        norm.
     weights :
         Weights omega of the cables in the cost, from 1e-20 to 1e20 and at most 1e14 apart, shape (m,) or one number.
         None = 1.

@@ -1,4 +1,4 @@
-"""Tension-rate limits: tensions near the last ones, for every method."""
+"""Tension-rate limits for every method."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,10 +9,10 @@ from .problem import TensionProblem
 
 
 def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike) -> TensionProblem:
-    """Narrow a problem's limits to what can be reached from the last tensions.
+    """Reduce a problem's limits to the tensions that can be reached from the last ones.
 
     The result is a problem like any other, for every method: `solve(limit_rate(problem, last.tensions, 5.0))`. If it is
-    infeasible its certificate speaks of the narrowed limits. A cable whose last tension is so far outside its limits
+    infeasible, its certificate refers to the reduced limits. A cable whose last tension is so far outside its limits
     that they cannot be reached goes as far towards them as it may.
 
     Parameters
@@ -22,8 +22,8 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
     previous :
         The last tensions [N], shape (m,).
     rate_max :
-        By how much a tension may change from one call to the next [N], >= 0, shape (m,) or one number; a rate in N/s
-        times the time step.
+        Largest change of a tension from one call to the next [N], >= 0, shape (m,) or one number; a rate in N/s times
+        the time step.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The answer to one problem: `TensionSolution`."""
+"""The solution of one problem: `TensionSolution`."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -16,29 +16,28 @@ from .status import Status
 
 @dataclass(slots=True, eq=False)
 class TensionSolution(Displayed):
-    """Tensions, or the proof that there are none.
+    """Tensions, or the proof that none exist.
 
     Attributes
     ----------
     problem :
-        The problem as it was stated.
+        The problem.
     tensions :
         Tensions [N], shape (m,), always inside the limits to the last bit; None unless `status` is optimal or
         inaccurate.
     status :
         See `Status`.
     method, backend :
-        The method and the code that answered. `backend` of "active-set" is "c" where the C core answered, or "daqp"
-        where it was not sure or towline was installed without it; of "qp" it is the package. It is None for methods
-        that have none.
+        The method and the code that computed the result. For "active-set" `backend` is "c" for the C core, or "daqp" if
+        its result was uncertain; for "qp" it is the package. Other methods have None.
     time :
         Wall time of the call [s].
     iterations :
-        Iterations of the method, None if it does not count any.
+        Iterations of the method, or None.
     detail :
-        What the method reports beyond the status, else empty.
+        Further message of the method; may be empty.
     proof :
-        The certificate, or a function of the problem that finds it when `certificate` is first read.
+        The certificate, or a function of the problem that computes it on first access of `certificate`.
     """
 
     problem: TensionProblem
@@ -65,7 +64,7 @@ class TensionSolution(Displayed):
         return [*facts, ("method", f"{self.method}{(self.backend and f' ({self.backend})') or ''}")]
 
     def _picture(self) -> str:
-        """Return each cable's tension as a mark between its limits; the closest ones where there are none."""
+        """Return each cable's tension as a mark between its limits; the closest ones if none exist."""
         problem, proof = self.problem, self.certificate
         tensions = proof.closest if self.tensions is None and proof is not None else self.tensions
         if tensions is None:
@@ -81,12 +80,12 @@ class TensionSolution(Displayed):
 
     @property
     def certificate(self) -> Certificate | None:
-        """Return why there are no tensions, exactly if `status` is infeasible or singular.
+        """Return the proof that no tensions exist; None unless `status` is infeasible or singular.
 
-        Its `closest` holds the tensions whose wrench is nearest. The method "active-set" proves its status by a
-        direction of its own; the sharpest certificate is then computed when it is first read. Where rounding keeps
-        the projection from finding it (cables parallel to six digits that pull with 1e6 times the load; one problem in
-        10^5 of those) the certificate is along the method's own direction, and its shortfall is less than the distance.
+        `closest` contains the tensions with the closest wrench. The method "active-set" proves its status by a
+        direction of its own, and the sharpest certificate is computed on first access. If rounding prevents this
+        (nearly parallel cables with huge tensions; about one problem in 10^5 of that kind) the certificate has the
+        method's direction, and its shortfall is smaller than the distance.
 
         Raises
         ------
@@ -104,7 +103,7 @@ class TensionSolution(Displayed):
 
     @property
     def feasible(self) -> bool:
-        """Return whether the tensions can be used as they are."""
+        """Return whether the tensions are usable."""
         return self.status is Status.OPTIMAL
 
     @property
@@ -140,7 +139,7 @@ class TensionSolution(Displayed):
         return None if self.tensions is None else self.problem.null_space.T @ self.tensions
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain lists, numbers and strings, ready for JSON; what does not exist is None."""
+        """Return plain lists, numbers and strings, ready for JSON; missing values are None."""
         given = self.tensions is not None
         return {
             "status": self.status.value,

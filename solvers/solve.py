@@ -1,4 +1,4 @@
-"""Solve one problem by any method: look it up, bring the problem to standard form, propose, verify."""
+"""Solve one problem by any method: convert it to standard form, compute a proposal, verify it."""
 
 from functools import partial
 from time import perf_counter
@@ -29,11 +29,11 @@ def methods() -> dict[str, Method]:
 def solve(
     problem: TensionProblem, method: str | Method = "active-set", backend: str | None = None, **options: Any
 ) -> TensionSolution:
-    """Distribute the tensions of one problem.
+    """Compute the tensions of one problem.
 
-    An infeasible problem is an answer, not an exception: the status reports it and a certificate proves it. The status
-    "optimal" of a method of least squares rests on multipliers that were verified, "infeasible" and "singular" on a
-    certificate that was verified, never on a solver's word.
+    An infeasible problem is a result, not an exception: the status reports it and a certificate proves it. For methods
+    of least squares the status "optimal" is based on verified multipliers; "infeasible" and "singular" are based on a
+    verified certificate. The status of a solver is never trusted.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def solve(
     Raises
     ------
     InputError
-        If there is no such method, back end or option; the message lists those that exist.
+        If the method, back end or option does not exist; the message lists the existing ones.
     """
     start = perf_counter()
     if not isinstance(problem, TensionProblem):
@@ -114,7 +114,7 @@ def _direction_of_core(problem: TensionProblem) -> Array | None:
 
 
 def _look_up(name: str | Method, backend: str | None, options: dict[str, Any]) -> tuple[Method, str | None]:
-    """Return the method and the back end it will use, or raise InputError listing what there is."""
+    """Return the method and its back end, or raise InputError with a list of the existing ones."""
     if isinstance(name, Method):
         method = name
     elif isinstance(name, str) and name in METHODS:

@@ -57,7 +57,7 @@ def test_constant():
 def test_wrong_winds_are_named():
     with pytest.raises(InputError, match=r"mean must be .* with a horizontal part"):
         air.dryden(TIMES, [0, 0, 1])
-    with pytest.raises(InputError, match="times must rise in equal steps"):
+    with pytest.raises(InputError, match="times must increase in equal steps"):
         air.dryden(TIMES**2, [1, 0, 0])
     with pytest.raises(InputError, match="corners"):
         air.trapezoid(TIMES, corners=(0.5, 0.1, 0.7, 0.9))

@@ -208,7 +208,7 @@ def test_a_motion_may_end_in_motion():
 )
 def test_what_does_not_fit_is_one_line(change, message):
     planner = Planner(GROUND, LINE | {"tube": {"position": 0.1}})
-    with pytest.raises(InputError, match="replan must be called after a plan"):
+    with pytest.raises(InputError, match="replan must be called after a feasible plan"):
         planner.replan({"pose": [0, 0, 1, 0, 0, 0]}, 0.0)
     planner.plan()
     with pytest.raises(InputError, match=message) as caught:

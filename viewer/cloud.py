@@ -31,7 +31,7 @@ class Cloud(Displayed):
     summary
         The number of points, as a sentence.
     dataset
-        What they were taken from.
+        Source dataset.
     """
 
     positions: np.ndarray

@@ -194,7 +194,7 @@ class Stage:
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
 
     def mind(self, client: viser.ClientHandle) -> None:
-        """Frame the robot in a picture that is higher than wide, now and whenever a screen is turned.
+        """Fit the camera to portrait screens, now and whenever a screen is turned.
 
         The initial camera may reach a browser after this one, and a user can return to it. A camera that a user has
         pointed elsewhere stays.

@@ -1,4 +1,4 @@
-"""Read what to show: a robot, a plan, a flight or a workspace."""
+"""Read a robot, a plan, a simulation or a workspace to show."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ACCEPTED = "a robot, or a file that `towline plan`, `towline simulate` or `towli
 
 @dataclass(frozen=True)
 class Subject(Displayed):
-    """A robot, a plan, a flight or a workspace to show.
+    """A robot, a plan, a simulation or a workspace to show.
 
     Attributes
     ----------

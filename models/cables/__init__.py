@@ -1,4 +1,4 @@
-"""What a cable is beside a straight line: elastic, cut into elements, heavy, sagging, or led over a pulley.
+"""Cable models besides the straight line: elastic, cut into elements, heavy, sagging, or over a pulley.
 
 `driving_force` is not imported here: it needs the dynamics of a robot, which may need these pulleys.
 """
