@@ -1,4 +1,4 @@
-"""Draw a flight over time: error, wind, carriers, tensions, how steps were answered; and the errors of many flights."""
+"""Draw a simulation over time: error, wind, carriers, tensions, controller status; and the errors of many runs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}
 
 
 def flight(trajectory: xr.Dataset) -> Figure:
-    """Draw error, wind, carriers' offsets and thrusts, as far as there are some, and how each step was answered."""
+    """Draw error, wind, carriers' deviations and thrusts, if any, and the status of each control step."""
     time = trajectory["time"].values
     draws: list[tuple[str, float, Any]] = [("", 1.7, _draw_error)]
     if "wind" in trajectory:
@@ -92,12 +92,12 @@ def tensions(trajectory: xr.Dataset) -> Figure:
 
 
 def errors(flights: xr.Dataset) -> Figure:
-    """Draw the largest error of each of many flights, from the smallest to the largest, with the tolerance."""
+    """Draw the largest error of each of many runs, in ascending order, with the tolerance."""
     canvas = style.figure(height=2.5)
     largest, tolerance = np.sort(flights["error_max"].values), float(flights.attrs["tolerance_m"])
     passed = flights["passed"].values[np.argsort(flights["error_max"].values, kind="stable")]
     scale, unit = _scale(largest[-1])
-    ax = style.axes(canvas, "share of the flights [%]", f"largest error [{unit}]")
+    ax = style.axes(canvas, "share of the runs [%]", f"largest error [{unit}]")
     share = 100 * (np.arange(len(largest)) + 0.5) / len(largest)
     ax.plot(share, largest / scale, color="#999999", linewidth=0.8)
     ax.plot(share[passed], largest[passed] / scale, "o", markersize=3, color=style.colour(0), label="passed")
@@ -113,7 +113,7 @@ def errors(flights: xr.Dataset) -> Figure:
 
 
 def _mark_events(panels: list[Axes], trajectory: xr.Dataset) -> None:
-    """Draw a line at each event of the flight through all panels, and name it in the legend."""
+    """Draw a line at each event through all panels, and name it in the legend."""
     happened = json.loads(trajectory.attrs.get("report", "{}")).get("events", [])
     for event, dashes in zip(happened, itertools.cycle(EVENT_DASHES), strict=False):
         for ax in panels:
@@ -170,7 +170,7 @@ def _draw_thrusts(ax: Axes, trajectory: xr.Dataset) -> None:
 
 
 def _draw_answers(ax: Axes, trajectory: xr.Dataset) -> None:
-    """Draw a row for each kind of answer, black where steps were answered so."""
+    """Draw a row for each status, black where steps had it."""
     time, answered = trajectory["time"].values, trajectory["answered"].values
     answers = _answers(trajectory)
     for row, flag in enumerate(answers.values()):
@@ -180,11 +180,11 @@ def _draw_answers(ax: Axes, trajectory: xr.Dataset) -> None:
     ax.set_ylim(len(answers) - 0.5, -0.5)
     ax.grid(False)
     ax.tick_params(axis="y", length=0)
-    style.heading(ax, "how each step was answered")
+    style.heading(ax, "status of each control step")
 
 
 def _answers(trajectory: xr.Dataset) -> dict[str, int]:
-    """Return the answers that the flight has, with their numbers."""
+    """Return the status words that occur, with their numbers."""
     variable = trajectory["answered"]
     words = str(variable.attrs["flag_meanings"]).split()
     known = zip(words, np.ravel(variable.attrs["flag_values"]).tolist(), strict=True)

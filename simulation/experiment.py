@@ -14,7 +14,7 @@ from .noise import Noise
 
 
 class Wind(Protocol):
-    """A wind over time."""
+    """Wind as a function of time and seed."""
 
     def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
         """Return the wind at the times (K,) [s] for this seed, (K, 3) [m/s]."""

@@ -52,12 +52,12 @@ def panels(figure):
 
 def test_error_offsets_and_answers_have_a_panel_each():
     drawn = panels(flight.flight(made()))
-    assert list(drawn) == ["error [mm]", "offset of\ncarriers [mm]", "how each step was answered"]
+    assert list(drawn) == ["error [mm]", "offset of\ncarriers [mm]", "status of each control step"]
     np.testing.assert_allclose(drawn["error [mm]"].lines[0].get_ydata(), 2 + TIME)
     (offset,) = drawn["offset of\ncarriers [mm]"].lines  # of the carrier that moves
     assert offset.get_label() == "quad"
     np.testing.assert_allclose(offset.get_ydata(), 3.0)
-    strip = drawn["how each step was answered"]
+    strip = drawn["status of each control step"]
     assert [text.get_text() for text in strip.get_yticklabels()] == ["as planned", "soft wrench"]
     spans = [[path.get_extents().intervalx for path in bar.get_paths()] for bar in strip.collections]
     np.testing.assert_allclose(np.concatenate(spans), [[0, 0.5], [1, 2], [0.5, 1]], atol=1e-9)

@@ -143,7 +143,7 @@ class Measurements(Displayed):
         Parameters
         ----------
         path
-            Of the file; one of the same name is replaced.
+            Path of the file; an existing file is overwritten.
 
         Raises
         ------

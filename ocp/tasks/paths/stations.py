@@ -27,7 +27,7 @@ class Stations(NamedTuple):
 
     @classmethod
     def joined(cls, parts: Iterable[tuple[str, float, Stations]]) -> Stations:
-        """Return those of paths one after the other, from the key and the start [s] of each."""
+        """Return the waypoints of a sequence of paths, from the key and the start [s] of each."""
         kept = [(key, start, its) for key, start, its in parts if its.names]
         return cls(
             tuple(f"{key}.{name}" for key, _, its in kept for name in its.names),
