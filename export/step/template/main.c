@@ -1,8 +1,8 @@
 /*
- * Compute steps from standard input, one a line, and print the status and the tensions of each.
+ * Compute steps from standard input, one per line, and print the status and the tensions of each.
  *
- * A line has pose, velocity and wanted acceleration of the platform (6 numbers each), then, where the robot has them, the
- * pose of each carrier that moves (6 each) and the wind (3), then the disturbance (6). Numbers are separated by spaces;
+ * A line contains pose, velocity and desired acceleration of the platform (6 numbers each), then, if the robot has them, the
+ * pose of each moving carrier (6 each) and the wind (3), then the disturbance (6). Numbers are separated by spaces;
  * disturbance, wind and carriers may be left out, in this order: no disturbance, still air, carriers at home.
  *
  * --certificate adds, after the tensions, the shortfall and the six numbers of its direction, zero where there is none.

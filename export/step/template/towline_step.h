@@ -1,13 +1,13 @@
 /*
- * One control step of the robot @name@: the tensions that move its platform as wanted, in C99.
+ * One control step of the robot @name@: the tensions for a desired acceleration of its platform, in C99.
  *
  * @generated@
  * @source@
  * Copyright (c) 2026, The towline developers. SPDX-License-Identifier: BSD-3-Clause
  *
- * State and wanted acceleration in, tensions out; where no tensions inside the limits give that acceleration, those that
- * miss the wrench by least, and a certificate of what is missing. No allocation, no globals, bounded iterations. SI units:
- * m, kg, s, N, rad. A pose is (x, y, z, roll, pitch, yaw) in the world frame {G}, with R = Rz(yaw) Ry(pitch) Rx(roll);
+ * It maps a state and a desired acceleration to tensions. If no tensions inside the limits give this acceleration, it
+ * returns those with the smallest wrench error, and a certificate. No allocation, no globals, bounded iterations. SI
+ * units: m, kg, s, N, rad. A pose is (x, y, z, roll, pitch, yaw) in the world frame {G}, with R = Rz(yaw) Ry(pitch) Rx(roll);
  * velocities and accelerations are its time derivatives.
  *
  * Iterations, at most. With m cables and n degrees of freedom, m - n of up to two: each limit is taken once, and each
@@ -35,11 +35,11 @@ extern "C" {
 
 @types@
 
-/* The measured state and what is wanted. Set all to zero ({0}) before filling in what you have. */
+/* The measured state and the desired acceleration. Set all to zero ({0}) before filling in what you have. */
 typedef struct {
     towline_real pose[6]; /* of the platform */
     towline_real velocity[6];
-    towline_real acceleration[6]; /* wanted; see towline_computed_torque */
+    towline_real acceleration[6]; /* desired; see towline_computed_torque */
 #if TOWLINE_CARRIERS > 0
     towline_real carrier_pose[6 * TOWLINE_CARRIERS]; /* one after the other. In {G} their motion does not enter the wrench */
 #endif
@@ -47,10 +47,10 @@ typedef struct {
     towline_real wind[3]; /* velocity of the air in {G} */
 #endif
     towline_real disturbance[6]; /* other force [N] and moment [N m] on the platform about its CoM, in {G} */
-    towline_real t_ref[TOWLINE_CABLES]; /* tensions to stay near */
+    towline_real t_ref[TOWLINE_CABLES]; /* preferred tensions */
 } towline_input;
 
-/* What a step leaves for the next one. towline_start sets it; rate_max may be changed at any time. */
+/* The memory between steps. towline_start sets it; rate_max may be changed at any time. */
 typedef struct {
     int has_command;
     towline_real tensions[TOWLINE_CABLES]; /* the last command */
@@ -83,12 +83,12 @@ void towline_computed_torque(const towline_gains *gains, const towline_reference
 /*
  * Compute a step. Whatever the input is, answer->tensions are a command within the limits of the cables:
  *
- * TOWLINE_OPTIMAL     they give the wanted acceleration, and are nearest to t_ref of all that do.
- * TOWLINE_INFEASIBLE  none do: soft answer, the tensions whose wrench misses the required one by least. `direction` is
+ * TOWLINE_OPTIMAL     they give the desired acceleration, as close to t_ref as possible.
+ * TOWLINE_INFEASIBLE  none do: soft solution, the tensions with the smallest wrench error. `direction` is
  * TOWLINE_SINGULAR    the certificate: no tensions within the limits reach the required wrench along it, by `shortfall`
- *                     newtons. Its first three entries have no unit, the others 1/m. Singular: nor do any beyond the limits.
- * TOWLINE_INACCURATE  rounding forbids a proof of any of these: soft answer.
- * TOWLINE_INVALID     the input is no state (NaN, infinite, a cable of no length), or the last command is not finite, or
+ *                     newtons. Its first three entries have no unit, the others 1/m. Singular: not even outside the limits.
+ * TOWLINE_INACCURATE  rounding prevents a proof of any of these: soft solution.
+ * TOWLINE_INVALID     the input is invalid (NaN, infinite, a cable of zero length), or the last command is not finite, or
  *                     rate_max is NaN or negative: the last command, held.
  *
  * With rate limits the limits are those that can be reached from the last command, and optimal, infeasible and the
