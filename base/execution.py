@@ -241,7 +241,7 @@ def _cluster(address: str) -> Iterator[Workers]:
         get_address_host(address)
         client: Any = distributed.Client(address, timeout=CONNECT_WITHIN, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
-        reason = "no answer" if isinstance(error, OSError) else "not an address"
+        reason = "no result" if isinstance(error, OSError) else "not an address"
         raise InputError(f"{accepted}, got {shown(address)} ({reason})") from None
     ended = "the scheduler ended before the work was done; a checkpoint can be resumed"
     seen = time.monotonic()

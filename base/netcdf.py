@@ -70,7 +70,7 @@ def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()
     Raises
     ------
     InputError
-        If the place cannot be written to, or is full.
+        If the folder cannot be written to, or the disk is full.
     """
     import h5netcdf
     import h5py

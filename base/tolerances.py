@@ -18,7 +18,7 @@ ROUNDING = 1e-13
 # that give no wrench that they are asked for.
 CANCELLED = 1e10
 
-# Singular values below this part of the largest count as zero.
+# Singular values below this part of the largest are zero.
 RANK = 1e-12
 
 # Directions with singular values between RANK and this part of the largest are required only if w would be missed

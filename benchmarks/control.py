@@ -2,10 +2,9 @@
 
     towline bench control [--steps 500] [--seeds 3] [--json]
 
-Each robot flies at rest in gusts, with elastic cables and a controller every millisecond. Three tables: how long the
-steps of each controller take, whole steps from state to command; how long each solver takes for the programs that
-predictive control had in such a flight, alternating every few programs; and how far each controller lets the platform
-go.
+Each robot holds its position in gusts, with elastic cables and a controller every millisecond. Three tables: how long
+the steps of each controller take, whole steps from state to command; how long each solver takes for the programs that
+predictive control had in such a run, alternating every few programs; and how far each controller lets the platform go.
 """
 
 from __future__ import annotations
@@ -51,7 +50,7 @@ class Error:
     task, controller :
         The task and the controller.
     rms_mm, max_mm :
-        Of the distance from the reference [mm]: root of the mean square, and largest of all flights.
+        Of the distance from the reference [mm]: root of the mean square, and largest of all runs.
     ratio :
         Median over the seeds of the largest error over that of computed torque with the same wind.
     soft :
@@ -92,7 +91,7 @@ def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progres
     Parameters
     ----------
     steps :
-        Of a flight, one each millisecond.
+        Steps of a run, one per millisecond.
     seeds :
         Of gusts, for the errors.
     tasks :
@@ -139,7 +138,7 @@ def _accepted(task: Task, robot: Robot) -> tuple[dict[str, Callable[[Robot], Con
 
 
 def _steps(task: Task, robot: Robot, steps: int) -> list[Step]:
-    """Measure the steps of one flight with each controller, after one that is not counted."""
+    """Measure the steps of one run with each controller, after one that is not counted."""
     accepted, refused = _accepted(task, robot)
     times = {}
     for _ in range(2):
@@ -180,7 +179,7 @@ def _errors(task: Task, robot: Robot, steps: int, seeds: int) -> list[Error]:
 
 
 def _programs(task: Task, robot: Robot, steps: int) -> list[Row]:
-    """Solve the programs of one flight with all solvers, alternating."""
+    """Solve the programs of one run with all solvers, alternating."""
     try:
         programs = record(task, robot, steps)
     except InputError:
@@ -221,7 +220,7 @@ def markdown(report: Report) -> str:
         "",
         f"Ratios: to `{REFERENCE}` and to `{TOWLINE}`, medians over turns of {BLOCK}. Error: of the first stage's "
         "controls, in units of their range. Residual: of the conditions of optimality, in the same units, all stages.",
-        f"Failures: no answer, or an error of more than {FAILED:g}.",
+        f"Failures: no result, or an error of more than {FAILED:g}.",
         "",
         *table(
             "task | solver | required | median us | p99 us | ratio | to Horizon | error | residual | failures",
@@ -231,8 +230,8 @@ def markdown(report: Report) -> str:
         "",
         "## Errors of the position",
         "",
-        f"{report.seeds} flights, the same gusts for all controllers. Ratio: of a flight's largest error to that with "
-        f"{STANDARD}, median of the flights.",
+        f"{report.seeds} flights, the same gusts for all controllers. Ratio: of a run's largest error to that with "
+        f"{STANDARD}, median of the runs.",
         "",
         *table("task | controller | rms mm | largest mm | ratio | not as planned | slack", errors, 2),
     ]

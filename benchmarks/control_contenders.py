@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from ..solvers import Horizon
 
 Array = NDArray[np.float64]
-REFERENCE, TOWLINE = "condensed, daqp.solve", "towline Horizon, as flown"
+REFERENCE, TOWLINE = "condensed, daqp.solve", "towline Horizon, as simulated"
 FAR = 1e4  # in place of infinite bounds, for solvers that need numbers
 GOOD = 1e-3  # residuals at which predictive control uses a solution that did not converge
 FIELDS = ("A", "B", "c", "start", "Q", "R", "q", "r", "u_min", "u_max")
 
 
 class Program(NamedTuple):
-    """A program as a flight has had it: arrays of `Horizon`, the guess, and whether it was used."""
+    """A program of a run: arrays of `Horizon`, the guess, and whether it was used."""
 
     A: Array  # (N, n, n)
     B: Array  # (N, n, m)
@@ -42,14 +42,14 @@ class Program(NamedTuple):
 
 
 class Solver(NamedTuple):
-    """One solver at the programs of one flight: `solve(arrange(program))` is the controls (N, m), None if none."""
+    """One solver at the programs of one run: `solve(arrange(program))` is the controls (N, m), None if none."""
 
     arrange: Callable[[Program], Any]
     solve: Callable[[Any], Array | None]
 
 
 class Contender(NamedTuple):
-    """A solver, the accuracy that is required of it, and how to start it with the first program of a flight."""
+    """A solver, the accuracy that is required of it, and how to start it with the first program of a run."""
 
     name: str
     tolerance: str

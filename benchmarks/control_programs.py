@@ -29,14 +29,14 @@ class Row:
     median_us, p99_us :
         Time of a program [us].
     ratio, ratio_to_horizon :
-        To condensing and `daqp.solve`, and to `Horizon` as it was flown: medians over the turns.
+        To condensing and `daqp.solve`, and to `Horizon` as it was simulated: medians over the turns.
     max_error :
         Largest error of the first stage's controls, in units of their range.
     residual :
         Largest step of a control of any stage along its gradient, over its curvature, inside its bounds; in the same
         units.
     failures :
-        Programs, of `programs`, without an answer or with an error above `FAILED`.
+        Programs, of `programs`, without a result or with an error above `FAILED`.
     programs :
         How many it was given.
     """
@@ -55,7 +55,7 @@ class Row:
 
 
 def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contender]) -> list[Row]:
-    """Measure contenders at the programs of one flight, alternating every few; `TOWLINE` and `REFERENCE` among them."""
+    """Measure contenders at the programs of one run, alternating every few; `TOWLINE` and `REFERENCE` among them."""
     solvers = {each.name: each.prepare(programs[0]) for each in contenders}
     for solver in solvers.values():  # imports belong to no program
         solver.solve(solver.arrange(programs[0]))

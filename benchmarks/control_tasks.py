@@ -1,4 +1,4 @@
-"""Robots in winds for `benchmarks.control`, their controllers, and the programs of predictive control in a flight."""
+"""Robots in winds for `benchmarks.control`, their controllers, and the programs of predictive control in a run."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class Recording(Predictive):
 
 
 def record(task: Task, robot: Robot, steps: int) -> list[Program]:
-    """Return the programs of a flight.
+    """Return the programs of a run.
 
     Raises
     ------

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 # A variable this near to a limit may have a multiplier there, relative to its size or to 1.
 _AT_LIMIT = 1e-11
 
-# Singular values below this part of the largest count as zero in the search for multipliers, the coarsest first: small
+# Singular values below this part of the largest are zero in the search for multipliers, the coarsest first: small
 # multipliers have small rounding errors, and where a fine cut is not needed it only adds noise times a huge number.
 _CUTS = (1e-6, 1e-9, 1e-15)
 _GOOD = 1e-12
@@ -76,7 +76,7 @@ def solve_problem(
         Not used.
     eps_abs :
         Residuals and duality gap that are good enough. It matters only where the equations are nearly dependent: then
-        those that equal 0 = 0 within the tolerance are left out, if the answer meets the original QP to `eps_abs`.
+        those that equal 0 = 0 within the tolerance are left out, if the result meets the original QP to `eps_abs`.
     method :
         One of `towline.solvers.methods()` that ends at the optimum.
 

@@ -116,7 +116,7 @@ def team(cables: list[tuple[float, float]]) -> Robot:
 
 
 def _offsets(cables: list[tuple[float, float]]) -> np.ndarray:
-    """Return the places of the quadrotors about the load, (n, 3) [m]."""
+    """Return the positions of the quadrotors about the load, (n, 3) [m]."""
     azimuth, elevation = np.array(cables).T
     flat = np.cos(elevation)
     return LENGTH * np.stack([np.cos(azimuth) * flat, np.sin(azimuth) * flat, np.sin(elevation)], axis=1)

@@ -48,7 +48,7 @@ class Row:
     ratio :
         To `daqp.solve`; above 1 is slower.
     max_error :
-        Largest error of a tension among the answers that it gave, in units of the largest tension; None if the task is
+        Largest error of a tension among its results, in units of the largest tension; None if the task is
         infeasible, if it gave none or if it minimises something else.
     failures :
         Problems, of `problems`, that it got wrong: none, or tensions or a wrench off by more than `FAILED`, for a
@@ -134,7 +134,7 @@ def run(
 
 
 class _Runner:
-    """One contender at one task: its answers, its times, and whether it is still in."""
+    """One contender at one task: its results, its times, and whether it is still in."""
 
     def __init__(self, contender: Contender, task: Task, limit: float) -> None:
         self.contender, self.task, self.limit = contender, task, limit
@@ -148,7 +148,7 @@ class _Runner:
         return not self.detail
 
     def turn(self, number: int) -> None:
-        """Solve every problem once; turn 0 is the one whose answers are kept and whose times are not."""
+        """Solve every problem once; turn 0 is the one whose results are kept and whose times are not."""
         try:
             call = self.contender.prepare(self.task)
             if number == 0:
@@ -231,7 +231,7 @@ def _row(runner: _Runner, reference: dict[int, list[float]]) -> Row:
 
 
 def _judge(contender: Contender, task: Task, answers: list[Array | None]) -> tuple[float | None, int]:
-    """Return the largest tension error, and how many answers are wrong."""
+    """Return the largest tension error, and how many results are wrong."""
     if task.optima is None:
         return None, sum(answer is not None for answer in answers)
     errors, failures = [], 0
@@ -270,7 +270,7 @@ def markdown(report: Report) -> str:
         f"{report.count} random problems a task, {report.repeats} turns after one that is not counted.",
         f"Ratio: to `{REFERENCE}` in the same turn. Error: largest of a tension, in units of the largest tension; - if "
         "there is nothing to compare.",
-        f"Failures: no answer, or off by more than {FAILED:g}; for infeasible problems, an answer.",
+        f"Failures: no result, or off by more than {FAILED:g}; for infeasible problems, a result.",
     ]
     for task in dict.fromkeys(row.task for row in report.rows):
         rows = []
@@ -302,6 +302,6 @@ def _picture(report: Report, path: Path) -> Path:
     ax.axvline(1.0, **style.LIMIT)
     ax.set_xscale("log")
     ax.set_yticks(range(len(names)), names)
-    style.heading(ax, f"m = {m}; hollow: some answers wrong")
+    style.heading(ax, f"m = {m}; hollow: some results wrong")
     style.legend_below(canvas, ax)
     return style.save(canvas, path)

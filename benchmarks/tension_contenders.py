@@ -57,7 +57,7 @@ class Contender(NamedTuple):
         The accuracy that it was set to.
     prepare :
         From a task to a function of the problem's index that returns x, shape (variables,), or None; for a batch, to a
-        function without arguments that returns x of all, shape (batch, variables), and which of them are answers.
+        function without arguments that returns x of all, shape (batch, variables), and which of them are results.
     batch :
         True if it takes all problems at once.
     same_aim :

@@ -48,7 +48,7 @@ class Effort(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """Describe what figures and viewer draw of a carrier beside its anchors."""
+    """Describe what figures and viewer draw of a carrier besides its anchors."""
 
     body: bool  # at its pose, with its name and path
     axes: bool  # of its frame, since it turns

@@ -252,7 +252,7 @@ def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
         notes["the joint's range, q_min to q_max, is left out"] += 1
     end = physical.find("end_location")
     if end is not None and any(end.numbers(3)):
-        notes["the place of the tool, end_location, is left out"] += 1
+        notes["the position of the tool, end_location, is left out"] += 1
     data: dict[str, Any] = {"mass": mass, "com": com.tolist(), "dof": JOINTS[kind], "home": _home(link, joint, kind)}
     inertia = _inertia(physical.child("inertia"), mass, com)
     if set(JOINTS[kind]) & {"roll", "pitch", "yaw"} or min(np.linalg.eigvalsh(inertia_matrix(inertia))) > 0:

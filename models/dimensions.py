@@ -1,4 +1,4 @@
-"""`dimensions`: the coordinates of a robot's datasets over time, the same in plans and flights."""
+"""`dimensions`: the coordinates of a robot's datasets over time, the same in plans and simulations."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def attachments(robot: _WithPoints, pose: np.ndarray) -> np.ndarray:
 def default_home(anchor_points: np.ndarray, attachment_points: np.ndarray) -> np.ndarray:
     """Return a home pose in {G}, (6,) [m, rad]: level, amid the anchors, or below them if the platform hangs.
 
-    The platform counts as suspended if the heights of its anchors differ by less than a tenth of their horizontal
+    The platform is treated as suspended if the heights of its anchors differ by less than a tenth of their horizontal
     spread. Then it is placed as far below their centre as they are wide.
 
     Parameters

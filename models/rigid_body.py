@@ -3,7 +3,7 @@
     force  : m (a_c - g)                       a_c = ddx + alpha x R c + omega x (omega x R c)
     moment : I alpha + omega x I omega         I = R I_b R^T, omega = R Omega, alpha = R (dP dTheta + P ddTheta)
 
-about the CoM, whose place in the platform frame is c. Source: paper F, Eqs. 24 and 29; paper C,
+about the CoM, whose position in the platform frame is c. Source: paper F, Eqs. 24 and 29; paper C,
 Eq. 4, which omits the gyroscopic term, and Eq. 12, which takes ddTheta for the angular acceleration.
 
 A load that the platform carries needs the same about its own CoM, and the moment of its force about the platform's.

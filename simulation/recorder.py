@@ -35,7 +35,7 @@ class Period(NamedTuple):
 
 
 class Recorder(Protocol):
-    """A record of flights."""
+    """A record of runs."""
 
     def take(self, period: Period) -> None:
         """Record a period."""

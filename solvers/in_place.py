@@ -13,7 +13,7 @@ from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
 
 Array = NDArray[np.float64]
 
-RHO = 1e8  # weight of the squared wrench error in a soft answer, beside the squared tensions
+RHO = 1e8  # weight of the squared wrench error in a soft solution, beside the squared tensions
 
 # With up to so many more cables than equations lanes are as quick for one row and several times as quick for many. With
 # more, one row takes 1.5 times as long. A row has the same bits alone and among others: the shape alone decides.
@@ -40,7 +40,7 @@ class InPlace:
     bounds, t_ref :
         Lowest and highest tensions, shape (2, rows, m), and tensions to stay near, shape (rows, m) [N].
     tensions :
-        The answers [N], shape (rows, m); nan where the numbers of a row are no problem.
+        The tensions [N], shape (rows, m); nan where the numbers of a row are no problem.
     code :
         Status of each row, shape (rows,): `STATUSES[int(code)]`.
     direction, shortfall :

@@ -162,7 +162,7 @@ class TensionProblem(Displayed):
 
         All tensions that give w, limits or not, are A^+ w + N lambda; `TensionSolution.lambda_` is the lambda of some.
         The first entry of each column is positive, or the first that is not zero. Singular values of S A below 1e-10
-        of the largest count as zero.
+        of the largest are zero.
         """
         _, sigma, rows = np.linalg.svd(self.scaled_A)
         null = rows[int(np.count_nonzero(sigma > DOUBTFUL * sigma[0])) :].T

@@ -106,7 +106,7 @@ def standard_forms(problem: TensionProblem) -> list[StandardForm]:
     Returns
     -------
     :
-        The standard form, in which singular values below `RANK` of the largest count as zero; before it, if some are
+        The standard form, in which singular values below `RANK` of the largest are zero; before it, if some are
         below `DOUBTFUL`, the coarse form without those.
     """
     apart = problem.t_min < problem.t_max

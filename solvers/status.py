@@ -7,7 +7,7 @@ class Status(StrEnum):
     """The status of a solution; the values are plain strings."""
 
     OPTIMAL = "optimal"
-    """The tensions give w inside the limits, within `TensionProblem.tolerance`, and are the method's answer."""
+    """The tensions give w inside the limits, within `TensionProblem.tolerance`, and are the method's result."""
 
     INFEASIBLE = "infeasible"
     """The limits forbid w; a verified certificate shows along which direction and by how much."""
@@ -18,7 +18,7 @@ class Status(StrEnum):
     if w is in its range the problem may well be optimal."""
 
     INACCURATE = "inaccurate"
-    """The tensions miss w by more than the tolerance, or are not proven to be the method's answer: read `residual` and
+    """The tensions miss w by more than the tolerance, or are not proven to be the method's result: read `residual` and
     `detail` before using them. Either no certificate proves that w is out of reach, or one does and the method is one
     that answers all the same (`Method.always_answers`)."""
 
@@ -27,7 +27,7 @@ class Status(StrEnum):
     problem like that is an `InputError`."""
 
     FAILED = "failed"
-    """A back end gave up, or called the problem infeasible and could not be believed, or the method has no answer here
+    """A back end gave up, or called the problem infeasible and could not be believed, or the method has no result here
     although other methods may have one; `detail` is its message."""
 
 

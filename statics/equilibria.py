@@ -122,7 +122,7 @@ def equilibria(
 
 
 def rest_near(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:
-    """Return a stable equilibrium near a pose, or None: by Newton's method if all cables are taut, else by descent.
+    """Return a stable equilibrium near a pose or None, by Newton's method if all cables are taut, else by descent.
 
     Parameters
     ----------

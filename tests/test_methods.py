@@ -22,7 +22,7 @@ NEW = [name for name in methods() if name not in ("active-set", "qp", "min-norm"
 ALWAYS_FIND = [name for name in NEW if methods()[name].exact]
 CLOSED = ("closed-form", "improved-closed-form")
 
-# Feasible problems to which a method has no answer, by its docstring.
+# Feasible problems to which a method has no result, by its docstring.
 CENTRELESS = {"no limits at all", "no upper limit"}
 DECLINED = {
     "centroid": CENTRELESS,

@@ -167,7 +167,7 @@ def test_what_is_left_out_is_noted(tmp_path):
         "my_bodies.xml: text beside the elements of physical is left out",
         "my_cables.xml: text beside the elements of attachments is left out",
         "the joint's range, q_min to q_max, is left out",
-        "the place of the tool, end_location, is left out",
+        "the position of the tool, end_location, is left out",
         "force_min is missing, taken as 0 N",
         "force_max 1e+10 N, which stands for no limit, is taken as 1e+09 N",
         "the property diameter of cable_ideal is left out",
@@ -417,14 +417,14 @@ def test_command_writes_a_file_that_loads(tmp_path):
     printed = run("import", "caspr", folder)
     assert printed.returncode == 0
     assert parse_yaml(printed.stdout, Robot, "printed") == read_caspr(folder).robot
-    assert "note: the place of the tool, end_location, is left out" in printed.stderr
+    assert "note: the position of the tool, end_location, is left out" in printed.stderr
     assert "note: other cable sets: one" in printed.stderr
     written = run("import", "caspr", folder, "--cable-set", "one", "--out", "mine.yaml", "--json", cwd=tmp_path)
     answer = json.loads(written.stdout)
     assert load(tmp_path / "mine.yaml") == read_caspr(folder, "one").robot
     assert (answer["name"], answer["file"], answer["cable_set"]) == ("my-robot-one", "mine.yaml", "one")
     assert answer["cable_sets"] == ["one", "two"]
-    assert answer["notes"] == ["the place of the tool, end_location, is left out"]
+    assert answer["notes"] == ["the position of the tool, end_location, is left out"]
     assert Robot.model_validate(answer["robot"]) == load(tmp_path / "mine.yaml")
 
 

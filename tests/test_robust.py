@@ -229,7 +229,7 @@ def test_what_robust_does_not_go_with():
         time_along(robot, HOVER | {"robust": 0.95})
     planner = Planner(known("wang-flying", 1e-5), rest)
     assert planner.plan().feasible
-    with pytest.raises(InputError, match="robust must be left out to plan again on the way"):
+    with pytest.raises(InputError, match="robust must be left out to replan"):
         planner.replan({}, 0.1)
     with pytest.raises(InputError, match="robust must be left out if the robot's file has no uncertainty"):
         spread(load("cogiro"), np.zeros((1, 6)), np.ones((1, 8)))

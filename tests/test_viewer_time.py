@@ -194,7 +194,7 @@ def test_two_plans_are_compared_at_the_same_time(compared, folder):
 
 
 def test_only_motions_of_one_robot_are_compared(folder):
-    for other, words in (("cogiro", "must be plans or flights, got the robot cogiro"),):
+    for other, words in (("cogiro", "must be plans or simulations, got the robot cogiro"),):
         with pytest.raises(InputError, match=words):
             read(str(folder / "line.nc"), other=other)
         with pytest.raises(InputError, match=words):

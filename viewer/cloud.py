@@ -76,7 +76,7 @@ def _count(dataset: xr.Dataset, name: str) -> str:
 
 
 def _check_places(positions: np.ndarray, where: str) -> None:
-    """Raise InputError unless all numbers are places that can be drawn."""
+    """Raise InputError unless all numbers are positions that can be drawn."""
     wrong = ~(np.abs(positions) <= FARTHEST)
     if wrong.any():
         raise InputError(f"{where}: positions must be within {FARTHEST:g} m, got {positions[wrong][0]:g}")

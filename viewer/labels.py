@@ -38,7 +38,7 @@ BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:ta
 def readout(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str:
     """Return status, margins, the certificate if there are no tensions, and a row for each cable.
 
-    `other` is the instant of a plan or a flight to compare with: its distance and its tensions are added.
+    `other` is the instant of a plan or a simulation to compare with: its distance and its tensions are added.
     """
     feasible = instant.certificate is None and np.isfinite(instant.tensions).all()
     colour = style.colour(0) if feasible else style.colour(1)

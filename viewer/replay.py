@@ -1,4 +1,4 @@
-"""Replay a saved plan or flight without interpolation: every instant shown was audited, or flown."""
+"""Replay a saved plan or simulation without interpolation: every instant shown was audited, or simulated."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Replay:
     tensions
         (n, m) [N], nan where there are none.
     reference
-        Origin of the platform's frame (n, 3) in {G} [m] where a flight should have it; None for a plan.
+        Origin of the platform's frame (n, 3) in {G} [m] where a simulation should have it; None for a plan.
     obstacles
         Lines (k, 3) in {G} [m] that outline each of the regions to keep out of.
 
@@ -177,7 +177,7 @@ class Replay:
 
 
 def _answers(dataset: xr.Dataset) -> list[str] | None:
-    """Return how each step of a flight was answered; None if the file does not have it."""
+    """Return the status of each step of a simulation; None if the file does not have it."""
     if "answered" not in dataset or "flag_meanings" not in dataset["answered"].attrs:
         return None
     words = str(dataset["answered"].attrs["flag_meanings"]).split()
@@ -188,7 +188,7 @@ def _answers(dataset: xr.Dataset) -> list[str] | None:
 
 
 def _events(dataset: xr.Dataset) -> list[tuple[float, str]]:
-    """Return the times [s] and the words of what happened in a flight; none if its file does not have them."""
+    """Return the times [s] and the texts of the events of a simulation; none if its file does not have them."""
     try:
         listed = json.loads(str(dataset.attrs.get("report", "{}")))["events"]
         found = [(float(event["at_s"]), str(event["what"])) for event in listed]

@@ -43,7 +43,7 @@ class Snapshot(Displayed):
     cut
         Which cables have been cut, (m,); None if none have.
     events
-        What has happened in a flight until now, as texts.
+        Events of a simulation until now, as texts.
     """
 
     pose: np.ndarray

@@ -83,7 +83,7 @@ class Stage:
         return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
     def show(self, instant: Snapshot, other: Snapshot | None = None) -> None:
-        """Draw an instant, and one of another plan or flight as a shadow."""
+        """Draw an instant, and one of another plan or simulation as a shadow."""
         if other is not None:
             self._shadow(other)
         points = instant.points
@@ -156,7 +156,7 @@ class Stage:
             label.visible = shown
 
     def _shadow(self, other: Snapshot) -> None:
-        """Draw platform and cables of another plan or flight."""
+        """Draw platform and cables of another plan or simulation."""
         _place(self._other_platform, other.pose)
         exits = np.where(np.isfinite(other.points.exits), other.points.exits, other.points.anchors)
         self._other_cables.points = np.stack([exits, other.points.attachments], axis=1).astype(np.float32)

@@ -34,9 +34,9 @@ class Subject(Displayed):
     title
         Its title, one line.
     robot
-        The robot, or that of the plan, flight or workspace.
+        The robot, or that of the plan, simulation or workspace.
     replay
-        The instants of a plan or a flight, or None.
+        The instants of a plan or a simulation, or None.
     cloud
         The points of a workspace, or None.
     other
@@ -66,7 +66,7 @@ class Subject(Displayed):
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
     def other_at(self, instant: Snapshot) -> Snapshot | None:
-        """Return the instant of the other plan or flight at the same time, or its last one; None without another."""
+        """Return the instant of the other motion at the same time, or its last one; None without another."""
         if self.other is None or instant.time is None:
             return None
         return self.other.at(self.other.index_at(instant.time), prove=False)
@@ -77,17 +77,17 @@ def read(
     robot: str | os.PathLike[str] | None = None,
     other: str | os.PathLike[str] | None = None,
 ) -> Subject:
-    """Read a robot, a plan, a flight or a workspace.
+    """Read a robot, a plan, a simulation or a workspace.
 
     Parameters
     ----------
     target
-        A robot of the library or a robot file; a plan, a flight or a workspace as NetCDF, or a workspace as a Zarr
+        A robot of the library or a robot file; a plan, a simulation or a workspace as NetCDF, or a workspace as a Zarr
         folder.
     robot
         The robot of a workspace, if it is not in the library: a workspace file has only the name.
     other
-        A plan or a flight to compare a plan or a flight with.
+        A plan or a flight to compare a plan or a simulation with.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def read(
     """
     path = file_path("target", target, ACCEPTED)
     if other is not None:
-        beside = file_path("other", other, "the file of a plan or a flight, or None")
+        beside = file_path("other", other, "the file of a plan or a simulation, or None")
         return _compared(read(path, robot), read(beside), printable(str(beside)))
     where = printable(str(path))
     name = None if robot is None else os.fspath(file_path("--robot", robot, "the name or the file of a robot"))
@@ -111,7 +111,7 @@ def read(
 def _compared(first: Subject, second: Subject, where: str) -> Subject:
     if first.replay is None or second.replay is None:
         wrong = first if first.replay is None else second
-        raise InputError(f"two files to compare must be plans or flights, got the {wrong.kind} {wrong.title}")
+        raise InputError(f"two files to compare must be plans or simulations, got the {wrong.kind} {wrong.title}")
     if (first.robot.name, first.robot.m) != (second.robot.name, second.robot.m):
         raise InputError(f"{where} must be of {first.robot.name} with {first.robot.m} cables, got {second.robot.name}")
     title = f"{first.title}; {second.kind} beside it: {second.title.partition(', ')[2]}"

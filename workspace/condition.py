@@ -43,7 +43,7 @@ class Condition(Part, ABC):
             Condition.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
 
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return whether the condition holds at each of n configurations, (n,); False if a number is not finite.
+        """Return whether the condition holds at each of n configurations, (n,) of bool; False at one with nan or inf.
 
         Raises
         ------
@@ -71,7 +71,7 @@ class Condition(Part, ABC):
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return a distance to fulfilment, (n,), zero exactly where the condition holds.
 
-        Its unit depends on the condition, and it decreases towards fulfilment, which searches use. The default is 1
+        It has a unit of the condition and decreases towards fulfilment, which searches use. The default is 1
         where the condition does not hold. The configurations must be finite.
         """
         return np.where(self.holds(robot, places), 0.0, 1.0)
@@ -163,7 +163,7 @@ class AllOf(Condition):
         return AllOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the sum of the shortfalls x, each mapped to x / (1 + x)."""
+        """Return the sum of the shortfalls x, each mapped to x / (1 + x), in its unit of the condition."""
         return np.sum([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
 
     def why_nowhere(self, robot: Robot) -> str | None:
@@ -186,7 +186,7 @@ class AnyOf(Condition):
         return AnyOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the smallest of the shortfalls x, mapped to x / (1 + x)."""
+        """Return the smallest of the shortfalls x, mapped to x / (1 + x), in its unit of the condition."""
         return np.min([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
 
     def why_nowhere(self, robot: Robot) -> str | None:

@@ -16,7 +16,7 @@ from qpbenchmark.benchmark import main
 HERE = Path(__file__).resolve().parent
 DATA = HERE / "data" / "cdpr.parquet"
 
-# [s]. These QPs take microseconds: 10 ms is no answer to a 1 kHz controller, and with the default of 10 s a single
+# [s]. These QPs take microseconds: 10 ms is no result to a 1 kHz controller, and with the default of 10 s a single
 # failure would outweigh a million good answers in the mean.
 RUNTIME = 0.01
 

@@ -48,7 +48,7 @@ class Fit(NamedTuple):
 
 
 def unobservable_below(eigenvalues: np.ndarray, length: float) -> float:
-    """Return the eigenvalue of the normal equations [1/m^2] below which a direction counts as unobservable.
+    """Return the eigenvalue of the normal equations [1/m^2] below which a direction is unobservable.
 
     An eigenvalue is 1 / sigma^2 of its direction. If sigma exceeds the cable length, the direction is unobservable
     within the validity of the linearisation. Rounding turns zero eigenvalues into 1e-16 of the largest.

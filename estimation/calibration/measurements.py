@@ -55,7 +55,7 @@ class Measurements(Displayed):
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (N, 6), or positions alone, (N, 3). Rows of
         nan were not measured. Default: no pose was measured.
     orientations
-        Orientations of the platform if `poses` are positions or None: (roll, pitch, yaw) [rad], (N, 3), or quaternions
+        Orientations of the platform, unless `poses` includes them: (roll, pitch, yaw) [rad], (N, 3), or quaternions
         (x, y, z, w), (N, 4). Rows of nan were not measured.
     tensions
         Cable tensions [N], (N, m), used to correct elastic elongation of cables with a stiffness. Default: not

@@ -12,12 +12,12 @@ class Costs(NamedTuple):
 
     exact: tuple[int, int]  # outer and inner iterations at full rank
     singular: tuple[int, int]  # the same where the rank is less
-    soft: tuple[int, int]  # the same of a soft answer
+    soft: tuple[int, int]  # the same of a soft solution
     mechanics: int  # operations without sines and cosines
     sines: int  # and cosines
     free: int  # operations of a step whose tensions reach no limit, mechanics included
-    soft_free: int  # operations of a step with a soft answer, without those of iterations
-    outer: int  # operations of an outer iteration of an exact answer at full rank
+    soft_free: int  # operations of a step with a soft solution, without those of iterations
+    outer: int  # operations of an outer iteration of an exact solution at full rank
     inner: int
     soft_outer: int
     soft_inner: int
@@ -99,7 +99,7 @@ class _Solve(NamedTuple):
 
     @property
     def total(self) -> int:
-        """Return the operations of a solve with all its iterations, and of the proof that its answer is the optimum."""
+        """Return the operations of a solve with all its iterations, and of the proof that its result is the optimum."""
         outer, inner = self.iterations
         stationarity = self.k * (2 * self.width + 3 * self.columns)
         return self.start + outer * self.outer + inner * self.inner + stationarity
@@ -108,18 +108,18 @@ class _Solve(NamedTuple):
 def lines_of(bounds: Costs) -> dict[str, list[str]]:
     """Return the lines on `iterations` and on `operations` that the header has."""
     rows = {
-        "exact answer, full rank": bounds.exact,
-        "exact answer, lower rank": bounds.singular,
-        "soft answer": bounds.soft,
+        "exact solution, full rank": bounds.exact,
+        "exact solution, lower rank": bounds.singular,
+        "soft solution": bounds.soft,
     }
     return {
         "iterations": [f"{name:26}{outer:4} outer, {inner:4} inner" for name, (outer, inner) in rows.items()],
         "operations": [
             f"mechanics                 {bounds.mechanics:7}, and {bounds.sines} sines and cosines",
             f"no tension at a limit     {bounds.free:7}, mechanics included",
-            f"exact answer, each outer  {bounds.outer:7}, inner {bounds.inner:7}",
-            f"soft answer, no iteration {bounds.soft_free:7}, mechanics and the attempt at an exact one included",
-            f"soft answer, each outer   {bounds.soft_outer:7}, inner {bounds.soft_inner:7}",
+            f"exact solution, each outer  {bounds.outer:7}, inner {bounds.inner:7}",
+            f"soft solution, no iteration {bounds.soft_free:7}, mechanics and the attempt at an exact one included",
+            f"soft solution, each outer   {bounds.soft_outer:7}, inner {bounds.soft_inner:7}",
             f"all iterations, at most   {bounds.most:7}",
         ],
     }

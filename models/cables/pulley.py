@@ -38,7 +38,7 @@ from . import checks
 
 
 class Exit(NamedTuple):
-    """The places and directions in which m cables leave their pulleys, in the frame of pulleys and attachments.
+    """The points and directions in which m cables leave their pulleys, in the frame of pulleys and attachments.
 
     Attributes
     ----------

@@ -204,7 +204,7 @@ class _Problem:
         )
 
     def misses(self, h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distances of the end beyond its place, (k,) each: the gradient of the energy."""
+        """Return the distances of the end beyond its position, (k,) each: the gradient of the energy."""
         x, z = _reach(h, v, 1.0, self.softness)
         return x - self.x, z - self.z
 

@@ -1,7 +1,7 @@
 """`distribution`: the tensions of a motion in phases, of which each has limits and a ground of its own.
 
-On the ground the support forces are further unknowns of each instant: columns beside those of the cables, with the
-lower limit 0.
+On the ground the support forces are further unknowns of each instant: columns in addition to those of the cables, with
+the lower limit 0.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Check all that a motion must keep beside its tensions: each limit on its own, from the motion alone, densely.
+"""Check all limits of a motion besides its tensions: each limit on its own, from the motion alone, densely.
 
 Each check returns the limits that are exceeded, each at its worst instant (`Excess`); an empty list means that all are
 kept. The formula of a limit is the one that the nonlinear program has (`limits`), evaluated here on the dense grid in
@@ -84,7 +84,7 @@ def _limits(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
 
 
 def _still(audited: AuditedMotion) -> list[Excess]:
-    """Check that carriers keep the coordinates that they cannot change, and their place if only winches move."""
+    """Check that carriers keep the coordinates that they cannot change, and their position if only winches move."""
     robot, exceeded = audited.scenario.robot, []
     for index, carrier in enumerate(robot.carriers):
         if not carrier.moves:
@@ -302,7 +302,7 @@ def _duration(audited: AuditedMotion) -> list[Excess]:
 
 
 def _jumps(audited: AuditedMotion) -> list[Excess]:
-    """Check that platform and carriers continue from each interval into the next without a jump of place or speed."""
+    """Check that positions and velocities of platform and carriers are continuous between intervals."""
     deviation = audited.deviation
     if deviation is None:
         return []
@@ -320,6 +320,6 @@ def _jumps(audited: AuditedMotion) -> list[Excess]:
             jump = np.abs(jump).reshape(len(inner), -1).max(axis=1)
             row = int(jump.argmax())
             if not jump[row] <= tolerance:
-                facts = (float(inner[row]), float(jump[row]), 0.0, unit, "exactly", "a jump of place or speed")
+                facts = (float(inner[row]), float(jump[row]), 0.0, unit, "exactly", "a jump of position or velocity")
                 exceeded.append(Excess("motion", name, *facts))
     return exceeded

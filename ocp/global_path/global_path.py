@@ -3,8 +3,8 @@
 A nonlinear program that starts inside an obstacle, or on its wrong side, stays there. Where the usual guess exceeds a
 limit at rest (`need`), two trees of configurations grow from start and end (`tree`), over the platform's coordinates
 and the shape of its formation (`space`). A configuration is clear if tensions exist there at rest and all limits are
-kept by a reserve (`at_rest`). A straight piece between two is clear if no distance can be exceeded between the places
-that are checked (`clear_space`). Motion is left to the program.
+kept by a reserve (`at_rest`). A straight piece between two is clear if no distance can be exceeded between the
+configurations that are checked (`clear_space`). Motion is left to the program.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class Space(Displayed):
 
     @cached_property
     def loose(self) -> list[int]:
-        """Return the carriers that keep their distance from the platform rather than a place."""
+        """Return the carriers that keep their distance from the platform rather than a position."""
         free = {owner for owner, coordinate in self.scenario.carrier_free if coordinate in POSITION}
         return [i for i in sorted(free) if not self.scenario.robot.carriers[i].confined]
 

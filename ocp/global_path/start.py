@@ -18,7 +18,7 @@ GLOBAL_SHARE = 0.2  # of the time limit
 def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
     """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
 
-    With `balance` a place without tensions at rest counts as a collision.
+    With `balance` a configuration without tensions at rest is a collision.
     """
     scenario = search.scenario
     if scenario.count == 0 or not is_open(scenario):
@@ -30,7 +30,7 @@ def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
         nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
         formation = formation_guess(scenario) if search.seconds_left > 0 else None
         if formation is not None and not guess_exceeds(scenario, formation, balance):
-            stage.message = f"the direct motion exceeds {exceeded}: a formation beside it keeps all limits"
+            stage.message = f"the direct motion exceeds {exceeded}: a shifted formation keeps all limits"
             return formation(nodes), True
         seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
         path, message = find_global_path(scenario, seconds)

@@ -13,7 +13,7 @@ from .state import State
 
 
 class Pair(NamedTuple):
-    """Two bodies: the hull of some points, and that of others or, without others, a convex place that stays."""
+    """Two bodies: the hull of some points, and that of others or, without others, a convex region that is fixed."""
 
     points: ca.SX  # (3, k) [m]
     others: ca.SX  # (3, j) [m], j = 0: a place
@@ -31,7 +31,7 @@ class Distance(Limit):
 
     @abstractmethod
     def pairs(self, state: State) -> list[Pair]:
-        """Return the pairs at one instant, (k,), in a frame in which the places stay."""
+        """Return the pairs at one instant, (k,), in a frame in which the regions are fixed."""
 
     @abstractmethod
     def apart(self, pair: Pair) -> ca.SX:

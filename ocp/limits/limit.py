@@ -107,7 +107,7 @@ class Limit(ABC):
     def on_the_way(self, first: State, second: State) -> ca.SX | None:
         """Return the least values that there are if all points move straight from one instant to another, (k, 1).
 
-        The program keeps these instead of those at its nodes where a step may jump over a place; None if not known.
+        The program keeps these instead of those at its nodes where a step may jump over a region; None if not known.
         """
         return None
 

@@ -28,7 +28,7 @@ class _Outside(Distance):
     place
         Its shape, in {G} or, if it moves with the platform, in the platform's frame.
     called
-        The name of the place.
+        The name of the region.
     riding
         Whether it moves with the platform.
     least
@@ -58,7 +58,7 @@ class _Outside(Distance):
         return beyond if beyond < CORNER * self.thickness else 0.0  # more distance keeps nothing from passing through
 
     def _points(self, state: State, points: ca.SX) -> ca.SX:
-        """Return points (3, k) of {G} in the frame of the place."""
+        """Return points (3, k) of {G} in the frame of the region."""
         return state.on_platform(points) if self._riding else points
 
     @override
@@ -67,13 +67,13 @@ class _Outside(Distance):
         return outside(self._place, *ca.horzsplit(pair.points))
 
     def _way_outside(self, points: ca.SX, later: ca.SX) -> ca.SX:
-        """Return the distances of the lines from points (3, k) to others (3, k) of the place's frame, (k, 1) [m]."""
+        """Return the distances of the lines from points (3, k) to others (3, k) of the region's frame, (k, 1) [m]."""
         ways = zip(ca.horzsplit(points), ca.horzsplit(later), strict=True)
         return ca.vertcat(*(cable_outside(self._place, *way) for way in ways))
 
 
 class PlatformOutside(_Outside):
-    """Keep the platform's CoM and its attachments out of a place that is fixed in {G}."""
+    """Keep the platform's CoM and its attachments out of a region that is fixed in {G}."""
 
     name = "keep_out"
 
@@ -94,7 +94,7 @@ class PlatformOutside(_Outside):
 
 
 class CarriersOutside(_Outside):
-    """Keep the origins of carriers out of a place."""
+    """Keep the origins of carriers out of a region."""
 
     def __init__(self, robot: Robot, which: Sequence[int], place: Place, called: str, riding: bool, least: float):
         super().__init__(place, called, riding, least)
@@ -115,7 +115,7 @@ class CarriersOutside(_Outside):
 
 
 class CablesOutside(_Outside):
-    """Keep the cables out of a place."""
+    """Keep the cables out of a region."""
 
     def __init__(self, robot: Robot, place: Place, called: str, riding: bool, least: float):
         super().__init__(place, called, riding, least)

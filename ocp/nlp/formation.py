@@ -1,6 +1,6 @@
 """Guess a motion that avoids obstacles: how platform and carriers shift, turn and squeeze past them.
 
-A nonlinear program that starts inside a wall, or on its wrong side, stays there. So at each of many places along the
+A nonlinear program that starts inside a wall, or on its wrong side, stays there. So at each of many points along the
 path a few formations are tried: the platform `lateral` and `vertical` of its path and turned by `yaw`, its carriers
 with it and drawn together across the path by `squeeze`, at their distance from the platform. Dynamic programming picks
 the sequence that violates the task's distances least, and among these a short and smooth one; finer tries about it
@@ -96,7 +96,7 @@ class _References:
 
 
 def _across(platform: Motion) -> np.ndarray:
-    """Return the horizontal direction across the platform's velocity; at rest, that of the nearest moving place."""
+    """Return the horizontal direction across the platform's velocity; at rest, that of the nearest moving point."""
     velocity = platform.velocity[:, :2]
     speed = np.linalg.norm(velocity, axis=1)
     moving = np.flatnonzero(speed > 1e-3 * max(speed.max(), 1e-9))
@@ -111,7 +111,7 @@ def _across(platform: Motion) -> np.ndarray:
 
 
 def _loose(scenario: Scenario) -> list[int]:
-    """Return the carriers that keep their places about the platform rather than in {G}."""
+    """Return the carriers that keep their positions relative to the platform rather than in {G}."""
     free = {owner for owner, _ in scenario.owners() if owner is not None}
     return [i for i in free if not scenario.robot.carriers[i].confined]
 
@@ -188,7 +188,7 @@ class _Distances:
 def _best(
     scenario: Scenario, places: _References, beyond: _Distances, tried: np.ndarray, span: np.ndarray
 ) -> np.ndarray:
-    """Return the cheapest sequence of formations (k, 4) among those tried at each place, (k, tries, 4)."""
+    """Return the cheapest sequence of formations (k, 4) among those tried at each point, (k, tries, 4)."""
     count, tries, _ = tried.shape
     every = _References(*(np.repeat(part, tries, axis=0) for part in (places.platform, places.carriers, places.across)))
     passed = beyond(*_placed(scenario, every, tried.reshape(-1, 4))).reshape(count, tries)

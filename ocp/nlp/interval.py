@@ -237,7 +237,7 @@ def _rate_rows(
 def _way_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], whole: list[list[ca.SX]]
 ) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
-    """Yield index, values and rows of the distances from thin places on the straight way from point to point."""
+    """Yield index, values and rows of the distances from thin regions on the straight way from point to point."""
     held = mesh.held(scenario)
     for limit, on_the_way in swept(scenario, mesh).items():
         values: list[ca.SX] = []

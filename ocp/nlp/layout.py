@@ -1,4 +1,4 @@
-"""Define the unknowns of a node of the transcription and their places in its column."""
+"""Define the unknowns of a node of the transcription and their positions in its column."""
 
 from __future__ import annotations
 
@@ -47,65 +47,65 @@ class Layout(Displayed):
 
     @property
     def q(self) -> slice:
-        """Return the place of the free coordinates."""
+        """Return the slice of the free coordinates."""
         return slice(0, self.n)
 
     @property
     def v(self) -> slice:
-        """Return the place of their rates."""
+        """Return the slice of their rates."""
         return slice(self.n, 2 * self.n)
 
     @property
     def a(self) -> slice:
-        """Return the place of their accelerations."""
+        """Return the slice of their accelerations."""
         return slice(2 * self.n, 3 * self.n)
 
     @property
     def jerk(self) -> slice:
-        """Return the place of the jerk, which is empty unless the scheme is smooth."""
+        """Return the slice of the jerk, which is empty unless the scheme is smooth."""
         return slice(3 * self.n, max(self.derivatives - 1, 3) * self.n)
 
     @property
     def snap(self) -> slice:
-        """Return the place of the snap, which is empty unless the scheme is smooth."""
+        """Return the slice of the snap, which is empty unless the scheme is smooth."""
         return slice(self.jerk.stop, self.motion.stop)
 
     @property
     def motion(self) -> slice:
-        """Return the place of the coordinates and all their derivatives."""
+        """Return the slice of the coordinates and all their derivatives."""
         return slice(0, self.derivatives * self.n)
 
     @property
     def tensions(self) -> slice:
-        """Return the place of the tensions, in units of the robot's force."""
+        """Return the slice of the tensions, in units of the robot's force."""
         return slice(self.motion.stop, self.motion.stop + self.m)
 
     @property
     def wind_tensions(self) -> slice:
-        """Return the place of the tensions in the decisive winds of a box, one wind after another, in the same unit."""
+        """Return the slice of the tensions in the decisive winds of a box, one wind after another, in the same unit."""
         start = self.tensions.stop
         return slice(start, start + self.winds * self.m)
 
     @property
     def supports(self) -> slice:
-        """Return the place of the forces of the ground, in the same unit; zero where the platform hangs."""
+        """Return the slice of the forces of the ground, in the same unit; zero where the platform hangs."""
         start = self.wind_tensions.stop
         return slice(start, start + self.grounds)
 
     @property
     def missing(self) -> slice:
-        """Return the place of an elastic program's missing wrenches: as planned, then in each decisive wind."""
+        """Return the slice of an elastic program's missing wrenches: as planned, then in each decisive wind."""
         start = self.supports.stop
         return slice(start, start + 6 * (1 + self.winds) * self.elastic)
 
     @property
     def slacks(self) -> slice:
-        """Return the place of the excesses over soft limits, in their scale."""
+        """Return the slice of the excesses over soft limits, in their scale."""
         start = self.missing.stop
         return slice(start, start + len(self.soft))
 
     def slack_of(self, limit: str) -> int:
-        """Return the place of a soft limit's slack."""
+        """Return the index of a  soft limit's slack."""
         return self.slacks.start + self.soft.index(limit)
 
     def slack(self, x: ca.SX, limit: Limit) -> ca.SX | None:
@@ -114,12 +114,12 @@ class Layout(Displayed):
 
     @property
     def shared(self) -> slice:
-        """Return the place of what all nodes share."""
+        """Return the slice of the shared unknowns."""
         start = self.slacks.stop
         return slice(start, start + len(self.carried))
 
     def at(self, name: str) -> int | None:
-        """Return the place of a shared unknown; None if there is none."""
+        """Return the index of a  shared unknown; None if there is none."""
         return self.shared.start + self.carried.index(name) if name in self.carried else None
 
     @property

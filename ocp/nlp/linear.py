@@ -1,6 +1,6 @@
-"""`LinearDistances`: a program with distances from places that are linear in its unknowns, about one motion at a time.
+"""`LinearDistances`: a program with distances from regions that are linear in its unknowns, about one motion at a time.
 
-A distance from a convex place falls at most as its linear expression does: while it is kept, so is the distance of
+A distance from a convex region falls at most as its linear expression does: while it is kept, so is the distance of
 points that move without turning. IPOPT needs some twenty iterations with such rows, where true distances, whose
 curvature bends the Lagrangian the wrong way, take a hundred. A motion that keeps them is where the next ones are taken,
 and what a few of these passes lead to is near a local optimum of the true program, which starts from it.

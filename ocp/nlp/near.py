@@ -1,4 +1,4 @@
-"""`Near`: the points of a program at which it keeps the distances from places: those near the motion it starts from.
+"""`Near`: the points of a program at which it keeps the distances from regions: those near the motion it starts from.
 
 Most of a motion is far from most obstacles, and distances cost more than all else that a program evaluates. Those that
 it leaves out are evaluated once for its solution; if one is exceeded there, the program is solved again with more.
@@ -30,7 +30,7 @@ class Near(Displayed):
 
     @classmethod
     def along(cls, scenario: Scenario, shares: np.ndarray, motion: Deviation, reach: float) -> Self:
-        """Return the points where a place is nearer than its bound and `reach`, of the motion's extent, permit.
+        """Return the points where a region is nearer than its bound and `reach`, of the motion's extent, permit.
 
         `shares` are those of the motion's duration at the program's points.
         """
@@ -55,7 +55,7 @@ class Near(Displayed):
 
 
 def is_local(limit: Limit) -> bool:
-    """Return whether a limit is a hard distance from a place."""
+    """Return whether a limit is a hard distance from a region."""
     return bool(np.isfinite(limit.thickness)) and limit.soft is None
 
 

@@ -348,7 +348,7 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
 def _on_ground(scenario: Scenario, layout: Layout, nodes: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> None:
     """Bound the forces of the ground, and keep the platform at rest on its path where it is on the ground.
 
-    Place and speed are fixed where it comes to rest: the acceleration, which is zero then, keeps them.
+    Position and velocity are fixed where it comes to rest: the acceleration, which is zero then, keeps them.
     """
     phases, scale = scenario.phases, scenario.robot.force_scale
     if not phases.rest:

@@ -1,4 +1,4 @@
-"""Decide which places are so thin that a motion may jump over them between two nodes: `swept`."""
+"""Decide which regions are so thin that a motion may jump over them between two nodes: `swept`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STEPS = 4  # a motion is rarely that many times as fast as its reference
 def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     """Return the limits that the program keeps between nodes rather than at them, and their functions.
 
-    They are distances from places that are thinner than a few steps of the reference motion. The result is
+    They are distances from regions that are thinner than a few steps of the reference motion. The result is
     empty for teams, since four quadrotors took four times as long through a slot.
     """
     if scenario.count > MANY:

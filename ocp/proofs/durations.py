@@ -1,12 +1,12 @@
 """Compute the durations in which a path can be followed exactly and by its own time law: `durations`.
 
-If all paths stretch, velocities go with 1/T and accelerations with 1/T^2, so at each place of the path the wrench is
+If all paths stretch, velocities go with 1/T and accelerations with 1/T^2, so at each point of the path the wrench is
 
     w(T) = c + d X,    X = (T_0 / T)^2,
 
 with c that of rest and c + d that of the duration T_0: the dynamics are linear in accelerations and quadratic in
 velocities. The X for which tensions inside their limits exist are then an interval, whose ends two linear programs in
-(t, X) give; a duration must lie in the intervals of all places.
+(t, X) give; a duration must lie in the intervals of all points.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Durations(NamedTuple):
         [s]; longest is infinite if rest is possible everywhere. If no duration is possible, shortest is infinite and
         longest zero.
     at
-        The place that decides, as a fraction of the duration: that of `shortest`, or where no duration is possible.
+        The decisive point, as a fraction of the duration: that of `shortest`, or where no duration is possible.
     """
 
     shortest: float
@@ -50,7 +50,7 @@ class Durations(NamedTuple):
 
 
 def durations(scenario: Scenario) -> Durations | None:
-    """Return the durations that are possible at `PLACES` places of the path; None if this method does not apply.
+    """Return the durations that are possible at `PLACES` points of the path; None if this method does not apply.
 
     It does not if anything but the duration is free, a path has times of its own, the drag depends on the speed
     in another way, or the cables have fewer independent columns than the platform has degrees of freedom.

@@ -112,7 +112,7 @@ def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
 
 
 def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray]) -> tuple[Motion, Motion]:
-    """Return the motion in {G} of platform and carriers at start, end and places between, where it is given."""
+    """Return the motion in {G} of platform and carriers at start, end and points between, where it is given."""
     platform, carriers = scenario.motion(times, None)
     owners = scenario.owners()
     for fixed in fixed_values(scenario):
@@ -173,7 +173,7 @@ def _at_no_attitude(
 def _stretched(
     scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
 ) -> list[Excess]:
-    """Return the worst cable that cannot keep the length that its drive fixes, if its carrier's place is given."""
+    """Return the worst cable that cannot keep the length that its drive fixes, if its carrier's position is given."""
     robot = scenario.robot
     if robot.fixed_lengths is None:
         return []

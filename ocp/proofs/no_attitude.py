@@ -1,7 +1,7 @@
 """Prove that an end of a motion collides with an obstacle at every attitude that the tube permits: `no_attitude`.
 
-Where the tube leaves a platform its attitude, but the task fixes the place where it rests, the attitudes are a box of
-angles. A distance changes by at most what points of the platform move, so one value proves all of a small box. Boxes
+Where the tube leaves a platform its attitude, but the task fixes the position where it rests, the attitudes are a box
+of angles. A distance changes by at most what points of the platform move, so one value proves all of a small box. Boxes
 that it does not prove are halved along each angle, until all are proven or an attitude keeps all distances.
 """
 

@@ -1,4 +1,4 @@
-"""`outline`: lines along the surface of a place to keep out of, as figures and viewer draw it."""
+"""`outline`: lines along the surface of a keep-out region, as figures and viewer draw it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ROUND = np.linspace(0.0, 2 * np.pi, 41)
 
 
 def outline(place: AnyKeepOut) -> list[np.ndarray]:
-    """Return lines (n, 3) in {G} [m] along the surface of a place to keep out of."""
+    """Return lines (n, 3) in {G} [m] along the surface of a keep-out region."""
     if isinstance(place, Block):
         return [place.centre + edge @ place.axes.T for edge in box_edges(-place.half, place.half)]
     if isinstance(place, ConvexMesh):

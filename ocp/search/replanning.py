@@ -90,12 +90,12 @@ def _check(scenario: Scenario) -> None:
     task = scenario.task
     where = f"task {task.name!r}"
     if scenario.phases.all:
-        raise InputError(f"{where}: phases must be left out to plan again on the way, got {len(scenario.phases.all)}")
+        raise InputError(f"{where}: phases must be left out to replan, got {len(scenario.phases.all)}")
     if task.robust is not None:
-        raise InputError(f"{where}: robust must be left out to plan again on the way, got {task.robust:g}")
+        raise InputError(f"{where}: robust must be left out to replan, got {task.robust:g}")
     if scenario.relative:
-        raise InputError(f"{where}: path.frame must be world to plan again on the way, got {scenario.path.frame!r}")
+        raise InputError(f"{where}: path.frame must be world to replan, got {scenario.path.frame!r}")
     if task.tube.waypoints == "exact":
-        raise InputError(f"{where}: tube.waypoints must be free to plan again on the way, got exact")
+        raise InputError(f"{where}: tube.waypoints must be free to replan, got exact")
     if isinstance(scenario.path, ReturnPath):
         raise InputError(f"{where}: path must be one that is followed from its beginning, got one of kind return")

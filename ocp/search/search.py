@@ -111,7 +111,7 @@ class Search:
     ) -> Outcome:
         """Solve the program of `mesh` from `guess`; default: from its last solution, or else from a guess of its own.
 
-        A guess is `coarser` if it is the same task's optimum on a coarser mesh, and `clear` if it is past all places
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh, and `clear` if it is past all regions
         that are in the way, as such an optimum is.
         """
         with self.stage(f"{name}, {mesh.steps} steps") as stage:
@@ -151,7 +151,7 @@ class Search:
         return outcome
 
     def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:
-        """Return a motion past the places that are in the way, from which the program of `mesh` soon ends, or None.
+        """Return a motion past the regions that are in the way, from which the program of `mesh` soon ends, or None.
 
         It results from passes with linear distances, each about the motion of the one before. The motion is one of
         `scenario`; default: of the search's own.
@@ -189,7 +189,7 @@ class Search:
         return Outcome(motion, float(motion.nodes[-1]), False, TIME_LIMIT, 0, slack, np.nan)
 
     def _run(self, mesh: Mesh, guess: Deviation | None, coarser: bool, reach: float) -> Outcome:
-        """Run the solver of `mesh`; one that does not exist yet has the places within `reach`."""
+        """Run the solver of `mesh`; one that does not exist yet has the regions within `reach`."""
         start, self.mesh = time.perf_counter(), mesh
         known = self._solvers.get(mesh)
         again = known is not None and guess is None and known.has_solution  # continues from there, with its own rows
@@ -209,7 +209,7 @@ class Search:
         return outcome
 
     def _built(self, mesh: Mesh, guess: Deviation | None, reach: float) -> Program:
-        """Return the program of `mesh`, without the rows of places that are farther than `reach` from the guess."""
+        """Return the program of `mesh`, without the rows of regions that are farther than `reach` from the guess."""
         scenario = self.scenario
         if not has_places(scenario) or not np.isfinite(reach):
             return build(scenario, mesh)

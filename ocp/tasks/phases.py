@@ -93,7 +93,7 @@ class Phases(Displayed):
 
     @cached_property
     def jumps(self) -> list[float]:
-        """Return the times at which the load changes with no phase on the ground beside it: the tensions jump [s]."""
+        """Return the times at which the load changes with no adjacent phase on the ground: the tensions jump [s]."""
         return [
             after.start
             for before, after in pairwise(self.all)

@@ -40,7 +40,7 @@ class Scenario(Displayed):
     Attributes
     ----------
     path
-        That of the platform: the task's, or the same places by a time law that the planner chose.
+        That of the platform: the task's, or the same geometry with a time law that the planner chose.
     relative
         Whether the platform's path is given in the frame of the robot's only carrier.
     platform_free
@@ -50,7 +50,7 @@ class Scenario(Displayed):
     phases
         Those of the task, if it has some.
     tightened
-        By how much the tension limits are tightened for the robots of an uncertainty, (m,) [N]; default: not.
+        By how much the tension limits are tightened for the uncertain robots, (m,) [N]; default: not.
     """
 
     robot: Robot
@@ -83,7 +83,7 @@ class Scenario(Displayed):
 
     @property
     def stretches(self) -> bool:
-        """Return whether another duration means the same places of all paths, later or sooner."""
+        """Return whether another duration only changes the time along all paths."""
         return all(path.stretches for path in (self.path, *self.carrier_paths.values()))
 
     @property

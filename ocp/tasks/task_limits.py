@@ -134,7 +134,7 @@ class TaskLimits(Part):
         description="least distance of the origins of carriers [m]; radius: the sum of the radii of both bodies, such "
         "as quadrotors",
     )
-    keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="places to keep out of")
+    keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="keep-out regions")
     soft: dict[str, Positive] = Field(
         default={},
         description="by the name of a limit, the excess that adds 1 to the objective; twice the excess adds 4",

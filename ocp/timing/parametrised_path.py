@@ -35,7 +35,7 @@ LOOKS = 2001  # points at which the geometry is checked
 
 
 class PathLimits(NamedTuple):
-    """The limits beside those of the tensions, all of whose values are proportional to speeds or to accelerations."""
+    """The limits besides those of the tensions, all of whose values are proportional to speeds or to accelerations."""
 
     speeds: Limits
     accelerations: Limits
@@ -98,7 +98,7 @@ class ParametrisedPath:
 
     @property
     def dwell(self) -> dict[float, float]:
-        """Return s of the places at which platform or carriers must rest, and how long they dwell there [s]."""
+        """Return s of the points at which platform or carriers must rest, and how long they dwell there [s]."""
         longest: dict[float, float] = {}
         for path in (self.path, *self.carriers.values()):
             for s, seconds in path.rests():
@@ -106,7 +106,7 @@ class ParametrisedPath:
         return longest
 
     def pieces(self, intervals: int) -> list[np.ndarray]:
-        """Return the grids of s between the places of rest: about so many intervals together, more in sharp bends."""
+        """Return the grids of s between the points of rest: about so many intervals together, more in sharp bends."""
         bends = np.vstack([path.bends() for path in (self.path, *self.carriers.values())])
         rests = np.array(sorted(self.dwell))
         edges = np.concatenate([[0.0], rests[(rests > 0) & (rests < 1)], [1.0]])

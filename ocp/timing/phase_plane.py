@@ -23,7 +23,7 @@ FLAT = 1e-9  # relative: a wrench that lies so near to the span of the cables li
 
 @dataclass(frozen=True)
 class PhasePlane(Displayed):
-    """The limits of a motion along a path, at N places of it.
+    """The limits of a motion along a path, at N points of it.
 
     Wrenches are those of the coordinates that can move, moments over `Robot.length`, all in newtons.
 
@@ -57,7 +57,7 @@ class PhasePlane(Displayed):
         return a, b, c
 
     def rests_at_ends(self, weight: float) -> bool:
-        """Return whether the platform can rest at the first and the last place."""
+        """Return whether the platform can rest at the first and the last point."""
         return bool((self.rows(weight)[2][[0, -1]] <= 0).all())
 
     def tension_rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -69,7 +69,7 @@ class PhasePlane(Displayed):
 
 @dataclass(frozen=True)
 class Proof(Displayed):
-    """A proof that at one place of the path no allowed speed and acceleration has tensions inside their limits.
+    """A proof that at one point of the path no allowed speed and acceleration has tensions inside their limits.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ def phase_plane(
     reserve: np.ndarray | float = 0.0,
     shrink: float = 0.0,
 ) -> PhasePlane:
-    """Return the limits at the places s (N,).
+    """Return the limits at the points s (N,).
 
     Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other limits
     reduced by the share `shrink`.
@@ -122,7 +122,7 @@ def phase_plane(
 
 
 def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:
-    """Return proofs for the places among s, (N,), at which no speed and acceleration is allowed.
+    """Return proofs for the points among s, (N,), at which no speed and acceleration is allowed.
 
     At the first and the last that is rest, which lasts, so that the platform does not accelerate there either.
     """

@@ -200,7 +200,7 @@ def _shown(task: Task, law: FastestLaw) -> Plan:
     scenario = lay_out(law.parametrised.robot, _timed(task, law))
     audited = replace(audit(scenario, None, to_show=True), excess=[], certificate=None)
     if law.certificate is None:
-        reason = f"no time law joins the places of the path; the search ended at s = {law.at:.4g}"
+        reason = f"no time law connects the points of the path; the search ended at s = {law.at:.4g}"
         return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
     at = float(law.path.time_at(np.array([law.at]))[0])
     audited = replace(audited, certificate=replace(law.certificate, time=at))
@@ -208,7 +208,7 @@ def _shown(task: Task, law: FastestLaw) -> Plan:
 
 
 class _Stretches(NamedTuple):
-    """Stretches of s, from places of a grid to others, and the largest wrench that misses in each, (k,) [N]."""
+    """Stretches of s, from points of a grid to others, and the largest wrench that misses in each, (k,) [N]."""
 
     start: np.ndarray
     end: np.ndarray
@@ -260,7 +260,7 @@ def _piece(
 
 
 def _proven(law: FastestLaw, pieces: list[_Piece]) -> FastestLaw | None:
-    """Return where no speed and acceleration are possible, with the proof of the worst place; None if nowhere."""
+    """Return where no speed and acceleration are possible, with the proof of the worst point; None if nowhere."""
     weight = law.parametrised.robot.force_scale
     proven = [
         proof

@@ -1,4 +1,4 @@
-"""Carriers that come nearer to places or to each other than their bodies are wide: `into_places`, `into_each_other`."""
+"""Carriers whose bodies enter keep-out regions or overlap: `into_places`, `into_each_other`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Meeting = tuple[float, str]  # by how much [m], and the sentence
 
 
 def into_places(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.ndarray]) -> list[str]:
-    """Return a sentence if a carrier reaches into a place, because the task states less than the radius of its body.
+    """Return a sentence if a carrier enters a region, because the task states less than the radius of its body.
 
     Parameters
     ----------

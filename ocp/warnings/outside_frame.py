@@ -31,7 +31,7 @@ class Side(NamedTuple):
 def outside_frame(seen: Instants) -> list[str]:
     """Return a sentence for each side of the robot's frame that the CoM of the platform or an attachment leaves.
 
-    The frame is the box of the anchors during the motion; below, the plane z = 0 of {G} counts as the floor if gravity
+    The frame is the box of the anchors during the motion; below, the plane z = 0 of {G} is the floor if gravity
     points down and no anchor is lower. A side beyond which the platform is at home, or for a robot without `home` at
     the start of the motion, does not count: a robot whose {G} lies in the ceiling has no floor, and a robot that lifts
     its platform over its anchors has no top. Anchors in one vertical plane have no sides across it, since a platform

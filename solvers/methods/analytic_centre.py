@@ -16,7 +16,7 @@ class AnalyticCentre(Method):
     Existence: wherever the problem is feasible and the feasible tensions are bounded; failed if they are unbounded.
     With w on the very boundary it is the centre of the cables that have a choice. Cables without any limit have no
     influence. A smooth function of A (of constant rank), w and the limits; t_ref and weights play no part. Like
-    "centroid" without its geometry: any m - rank costs the same, about ten Newton steps, few from the last answer
+    "centroid" without its geometry: any m - rank costs the same, about ten Newton steps, few from the last solution
     (`start`). Outside the feasible set: a certificate.
     """
 
@@ -28,7 +28,7 @@ class AnalyticCentre(Method):
     exact = True
     continuous = True
     options: ClassVar[dict[str, str] | None] = {
-        "start": "tensions to start from [N], shape (m,), for example the last answer; they need not give w"
+        "start": "tensions to start from [N], shape (m,), for example the last solution; they need not give w"
     }
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

@@ -21,9 +21,9 @@ class ClosedForm(Method):
     """Pseudo-inverse solution nearest to the middle of the limits.
 
     Existence: not guaranteed; the tensions may leave the limits though the problem is feasible (status failed, `detail`
-    names the cable). Continuous and even smooth in w wherever it answers. Cost: one product with the pseudo-inverse.
-    Outside the feasible set: a certificate. A cable without two limits has t_ref, moved inside the limits, for a
-    middle; t_ref plays no other part.
+    names the cable). Continuous and even smooth in w wherever it returns tensions. Cost: one product with the
+    pseudo-inverse. Outside the feasible set: a certificate. A cable without two limits has t_ref, moved inside the
+    limits, for a middle; t_ref plays no other part.
     """
 
     name = "closed-form"

@@ -21,11 +21,11 @@ class LogBarrier(Method):
     """Continuously differentiable distribution, strictly inside the limits.
 
     Existence: wherever the problem is feasible; with w on the very boundary only the cables that have a choice stay off
-    their limits. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where
-    a cable comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance
-    of about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: about
-    ten Newton steps from the middle of the limits, one to six from the last answer (`start`). Outside the feasible set:
-    a certificate.
+    their limits. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where a
+    cable comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance of
+    about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: about ten
+    Newton steps from the middle of the limits, one to six from the last solution (`start`). Outside the feasible set: a
+    certificate.
     """
 
     name = "log-barrier"
@@ -39,7 +39,7 @@ class LogBarrier(Method):
     options: ClassVar[dict[str, str] | None] = {
         "barrier": "square root of mu in units of the narrowest range t_max - t_min (of 1 N if there is none); 0.01 if "
         "not given",
-        "start": "tensions to start from [N], shape (m,), for example the last answer; they need not give w",
+        "start": "tensions to start from [N], shape (m,), for example the last solution; they need not give w",
     }
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

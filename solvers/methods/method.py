@@ -62,7 +62,7 @@ class Method(ABC):
     multipliers prove it."""
 
     seeks_reference: ClassVar[bool] = False
-    """True if s = 0, tensions at t_ref, is the method's answer wherever it is a feasible one."""
+    """True if s = 0, tensions at t_ref, is the method's result wherever it is a feasible one."""
 
     always_answers: ClassVar[bool] = False
     """True if the tensions are worth having even if w is out of reach: then they come with the certificate."""

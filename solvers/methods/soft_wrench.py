@@ -48,7 +48,8 @@ class SoftWrench(Method):
     least_squares = True
     always_answers = True
     options: ClassVar[dict[str, str] | None] = {
-        "rho": "weight of the squared wrench error beside the squared tensions, 1e-12 to 1e12; infinite if not given"
+        "rho": "weight of the squared wrench error relative to the squared tensions, 1e-12 to 1e12; infinite if not "
+        "given"
     }
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:

@@ -35,16 +35,16 @@ class PathBase(Part):
 
     @property
     def stretches(self) -> bool:
-        """Return whether another duration means the same places, later or sooner."""
+        """Return whether another duration only changes the time along the path."""
         return self.natural_duration is None and not self.resting
 
     @property
     def resting(self) -> float:
-        """Return for how long of the duration the path dwells at places [s]."""
+        """Return for how long of the duration the path dwells [s]."""
         return 0.0
 
     def rests(self) -> list[tuple[float, float]]:
-        """Return s of each place inside at which every motion along the path must rest, and how long it dwells [s]."""
+        """Return s of each inner point at which every motion along the path must rest, and how long it dwells [s]."""
         return []
 
     def bends(self) -> np.ndarray:

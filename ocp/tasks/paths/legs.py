@@ -163,7 +163,7 @@ class Legs(Displayed):
         return np.concatenate([[0.0], self._corners[0], [1.0]])
 
     def rests(self) -> list[tuple[float, float]]:
-        """Return s of each place where the path has to rest, and for how long [s]; its ends if it dwells there."""
+        """Return s of each point where the path must stop, and for how long [s]; its ends if it dwells there."""
         at = self.places
         inner = np.concatenate([[False], self._overlaps == 0, [False]])
         return [(float(at[k]), float(self.dwell[k])) for k in np.flatnonzero(inner | (self.dwell > 0))]
@@ -211,7 +211,7 @@ class Legs(Displayed):
 
     @cached_property
     def angles(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return places s along the path, (k,), and (roll, pitch, yaw) there without jumps, (k, 3)."""
+        """Return points s along the path, (k,), and (roll, pitch, yaw) there without jumps, (k, 3)."""
         edges = self.places
         s = np.append((edges[:-1, None] + np.diff(edges)[:, None] * np.arange(LOOKS) / LOOKS).ravel(), 1.0)
         progress = self._progress(s)

@@ -3,7 +3,7 @@
 Acceleration and jerk are zero at both ends: where carriers must be depends on the platform's acceleration, so they can
 start and end at rest only if its acceleration and jerk are zero there. The smoother law is zero up to the fifth
 derivative: where fewer than six cables hold a platform on an exact path, its acceleration determines the directions of
-the cables, hence the places of the quadrotors; and these rest only if their jerk, which turns their thrust, is zero.
+the cables, hence the positions of the quadrotors; and these rest only if their jerk, which turns their thrust, is zero.
 """
 
 from __future__ import annotations

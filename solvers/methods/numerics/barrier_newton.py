@@ -5,11 +5,11 @@ $$
 \quad \text{s.t.} \quad Q s = b
 $$
 
-Far from the answer the plain Newton method crawls along the limits: with w not met yet, or with weights that differ by
-thousands, hundreds of short steps. So primal-dual steps (Wright 1997, chapter 5), in which each distance to a limit has
-a multiplier of its own, lead from any point, the last answer along a motion if there is one, to where plain Newton
-steps converge at once. Should they get stuck, a linear program finds a point to start from, from where damped steps
-cannot fail: the function is self-concordant (Boyd and Vandenberghe 2004, section 9.6).
+Far from the solution the plain Newton method crawls along the limits: with w not met yet, or with weights that differ
+by thousands, hundreds of short steps. So primal-dual steps (Wright 1997, chapter 5), in which each distance to a limit
+has a multiplier of its own, lead from any point, the last solution along a motion if there is one, to where plain
+Newton steps converge at once. Should they get stuck, a linear program finds a point to start from, from where damped
+steps cannot fail: the function is self-concordant (Boyd and Vandenberghe 2004, section 9.6).
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 r"""Linear programs of the tensions, by HiGHS, and the tensions nearest to t_ref among their solutions.
 
 A linear program often has many solutions and a solver returns any of them. Here the one nearest to t_ref is taken,
-which makes the answer unique and, for a fixed wrench matrix, continuous in w. It is not continuous as the cables turn:
-where an edge of the feasible tensions turns past the cost's direction, all linear programs jump.
+which makes the solution unique and, for a fixed wrench matrix, continuous in w. It is not continuous as the cables
+turn: where an edge of the feasible tensions turns past the cost's direction, all linear programs jump.
 """
 
 import numpy as np
