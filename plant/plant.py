@@ -367,7 +367,7 @@ class Plant:
                 list(pool.map(run_rows, edges[:-1], edges[1:]))
         if not np.isfinite(history[:, -1]).all():
             raise SolverError(
-                f"the motion of {self.robot.name} grows beyond all numbers in steps of {period / substeps:g} s: use "
+                f"the motion of {self.robot.name} diverges in steps of {period / substeps:g} s: use "
                 f"more substeps, or a stiffness if cables that do not stretch get lengths that no pose has"
             )
         times = period * keep * np.arange(kept)

@@ -46,7 +46,7 @@ _FLOAT = """#ifndef TOWLINE_FLOAT
 def export_step(
     robot: Robot | str | os.PathLike[str], folder: str | os.PathLike[str], precision: str = "double"
 ) -> Path:
-    """Write one control step of a robot as C: from its state and a wanted acceleration to tensions and certificate.
+    """Write one control step of a robot as C: from its state and a desired acceleration to tensions and certificate.
 
     The folder gets `towline_step.h` and `towline_step.c`, which need only a C99 compiler with `sin`, `cos` and `sqrt`,
     an example `main.c` that computes steps from its standard input, a `Makefile` and a `README.md`. All or nothing is
@@ -121,7 +121,7 @@ def _columns(moving: list[str], has_wind: bool) -> list[tuple[int, int, str]]:
     groups = [
         (6, "pose of the platform: x, y, z, roll, pitch, yaw"),
         (6, "its velocity"),
-        (6, "its wanted acceleration"),
+        (6, "its desired acceleration"),
     ]
     groups += [(6, f"pose of carrier {name}") for name in moving]
     groups += [(3, "wind, in {G}")] if has_wind else []

@@ -87,7 +87,7 @@ def _run(
 ) -> np.ndarray:
     """Return poses (count, 6) after each of `count` steps of 2 `stride` samples, from the plan at `row`.
 
-    `steps` makes all steps of `_forward` in one call. Poses are nan once the motion has diverged beyond all numbers.
+    `steps` makes all steps of `_forward` in one call. Poses are nan once the motion has diverged.
     """
     motion, carriers, tensions = plan
     at = row + stride * (2 * np.arange(count)[:, None] + np.arange(3)).ravel()  # beginning, middle, end of each step

@@ -142,7 +142,7 @@ def _offset(whole: Scenario, last: Plan, at: np.ndarray, time: float, state: Ini
 
 
 def _from(path: AnyPath, duration: float, time: float, settle: float, offset: dict[str, Any]) -> ReturnPath:
-    """Return the rest of a path."""
+    """Return the remainder of a path."""
     given = {"path": path, "duration": duration, "start": time, "settle": settle}
     return ReturnPath(kind="return", frame=path.frame, **given, **offset)
 

@@ -39,7 +39,7 @@ class Replanner:
     Raises
     ------
     InputError
-        If the rest of its task cannot be planned.
+        If the remainder of its task cannot be planned.
     """
 
     def __init__(self, first: Plan, climb: Callable[[Search, Deviation | None], Plan]):
@@ -50,7 +50,7 @@ class Replanner:
         self._solvers: dict[Mesh, Solver] = {}
 
     def search(self, state: Any, time: Any, settle: Any, progress: Progress | None) -> tuple[Search, Deviation | None]:
-        """Return the search for the rest of the motion from `time` [s] on, and a guess.
+        """Return the search for the remainder of the motion from `time` [s] on, and a guess.
 
         Raises
         ------
