@@ -469,7 +469,7 @@ def test_a_motion_that_no_numbers_hold_never_passes():
     push = {"disturbance": np.full(6, 1e300), "duration": 0.05}
     alone = simulate(robot, robot.home, **push)
     assert not alone.passed
-    assert "beyond all numbers" in alone.report()
+    assert "the simulation diverged" in alone.report()
     many = simulate(robot, robot.home, **push, runs=2)
     assert not many["passed"].values.any()
     assert np.isfinite(many["error_max"].values).all()
