@@ -24,7 +24,7 @@ def with_addresses(readme: str, repository: str, version: str) -> str:
     """Return a README whose links and pictures are addresses in the repository, at the tag of a version."""
 
     def address(match: re.Match[str]) -> str:
-        kind = "raw" if match["path"].endswith(".png") else "blob"
+        kind = "raw" if match["path"].endswith((".png", ".gif")) else "blob"
         return f"{match['before']}{repository}/{kind}/v{version}/{match['path']}"
 
     return PATH.sub(address, readme)

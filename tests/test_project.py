@@ -45,7 +45,7 @@ def test_on_a_package_index_every_link_is_an_address_at_the_release(shown):
     assert len(addresses) == len(targets(README))
     for path, address in zip(targets(README), addresses, strict=True):
         if not path.startswith("#"):
-            kind = "raw" if path.endswith(".png") else "blob"
+            kind = "raw" if path.endswith((".png", ".gif")) else "blob"
             assert address == f"{REPOSITORY}/{kind}/v{VERSION}/{path}"
     assert shown.replace(f"{REPOSITORY}/blob/v{VERSION}/", "").replace(f"{REPOSITORY}/raw/v{VERSION}/", "") == README
 
