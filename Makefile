@@ -23,6 +23,7 @@ setup: .venv/dev.stamp
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/clang-format --dry-run -Werror core/*.h core/*/*.[ch]
 
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python

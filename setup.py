@@ -107,7 +107,7 @@ def main() -> None:
         depends=["setup.py", *sorted(str(path) for path in Path(CORE).rglob("*.h"))],
         include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
-        extra_compile_args=[] if sys.platform == "win32" else FLAGS,
+        extra_compile_args=[] if sys.platform == "win32" else [*FLAGS, *os.environ.get("CFLAGS", "").split()],
         py_limited_api=True,
     )
     # Named as the script, this file is no module of the package, whichever program runs it.
