@@ -177,7 +177,10 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
     ]
     if not box.samples:
         where = f"in the box {', '.join(sides)}" if sides else "at any position"
-        return [f"  can rest, {attitude}, {where}: the carriers move along, since the cables keep their lengths"]
+        return [
+            f"  can rest, {attitude}, {where}",
+            "    (the carriers move along, since the cables keep their lengths)",
+        ]
     lines = [f"  can rest, {attitude} and with its carriers at home, in the box", f"    {', '.join(sides)}"]
     if (box.centre != robot.home[:3]).any():
         lines[0] += f" about ({quantity_row(box.centre)}) m, the nearest sample at which it can"
