@@ -59,6 +59,7 @@ pictures: .venv/core.stamp
 	cd build && ../$(BIN)/towline plan ipanema-1 lift.yaml --vary margin=0:40:5 --vary duration=0.2:1.2:0.1 \
 		--figures ../docs/pictures
 	cd build && ../$(BIN)/towline robots cogiro --figure ../docs/pictures/cogiro.png
+	$(BIN)/python docs/draw_reference.py
 	cd build && ../$(BIN)/towline workspace cogiro --samples 20000 --figure ../docs/pictures/cogiro-workspace.png
 
 clean:

@@ -39,7 +39,7 @@ class Robot(DisplayedRobot):
     The arrays below are what computations read; each has one row per cable or carrier, in the order of the file.
     """
 
-    name: Name
+    name: Name = Field(description="of the robot, in reports and names of files")
     source: str = Field(min_length=1, description="where the numbers come from, and which are assumed")
     gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="in {G} [m/s^2]")
     drive: Drive = Field(
@@ -50,8 +50,8 @@ class Robot(DisplayedRobot):
         "if all cables hang from quadrotors or mobile carriers and none has a winch, an encoder or a pulley; else both",
     )
     platform: Platform
-    carriers: tuple[AnyCarrier, ...] = Field(min_length=1)
-    cables: tuple[Cable, ...] = Field(min_length=1)
+    carriers: tuple[AnyCarrier, ...] = Field(min_length=1, description="what the cables hang from")
+    cables: tuple[Cable, ...] = Field(min_length=1, description="in the order in which results number them")
     uncertainty: Uncertainty | None = Field(
         default=None, description="how well numbers of the cables are known; default: they count as exact"
     )
