@@ -97,6 +97,7 @@ def test_an_infeasible_variant_comes_with_advice(tmp_path):
     refused = run("plan", "mine.yaml", "mine-task.yaml", cwd=tmp_path)
     assert refused.returncode == 1
     assert "INFEASIBLE" in refused.stdout
+    assert [path.name for path in tmp_path.glob("*.nc")] == ["mine-first-infeasible.nc"]  # it replaces no good plan
     advised = re.search(r"feasible duration +([\d.]+) s", refused.stdout)[1]
     task.write_text(text.replace("duration: 6 ", f"duration: {float(advised) + 0.001} "))
     assert run("plan", "mine.yaml", "mine-task.yaml", cwd=tmp_path).returncode == 0

@@ -57,7 +57,7 @@ def test_addresses_stay_as_they_are():
 
 
 def test_the_address_of_the_repository_has_one_place():
-    """The others beside it and that of the citation begin with `Repository`, and no other file has it."""
+    """The others and that of the citation begin with `Repository`, and the README clones it; no other file has it."""
     others = {"Documentation": "/tree/main/docs", "Changelog": "/blob/main/CHANGELOG.md", "Issues": "/issues"}
     assert PROJECT["urls"] == {"Repository": REPOSITORY} | {name: REPOSITORY + path for name, path in others.items()}
     owner = REPOSITORY.rpartition("/")[0]
@@ -65,7 +65,8 @@ def test_the_address_of_the_repository_has_one_place():
     texts = [path for path in texts if path.suffix in (".cff", ".md", ".py", ".toml", ".txt", ".yml")]
     named = {path.name for path in texts if f"{owner}/" in path.read_text(encoding="utf-8")}
     assert len(texts) > 100
-    assert named == {"pyproject.toml", "CITATION.cff"}
+    assert named == {"pyproject.toml", "CITATION.cff", "README.md"}
+    assert f"\ngit clone {REPOSITORY} && cd towline\n" in README
 
 
 def test_the_citation_is_of_this_project():
