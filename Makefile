@@ -23,6 +23,7 @@ setup: .venv/dev.stamp
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/clang-format --dry-run -Werror core/*.h core/*/*.[ch]
 
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
@@ -47,15 +48,18 @@ errata: .venv/core.stamp
 	  cp build/$$paper/$$paper-errata.md docs/errata/$$paper.md || exit 1; \
 	done
 
-# Runs the demo, every example where the README's pictures are, and a sweep; plans saved there are ignored by git.
+# Runs the demo, every example where the documentation's pictures are, and a sweep; plans saved there are ignored by git.
 pictures: .venv/core.stamp
 	mkdir -p docs/pictures build
 	cd build && ../$(BIN)/towline demo && cp towline-demo/tensions.png ../docs/pictures/circle.png
+	printf 'name: circle\npath: {kind: circle, centre: [0, 0, -1], radius: 0.8, rate: 0.8}\nbase: {kind: free, ends: periodic}\n' > build/circle.yaml
+	cd build && ../$(BIN)/towline plan wang-flying-quadrotor circle.yaml --animate ../docs/pictures/hero.gif --fps 12
 	cd docs/pictures && for example in ../../examples/*.py; do ../../$(BIN)/python $$example || exit 1; done
 	printf 'name: lift\npath: {kind: line, start: [0, 0, 1], end: [0.6, 0.4, 1.6]}\nduration: 3\n' > build/lift.yaml
 	cd build && ../$(BIN)/towline plan ipanema-1 lift.yaml --vary margin=0:40:5 --vary duration=0.2:1.2:0.1 \
 		--figures ../docs/pictures
 	cd build && ../$(BIN)/towline robots cogiro --figure ../docs/pictures/cogiro.png
+	$(BIN)/python docs/draw_reference.py
 	cd build && ../$(BIN)/towline workspace cogiro --samples 20000 --figure ../docs/pictures/cogiro-workspace.png
 
 clean:

@@ -24,7 +24,7 @@ def with_addresses(readme: str, repository: str, version: str) -> str:
     """Return a README whose links and pictures are addresses in the repository, at the tag of a version."""
 
     def address(match: re.Match[str]) -> str:
-        kind = "raw" if match["path"].endswith(".png") else "blob"
+        kind = "raw" if match["path"].endswith((".png", ".gif")) else "blob"
         return f"{match['before']}{repository}/{kind}/v{version}/{match['path']}"
 
     return PATH.sub(address, readme)
@@ -107,7 +107,7 @@ def main() -> None:
         depends=["setup.py", *sorted(str(path) for path in Path(CORE).rglob("*.h"))],
         include_dirs=[CORE, f"{CORE}/distribution"],
         define_macros=[("Py_LIMITED_API", "0x030B0000"), ("TOWLINE_CABLES", "32")],
-        extra_compile_args=[] if sys.platform == "win32" else FLAGS,
+        extra_compile_args=[] if sys.platform == "win32" else [*FLAGS, *os.environ.get("CFLAGS", "").split()],
         py_limited_api=True,
     )
     # Named as the script, this file is no module of the package, whichever program runs it.

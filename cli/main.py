@@ -27,6 +27,7 @@ from .stopping import end, requested
 COMMANDS = {
     "demo": "Plan, draw and simulate a circle of a flying cable robot.",
     "robots": "List the robots of the library, or diagnose one.",
+    "new": "Write a commented robot file and a feasible task for it, to edit.",
     "tension": "Compute the cable tensions at one pose, by every method.",
     "pose": "Estimate the pose of the platform from its cable lengths.",
     "plan": "Plan a motion that keeps every tension inside its limits.",

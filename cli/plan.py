@@ -39,8 +39,9 @@ TaskArgument = Annotated[Path, typer.Argument(metavar="TASK", help="A task file 
 OutOption = Annotated[
     Path | None,
     typer.Option(
-        help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files. An "
-        "existing file is overwritten."
+        help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files, and "
+        "ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing file is "
+        "overwritten."
     ),
 ]
 FiguresOption = Annotated[
@@ -129,13 +130,16 @@ def plan(
     from ..ocp import read_task
 
     loaded, read = load(robot), read_task(task)
-    target = check_ending("--out", out or Path(f"{loaded.name}-{read.name}.nc"), ".nc")
+    usual = f"{loaded.name}-{read.name}"
+    target = check_ending("--out", out or Path(f"{usual}.nc"), ".nc")
     if report is not None:
         check_ending("--report", report, ".html", ".htm")
     drawn = figures and figures / f"path.{form}"
     check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": drawn})
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         planned = plan_motion(loaded, read, watch, robust=robust)
+        if out is None and not planned.feasible:  # it replaces no plan that is
+            target = Path(f"{usual}-{planned.status}.nc")
         written = {"file": planned.save(target)}
         if not planned.feasible:
             watch.now("searching for feasible tasks near this one")

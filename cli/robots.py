@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ..models import Robot
     from ..models.diagnosis import Diagnosis
     from ..solvers import TensionSolution
+    from ..workspace.resting_box import RestingBox
 
 MOVES = {
     "both": "winches change the lengths of cables, and carriers may move",
@@ -35,8 +36,8 @@ def robots(
 ) -> None:
     """List the robots of the library, or diagnose one.
 
-    The diagnosis reports the rank of the wrench matrix (and why, if it is deficient), the tensions at rest at home or
-    the proof that none exist, and warnings about implausible numbers.
+    The diagnosis reports the rank of the wrench matrix (and why, if it is deficient), the tensions at rest at home or the
+    proof that none exist, a box of positions at which the platform can rest, and warnings about implausible numbers.
     """
     if schema:
         from ..models import Robot
@@ -51,18 +52,20 @@ def robots(
         from ..models.diagnosis import diagnose
         from ..solvers import solve
         from ..statics.distribution import pose_problem
+        from ..workspace.resting_box import resting_box
 
         robot = load(name)
         check_outputs({"--figure": figure})
         at_home = solve(pose_problem(Dynamics(robot), robot.home))
-        result = _to_dict(robot, diagnose(robot), at_home)
+        box = resting_box(robot)
+        result = _to_dict(robot, diagnose(robot), at_home, box)
         if figure is not None:
             _draw(robot, at_home, figure)
             result["figure"] = figure
         if as_json:
             print_json(result)
         else:
-            _show(robot, result, at_home)
+            _show(robot, result, at_home, box)
 
 
 def _list(library: list[dict[str, Any]], as_json: bool) -> None:
@@ -83,7 +86,7 @@ def _count(kinds: dict[str, int]) -> str:
     return ", ".join(f"{count} {kind}" for kind, count in kinds.items())
 
 
-def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> dict[str, Any]:
+def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution, box: RestingBox | None) -> dict[str, Any]:
     kinds = [carrier.kind for carrier in robot.carriers]
     return {
         "name": robot.name,
@@ -105,10 +108,19 @@ def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution) -> di
         "reason": diagnosis.reason,
         "warnings": diagnosis.warnings,
         "at_home": at_home.to_dict(),
+        "resting_box": None
+        if box is None
+        else {
+            "min": box.low.tolist(),
+            "max": box.high.tolist(),
+            "about": box.centre.tolist(),
+            "samples": box.samples,
+            "spacing": box.spacing.tolist(),
+        },
     }
 
 
-def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> None:
+def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution, box: RestingBox | None) -> None:
     from ..base.text import quantity, quantity_range, quantity_row
 
     of = f"of {len(robot.platform.dof)}"
@@ -129,6 +141,7 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution) -> Non
         f"  its singular values, moments divided by the characteristic length: "
         f"{quantity_row(result['singular_values'])}",
         *_rest(at_home),
+        *_box(robot, box),
         *(f"  warning: {warning}" for warning in result["warnings"]),
         "  source:",
         *(f"    {line.strip()}" for line in robot.source.strip().splitlines()),
@@ -148,6 +161,33 @@ def _rest(at_home: TensionSolution) -> list[str]:
     if at_home.certificate is not None:
         lines += [f"    {line}" for line in at_home.certificate.describe().splitlines()]
     return lines
+
+
+def _box(robot: Robot, box: RestingBox | None) -> list[str]:
+    """Return where the platform can rest, and how that was sampled."""
+    import numpy as np
+
+    from ..base.text import quantity_range, quantity_row
+
+    attitude = "at home's attitude"
+    if box is None:
+        return [f"  can rest, {attitude} and with its carriers at home, at none of the positions that were sampled"]
+    sides = [
+        f"{'xyz'[axis]} {quantity_range([box.low[axis], box.high[axis]], 'm', 3)}"
+        for axis in np.flatnonzero(robot.dof_mask[:3])
+        if np.isfinite(box.low[axis])
+    ]
+    if not box.samples:
+        where = f"in the box {', '.join(sides)}" if sides else "at any position"
+        return [
+            f"  can rest, {attitude}, {where}",
+            "    (the carriers move along, since the cables keep their lengths)",
+        ]
+    lines = [f"  can rest, {attitude} and with its carriers at home, in the box", f"    {', '.join(sides)}"]
+    if (box.centre != robot.home[:3]).any():
+        lines[0] += f" about ({quantity_row(box.centre)}) m, the nearest sample at which it can"
+    steps = quantity_row(box.spacing[box.spacing > 0], digits=2)
+    return [*lines, f"    ({box.samples} positions sampled, in the box at most {steps} m apart along each axis)"]
 
 
 def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:

@@ -4,6 +4,8 @@ Formulas become MathML when the site is built, because browsers draw MathML with
 `pymdownx.arithmatex` leaves `$...$` and `$$...$$` as LaTeX in elements of class arithmatex, and `on_page_content`
 translates it.
 
+The pages of `generated` are made from the code and the notebooks.
+
 mkdocstrings looks for sources in a folder called `towline`. The repository's root is that package, whatever the folder
 is called, so the sources are copied to build/docs/towline.
 """
@@ -14,7 +16,10 @@ import shutil
 import tomllib
 from pathlib import Path
 
+from generated import pages
 from latex2mathml.converter import convert
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parent.parent
 SOURCES = ROOT / "build" / "docs"
@@ -30,6 +35,13 @@ def on_startup(**_: object) -> None:
         folder.mkdir(parents=True)
         for source in ROOT.joinpath(*package.split(".")[1:]).glob("*.py"):
             shutil.copy(source, folder)
+
+
+def on_files(files: Files, config: MkDocsConfig, **_: object) -> Files:
+    """Add the pages that are made from the code."""
+    for path, content in pages().items():
+        files.append(File.generated(config, path, content=content))
+    return files
 
 
 def on_page_content(content: str, **_: object) -> str:

@@ -55,7 +55,7 @@ class Carrier(Part):
     tows: ClassVar[bool] = False  # by cables without winches, unless the robot's file has winches or states its drive
     efforts: ClassVar[tuple[str, ...]] = ()  # names of what must hold it, against gravity and the pull of its cables
 
-    name: Name
+    name: Name = Field(description="by which cables and tasks refer to it")
     home: Pose = Field(default=AT_ORIGIN, description="pose of the carrier frame in {G} at rest [m, rad]")
     kind: Any  # a Literal in each class
 

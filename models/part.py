@@ -98,8 +98,8 @@ class Part(Displayed, BaseModel):
 class Box(Part):
     """A box along the axes of {G}, from its lowest to its highest corner [m]."""
 
-    min: Vector3
-    max: Vector3
+    min: Vector3 = Field(description="lowest corner [m]")
+    max: Vector3 = Field(description="highest corner [m]")
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

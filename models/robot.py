@@ -39,7 +39,7 @@ class Robot(DisplayedRobot):
     Computations use the arrays below; each has one row per cable or carrier, in the order of the file.
     """
 
-    name: Name
+    name: Name = Field(description="of the robot, in reports and names of files")
     source: str = Field(min_length=1, description="source of the numbers, and which of them are assumed")
     gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="in {G} [m/s^2]")
     drive: Drive = Field(
@@ -51,8 +51,8 @@ class Robot(DisplayedRobot):
         "if all cables hang from quadrotors or mobile carriers and none has a winch, an encoder or a pulley; else both",
     )
     platform: Platform
-    carriers: tuple[AnyCarrier, ...] = Field(min_length=1)
-    cables: tuple[Cable, ...] = Field(min_length=1)
+    carriers: tuple[AnyCarrier, ...] = Field(min_length=1, description="what the cables hang from")
+    cables: tuple[Cable, ...] = Field(min_length=1, description="in the order in which results number them")
     uncertainty: Uncertainty | None = Field(
         default=None, description="uncertainty of anchors, attachments and pulley radii; default: exact"
     )

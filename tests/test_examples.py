@@ -129,8 +129,8 @@ def test_an_example_does_what_it_says(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_the_readme_shows_it(name):
-    assert f"docs/pictures/{name}.png" in (ROOT / "README.md").read_text()
+def test_the_documentation_shows_it(name):
+    assert f"pictures/{name}.png" in (ROOT / "docs" / "examples.md").read_text()
     picture = (ROOT / "docs" / "pictures" / f"{name}.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) <= MOST_BYTES

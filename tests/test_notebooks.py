@@ -1,6 +1,7 @@
 """Each notebook runs from top to bottom, is stored with its outputs, and says today what it said when it was stored."""
 
 import re
+import tomllib
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,7 +11,8 @@ from jupyter_client.manager import KernelManager
 from nbclient import NotebookClient
 from traitlets.config import Config
 
-NOTEBOOKS = sorted((Path(__file__).parent.parent / "notebooks").glob("*.ipynb"))
+ROOT = Path(__file__).parent.parent
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 MOST_BYTES, MOST_SECONDS = 600_000, 60
 VERDICT = re.compile(r"\b(FEASIBLE|INFEASIBLE|NOT-FOUND|optimal|infeasible|accepted)\b")
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -51,7 +53,7 @@ def kernel():
 def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
     assert path.stat().st_size < MOST_BYTES
     stored, fresh = (nbformat.read(path, as_version=4) for _ in range(2))
-    assert 8 <= len(stored.cells) <= 17
+    assert 8 <= len(stored.cells) <= 20
     assert [cell.execution_count for cell in code(stored)] == list(range(1, len(code(stored)) + 1))
     shown = [out for cell in code(stored) for out in cell.outputs]
     assert {out.output_type for out in shown} <= {"stream", "display_data", "execute_result"}
@@ -67,9 +69,20 @@ def test_a_notebook_runs_and_says_the_same(path, kernel, tmp_path):
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_uses_the_public_interface(path):
-    """Notebooks import the front door, and modules that the README names; they store nothing of this machine."""
+    """Notebooks import the front door, and modules of the API reference; they store nothing of this machine."""
     packages = ("control", "estimation", "models", "solvers", "statics.equilibria", "workspace")
-    allowed = {"towline", *(f"towline.{package}" for package in packages)}
+    of_models = ("models.air", "models.cables.driving_force")
+    allowed = {"towline", *(f"towline.{package}" for package in (*packages, *of_models))}
     text = path.read_text()
     assert set(re.findall(r"from (towline[\w.]*) import", text)) <= allowed
     assert not re.search(r"/home/|/tmp/|site-packages|Traceback", text)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_opens_where_notebooks_are_hosted(path):
+    """The first cell has one link that runs the notebook and one that shows it, at the project's public address."""
+    repository = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["urls"]["Repository"]
+    project, file = repository.removeprefix("https://github.com/"), f"notebooks/{path.name}"
+    first = nbformat.read(path, as_version=4).cells[0].source
+    assert f"(https://mybinder.org/v2/gh/{project}/main?labpath={file})" in first
+    assert f"(https://nbviewer.org/github/{project}/blob/main/{file})" in first

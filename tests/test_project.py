@@ -45,7 +45,7 @@ def test_on_a_package_index_every_link_is_an_address_at_the_release(shown):
     assert len(addresses) == len(targets(README))
     for path, address in zip(targets(README), addresses, strict=True):
         if not path.startswith("#"):
-            kind = "raw" if path.endswith(".png") else "blob"
+            kind = "raw" if path.endswith((".png", ".gif")) else "blob"
             assert address == f"{REPOSITORY}/{kind}/v{VERSION}/{path}"
     assert shown.replace(f"{REPOSITORY}/blob/v{VERSION}/", "").replace(f"{REPOSITORY}/raw/v{VERSION}/", "") == README
 
@@ -57,7 +57,7 @@ def test_addresses_stay_as_they_are():
 
 
 def test_the_address_of_the_repository_has_one_place():
-    """The others beside it and that of the citation begin with `Repository`, and no other file has it."""
+    """The others and that of the citation begin with `Repository`, and the README clones it; no other file has it."""
     others = {"Documentation": "/tree/main/docs", "Changelog": "/blob/main/CHANGELOG.md", "Issues": "/issues"}
     assert PROJECT["urls"] == {"Repository": REPOSITORY} | {name: REPOSITORY + path for name, path in others.items()}
     owner = REPOSITORY.rpartition("/")[0]
@@ -65,7 +65,8 @@ def test_the_address_of_the_repository_has_one_place():
     texts = [path for path in texts if path.suffix in (".cff", ".md", ".py", ".toml", ".txt", ".yml")]
     named = {path.name for path in texts if f"{owner}/" in path.read_text(encoding="utf-8")}
     assert len(texts) > 100
-    assert named == {"pyproject.toml", "CITATION.cff"}
+    assert named == {"pyproject.toml", "CITATION.cff", "README.md"}
+    assert f"\ngit clone {REPOSITORY} && cd towline\n" in README
 
 
 def test_the_citation_is_of_this_project():

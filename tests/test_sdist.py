@@ -59,7 +59,9 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     step = {name for name in tracked if name.startswith("export/step/template/")}
     pages = {name for name in tracked if re.fullmatch(r"(figures|viewer)/[^/]*\.(html|js)", name)}
     claims = {name for name in tracked if re.fullmatch(r"studies/\w+/claims\.yaml", name)}
-    data = {f"towline/{name}" for name in robots | step | pages | claims | {"py.typed", "ocp/tasks/task.schema.json"}}
+    new = {name for name in tracked if re.fullmatch(r"cli/templates/[^/]*\.yaml", name)}
+    schema = {"py.typed", "ocp/tasks/task.schema.json"}
+    data = {f"towline/{name}" for name in robots | step | pages | claims | new | schema}
     core = re.compile(r"towline/core/((\w+/)?\w+\.[ch]|_core\.pyi|_core(\.abi3\.so|\.pyd))")
     assert {name for name in files - modules if not core.fullmatch(name)} == data
 

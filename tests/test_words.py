@@ -86,6 +86,7 @@ PAGES = [
         *(ROOT / "examples").glob("*.py"),
         *(ROOT / "notebooks").glob("*.ipynb"),
         *(ROOT / "models" / "library").glob("*.yaml"),
+        *(ROOT / "cli" / "templates").glob("*.yaml"),
     )
 ]
 

@@ -55,7 +55,7 @@ class Ground(Part):
 class Phase(Part):
     """A part of a task: a path, the load, and the ground."""
 
-    name: Name
+    name: Name = Field(description="of the phase, in reports")
     path: SinglePath | None = Field(default=None, description="default: rest at the end of the previous phase")
     duration: Positive | None = Field(default=None, description="[s], at least 0.01; default: the path's own")
     load: Load | None = Field(default=None, description="load fixed to the platform; default: none")

@@ -158,7 +158,7 @@ class Task(Part):
 
     model_config = ConfigDict(json_schema_extra=_or_phases)
 
-    name: Name = "task"
+    name: Name = Field(default="task", description="of the task, in reports and names of files")
     path: AnyPath = Field(
         default=cast(Any, None), description="path of the platform; with phases: the sequence of their paths"
     )

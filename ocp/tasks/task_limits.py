@@ -45,7 +45,7 @@ class KeepOut(Part):
     carrier_platform_clearance. Cables end at their attachments, so such a body must not contain these.
     """
 
-    name: str = Field(default="obstacle", min_length=1, max_length=60)
+    name: str = Field(default="obstacle", min_length=1, max_length=60, description="in reports and figures")
     frame: Literal["world", "platform"] = Field(
         default="world",
         description="world: fixed in {G}; platform: it moves with the platform, and cables and carriers keep out of it",

@@ -32,7 +32,7 @@ SinglePath: TypeAlias = Annotated[
 class Piece(Part):
     """One path of a sequence."""
 
-    path: SinglePath
+    path: SinglePath = Field(description="in the frame of the sequence")
     duration: Positive | None = Field(default=None, description="[s]; default: the path's own")
 
     @property

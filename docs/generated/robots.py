@@ -1,0 +1,33 @@
+"""The page of the library's robots, each with a picture."""
+
+from towline import load
+from towline.models.library import contents
+
+from .markup import escaped, table
+
+HEAD = """# The robots of the library
+
+These robots ship with towline. `cogiro` in a command, or `load("cogiro")` in Python, is the robot of that name.
+`towline robots cogiro` diagnoses it, and `towline robots cogiro --figure cogiro.png` draws the picture that you see
+here: cables are coloured by their tensions at rest at home, or grey if the robot cannot rest there. Green points are
+positions at which it can rest.
+
+"""
+
+
+def robots() -> str:
+    """Return the page."""
+    rows, sections = [], []
+    for entry in contents():
+        name = entry["name"]
+        robot = load(name)
+        carriers = ", ".join(f"{count} {kind}" for kind, count in entry["carriers"].items())
+        dof = ", ".join(robot.platform.dof)
+        rows.append([f"[{name}](#{name})", str(robot.m), str(len(robot.platform.dof)), carriers, f"{entry['mass']:g}"])
+        facts = f"{robot.m} cables, {len(robot.platform.dof)} degrees of freedom ({dof}), carriers: {carriers}."
+        sections.append(
+            f"## {name} {{ #{name} }}\n\n![{name}: carriers, cables and platform](../pictures/robots/{name}.png)"
+            f"{{ width=400 }}\n\n{facts}\n\n{escaped(entry['source'])}\n"
+        )
+    listed = table(["robot", "cables", "degrees of freedom", "carriers", "mass [kg]"], rows)
+    return HEAD + listed + "\n" + "\n".join(sections)

@@ -1,0 +1,133 @@
+"""The reference has what the code has: every command and option, key, status word and robot; pictures stay small."""
+
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+import typer
+from PIL import Image
+
+from towline import Robot, Task, available
+from towline.cli.main import COMMANDS, app
+from towline.control.command import ANSWERS
+from towline.ocp import MotionStatus
+from towline.ocp.sweeps.row import FAILED
+from towline.solvers import Status
+from towline.studies.accounts.claim import Verdict
+
+DOCS = Path(__file__).parent.parent / "docs"
+REFERENCE = DOCS / "reference"
+sys.path.insert(0, str(DOCS))  # as MkDocs does for its hooks
+from generated import pages  # noqa: E402
+
+sys.path.remove(str(DOCS))
+
+
+@pytest.fixture(scope="module")
+def made():
+    return pages()
+
+
+def leaves(group, path=()):
+    """Return all commands by their words, those of groups too."""
+    context = typer.Context(group, info_name="towline")
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if hasattr(command, "list_commands"):
+            yield from leaves(command, (*path, name))
+        else:
+            yield (*path, name), command
+
+
+def sections(page):
+    """Return the text below each heading of the second level by its anchor."""
+    parts = page.split("\n## ")[1:]
+    return {part.partition("{ #")[2].partition(" }")[0]: part for part in parts}
+
+
+def test_every_command_is_there_with_its_options_and_defaults(made):
+    page = sections(made["reference/commands.md"])
+    found = dict(leaves(typer.main.get_command(app)))
+    assert {words[0] for words in found} == set(COMMANDS)
+    for words, command in found.items():
+        text = " ".join(page["-".join(words)].split())
+        for parameter in command.params:
+            names = [name for name in parameter.opts if name.startswith("--")] or [parameter.metavar]
+            assert f"\n`{', '.join(names)}" in page["-".join(words)], (words, names)
+            if names[0].startswith("--") and parameter.default and not parameter.is_flag:
+                shown = str(parameter.default)
+                assert f"[default: {shown}]" in text, (words, names, shown)
+
+
+@pytest.mark.parametrize(("model", "page"), [(Robot, "robot-keys"), (Task, "task-keys")])
+def test_every_key_of_every_part_is_there(model, page, made):
+    text = sections(made[f"reference/{page}.md"])
+    schema = model.model_json_schema()
+    parts = {f"{model.__name__.lower()}-file": schema} | {key.lower(): part for key, part in schema["$defs"].items()}
+    assert set(text) == set(parts)
+    for anchor, part in parts.items():
+        rows = {line.split("|")[1].strip(): line for line in text[anchor].splitlines() if line.startswith("| `")}
+        assert set(rows) == {f"`{key}`" for key in part["properties"]}
+        for key in part["properties"]:
+            cells = [cell.strip() for cell in rows[f"`{key}`"].split(" | ")]
+            assert len(cells) == 5
+            assert ("required" in cells[3]) == (key in part.get("required", []))
+            assert cells[1], key
+            assert cells[2] or cells[4].strip(" |"), f"{anchor}.{key} has neither unit nor description"
+
+
+def test_units_and_defaults_are_those_of_the_schema(made):
+    """A few rows as they should be, written by hand."""
+    robot, task = made["reference/robot-keys.md"], made["reference/task-keys.md"]
+    for row in (
+        "| `gravity` | 3 numbers | m/s² | `[0, 0, -9.81]` | in &#123;G&#125; |",
+        "| `t_max` | number &gt; 0 | N | required | largest tension |",
+        "| `friction` | number &gt;= 0 | N | 0 | dry friction, as a force on the cable |",
+    ):
+        assert row in robot
+    assert "| `margin` | number &gt;= 0 | N | 0 | every tension stays this far inside its limits |" in task
+    assert "| `steps` | whole number &gt;= 4, &lt;= 20000 |  | 100 |" in task
+
+
+def test_every_robot_has_its_picture(made):
+    page = sections(made["reference/robots.md"])
+    assert set(page) == set(available())
+    for name in available():
+        file = DOCS / "pictures" / "robots" / f"{name}.png"
+        assert f"../pictures/robots/{name}.png" in page[name]
+        assert file.stat().st_size < 25_000
+        assert Image.open(file).width >= 400
+    assert {path.stem for path in (DOCS / "pictures" / "robots").iterdir()} == set(available())
+
+
+def test_every_status_word_is_explained():
+    """Each is a term with a sentence, in the section of what has it."""
+    text = {part.partition("\n")[0]: part for part in (REFERENCE / "status.md").read_text().split("\n## ")}
+    for section, words in (
+        ("Motions", [*MotionStatus, FAILED]),
+        ("Tensions", Status),
+        ("Steps of a controller", ANSWERS),
+        ("Claims of a paper", Verdict),
+    ):
+        terms = [line.strip("`") for line in text[section].splitlines() if line.startswith("`") and line.endswith("`")]
+        assert sorted(terms) == sorted(str(word) for word in words)
+    codes = [line.split("|")[1].strip() for line in text["Exit codes"].splitlines() if line.startswith("| ")]
+    assert codes[1:] == ["0", "1", "2", "3", "130", "141", "143"]
+
+
+def test_the_glossary_is_in_order_and_has_the_words_of_robots():
+    lines = (REFERENCE / "glossary.md").read_text().splitlines()
+    terms = [line for line, after in pairwise(lines) if after.startswith(":   ")]
+    assert terms == sorted(terms, key=str.lower)
+    for term in ("Anchor", "Attachment", "Carrier", "Platform", "Certificate", "Tube", "Wrench matrix", "Plant"):
+        assert term in terms
+
+
+def test_notebooks_are_pages_with_their_pictures(made):
+    for notebook in sorted((DOCS.parent / "notebooks").glob("*.ipynb")):
+        page = made[f"notebooks/{notebook.stem}.md"]
+        assert page.startswith("# ")
+        for picture in [name for name in made if name.startswith(f"notebooks/{notebook.stem}-")]:
+            assert made[picture].startswith(b"\x89PNG")
+            assert f"({Path(picture).name})" in page
