@@ -39,6 +39,16 @@ BANNED = {
     r"(goes|go|going) by": "depends on, follows",
     r"dear(er)?": "costly",
     r"what was found|how it was found|what is found": "the result",
+    r"tears?|tore": "breaks",
+    r"by itself": "alone",
+    r"forward time": "simulation",
+    r"likel(iest|ier)": "most likely",
+    r"robots? of (the|an) uncertainty": "uncertain robots",
+    r"beyond all numbers": "diverges",
+    r"samples? left out|left[- ]out samples?": "validation samples",
+    r"wanted acceleration": "desired acceleration",
+    r"places? to keep out of": "keep-out region",
+    r"what it is worth": "its value, its accuracy",
     r"as for [A-Z`]\S*\.": "write it out",
 }
 PHRASES = {

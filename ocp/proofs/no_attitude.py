@@ -20,7 +20,7 @@ CERTAIN = 1e-5  # [m], of distances, whose formulas are rounded where things tou
 def no_attitude(
     scenario: Scenario, time: float, angles: list[int], platform: np.ndarray, carriers: np.ndarray, usable: np.ndarray
 ) -> list[Excess]:
-    """Return the worst violation at the reference attitude if there is one at every attitude, else nothing.
+    """Return the largest violation at the reference attitude if there is one at every attitude, else nothing.
 
     Parameters
     ----------
