@@ -15,7 +15,7 @@ from PIL import Image
 from towline import available
 from towline.figures import style
 
-PICTURES = Path(__file__).parent / "pictures"
+PICTURES = Path(__file__).parent / "reference" / "pictures"
 WIDTH, COLOURS = 480, 32  # of a small picture: pixels, and shades
 DARK, PLATFORM = "#333333", style.COLOURS[0]
 TURNS = (("yaw", 2, 0.6), ("pitch", 1, 0.5), ("roll", 0, 0.7))  # axis of the turn, and its angle [rad]

@@ -94,11 +94,11 @@ def test_every_robot_has_its_picture(made):
     page = sections(made["reference/robots.md"])
     assert set(page) == set(available())
     for name in available():
-        file = DOCS / "pictures" / "robots" / f"{name}.png"
-        assert f"../pictures/robots/{name}.png" in page[name]
+        file = REFERENCE / "pictures" / "robots" / f"{name}.png"
+        assert f"(pictures/robots/{name}.png)" in page[name]
         assert file.stat().st_size < 25_000
         assert Image.open(file).width >= 400
-    assert {path.stem for path in (DOCS / "pictures" / "robots").iterdir()} == set(available())
+    assert {path.stem for path in (REFERENCE / "pictures" / "robots").iterdir()} == set(available())
 
 
 def test_every_status_word_is_explained():
