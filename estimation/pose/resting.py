@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base.errors import InputError
@@ -11,72 +13,48 @@ from ...models.robot import Robot
 from ...statics.equilibria import Equilibrium, equilibria, per_length, rest_near
 from .estimate import PoseEstimate
 from .problem import Problem
-from .search import estimates
 
 
-def open_estimates(
-    robot: Robot,
-    problem: Problem,
-    lengths: np.ndarray,
-    starts: np.ndarray | None,
-    carriers: np.ndarray | None,
-    sigma: np.ndarray,
-) -> PoseEstimate:
-    """Return the estimates of a robot whose lengths leave a motion open at home, or everywhere.
-
-    Where there are enough lengths and they decide the pose well, it is theirs; elsewhere it is the rest.
-
-    Parameters
-    ----------
-    problem, lengths, starts
-        As for a descent: (N, m) and (N, 6), or None for starts of its own.
-    carriers
-        (c, 6) or (N, c, 6), in {G}, or None for those at home.
-    sigma
-        (m,) [m].
+def resting(problem: Problem, lengths: np.ndarray, starts: np.ndarray | None, sigma: np.ndarray) -> PoseEstimate:
+    """Return where the platform rests with lengths (N, m), near `starts` (N, 6) or, without any, anywhere.
 
     Raises
     ------
     InputError
-        If the robot has no gravity and too few cables: the lengths alone do not decide.
+        If the robot has no gravity: the lengths alone do not decide.
     """
-    places = np.broadcast_to(
-        robot.carrier_home if carriers is None else carriers, (len(lengths), *robot.carrier_home.shape)
-    )
-    if robot.m < problem.freedoms:
-        if robot.weight == 0.0:
-            raise InputError(
-                f"gravity must not be zero where the lengths leave a motion open, as the {robot.m} cables of robot "
-                f"{robot.name!r} do for {problem.freedoms} coordinates"
-            )
-        rests = _rests(robot, problem, lengths, starts, places, sigma)
-        return PoseEstimate(robot, *rests[:3], sigma, carriers, None, np.ones(len(lengths), bool), rests[3])
-    own = estimates(robot, problem, lengths, starts, carriers, sigma)
+    robot = problem.robot
+    if robot.weight == 0.0:
+        raise InputError(
+            f"gravity must not be zero where the lengths leave a motion open, as the {robot.m} cables of robot "
+            f"{robot.name!r} do for {problem.freedoms} coordinates"
+        )
+    poses, errors, found, covariances = _rests(problem, lengths, starts, sigma)
+    by_gravity = np.ones(len(lengths), bool)
+    return PoseEstimate(robot, poses, errors, found, sigma, problem.carriers, None, by_gravity, covariances)
+
+
+def with_rests(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np.ndarray | None) -> PoseEstimate:
+    """Return estimates by lengths alone with the rest instead where these do not decide the pose well."""
     hang = np.flatnonzero(~(own.consistent & own.conditioned))
-    if robot.weight == 0.0 or not hang.size:
+    if own.robot.weight == 0.0 or not hang.size:
         return own
     covariance, by_gravity = own.covariance.copy(), np.zeros(len(lengths), bool)
     near = own.pose if starts is None else starts
-    rests = _rests(robot, problem.of(hang), lengths[hang], near[hang], places[hang], sigma)
+    rests = _rests(problem.of(hang), lengths[hang], near[hang], own.sigma)
     rows = hang[rests[2]]
     for whole, part in zip((own.pose, own.residuals, own.converged, covariance), rests, strict=True):
         whole[rows] = part[rests[2]]
     by_gravity[rows] = True
-    return PoseEstimate(
-        robot, own.pose, own.residuals, own.converged, sigma, carriers, own.ambiguous, by_gravity, covariance
-    )
+    return replace(own, by_gravity=by_gravity, known_covariance=covariance)
 
 
 def _rests(
-    robot: Robot,
-    problem: Problem,
-    lengths: np.ndarray,
-    starts: np.ndarray | None,
-    carriers: np.ndarray,
-    sigma: np.ndarray,
+    problem: Problem, lengths: np.ndarray, starts: np.ndarray | None, sigma: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return poses (N, 6), errors (N, m) [m], where there is a rest (N,), and covariances (N, 6, 6)."""
-    near = starts
+    robot, near = problem.robot, starts
+    carriers = np.broadcast_to(problem.carriers, (len(lengths), *robot.carrier_home.shape))
     if near is None:
         near = problem.descend_from_afar(lengths, 1.0 / sigma, np.tile(problem.home, (len(lengths), 1)))[0]
     poses, errors = near.copy(), np.full(lengths.shape, np.inf)
