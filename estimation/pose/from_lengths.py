@@ -16,7 +16,7 @@ from ...models.part import LARGEST
 from ...models.robot import Robot
 from .estimate import PoseEstimate
 from .problem import Problem, problem_of
-from .resting import resting, with_rests
+from .resting import resting
 from .search import estimates
 
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
@@ -71,11 +71,9 @@ def pose_from_lengths(
     each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
     problem = problem_of(robot, each)
     starts = None if start is None else _start(problem, start, batch)
-    if robot.m >= problem.freedoms:
-        found = estimates(problem, rows, starts, deviations)
-        found = with_rests(found, problem, rows, starts) if problem.open else found
-    else:
-        found = resting(problem, rows, starts, deviations)
+    found = estimates(problem, rows, starts, deviations)
+    if problem.open:
+        found = resting(found, problem, rows, starts)
     return found.reshaped(batch, carriers)
 
 
