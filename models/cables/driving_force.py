@@ -136,13 +136,15 @@ def driving_force(
     given = (robot.carrier_home[0], None, None) if base is None else tuple(base)
     if len(given) != 3:
         raise InputError(f"base must be pose, velocity and acceleration of the carrier, got {len(given)} of them")
-    carrier_pose, *carrier_rates = given
+    carrier_pose, carrier_velocity, carrier_acceleration = given
     carrier_pose = _series("carrier_pose", carrier_pose, instants)
     one_of("winding", winding, ("paid out", "printed"))
     pretension = _pretension(pretension, (instants, robot.m))
 
     dynamics = Dynamics(robot).relative
-    w = dynamics.required_wrench(pose, velocity, acceleration, carrier_pose, *carrier_rates, wind)
+    w = dynamics.required_wrench(
+        pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration, wind
+    )
     if w.shape != (instants, 6):
         raise InputError(f"all arguments must have {instants} instants like pose, got {w.shape[:-1]}")
     A = dynamics.wrench_matrix(pose)
