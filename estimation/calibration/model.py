@@ -15,7 +15,7 @@ which vary where the pose was measured with an error, and where it was not measu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -117,10 +117,6 @@ class Model(Displayed):
     def robot(self) -> Robot:
         """Return the robot of the file."""
         return self.parameters.robot
-
-    def with_parameters(self, parameters: Parameters) -> Model:
-        """Return the model with other parameters that vary."""
-        return replace(self, parameters=parameters)
 
     @cached_property
     def _given(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

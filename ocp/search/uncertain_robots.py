@@ -18,9 +18,9 @@ from ...base.text import quantity
 from ...models import Robot
 from ...statics.robust import Spread, motion_factor
 from ..audits.excess import Excess
-from ..audits.planner_step import PlannerStep
 from ..audits.robust_margin import RobustMargin
 from ..plan import Plan
+from ..result import PlannerStep
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
