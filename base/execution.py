@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -120,14 +119,7 @@ class Workers:
         SolverError
             If workers end before their work is done.
         """
-        under_way: deque[Future[Result]] = deque()
-        with self._ending(under_way):
-            for job in jobs:
-                under_way.append(self.executor.submit(function, *job))
-                if len(under_way) >= self.limit():
-                    yield self._next(under_way)
-            while under_way:
-                yield self._next(under_way)
+        return self._results(function, jobs, self._next)
 
     def as_completed(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
         """Yield `function(*job)` of each job as soon as it is there, so that no worker waits for a slow one.
@@ -137,19 +129,28 @@ class Workers:
         SolverError
             If workers end before their work is done.
         """
-        under_way: set[Future[Result]] = set()
+        return self._results(function, jobs, self._done)
+
+    def _results(
+        self,
+        function: Callable[..., Result],
+        jobs: Iterable[tuple[Any, ...]],
+        take: Callable[[list[Future[Result]]], Iterator[Result]],
+    ) -> Iterator[Result]:
+        """Yield the results of all jobs, as `take` takes them from those under way."""
+        under_way: list[Future[Result]] = []
         with self._ending(under_way):
             for job in jobs:
-                under_way.add(self.executor.submit(function, *job))
+                under_way.append(self.executor.submit(function, *job))
                 while len(under_way) >= self.limit():
-                    yield from self._done(under_way)
+                    yield from take(under_way)
             while under_way:
-                yield from self._done(under_way)
+                yield from take(under_way)
 
-    def _next(self, under_way: deque[Future[Result]]) -> Result:
-        """Wait until the first job is done; remove it and return its result."""
+    def _next(self, under_way: list[Future[Result]]) -> Iterator[Result]:
+        """Wait until the first job is done; remove it and yield its result."""
         self._wait(under_way[0])
-        return under_way.popleft().result()
+        yield under_way.pop(0).result()
 
     def _wait(self, *futures: Future[Result]) -> set[Future[Result]]:
         """Wait until at least one of some jobs is done; return those that are."""
@@ -157,7 +158,7 @@ class Workers:
             self.look()
         return done
 
-    def _done(self, under_way: set[Future[Result]]) -> Iterator[Result]:
+    def _done(self, under_way: list[Future[Result]]) -> Iterator[Result]:
         """Wait until jobs are done; remove them and yield their results."""
         for future in self._wait(*under_way):
             under_way.remove(future)

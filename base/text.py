@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import SupportsFloat, SupportsIndex
 
 Number = SupportsFloat | SupportsIndex | None
@@ -141,3 +141,15 @@ def _decimals(value: float, count: int) -> str:
 
 def _whole(value: int) -> str:
     return f"{value:,}".replace(",", " ") if abs(value) >= GROUPED_FROM else str(value)
+
+
+def in_columns(rows: Sequence[Sequence[str]], right: Collection[int]) -> list[str]:
+    """Return rows as lines of a table, its columns as wide as they need, those of the indices `right` flush right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            cell.rjust(width) if k in right else cell.ljust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]

@@ -16,7 +16,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..base import processors
-from ..models import Dynamics, Robot, load, points, pose_from_lengths
+from ..estimation import pose_from_lengths
+from ..models import Dynamics, Robot, load, points
 from ..workspace import Condition, Lengths, Margin, Places, StaticEquilibrium, WrenchClosure, WrenchFeasible
 from .harness import head, machine, row, timed
 

@@ -122,32 +122,27 @@ def _towline(warm: bool) -> Callable[[Program], Solver]:
     return prepare
 
 
-def _daqp(first: Program) -> Solver:
-    import daqp
+def _daqp(alone: bool) -> Callable[[Program], Solver]:
+    """Return how to start DAQP: `alone` without the time of condensing, from the last solution."""
 
-    shape = first.r.shape
-    none, kinds = np.zeros((0, first.r.size)), np.zeros(first.r.size, dtype=np.int32)
+    def prepare(first: Program) -> Solver:
+        import daqp
 
-    def solve(program: Program) -> Array | None:
-        cost, slope = condense(program)
-        u, _, flag, _ = daqp.solve(cost, slope, none, program.u_max.ravel(), program.u_min.ravel(), kinds)
-        return u.reshape(shape) if flag > 0 else None
+        shape = first.r.shape
+        none, kinds = np.zeros((0, first.r.size)), np.zeros(first.r.size, dtype=np.int32)
 
-    return Solver(lambda program: program, solve)
+        def condensed(program: Program) -> tuple[Any, ...]:
+            return *condense(program), none, program.u_max.ravel(), program.u_min.ravel(), kinds
 
+        def solve(given: tuple[Any, ...], guess: Array | None = None) -> Array | None:
+            u, _, flag, _ = daqp.solve(*given, primal_start=guess)
+            return u.reshape(shape) if flag > 0 else None
 
-def _daqp_alone(first: Program) -> Solver:
-    import daqp
+        if alone:
+            return Solver(lambda program: (condensed(program), program.controls.ravel()), lambda given: solve(*given))
+        return Solver(lambda program: program, lambda program: solve(condensed(program)))
 
-    shape = first.r.shape
-    none, kinds = np.zeros((0, first.r.size)), np.zeros(first.r.size, dtype=np.int32)
-
-    def solve(given: tuple[Array, ...]) -> Array | None:
-        cost, slope, high, low, guess = given
-        u, _, flag, _ = daqp.solve(cost, slope, none, high, low, kinds, primal_start=guess)
-        return u.reshape(shape) if flag > 0 else None
-
-    return Solver(lambda p: (*condense(p), p.u_max.ravel(), p.u_min.ravel(), p.controls.ravel()), solve)
+    return prepare
 
 
 class Sparse:
@@ -261,8 +256,8 @@ def _hpipm(first: Program) -> Solver:
 CONTENDERS = (
     Contender(TOWLINE, "1e-6", _towline(True)),
     Contender("towline Horizon, cold", "1e-6", _towline(False)),
-    Contender(REFERENCE, "1e-6, its own", _daqp),
-    Contender("daqp.solve, warm, condensing not counted", "1e-6, its own", _daqp_alone),
+    Contender(REFERENCE, "1e-6, its own", _daqp(alone=False)),
+    Contender("daqp.solve, warm, condensing not counted", "1e-6, its own", _daqp(alone=True)),
     Contender("osqp, sparse, warm", "1e-6", _osqp),
     Contender("hpipm through CasADi", "speed_abs, its own", _hpipm),
 )

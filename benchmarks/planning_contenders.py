@@ -27,6 +27,7 @@ from ..models import Robot, load
 from ..models.rotation import inverse_rate_matrix, rotation
 from ..ocp import Planner, Task
 from ..ocp.audits.audit import Audit, audit
+from ..ocp.nlp.solver import FROM_A_SOLUTION
 from ..ocp.tasks.deviation import Deviation
 from ..ocp.tasks.lay_out import lay_out
 from ..studies.flying.circle import HOVER, tasks
@@ -36,15 +37,7 @@ MOST = 3.0  # acceleration of the base [m/s^2]
 OFFSET, JERK = 10.0, 10.0  # base away from the hovering point [m], and its jerk [m/s^3], that cost as much as 1 m/s^2
 ACCURACY = {"print_level": 0, "sb": "yes", "tol": 1e-8, "constr_viol_tol": 1e-9}
 FIRST = ACCURACY | {"mu_init": 1e-3}  # the guess is near: IPOPT's own 0.1 takes more iterations
-AGAIN = ACCURACY | {
-    "mu_init": 1e-6,
-    "warm_start_init_point": "yes",
-    "warm_start_bound_push": 1e-6,
-    "warm_start_bound_frac": 1e-6,
-    "warm_start_slack_bound_push": 1e-6,
-    "warm_start_slack_bound_frac": 1e-6,
-    "warm_start_mult_bound_push": 1e-6,
-}
+AGAIN = ACCURACY | FROM_A_SOLUTION
 
 
 Solve = Callable[..., Any]  # (states, controls, multipliers) -> the same of the solution

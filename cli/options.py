@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 from ..base.errors import InputError
+from ..base.text import in_columns
 
 if TYPE_CHECKING:
     import numpy as np
@@ -107,14 +108,8 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], align: s
 
     The terminal wraps a wide table, because a number that is cut off would read as another number.
     """
-    lines = [headings, *rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(len(headings))]
-    for line in lines:
-        cells = (
-            cell.rjust(width) if side == "r" else cell.ljust(width)
-            for cell, width, side in zip(line, widths, align, strict=True)
-        )
-        typer.echo("  ".join(cells).rstrip())
+    for line in in_columns([headings, *rows], [column for column, side in enumerate(align) if side == "r"]):
+        typer.echo(line)
 
 
 def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.ndarray:

@@ -9,7 +9,8 @@ import typer
 from .options import CarrierPoseOption, JsonOption, RobotArgument, numbers, print_json, print_table
 
 if TYPE_CHECKING:
-    from ..models import PoseEstimate, Robot
+    from ..estimation import PoseEstimate
+    from ..models import Robot
 
 SIX = "x y z roll pitch yaw"
 
@@ -34,7 +35,8 @@ def pose(
     If the lengths do not determine the pose, the result is the equilibrium pose. The exit code is 1 if no pose fits the
     lengths.
     """
-    from ..models import branches, load, pose_from_lengths
+    from ..estimation import branches, pose_from_lengths
+    from ..models import load
 
     loaded = load(robot)
     measured = numbers("--lengths", lengths, loaded.m)

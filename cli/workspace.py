@@ -272,19 +272,12 @@ def _count(samples: float) -> int:
 def _summary(result: xr.Dataset) -> dict[str, Any]:
     low, high = result["bounds"].values.tolist()
     return {
-        "robot": result.attrs["robot"],
-        "samples": result.attrs["samples"],
-        "accepted": result.attrs["accepted"],
+        **{name: result.attrs[name] for name in ("robot", "samples", "accepted")},
         "volume": float(result["volume"]),
         "volume_interval": result["volume_interval"].values.tolist(),
         "volume_unit": result["volume"].attrs["units"],
         "bounds": {name: [low[i], high[i]] for i, name in enumerate("xyz")},
-        "seconds": result.attrs["seconds"],
-        "poses_per_s": result.attrs["poses_per_s"],
-        "method": result.attrs["method"],
-        "seed": result.attrs["seed"],
-        "condition": result.attrs["condition"],
-        "region": result.attrs["region"],
+        **{name: result.attrs[name] for name in ("seconds", "poses_per_s", "method", "seed", "condition", "region")},
     }
 
 

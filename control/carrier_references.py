@@ -144,16 +144,33 @@ class Freed(Moved):
         return result
 
 
-class Flown(Freed):
+class Late(Moved):
+    """Coordinates whose commanded accelerations take effect after a delay: pending ones are kept."""
+
+    def _wait_for(self, delay: float, stage: float) -> None:
+        """Keep commanded accelerations for a delay, of which whole stages are pending [s]."""
+        late = round(delay / stage)
+        self._under_way = late * stage, late, stage
+        self._pending = Pending(delay + stage)
+
+    @override
+    def under_way(self) -> np.ndarray:
+        return self._pending.means(*self._under_way)
+
+    @override
+    def rest(self, stage: float, carriers: np.ndarray) -> None:
+        """Leave carriers to their reference."""
+        self._pending.add(np.zeros(self.count))
+
+
+class Flown(Late, Freed):
     """Coordinates of flying carriers: a solution starts from the measured state.
 
     They turn before they accelerate, so commanded deviations from the reference take effect after a delay.
     """
 
     def __init__(self, reach: np.ndarray, strongest: float, delay: float, stage: float):
-        late = round(delay / stage)
-        self._under_way = late * stage, late, stage
-        self._pending = Pending(delay + stage)
+        self._wait_for(delay, stage)
         super().__init__(reach, strongest)
 
     @override
@@ -170,30 +187,19 @@ class Flown(Freed):
         return self._placed[:2]
 
     @override
-    def under_way(self) -> np.ndarray:
-        return self._pending.means(*self._under_way)
-
-    @override
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         self._pending.add(more)
         super().order(planned, more, platform, carriers)
 
-    @override
-    def rest(self, stage: float, carriers: np.ndarray) -> None:
-        """Leave carriers to their reference."""
-        self._pending.add(np.zeros(self.count))
 
-
-class Tethered(Moved):
+class Tethered(Late):
     """Degrees of freedom of carriers held by cables of fixed length: a solution starts from the measured state."""
 
     def __init__(self, robot: Robot, delay: float, stage: float):
         self.freed = np.zeros((0, 2), dtype=np.int64)
         self.tethers = _tethers(robot)
         self.count, self._robot = int((MOST_TETHERS - self.tethers["cables"]).sum()), record_of(robot)
-        late = round(delay / stage)
-        self._under_way = late * stage, late, stage
-        self._pending = Pending(delay + stage)
+        self._wait_for(delay, stage)
         self.reset()
 
     @override
@@ -218,10 +224,6 @@ class Tethered(Moved):
         return self._now[0, :2]
 
     @override
-    def under_way(self) -> np.ndarray:
-        return self._pending.means(*self._under_way)
-
-    @override
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
         self._pending.add(more)
         motion = np.zeros((3, 6 + self.count))
@@ -231,11 +233,6 @@ class Tethered(Moved):
         moving[:, :2] = self._measured[1:].reshape(-1, 2, 6)
         control_carriers(self._robot, self.tethers, motion, moving)
         carriers[:, :, :3] = moving[:, :, :3]
-
-    @override
-    def rest(self, stage: float, carriers: np.ndarray) -> None:
-        """Leave carriers to their reference."""
-        self._pending.add(np.zeros(self.count))
 
 
 def _tethers(robot: Robot) -> np.ndarray:

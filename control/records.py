@@ -3,8 +3,6 @@
 Units and meanings of the fields are explained there.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core import MOST_CABLES, MOST_CARRIERS

@@ -70,18 +70,14 @@ def weights(
         Accelerations of the pose at home per unit of the freed coordinates, (6, f). They contribute to the least effort
         if tensions do not control all degrees of freedom.
     """
-    dynamics, rest, mask = dynamics_of(robot), np.zeros(6), robot.dof_mask
-    still = dynamics.required_wrench(robot.home, rest, rest)
-    M = np.stack([dynamics.required_wrench(robot.home, rest, unit) - still for unit in np.eye(6)], axis=1)
-    scale = np.repeat([1.0, 1 / robot.length], 3) * mask
-    A = scale[:, None] * dynamics.wrench_matrix(robot.home, robot.carrier_home)
+    A, M = _at_home(robot)
     far = (SHARE * robot.force_scale / reach) ** 2
     if robot.m < len(robot.platform.dof):
-        A = np.concatenate([A, scale[:, None] * (M @ moved) / np.sqrt(far)], axis=1)
+        A = np.concatenate([A, M @ moved / np.sqrt(far)], axis=1)
     U, sizes, _ = np.linalg.svd(A)
     sizes = np.concatenate([sizes, np.zeros(6)])[:6]
     held = sizes > SINGULAR * sizes[0]
-    effort = (U[:, held] / sizes[held]).T @ (scale[:, None] * M * mask)  # least tensions for unit accelerations
+    effort = (U[:, held] / sizes[held]).T @ (M * robot.dof_mask)  # least tensions for unit accelerations
     of_acceleration = np.einsum("ij,ij->j", effort, effort)
     pose, rate = bandwidth**4 * of_acceleration, 2 * bandwidth**2 * of_acceleration
     states = np.concatenate([pose, rate, far, 2 * far / carrier_bandwidth**2])
@@ -90,12 +86,17 @@ def weights(
 
 def tensions_of(robot: Robot) -> np.ndarray:
     """Return the smallest tensions for unit accelerations of the pose at rest at home, (m, 6) [N]."""
-    dynamics, rest, mask = dynamics_of(robot), np.zeros(6), robot.dof_mask
+    A, M = _at_home(robot)
+    return np.linalg.pinv(A, SINGULAR) @ (M * robot.dof_mask)
+
+
+def _at_home(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Return wrench matrix (6, m) and wrenches of unit accelerations (6, 6), with moments divided by the length."""
+    dynamics, rest = dynamics_of(robot), np.zeros(6)
+    scale = (np.repeat([1.0, 1 / robot.length], 3) * robot.dof_mask)[:, None]
     still = dynamics.required_wrench(robot.home, rest, rest)
     M = np.stack([dynamics.required_wrench(robot.home, rest, unit) - still for unit in np.eye(6)], axis=1)
-    scale = np.repeat([1.0, 1 / robot.length], 3) * mask
-    A = scale[:, None] * dynamics.wrench_matrix(robot.home, robot.carrier_home)
-    return np.linalg.pinv(A, SINGULAR) @ (scale[:, None] * M * mask)
+    return scale * dynamics.wrench_matrix(robot.home, robot.carrier_home), scale * M
 
 
 def terminal(A: np.ndarray, B: np.ndarray, by: Weights) -> np.ndarray:

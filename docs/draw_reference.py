@@ -15,8 +15,9 @@ from PIL import Image
 from towline import available
 from towline.figures import style
 
-PICTURES = Path(__file__).parent / "pictures"
-WIDTH, COLOURS = 480, 32  # of a small picture: pixels, and shades
+PICTURES = Path(__file__).parent / "reference" / "pictures"
+WIDTH, COLOURS = 560, 128  # of a small picture: pixels, and shades
+ALMOST_WHITE = 247
 DARK, PLATFORM = "#333333", style.COLOURS[0]
 TURNS = (("yaw", 2, 0.6), ("pitch", 1, 0.5), ("roll", 0, 0.7))  # axis of the turn, and its angle [rad]
 
@@ -111,7 +112,11 @@ def shrink(file: Path, width: int) -> None:
     """Make a picture so wide [pixels], with few shades, without the date of its making."""
     picture = Image.open(io.BytesIO(file.read_bytes())).convert("RGB")
     picture = picture.resize((width, round(picture.height * width / picture.width)), Image.Resampling.LANCZOS)
-    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(file, optimize=True)
+    picture = picture.quantize(COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    shades = np.reshape(picture.getpalette(), (-1, 3))
+    shades[(shades > ALMOST_WHITE).all(axis=1)] = 255  # the octree makes white a little grey
+    picture.putpalette(shades.ravel().tolist())
+    picture.save(file, optimize=True)
 
 
 def _frame(

@@ -50,7 +50,7 @@ def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = 
     return canvas
 
 
-def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: np.ndarray | None = None) -> Figure:
+def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> Figure:
     """Draw each calibrated anchor relative to the file, with the ellipsoid that contains it with 95 % probability.
 
     There is a panel for each cable, all at the same scale: y against x, and z against x.
@@ -61,8 +61,6 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: 
         Anchors of the file and calibrated ones, (m, 3) each [m].
     covariances
         Of the calibrated ones, (m, 3, 3) [m^2].
-    true
-        The true anchors, if they are known, as in a simulation, (m, 3) [m].
     """
     from matplotlib.patches import Ellipse
 
@@ -85,11 +83,6 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray, true: 
             label = f"calibrated, {'xyz'[up]} against x, 95 % ellipse"
             ax.plot(*centre, style.marker(index), color=shade, markersize=2.5, label=label)
             ax.add_patch(Ellipse(centre, sizes[1], sizes[0], angle=angle, facecolor=shade, alpha=0.35))
-            if true is not None:
-                there = 1e3 * (true - file)[cable]
-                ax.plot(
-                    there[0], there[up], "x1"[index], color=shade, markersize=5, label=f"true, {'xyz'[up]} against x"
-                )
         ax.plot(0, 0, "+", color="#000000", markersize=7, label="file")
         ax.set_xlim(-reach, reach)
         ax.set_ylim(-reach, reach)

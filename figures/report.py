@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from ..base.display import Displayed, Fact
 from ..base.inputs import file_path
+from ..base.text import in_columns
 from ..base.writing import whole_file
 from .drawing import Drawing
 
@@ -153,14 +154,6 @@ class Reported:
 
 
 def _in_columns(table: Table) -> list[str]:
-    """Return a table's lines, columns as wide as they need."""
-    rows = [table.columns, *table.rows]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(table.columns))]
-    lines = [
-        "  ".join(
-            cell.rjust(width) if k in table.numeric else cell.ljust(width)
-            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in rows
-    ]
+    """Return a table's lines, below its title."""
+    lines = in_columns([table.columns, *table.rows], table.numeric)
     return [*([f"  {table.title}"] if table.title else []), *(f"    {line}" for line in lines)]

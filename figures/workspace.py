@@ -37,9 +37,7 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
     return canvas
 
 
-def cross_sections(
-    points: np.ndarray, heights: list[float], thickness: float, marks: np.ndarray | None = None
-) -> Figure:
+def cross_sections(points: np.ndarray, heights: list[float], thickness: float) -> Figure:
     """Draw the points of {G} that lie within `thickness` / 2 of each of some heights, from above, at one scale.
 
     Parameters
@@ -48,14 +46,12 @@ def cross_sections(
         (n, 3) [m].
     heights, thickness
         [m].
-    marks
-        Points to mark, (k, 3) [m].
     """
     columns = min(len(heights), 2)
     rows = -(-len(heights) // columns)
     canvas = style.figure(height=0.5 + 1.5 * rows)
     shown = [points[np.abs(points[:, 2] - height) <= thickness / 2][:, :2] for height in heights]
-    every = np.vstack([*shown, *([] if marks is None else [marks[:, :2]])])
+    every = np.vstack(shown)
     first = None
     for place, height in enumerate(heights):
         lowest, leftmost = place + columns >= len(heights), place % columns == 0
@@ -63,7 +59,7 @@ def cross_sections(
         ax = style.axes(canvas, *labels, (rows, columns, place + 1), first)
         first = first or ax
         ax.tick_params(labelbottom=lowest, labelleft=leftmost)
-        _panel(ax, {"": shown[place]}, None if marks is None else marks[:, :2])
+        _panel(ax, {"": shown[place]}, None)
         ax.set_aspect("equal", adjustable="box")  # the limits must stay equal
         style.heading(ax, f"z = {height:g} m ± {500 * thickness:g} mm,\n{len(shown[place])} points", 1 / columns)
         if len(every):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from .part import Box, Inertia
-
-if TYPE_CHECKING:
-    from .rotation import Matrix
+from .rotation import Matrix
 
 
 class MotionLimits(NamedTuple):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache, reduce
 from operator import or_
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 import numpy as np
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, model_validator
@@ -18,10 +18,8 @@ from pydantic_core import CoreSchema, core_schema
 from ..base.errors import InputError
 from .carrier_answers import Actuator, Drawing, Effort, MotionLimits, RigidBody
 from .part import AT_ORIGIN, BodyInertia, Box, Finite, Name, NonNegative, Part, Pose, Positive, inertia_matrix
+from .rotation import Matrix
 from .schema import json_schema
-
-if TYPE_CHECKING:
-    from .rotation import Matrix
 
 __all__ = [
     "Actuator",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from ..statics.robust import RobotShare, share_of_robots
 from .audits.audit import Audit
 from .audits.infeasible_spans import infeasible_spans
 from .audits.phase_summary import PhaseSummary, summaries
-from .audits.planner_step import PlannerStep
 from .audits.waypoint_distance import WaypointDistance, waypoint_distance
 from .tasks.deviation import Deviation
 from .tasks.paths import Motion
@@ -32,6 +31,24 @@ if TYPE_CHECKING:
 
 DRAWN_AT = 200  # times at which drawn robots are checked
 MOST_WARNED = 100_000  # times that are looked at for warnings, or less than twice as many
+
+
+class PlannerStep(NamedTuple):
+    """One step of the planner.
+
+    Attributes
+    ----------
+    name
+        What was computed: "ends and path", "timing", "nonlinear program, 100 steps".
+    message
+        Its result, as text with units; empty if it has no result worth a line.
+    seconds
+        Wall time [s].
+    """
+
+    name: str
+    message: str
+    seconds: float
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 from ..base.execution import Execution
 from ..base.former_names import moved_name
 from .conditions import Conditions
-from .noise import Noise
+from .sensors import Noise
 from .simulate import simulate
 from .simulation import Simulation
 

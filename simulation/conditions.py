@@ -12,7 +12,7 @@ from ..base.display import Displayed
 from ..base.inputs import finite_array, number, one_of, whole_number
 from ..models.parsing import validate
 from ..plant.plant import DRIVES
-from .noise import Noise
+from .sensors import Noise
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.display import record
 from ..control import Reference
 from .faults import Fault
-from .noise import Noise
+from .sensors import Noise
 
 
 class Wind(Protocol):

@@ -17,42 +17,11 @@ from ..plant.periods import Periods
 from .checking import check_command
 from .command_conversion import Orders
 from .experiment import Experiment
-from .noise import Noise
 from .recorder import Period, Recorder
+from .sensors import Sensors
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
 FEW = 1000  # numbers that BLAS adds with one thread
-DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
-
-
-class Sensors:
-    """Sensors with noise, bias and delay, with separate random numbers for each run."""
-
-    def __init__(self, noise: Noise, seeds: Sequence[int], period: float, m: int):
-        self._noise, self._delay = noise, round(noise.delay / period)
-        self._random = [np.random.default_rng([seed, 1]) for seed in seeds]
-        self._of_motion, self._m = noise.of_motion, m
-        self._exact = not (self._of_motion.any() or noise.bias_of_motion.any())
-        self._exact_tensions = not (noise.tension or noise.tension_bias)
-        draws = [random.normal(size=12 + m) for random in self._random]
-        self._bias = np.array(draws)[:, None, :12] * noise.bias_of_motion
-        self._tension_bias = np.array(draws)[:, 12:] * noise.tension_bias
-        self._late: list[tuple[np.ndarray, np.ndarray]] = []
-
-    def report(self, k: int, motions: np.ndarray, tensions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sensor readings in period `k` for motions (N, 1 + c, 12) and tensions (N, m)."""
-        if not (self._exact and self._exact_tensions):
-            if k % DRAWN_AT_ONCE == 0:
-                size = (DRAWN_AT_ONCE, 12 + self._m)
-                self._drawn = np.stack([random.normal(size=size) for random in self._random], axis=1)
-            drawn = self._drawn[k % DRAWN_AT_ONCE]
-            motions = motions.copy()
-            motions[:, :1] += self._bias + drawn[:, None, :12] * self._of_motion
-            tensions = np.maximum(tensions + self._tension_bias + drawn[:, 12:] * self._noise.tension, 0.0)
-        if self._delay:
-            self._late.append((motions.copy(), tensions.copy()))
-            motions, tensions = self._late[0] if len(self._late) <= self._delay else self._late.pop(0)
-        return motions, tensions
 
 
 class Pilot:

@@ -26,9 +26,9 @@ from .experiment import Experiment
 from .faults import read_faults
 from .flights import flights
 from .flying import fly
-from .noise import Noise
 from .record import Record
 from .runs import fly_many
+from .sensors import Noise
 from .simulation import Simulation
 from .steps import steps_in
 from .trajectory import Motion, Trajectory, read_trajectory

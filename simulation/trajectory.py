@@ -57,15 +57,15 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
         If it has another type, or belongs to another robot.
     """
     if isinstance(reference, str | os.PathLike):
-        return _of_dataset(robot, _loaded(reference))
-    if hasattr(reference, "trajectory"):
-        return _of_dataset(robot, reference.trajectory)
-    if hasattr(reference, "data_vars"):
-        return _of_dataset(robot, reference)
-    if isinstance(reference, dict):
+        reference = _loaded(reference)
+    elif isinstance(reference, dict):
         from ..ocp import Task
 
-        return _of_path(robot, validate({"path": reference}, Task, "reference").path, duration)
+        reference = validate({"path": reference}, Task, "reference").path
+    elif hasattr(reference, "trajectory"):
+        reference = reference.trajectory
+    if hasattr(reference, "data_vars"):
+        return _of_dataset(robot, reference)
     if callable(getattr(reference, "at", None)):
         return _of_path(robot, reference, duration)
     try:

@@ -8,7 +8,7 @@ so d . w > h(d) proves that w is not in it (Farkas), and needs no solver to chec
 available wrench to w makes the gap d . w - h(d) as large as it can be: then it is the distance between them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -190,22 +190,11 @@ class Certificate(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists and numbers, ready for JSON; time, span and wind only if they are set."""
-        motion = {"time": self.time, "span": self.span, "wind": self.wind}
+        given = {field.name: getattr(self, field.name) for field in fields(self)} | {"binding": self.binding}
         return {
-            "direction": self.direction.tolist(),
-            "shortfall": self.shortfall,
-            "binding": self.binding.tolist(),
-            "at_max": self.at_max.tolist(),
-            "at_min": self.at_min.tolist(),
-            "support": self.support,
-            "demand": self.demand,
-            "closest": self.closest.tolist(),
-            "length": self.length,
-            **{
-                name: list(value) if isinstance(value, tuple) else value
-                for name, value in motion.items()
-                if value is not None
-            },
+            name: np.asarray(value).tolist() if isinstance(value, np.ndarray | tuple) else value
+            for name, value in given.items()
+            if value is not None
         }
 
 

@@ -147,10 +147,16 @@ class Horizon(Displayed):
         self._residuals, self._count, self._converged = np.zeros(4), 0, False
         self.tolerance, self.iterations_max = 1e-8, 50
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copy and pickle the memory, whose parts the arrays are."""
-        solved = self._residuals.copy(), self._count, self._converged
-        return _restored, (self._sizes, self._memory.copy(), *solved, self.tolerance, self.iterations_max)
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy or a pickle holds: of the arrays the memory alone, whose parts they are."""
+        names = ("_sizes", "_memory", "_residuals", "_count", "_converged", "tolerance", "iterations_max")
+        return {name: getattr(self, name) for name in names}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        Horizon.__init__(self, *state["_sizes"])
+        self._memory[:] = state.pop("_memory")
+        self.__dict__.update(state)
+        self._residuals = self._residuals.copy()
 
     def relative_to(self, states: Array, controls: Array) -> None:
         """Write the same problem in differences from a reference.
@@ -215,19 +221,3 @@ class Horizon(Displayed):
     def residuals(self) -> Residuals:
         """Return the residuals of the last solution."""
         return Residuals(*self._residuals.tolist())
-
-
-def _restored(
-    sizes: tuple[int, ...],
-    memory: Array,
-    residuals: Array,
-    count: int,
-    converged: bool,
-    tolerance: float,
-    iterations_max: int,
-) -> Horizon:
-    horizon = Horizon(*sizes)
-    horizon._memory[:], horizon._residuals[:] = memory, residuals
-    horizon._count, horizon._converged = count, converged
-    horizon.tolerance, horizon.iterations_max = tolerance, iterations_max
-    return horizon

@@ -21,7 +21,7 @@ Statistics 14, 1986.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,9 +31,7 @@ from ..base.errors import InputError
 from ..base.inputs import finite_array, real_array, required, shown, whole_number
 from ..models.part import LARGEST
 from ..models.robot import Robot
-
-if TYPE_CHECKING:
-    from ..models.uncertainty import Uncertainty
+from ..models.uncertainty import Uncertainty
 
 __all__ = ["RobotShare", "Spread", "check_share", "ellipsoid_factor", "motion_factor", "share_of_robots", "spread"]
 

@@ -197,13 +197,12 @@ def residuals(cables: int, times: np.ndarray | None = None) -> Figure:
     return calibration.residuals(0.02 * np.sin(np.arange(cables)) + draws[0], draws[1], times)
 
 
-def corrected(cables: int, known: bool) -> Figure:
+def corrected(cables: int) -> Figure:
     """Draw anchors that are some 20 mm off the file's, with ellipsoids of 2 mm."""
     rng = np.random.default_rng(2)
     file, shift, roots = rng.normal(size=(cables, 3)), rng.normal(size=(2, cables, 3)), rng.normal(size=(cables, 3, 3))
     covariances = 4e-6 * roots @ roots.swapaxes(1, 2)
-    true = file + 0.02 * shift[0]
-    return calibration.anchors(file, true + 0.002 * shift[1], covariances, true if known else None)
+    return calibration.anchors(file, file + 0.02 * shift[0] + 0.002 * shift[1], covariances)
 
 
 def deviations(cables: int, opened: bool) -> Figure:
@@ -253,9 +252,9 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "errors": lambda: flight.errors(flights()),
     "residuals": lambda: residuals(8, np.arange(400) / 100),
     "residuals-3": lambda: residuals(3),
-    "anchors-3": lambda: corrected(3, known=True),
-    "anchors-8": lambda: corrected(8, known=False),
-    "anchors-12": lambda: corrected(12, known=True),
+    "anchors-3": lambda: corrected(3),
+    "anchors-8": lambda: corrected(8),
+    "anchors-12": lambda: corrected(12),
     "observability": lambda: deviations(8, opened=False),
     "observability-open": lambda: deviations(12, opened=True),
     "curves": _curves,
@@ -265,7 +264,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "sweep-2": lambda: swept((6, 8)),
     "sweep-3": lambda: swept((6, 8, 4)),
     "projections": lambda: workspace.projections({"W1": _ball(500, 1.0), "W2": _ball(500, 0.5)}, 2 * SQUARE),
-    "cross-sections": lambda: workspace.cross_sections(_ball(3000, 1.0), [-0.5, 0.0, 0.5], 0.02, 2 * SQUARE),
+    "cross-sections": lambda: workspace.cross_sections(_ball(3000, 1.0), [-0.5, 0.0, 0.5], 0.02),
     "reached": lambda: workspace.reached(sampled((20, 20, 10))),
     "reached-flat": lambda: workspace.reached(sampled((20, 20, 1))),
     "reached-line": lambda: workspace.reached(sampled((20, 1, 1))),

@@ -29,7 +29,7 @@ def test_anchors_have_the_ellipses_of_their_covariances():
     file, moved = RNG.normal(size=(6, 3)), RNG.normal(size=(6, 3)) * 0.02
     roots = RNG.normal(size=(6, 3, 3)) * 0.002
     covariances = roots @ roots.swapaxes(1, 2)
-    panels = anchors(file, file + moved, covariances, file).axes
+    panels = anchors(file, file + moved, covariances).axes
     assert [ax.get_title() for ax in panels] == [f"anchor {i}" for i in range(1, 7)]
     for ax, shift, covariance in zip(panels, moved, covariances, strict=True):
         ellipses = [patch for patch in ax.patches if isinstance(patch, Ellipse)]

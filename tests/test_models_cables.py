@@ -147,9 +147,7 @@ def test_driving_force_balances_the_platform_in_the_world():
     """Newton-Euler in {G} with F = T + dT on the platform, at every instant."""
     robot = load("wang-flying")
     motion, base, shake, time = circle()
-    result = driving_force(
-        robot, *motion, shake, 0.1, carrier_pose=base[0], carrier_velocity=base[1], carrier_acceleration=base[2]
-    )
+    result = driving_force(robot, *motion, shake, 0.1, base=base)
     np.testing.assert_allclose(result.time, time, atol=1e-12)
     dynamics = Dynamics(robot)
     world = dynamics.relative.motion_in_world(*motion, *base)
@@ -166,7 +164,7 @@ def test_driving_force_increments_instant_by_instant(elements):
     """Each cable alone, in {G}: lengths by scipy's rotations, dT_K by the assembled chain."""
     robot = load("wang-flying")
     motion, base, shake, _ = circle(instants=11)
-    result = driving_force(robot, *motion, shake, 0.01, elements, carrier_pose=base[0])
+    result = driving_force(robot, *motion, shake, 0.01, elements, base=(base[0], None, None))
     for k in range(11):
         R_A = Rotation.from_euler("ZYX", base[0][k, [5, 4, 3]]).as_matrix()
         R_B = R_A @ Rotation.from_euler("ZYX", motion[0][k, [5, 4, 3]]).as_matrix()
@@ -280,6 +278,7 @@ def test_driving_force_refuses_in_one_line():
         (lambda: driving_force(robot, *motion, shake[:3], 0.1), "vibration"),
         (lambda: driving_force(robot, *motion, shake, 0.0), "time_step"),
         (lambda: driving_force(robot, *motion, shake, 0.1, 0), "elements"),
+        (lambda: driving_force(robot, *motion, shake, 0.1, base=motion[:2]), "base"),
         (lambda: driving_force(robot, *motion, shake, 0.1, pretension=-1.0), "pretension"),
         (lambda: driving_force(robot, *motion, shake, 0.1, winding="paid"), "winding"),
         (lambda: driving_force(robot, motion[0][0], *motion[1:], shake, 0.1), "pose"),

@@ -8,7 +8,7 @@ import pytest
 import typer
 from PIL import Image
 
-from towline import Robot, Task, available
+from towline import Robot, Task, available, load, plan, simulate
 from towline.cli.main import COMMANDS, app
 from towline.control.command import ANSWERS
 from towline.ocp import MotionStatus
@@ -94,11 +94,11 @@ def test_every_robot_has_its_picture(made):
     page = sections(made["reference/robots.md"])
     assert set(page) == set(available())
     for name in available():
-        file = DOCS / "pictures" / "robots" / f"{name}.png"
-        assert f"../pictures/robots/{name}.png" in page[name]
+        file = REFERENCE / "pictures" / "robots" / f"{name}.png"
+        assert f"(pictures/robots/{name}.png)" in page[name]
         assert file.stat().st_size < 25_000
         assert Image.open(file).width >= 400
-    assert {path.stem for path in (DOCS / "pictures" / "robots").iterdir()} == set(available())
+    assert {path.stem for path in (REFERENCE / "pictures" / "robots").iterdir()} == set(available())
 
 
 def test_every_status_word_is_explained():
@@ -114,6 +114,27 @@ def test_every_status_word_is_explained():
         assert sorted(terms) == sorted(str(word) for word in words)
     codes = [line.split("|")[1].strip() for line in text["Exit codes"].splitlines() if line.startswith("| ")]
     assert codes[1:] == ["0", "1", "2", "3", "130", "141", "143"]
+
+
+def test_every_row_of_reports_is_explained():
+    """Rows of a plan that is feasible, of one that is not, of a robust one, and of simulations."""
+    page = {part.partition("\n")[0]: part for part in (REFERENCE / "reports.md").read_text().split("\n## ")}
+    robot, team = load("wang-flying"), load("multi-quadrotor-3")
+    rest = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.5}
+    side = {"path": {"kind": "line", "start": [0, 0, -1], "end": [0.8, 0, -1]}, "duration": 0.5}
+    turns = {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0.05, 0, -1.1], [0, 0, -1.2]]}, "duration": 3}
+    flown = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 2, "base": {"kind": "free"}}
+    motions = [(robot, {**rest, "wind": [1, 0, 0]}), (robot, side), (robot, turns), (team, flown)]
+    plans = [plan(who, task) for who, task in motions]
+    assert len({found.status for found in plans}) > 1
+    runs = [simulate(robot, plans[0], duration=0.1), simulate(robot, plans[0], duration=0.1, events=["cut 1 at 0.02"])]
+    names = {carrier.name for who in (robot, team) for carrier in who.carriers} | {""}
+    for results, section in ((plans, "Plans"), (runs, "Simulations")):
+        for result in results:
+            parts = [part for part in result._report().parts if hasattr(part, "facts")]
+            rows = {name for part in parts for name, _ in part.facts} - names
+            assert rows
+            assert not [name for name in rows if f"`{name}`" not in page[section]]
 
 
 def test_the_glossary_is_in_order_and_has_the_words_of_robots():

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.display import Displayed
-
-if TYPE_CHECKING:
-    from .replay import Replay
+from .replay import Replay
 
 POINTS = 240  # of a curve, about one for each pixel of the panel
 

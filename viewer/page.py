@@ -5,17 +5,15 @@ from __future__ import annotations
 import json
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..figures.tension_colours import place, shades
+from ..models import Robot
 from . import labels
 from .snapshot import Snapshot
-
-if TYPE_CHECKING:
-    from ..models import Robot
-    from .subject import Subject
+from .subject import Subject
 
 SCRIPT, CAMERA = (Path(__file__).with_name(name).read_text(encoding="utf-8") for name in ("page.js", "camera.js"))
 

@@ -73,20 +73,23 @@ def sliders(robot: Robot, geometry: Geometry) -> list[Slider]:
 
 def whole_steps(low: float, high: float) -> tuple[float, float, float]:
     """Return ends of a slider that are whole steps around a range, and the step: a power of ten, a 200th or less."""
-    span = max(high - low, SHORTEST)
-    digits = int(np.ceil(-np.log10(span / 200)))
-    step = 10.0**-digits
+    step, digits = _step(max(high - low, SHORTEST))
     first = float(np.floor(low / step))
     last = max(float(np.ceil(high / step)), first + 1.0)
-    return round(first * step, max(digits, 0)), round(last * step, max(digits, 0)), step
+    return round(first * step, digits), round(last * step, digits), step
 
 
 def _slider(carrier: int | None, coordinate: int, low: float, high: float, home: float) -> Slider:
     """Return a slider whose ends are whole steps inside the range, so that they are round numbers."""
     if not high > low:
         return Slider(carrier, coordinate, float(home), float(home), 1.0)
-    digits = int(np.ceil(-np.log10((high - low) / 200)))
-    step = 10.0**-digits
-    inner_low = round(float(np.ceil(low / step - 1e-6)) * step, max(digits, 0))
-    inner_high = round(float(np.floor(high / step + 1e-6)) * step, max(digits, 0))
+    step, digits = _step(high - low)
+    inner_low = round(float(np.ceil(low / step - 1e-6)) * step, digits)
+    inner_high = round(float(np.floor(high / step + 1e-6)) * step, digits)
     return Slider(carrier, coordinate, min(inner_low, float(home)), max(inner_high, float(home)), step)
+
+
+def _step(span: float) -> tuple[float, int]:
+    """Return the step of a slider, a power of ten, a 200th of its span or less, and how many decimals it has."""
+    digits = int(np.ceil(-np.log10(span / 200)))
+    return 10.0**-digits, max(digits, 0)

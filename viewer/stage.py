@@ -37,6 +37,8 @@ AIMS = 50  # of a camera that are remembered
 ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
 CELLS = 10  # of the grid along the robot's size, about
 
+Colour = tuple[int, int, int]
+
 
 class Stage:
     """A subject's robot on a viser server.
@@ -135,17 +137,7 @@ class Stage:
             old.remove()
         colours = shades(np.linspace(0.0, 1.0, max(len(bands), 1)))
         self._bands = [
-            self._scene.add_mesh_simple(
-                f"/surface/{number}",
-                vertices.astype(np.float32),
-                faces.astype(np.uint32),
-                color=(int(colour[0]), int(colour[1]), int(colour[2])),
-                opacity=0.75,
-                material="toon3",
-                side="double",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            self._mesh(f"/surface/{number}", vertices, faces, tuple(colour.tolist()), 0.75, flat=False)
             for number, ((vertices, faces), colour) in enumerate(zip(bands, colours, strict=False), 1)
             if len(faces)
         ]
@@ -262,23 +254,23 @@ class Stage:
                 precision="float32",
             )
 
-    def _lines(self, name: str, lines: list[np.ndarray], colour: tuple[int, int, int], width: float = THIN) -> None:
+    def _lines(self, name: str, lines: list[np.ndarray], colour: Colour, width: float = THIN) -> None:
         """Draw lines, (k, 3) each [m]."""
         parts = [np.stack([line[:-1], line[1:]], axis=1) for line in lines if len(line) > 1]
         if parts:
-            points = np.concatenate(parts).astype(np.float32)
-            self._scene.add_line_segments(name, points, colour, thickness=width, thickness_units="screen")
+            self._segments(name, np.concatenate(parts), colour, width)
+
+    def _segments(self, name: str, ends: np.ndarray, colour: Colour, width: float = THIN) -> viser.LineSegmentsHandle:
+        """Draw lines from end to end, (k, 2, 3) [m], in one colour."""
+        return self._scene.add_line_segments(
+            name, ends.astype(np.float32), colour, thickness=width, thickness_units="screen"
+        )
 
     def _make_actors(self, captioned: bool) -> None:
         scene, robot, size = self._scene, self._robot, self._size
         # An object each: viser shows one colour as it is, but colours of single segments too pale.
-        nowhere = np.zeros((2, 2, 3), np.float32)
-        self._cables = [
-            scene.add_line_segments(
-                f"/cables/{index + 1}", nowhere, BLACK, thickness=CABLE_WIDTH, thickness_units="screen"
-            )
-            for index in range(robot.m)
-        ]
+        nowhere = np.zeros((2, 2, 3))
+        self._cables = [self._segments(f"/cables/{index + 1}", nowhere, BLACK, CABLE_WIDTH) for index in range(robot.m)]
         ends = np.zeros((robot.m, 3), np.float32)
         # Dots would hide a platform that is much smaller than the robot.
         small = min(DOT * size, 0.25 * float(np.ptp(robot.attachments, axis=0).max()) or DOT * size)
@@ -288,9 +280,7 @@ class Stage:
         ]
         self._sheaves = None
         if robot.pulley_radii.any():
-            self._sheaves = scene.add_line_segments(
-                "/pulleys", nowhere, BLACK, thickness=2 * THIN, thickness_units="screen"
-            )
+            self._sheaves = self._segments("/pulleys", nowhere, BLACK, 2 * THIN)
         self._platform = scene.add_frame("/platform", show_axes=False)
         self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
         com = np.array([robot.platform.com], np.float32)
@@ -315,14 +305,8 @@ class Stage:
             scene.add_label(f"/tensions/{index + 1}", "", anchor="center-center", font_screen_scale=0.8)
             for index in range(robot.m)
         ]
-        self._arrow = scene.add_line_segments(
-            "/missing",
-            np.zeros((1 + BARBS, 2, 3), np.float32),
-            rgb(style.colour(1)),
-            thickness=1.5 * CABLE_WIDTH,
-            thickness_units="screen",
-            visible=False,
-        )
+        self._arrow = self._segments("/missing", np.zeros((1 + BARBS, 2, 3)), rgb(style.colour(1)), 1.5 * CABLE_WIDTH)
+        self._arrow.visible = False
         self._short = scene.add_label("/shortfall", "", anchor="bottom-center", visible=False)
         above = np.array([*self.centre[:2], self._extent.high[2] + 0.12 * size])
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
@@ -331,31 +315,31 @@ class Stage:
         colour = rgb(labels.OTHER)
         self._other_platform = self._scene.add_frame("/other/platform", show_axes=False)
         self._body("/other/platform/body", self._robot.attachments, colour, opacity=0.35)
-        self._other_cables = self._scene.add_line_segments(
-            "/other/cables",
-            np.zeros((self._robot.m, 2, 3), np.float32),
-            colour,
-            thickness=THIN,
-            thickness_units="screen",
-        )
+        self._other_cables = self._segments("/other/cables", np.zeros((self._robot.m, 2, 3)), colour)
         self._lines("/other/path", [path], colour)
 
-    def _body(self, name: str, corners: np.ndarray, colour: tuple[int, int, int], opacity: float = 0.7) -> None:
+    def _body(self, name: str, corners: np.ndarray, colour: Colour, opacity: float = 0.7) -> None:
         """Draw the convex hull of corners (k, 3) [m] in the frame above `name`, if it has a volume or an area."""
         triangles = [[face[0], *pair] for face in faces(corners) for pair in pairwise(face[1:])]
         if triangles:
-            self._scene.add_mesh_simple(
-                name,
-                corners.astype(np.float32),
-                np.array(triangles, np.uint32),
-                color=colour,
-                opacity=opacity,
-                material="toon3",  # the shaders of the others keep a machine without a GPU busy for ten seconds
-                flat_shading=True,
-                side="double",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            self._mesh(name, corners, np.array(triangles), colour, opacity, flat=True)
+
+    def _mesh(
+        self, name: str, places: np.ndarray, triangles: np.ndarray, colour: Colour, opacity: float, flat: bool
+    ) -> viser.MeshHandle:
+        """Draw triangles (n, 3), by the indices of their corners among `places` (k, 3) [m]."""
+        return self._scene.add_mesh_simple(
+            name,
+            places.astype(np.float32),
+            triangles.astype(np.uint32),
+            color=colour,
+            opacity=opacity,
+            material="toon3",  # the shaders of the others keep a machine without a GPU busy for ten seconds
+            flat_shading=flat,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
 
 
 def _strokes(start: np.ndarray, tip: np.ndarray) -> np.ndarray:

@@ -55,13 +55,13 @@ def resting_box(robot: Robot) -> RestingBox | None:
         low[2] = min(low[2], 0.0 if centre[2] > 0 else centre[2] - (high[2] - low[2]) / 2)
     axes = _grid(robot, np.minimum(low, centre), centre, np.maximum(high, centre))
     able = _can_rest(robot, axes)
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)[able]
-    if not len(nodes):
+    resting = _nodes(axes)[able]
+    if not len(resting):
         return None
-    centre = nodes[np.argmin(np.linalg.norm(nodes - centre, axis=1))]
+    centre = resting[np.argmin(np.linalg.norm(resting - centre, axis=1))]
     low, high = largest_box(able, axes, centre, around=1)
     axes = _grid(robot, low, centre, high)
-    finer = _can_rest(robot, axes)
+    finer = _can_rest(robot, axes) | (_nodes(axes) == centre).all(axis=-1)  # as the first grid has found
     low, high = largest_box(finer, axes, centre)
     return RestingBox(low, high, centre, able.size + finer.size, np.array([np.diff(a).max(initial=0.0) for a in axes]))
 
@@ -140,9 +140,14 @@ def _grid(robot: Robot, low: np.ndarray, centre: np.ndarray, high: np.ndarray) -
     ]
 
 
+def _nodes(axes: list[np.ndarray]) -> np.ndarray:
+    """Return the nodes of a grid, (nx, ny, nz, 3)."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+
 def _can_rest(robot: Robot, axes: list[np.ndarray]) -> np.ndarray:
     """Return at which nodes of a grid the platform can rest, (nx, ny, nz) of bool."""
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    nodes = _nodes(axes)
     poses = np.tile(robot.home, (*nodes.shape[:3], 1))
     poses[..., :3] = nodes
     able = feasible(robot, Places.at_home(robot, poses.reshape(-1, 6)), rest_wrench(robot)[None])

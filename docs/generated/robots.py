@@ -26,8 +26,8 @@ def robots() -> str:
         rows.append([f"[{name}](#{name})", str(robot.m), str(len(robot.platform.dof)), carriers, f"{entry['mass']:g}"])
         facts = f"{robot.m} cables, {len(robot.platform.dof)} degrees of freedom ({dof}), carriers: {carriers}."
         sections.append(
-            f"## {name} {{ #{name} }}\n\n![{name}: carriers, cables and platform](../pictures/robots/{name}.png)"
-            f"{{ width=400 }}\n\n{facts}\n\n{escaped(entry['source'])}\n"
+            f"## {name} {{ #{name} }}\n\n![{name}: carriers, cables and platform](pictures/robots/{name}.png)"
+            f"{{ width=400 }}\n\n{facts}\n\n{escaped(robot.source)}\n"
         )
     listed = table(["robot", "cables", "degrees of freedom", "carriers", "mass [kg]"], rows)
     return HEAD + listed + "\n" + "\n".join(sections)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,9 +18,6 @@ from .measurements import Measurements
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import OF_CABLE, Parameters, check_free
-
-if TYPE_CHECKING:
-    import os
 
 DRAWN = 8192  # random poses, of which those at which the robot can rest are candidates
 KEPT = 600

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +18,6 @@ from ...base.netcdf import Contents, Variable, save_netcdf
 from ...models import points
 from ...models.part import COORDINATES, LARGEST
 from ...models.robot import Robot
-
-if TYPE_CHECKING:
-    import os
-    from pathlib import Path
 
 SIGMA = 1e-3  # [m] of lengths
 LARGEST_SIGMA = 100.0  # [m] or [rad]

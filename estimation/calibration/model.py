@@ -15,7 +15,7 @@ The pose of sample k is the pose measured at t_k + clock, or an initial one, plu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -117,10 +117,6 @@ class Model(Displayed):
     def robot(self) -> Robot:
         """Return the robot of the file."""
         return self.parameters.robot
-
-    def with_parameters(self, parameters: Parameters) -> Model:
-        """Return the model with other free parameters."""
-        return replace(self, parameters=parameters)
 
     @cached_property
     def _given(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

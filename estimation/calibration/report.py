@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...base.display import Fact
 from ...base.text import quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
-
-if TYPE_CHECKING:
-    from ...base.display import Fact
-    from .result import CalibrationData, Parameter
+from .result import CalibrationData, Parameter
 
 MOST_LISTED = 12
 MOST_NAMED = 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +18,10 @@ from ...models import points
 from ...models.part import LARGEST
 from ...models.robot import Robot
 from .cross_validation import HeldOut, compare, poses_fitted
+from .measurements import Measurements
 from .normal_equations import metric, state_equations
 from .outliers import Outlier, Slip
 from .solving import Solved, cleaned, covariance_of, inflation_of, lengths_of, noise_of
-
-if TYPE_CHECKING:
-    from .measurements import Measurements
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior

@@ -13,9 +13,10 @@ from itertools import product
 import numpy as np
 
 from ...base.errors import InputError
-from ...models import points, pose_from_lengths
+from ...models import points
 from ...models.robot import Robot
 from ..pose.estimate import largest_cost
+from ..pose.from_lengths import pose_from_lengths
 from ..pose.problem import problem_of
 from ..pose.search import level_platform
 from .fit import Fit, fit

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +23,7 @@ MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the ge
 MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standard deviations away
 
 
+@dataclass(eq=False)
 class PoseEstimate(Displayed):
     """The pose of the platform that fits measured cable lengths best; arrays have the leading dimensions of these.
 
@@ -44,23 +46,19 @@ class PoseEstimate(Displayed):
         level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
     by_gravity
         True if the lengths alone do not determine the pose, and gravity fixes it, (...).
+    known_covariance
+        Covariance of an equilibrium, (..., 6, 6), which does not follow from the lengths alone.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        pose: np.ndarray,
-        residuals: np.ndarray,
-        converged: Any,
-        sigma: np.ndarray,
-        carrier_pose: np.ndarray | None,
-        ambiguous: Any = None,
-        by_gravity: Any = False,
-        covariance: np.ndarray | None = None,
-    ):
-        self.robot, self.pose, self.residuals, self.converged = robot, pose, residuals, converged
-        self.sigma, self.carrier_pose = sigma, carrier_pose
-        self.ambiguous, self.by_gravity, self._covariance = ambiguous, by_gravity, covariance
+    robot: Robot
+    pose: np.ndarray
+    residuals: np.ndarray
+    converged: Any
+    sigma: np.ndarray
+    carrier_pose: np.ndarray | None
+    ambiguous: Any = None
+    by_gravity: Any = False
+    known_covariance: np.ndarray | None = None
 
     def _headline(self) -> str:
         shape = self.pose.shape[:-1]
@@ -77,16 +75,13 @@ class PoseEstimate(Displayed):
 
     def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
         """Return N estimates with the leading dimensions `batch`, and with `carrier_pose` as it was given."""
-        parts = self.pose, self.residuals, self.converged, self.ambiguous, self.by_gravity, self._covariance
-        shaped: list[Any]
+        names = ("pose", "residuals", "converged", "ambiguous", "by_gravity", "known_covariance")
+        arrays = {name: value for name in names if isinstance(value := getattr(self, name), np.ndarray)}
         if batch:
-            shaped = [p.reshape((*batch, *p.shape[1:])) if isinstance(p, np.ndarray) else p for p in parts]
+            shaped = {name: value.reshape((*batch, *value.shape[1:])) for name, value in arrays.items()}
         else:
-            shaped = [p[0] if isinstance(p, np.ndarray) else p for p in parts]
-            shaped[2:5] = [None if p is None else bool(p) for p in shaped[2:5]]
-        pose, residuals, converged, ambiguous, by_gravity, covariance = shaped
-        given = (self.robot, pose, residuals, converged, self.sigma, carrier_pose, ambiguous, by_gravity)
-        return PoseEstimate(*given, covariance)
+            shaped = {name: value[0] if value.ndim > 1 else bool(value[0]) for name, value in arrays.items()}
+        return replace(self, **shaped, carrier_pose=carrier_pose)
 
     @property
     def residual(self) -> Any:
@@ -110,8 +105,8 @@ class PoseEstimate(Displayed):
 
         It is zero for coordinates that cannot move, and infinite if some motion is undetermined.
         """
-        if self._covariance is not None:
-            return self._covariance
+        if self.known_covariance is not None:
+            return self.known_covariance
         covariances = np.empty((*self.pose.shape[:-1], 6, 6))
         poses = np.ascontiguousarray(self.pose)
         pose_covariance(record_of(self.robot), self._carriers(), 1.0 / self.sigma, poses, covariances)

@@ -16,7 +16,7 @@ from ...models.part import LARGEST
 from ...models.robot import Robot
 from .estimate import PoseEstimate
 from .problem import Problem, problem_of
-from .resting import open_estimates
+from .resting import resting
 from .search import estimates
 
 SIGMA = 1e-3  # [m], of a measured length: what a winch with an encoder achieves
@@ -71,11 +71,10 @@ def pose_from_lengths(
     each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
     problem = problem_of(robot, each)
     starts = None if start is None else _start(problem, start, batch)
+    found = estimates(problem, rows, starts, deviations)
     if problem.open:
-        flat = open_estimates(robot, problem, rows, starts, each, deviations)
-    else:
-        flat = estimates(robot, problem, rows, starts, each, deviations)
-    return flat.reshaped(batch, carriers)
+        found = resting(found, problem, rows, starts)
+    return found.reshaped(batch, carriers)
 
 
 def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:

@@ -22,27 +22,25 @@ class Problem(NamedTuple):
 
     Attributes
     ----------
-    record
-        The robot in the format of the core.
+    robot, record
+        The robot, and its format in the core.
     carriers
         Poses of the carriers, (c, 6), or (N, c, 6) for N poses of the platform.
     free
         1 for coordinates that move, else 0, (6,).
     home
         Initial pose of the platform, (6,) [m, rad].
-    m
-        Number of cables.
     freedoms
         Number of coordinates that move.
     open
         True if the lengths do not determine the pose at home, as with parallel cables, so that gravity does.
     """
 
+    robot: Robot
     record: np.ndarray
     carriers: np.ndarray
     free: np.ndarray
     home: np.ndarray
-    m: int
     freedoms: int
     open: bool
 
@@ -77,7 +75,7 @@ class Problem(NamedTuple):
         -------
         Poses (N, 6), weighted errors (N, m) [m], and whether each descent ended at a minimum, (N,).
         """
-        moved, errors, steps = np.array(poses, order="C"), np.empty((len(lengths), self.m)), np.empty(len(lengths))
+        moved, errors, steps = np.array(poses, order="C"), np.empty(lengths.shape), np.empty(len(lengths))
         free = self.free if free is None else free
         descend(self.record, self.carriers, lengths, weights, free, np.array(damping), moved, errors, steps)
         return moved, errors, steps > 0.0
@@ -96,7 +94,7 @@ class Problem(NamedTuple):
 
     def milder(self, weights: np.ndarray) -> np.ndarray:
         """Return weights, (m,), limited relative to those of the cables that are needed to determine the pose."""
-        return np.minimum(weights, MILD * np.sort(weights)[max(self.m - self.freedoms, 0)])
+        return np.minimum(weights, MILD * np.sort(weights)[max(self.robot.m - self.freedoms, 0)])
 
 
 def problem_of(robot: Robot, carrier_pose: np.ndarray | None = None) -> Problem:
@@ -120,5 +118,5 @@ def _at_home(robot: Any) -> Problem:
     J = gradient(robot, robot.home, None)[:, robot.dof_mask > 0.0]
     values = np.linalg.svd(J * robot.wrench_scale[robot.dof_mask > 0.0], compute_uv=False)
     is_open = robot.m < J.shape[1] or bool(values[-1] < OPEN * values[0])
-    of_robot = record_of(robot), robot.carrier_home, robot.dof_mask, robot.home
-    return Problem(*of_robot, robot.m, J.shape[1], is_open)
+    of_robot = robot, record_of(robot), robot.carrier_home, robot.dof_mask, robot.home
+    return Problem(*of_robot, J.shape[1], is_open)

@@ -14,7 +14,6 @@ from itertools import combinations, product
 import numpy as np
 
 from ...models import points
-from ...models.robot import Robot
 from .estimate import EXACT, PoseEstimate, largest_cost, moved
 from .problem import DAMPING, Problem
 from .taut import taut
@@ -27,20 +26,16 @@ RARE = 1e-4  # share of sound measurements that fit no better than the least lik
 MISFIT = 1e12  # beyond the score of any pose that fits
 
 
-def search(
-    robot: Robot, problem: Problem, lengths: np.ndarray, sigma: np.ndarray, carrier_pose: np.ndarray | None
-) -> _Best:
-    """Return poses (N, 6), errors (N, m) in standard deviations, and whether they are minima and ambiguous, (N,).
+def search(problem: Problem, lengths: np.ndarray, sigma: np.ndarray) -> _Best:
+    """Return poses (N, 6), errors (N, m) in standard deviations, and whether they are minima or ambiguous, (N,).
 
-    Arguments are those of `pose_from_lengths`, with lengths (N, m).
+    Lengths (N, m) [m] have the standard deviations `sigma` (m,) [m].
     """
-    best = _Best(robot, problem, len(lengths))
+    best = _Best(problem, len(lengths))
     level = level_platform(problem, lengths, 1.0 / sigma)
     for start in _starts(problem, level):
         left = best.left
-        to, errors, ended = problem.of(left).descend_from_afar(lengths[left], 1.0 / sigma, start[left])
-        carriers = carrier_pose if carrier_pose is None or carrier_pose.ndim == 2 else carrier_pose[left]
-        best.offer(left, to, errors, ended, carriers)
+        best.offer(left, *problem.of(left).descend_from_afar(lengths[left], 1.0 / sigma, start[left]))
         if not best.left.size:
             break
     return best
@@ -59,8 +54,9 @@ class _Best:
         Rows that need a further search.
     """
 
-    def __init__(self, robot: Robot, problem: Problem, count: int):
-        self._robot, self._home = robot, points.rotations(problem.home[3:])
+    def __init__(self, problem: Problem, count: int):
+        robot = problem.robot
+        self._problem, self._home = problem, points.rotations(problem.home[3:])
         redundancy = robot.m - problem.freedoms
         self._most, self._square = largest_cost(redundancy), redundancy == 0
         self._doubtful = largest_cost(redundancy, RARE)
@@ -68,22 +64,19 @@ class _Best:
         self.ended, self.ambiguous, self.left = np.zeros(count, bool), np.zeros(count, bool), np.arange(count)
         self._score, self._plausible = np.full(count, np.inf), np.zeros(count, bool)
 
-    def offer(
-        self, rows: np.ndarray, poses: np.ndarray, errors: np.ndarray, ended: np.ndarray, carriers: np.ndarray | None
-    ) -> None:
+    def offer(self, rows: np.ndarray, poses: np.ndarray, errors: np.ndarray, ended: np.ndarray) -> None:
         """Keep the poses of `rows` that are better than the previous ones."""
         cost = np.sum(errors**2, axis=1)
         fits = ended & (cost <= self._most)
         # The true pose may be one that hardly fits, or one that is not held with the file's CoM and load.
         plausible = ended & (cost <= self._doubtful)
         if self._square and fits.any():
-            of_fits = carriers if carriers is None or carriers.ndim == 2 else carriers[fits]
-            fits[fits] = taut(self._robot, poses[fits], of_fits)
+            fits[fits] = taut(self._problem.robot, poses[fits], self._problem.of(rows[fits]).carriers)
         R = points.rotations(poses[:, 3:])
         turned = np.einsum("nij,ij->n", R, self._home)  # the trace of R R_home^T
         angle = np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0))
         score = np.where(fits, cost + (angle / USUAL) ** 2, np.where(np.isfinite(cost), MISFIT + cost, np.inf))
-        apart = np.abs(poses[:, :3] - self.poses[rows, :3]).max(axis=1) > APART * self._robot.length
+        apart = np.abs(poses[:, :3] - self.poses[rows, :3]).max(axis=1) > APART * self._problem.robot.length
         apart |= np.abs(R - points.rotations(self.poses[rows, 3:])).max(axis=(1, 2)) > APART
         self.ambiguous[rows] |= plausible & self._plausible[rows] & apart
         better = score < self._score[rows]
@@ -114,7 +107,7 @@ def _starts(problem: Problem, level: np.ndarray):
                 step = np.zeros(6)
                 step[3 + axis] = sign * turn
                 yield moved(level, step)
-    if problem.m == problem.freedoms == 6:
+    if problem.robot.m == problem.freedoms == 6:
         for turn in OBLIQUE:
             for one, other in combinations(range(3, 6), 2):
                 for signs in product((1.0, -1.0), repeat=2):
@@ -123,18 +116,13 @@ def _starts(problem: Problem, level: np.ndarray):
                     yield moved(level, step)
 
 
-def estimates(
-    robot: Robot,
-    problem: Problem,
-    lengths: np.ndarray,
-    starts: np.ndarray | None,
-    carriers: np.ndarray | None,
-    sigma: np.ndarray,
-) -> PoseEstimate:
-    """Return the poses that fit lengths (N, m) best; the other arguments are checked ones of `pose_from_lengths`."""
+def estimates(problem: Problem, lengths: np.ndarray, starts: np.ndarray | None, sigma: np.ndarray) -> PoseEstimate:
+    """Return the poses that fit lengths (N, m) best, nearest to `starts` (N, 6) or, without any, of all."""
+    robot, carriers, ambiguous = problem.robot, problem.carriers, None
     if starts is None:
-        best = search(robot, problem, lengths, sigma, carriers)
-        residuals = np.multiply(best.errors, sigma, out=best.errors)
-        return PoseEstimate(robot, best.poses, residuals, best.ended, sigma, carriers, best.ambiguous)
-    poses, errors, converged = problem.descend(lengths, 1.0 / sigma, starts, 0.0)
-    return PoseEstimate(robot, poses, np.multiply(errors, sigma, out=errors), converged, sigma, carriers)
+        best = search(problem, lengths, sigma)
+        poses, errors, ended, ambiguous = best.poses, best.errors, best.ended, best.ambiguous
+    else:
+        poses, errors, ended = problem.descend(lengths, 1.0 / sigma, starts, 0.0)
+    errors *= sigma
+    return PoseEstimate(robot, poses, errors, ended, sigma, carriers, ambiguous)

@@ -10,6 +10,7 @@ Source: paper F, section V, steps 1 to 8, where step 7 prints T' for dT; Eqs. 8 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -82,9 +83,7 @@ def driving_force(
     time_step: float,
     elements: int = 8,
     *,
-    carrier_pose: Any = None,
-    carrier_velocity: Any = None,
-    carrier_acceleration: Any = None,
+    base: Sequence[Any] | None = None,
     wind: Any = None,
     pretension: Any = 0.0,
     winding: Literal["paid out", "printed"] = "paid out",
@@ -108,8 +107,8 @@ def driving_force(
         Dt [s].
     elements
         N of the paper: elements of each cable.
-    carrier_pose, carrier_velocity, carrier_acceleration
-        Of {A} in {G}, (N, 6); default: at home and at rest.
+    base
+        Pose, velocity and acceleration of {A} in {G}, (N, 6) each; default: at home and at rest.
     wind
         Velocity of the air in {G} [m/s], (N, 3) or (3,); default: no air.
     pretension
@@ -134,13 +133,18 @@ def driving_force(
         raise InputError(f"pose must have the shape (N, 6), one row per instant, got {pose.shape}")
     instants = len(pose)
     vibration = _series("vibration", vibration, instants)
-    base = robot.carrier_home[0] if carrier_pose is None else carrier_pose
-    base = _series("carrier_pose", base, instants)
+    given = (robot.carrier_home[0], None, None) if base is None else tuple(base)
+    if len(given) != 3:
+        raise InputError(f"base must be pose, velocity and acceleration of the carrier, got {len(given)} of them")
+    carrier_pose, carrier_velocity, carrier_acceleration = given
+    carrier_pose = _series("carrier_pose", carrier_pose, instants)
     one_of("winding", winding, ("paid out", "printed"))
     pretension = _pretension(pretension, (instants, robot.m))
 
     dynamics = Dynamics(robot).relative
-    w = dynamics.required_wrench(pose, velocity, acceleration, base, carrier_velocity, carrier_acceleration, wind)
+    w = dynamics.required_wrench(
+        pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration, wind
+    )
     if w.shape != (instants, 6):
         raise InputError(f"all arguments must have {instants} instants like pose, got {w.shape[:-1]}")
     A = dynamics.wrench_matrix(pose)
@@ -148,7 +152,7 @@ def driving_force(
     arms = robot.attachments @ rotations(pose[:, 3:]).transpose(0, 2, 1)  # R b, (N, m, 3), in {A}
     vectors = robot.anchors - (pose[:, None, :3] + arms)  # A - B, (N, m, 3), in {A}
     lengths = np.linalg.norm(vectors, axis=-1)
-    to_A = rotations(base[:, 3:]).transpose(0, 2, 1)
+    to_A = rotations(carrier_pose[:, 3:]).transpose(0, 2, 1)
     in_A = np.concatenate([np.einsum("nij,nj->ni", to_A, part) for part in np.split(vibration, 2, axis=1)], axis=1)
     displacements = element_chain.attachment_displacements(arms, in_A)
     dT_C = element_chain.damping_increment(vectors, damping, displacements, time_step)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -57,14 +57,4 @@ class Excess(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields for JSON, with the sentence as "text"; numbers that do not exist are None."""
-        return {
-            "limit": self.limit,
-            "about": self.about,
-            "time": self.time,
-            "value": self.value if np.isfinite(self.value) else None,
-            "bound": self.bound,
-            "unit": self.unit,
-            "accepted": self.accepted,
-            "why": self.why,
-            "text": str(self),
-        }
+        return asdict(self) | {"value": self.value if np.isfinite(self.value) else None, "text": str(self)}

@@ -5,6 +5,7 @@ A region that moves with the platform is its body, and its limits have separate 
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 
 import casadi as ca
@@ -66,13 +67,25 @@ class _Outside(Distance):
         outside = point_outside if pair.points.shape[1] == 1 else cable_outside
         return outside(self._place, *ca.horzsplit(pair.points))
 
-    def _way_outside(self, points: ca.SX, later: ca.SX) -> ca.SX:
-        """Return the distances of the lines from points (3, k) to others (3, k) of the region's frame, (k, 1) [m]."""
-        ways = zip(ca.horzsplit(points), ca.horzsplit(later), strict=True)
+
+class _PointsOutside(_Outside):
+    """Keep points, and the lines along which they move, out of a region."""
+
+    @abstractmethod
+    def _points_of(self, state: State) -> ca.SX:
+        """Return the points in the region's frame, (3, k) [m]."""
+
+    @override
+    def pairs(self, state: State) -> list[Pair]:
+        return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(self._points_of(state))]
+
+    @override
+    def on_the_way(self, first: State, second: State) -> ca.SX:
+        ways = zip(ca.horzsplit(self._points_of(first)), ca.horzsplit(self._points_of(second)), strict=True)
         return ca.vertcat(*(cable_outside(self._place, *way) for way in ways))
 
 
-class PlatformOutside(_Outside):
+class PlatformOutside(_PointsOutside):
     """Keep the platform's CoM and its attachments out of a region that is fixed in {G}."""
 
     name = "keep_out"
@@ -82,18 +95,11 @@ class PlatformOutside(_Outside):
         self.labels = ("platform",) * (1 + robot.m)
 
     @override
-    def pairs(self, state: State) -> list[Pair]:
-        return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(self._points_of(state))]
-
-    @override
-    def on_the_way(self, first: State, second: State) -> ca.SX:
-        return self._way_outside(self._points_of(first), self._points_of(second))
-
     def _points_of(self, state: State) -> ca.SX:
         return ca.horzcat(state.com, state.attachments)
 
 
-class CarriersOutside(_Outside):
+class CarriersOutside(_PointsOutside):
     """Keep the origins of carriers out of a region."""
 
     def __init__(self, robot: Robot, which: Sequence[int], place: Place, called: str, riding: bool, least: float):
@@ -103,13 +109,6 @@ class CarriersOutside(_Outside):
         self.which = which
 
     @override
-    def pairs(self, state: State) -> list[Pair]:
-        return [Pair(point, ca.SX(3, 0)) for point in ca.horzsplit(self._points_of(state))]
-
-    @override
-    def on_the_way(self, first: State, second: State) -> ca.SX:
-        return self._way_outside(self._points_of(first), self._points_of(second))
-
     def _points_of(self, state: State) -> ca.SX:
         return self._points(state, ca.horzcat(*(state.carriers[index].position for index in self.which)))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import casadi as ca
@@ -80,13 +80,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     given = scenario.duration / mesh.steps
     h = step * stretch(layout, x)
     own = points(scenario, layout, h, given, columns)
-    values: list[ca.SX] = []
-    rows: list[Row] = []
-
-    _chain_rows(layout, h, given, columns, own, values, rows)
-    values.append(x_end[layout.shared] - x[layout.shared])
-    rows += [Row("shared", 0.0, 0.0)] * len(layout.carried)
-    _inner_rows(scenario, layout, h, columns, own, values, rows)
+    constraints = [_chain_rows(layout, h, given, columns, own), *_inner_rows(scenario, layout, h, columns, own)]
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
     whole = [
         [ca.vertcat(*body) for body in (in_world(scenario, bodies[0], bodies[1:]), *bodies[1:])] for bodies in moving
@@ -94,7 +88,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     cost = _jerk_cost(scenario, h, own)
     cost += _rate_cost(scenario, layout, h, columns, whole, take_up)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
-    _rate_rows(scenario, mesh, layout, h, columns, whole, values, rows)
+    constraints += _rate_rows(scenario, mesh, layout, h, columns, whole)
     local = []
     for index, more, named in _way_rows(scenario, mesh, layout, columns, whole):
         if is_local(scenario.limits.all[index]):
@@ -102,8 +96,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
             its = ca.Function("near", inputs, [ca.vertcat(*more)], names, ["values"], differentiated(4, 2))
             local.append((index, its, named))
         else:
-            values += more
-            rows += named
+            constraints.append((more, named))
 
     @cache
     def points_of(carrier: int | None) -> Points:
@@ -116,7 +109,8 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         jerk = [of_body @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
         return _total(scenario, h, motion, [of_body @ column[layout.a] for column in columns], jerk)
 
-    _hull_rows(scenario, mesh, points_of, values, rows)
+    constraints += _hull_rows(scenario, mesh, points_of)
+    values, rows = ([*chain(*parts)] for parts in zip(*constraints, strict=True))
     inputs = [x, x_end, parameters, parameters_end, numbers]
     names = ["x", "x_end", "p", "p_end", "grid"]
     function = ca.Function("interval", inputs, [ca.vertcat(*values)], names, ["values"], differentiated(5, 2))
@@ -140,41 +134,30 @@ def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca
 
 
 def _chain_rows(
-    layout: Layout,
-    h: ca.SX | float,
-    given: float,
-    columns: list[ca.SX],
-    own: Points,
-    values: list[ca.SX],
-    rows: list[Row],
-) -> None:
-    """Add rows: the end is the result of the integration."""
+    layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], own: Points
+) -> tuple[list[ca.SX], list[Row]]:
+    """Return values and rows: the end is the result of the integration, with equal shared unknowns."""
     x_end, n = columns[-1], layout.n
-    values += [x_end[layout.q] - own.position[-1], (x_end[layout.v] - own.speed[-1]) * h]
-    rows += [Row("position", 0.0, 0.0)] * n + [Row("velocity", 0.0, 0.0)] * n
+    values = [x_end[layout.q] - own.position[-1], (x_end[layout.v] - own.speed[-1]) * h]
+    names = ["position"] * n + ["velocity"] * n
     if layout.derivatives > 3:
         a, jerk = _smooth_end(layout, h, given, columns)
         values += [x_end[layout.a] - a, x_end[layout.jerk] - jerk]
-        rows += [Row("acceleration", 0.0, 0.0)] * n + [Row("jerk", 0.0, 0.0)] * n
+        names += ["acceleration"] * n + ["jerk"] * n
+    values.append(x_end[layout.shared] - columns[0][layout.shared])
+    return values, [Row(name, 0.0, 0.0) for name in names + ["shared"] * len(layout.carried)]
 
 
 def _inner_rows(
-    scenario: Scenario,
-    layout: Layout,
-    h: ca.SX | float,
-    columns: list[ca.SX],
-    own: Points,
-    values: list[ca.SX],
-    rows: list[Row],
-) -> None:
-    """Add rows: inner points lie on the polynomials, with equal shared unknowns."""
-    n = layout.n
+    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], own: Points
+) -> Iterator[tuple[list[ca.SX], list[Row]]]:
+    """Yield values and rows: inner points lie on the polynomials, with equal shared unknowns."""
+    names = ["position"] * layout.n + ["velocity"] * layout.n + ["shared"] * len(layout.carried)
     for share, column in zip(scenario.scheme.inner, columns[1:-1], strict=True):
-        values += [column[layout.q] - bernstein.value(own.position, share)]
-        values += [(column[layout.v] - bernstein.value(own.speed, share)) * h]
-        values.append(column[layout.shared] - columns[0][layout.shared])
-        rows += [Row("position", 0.0, 0.0)] * n + [Row("velocity", 0.0, 0.0)] * n
-        rows += [Row("shared", 0.0, 0.0)] * len(layout.carried)
+        position = column[layout.q] - bernstein.value(own.position, share)
+        speed = (column[layout.v] - bernstein.value(own.speed, share)) * h
+        shared = column[layout.shared] - columns[0][layout.shared]
+        yield [position, speed, shared], [Row(name, 0.0, 0.0) for name in names]
 
 
 def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points) -> ca.SX:
@@ -208,16 +191,9 @@ def _pieces(scenario: Scenario, at_points: list[ca.SX]) -> list[tuple[float, ca.
 
 
 def _rate_rows(
-    scenario: Scenario,
-    mesh: Mesh,
-    layout: Layout,
-    h: ca.SX | float,
-    columns: list[ca.SX],
-    whole: list[list[ca.SX]],
-    values: list[ca.SX],
-    rows: list[Row],
-) -> None:
-    """Add the limits of how fast something changes, from point to point."""
+    scenario: Scenario, mesh: Mesh, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: list[list[ca.SX]]
+) -> Iterator[tuple[list[ca.SX], list[Row]]]:
+    """Yield values and rows of the limits of how fast something changes, from point to point."""
     limits = scenario.limits
     if not any(isinstance(limit, Rate) for limit in limits):
         return
@@ -229,9 +205,7 @@ def _rate_rows(
         if isinstance(limit, Rate):
             for share, first, second in _pieces(scenario, at_points):
                 rate = (second[place] - first[place]) / (h * share)
-                more, named = bounded(limit, rate, mesh, layout.slack(columns[0], limit), {})
-                values += more
-                rows += named
+                yield bounded(limit, rate, mesh, layout.slack(columns[0], limit), {})
 
 
 def _way_rows(
@@ -240,12 +214,9 @@ def _way_rows(
     """Yield index, values and rows of the distances from thin regions on the straight way from point to point."""
     held = mesh.held(scenario)
     for limit, on_the_way in swept(scenario, mesh).items():
-        values: list[ca.SX] = []
-        rows: list[Row] = []
-        for first, second in pairwise(whole):
-            more, named = bounded(limit, on_the_way(*first, *second), mesh, layout.slack(columns[0], limit), held)
-            values += more
-            rows += named
+        slack = layout.slack(columns[0], limit)
+        pieces = [bounded(limit, on_the_way(*first, *second), mesh, slack, held) for first, second in pairwise(whole)]
+        values, rows = ([*chain(*parts)] for parts in zip(*pieces, strict=True))
         yield scenario.limits.all.index(limit), values, rows
 
 
@@ -255,9 +226,9 @@ def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: li
 
 
 def _hull_rows(
-    scenario: Scenario, mesh: Mesh, points_of: Callable[[int | None], Points], values: list[ca.SX], rows: list[Row]
-) -> None:
-    """Add the hard convex limits at the Bernstein points: so they hold between the nodes too."""
+    scenario: Scenario, mesh: Mesh, points_of: Callable[[int | None], Points]
+) -> Iterator[tuple[list[ca.SX], list[Row]]]:
+    """Yield values and rows of the hard convex limits at Bernstein points: so they hold between the nodes too."""
     held = mesh.held(scenario)
     for limit in scenario.limits:
         hull = limit.hull
@@ -271,9 +242,7 @@ def _hull_rows(
             points = points[1:-1]
         evaluate = scenario.limits.hull(limit)
         for point in points:
-            more, named = bounded(limit, evaluate(point), mesh, None, held)
-            values += more
-            rows += named
+            yield bounded(limit, evaluate(point), mesh, None, held)
 
 
 def _total(

@@ -58,7 +58,7 @@ _FROM_COARSER = {"mu_init": 1e-5}
 
 
 # A solution with its multipliers is the nearest.
-_FROM_A_SOLUTION = {
+FROM_A_SOLUTION = {
     "mu_init": 1e-6,
     "warm_start_init_point": "yes",
     "warm_start_bound_push": 1e-6,
@@ -71,14 +71,14 @@ _FROM_A_SOLUTION = {
 
 # Of a program whose parameters have changed a little: with the accuracy of others each would take two iterations more,
 # and the motions differ by less than the audit can tell. What constraints may miss is the same.
-_FROM_A_NEAR_SOLUTION = _FROM_A_SOLUTION | {"mu_init": 1e-7, "tol": 1e-6}
+_FROM_A_NEAR_SOLUTION = FROM_A_SOLUTION | {"mu_init": 1e-7, "tol": 1e-6}
 
 
 _STARTS: dict[str, dict[str, Any]] = {
     "near": _FROM_A_NEAR_SOLUTION,
     "motion": _FROM_A_MOTION,
     "coarser": _FROM_COARSER,
-    "solution": _FROM_A_SOLUTION,
+    "solution": FROM_A_SOLUTION,
 }
 
 

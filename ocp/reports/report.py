@@ -268,10 +268,7 @@ def _robots(plan: PlanData) -> list[Fact]:
     drawn = plan.share_of_robots().holds
     return [
         (share, kept),
-        (
-            "tension spread",
-            f"by up to {quantity(margin.reach.max(), 'N')} {at}, {margin.factor:.3g} standard deviations",
-        ),
+        ("tension spread", f"up to {quantity(margin.reach.max(), 'N')} {at}, {margin.factor:.3g} standard deviations"),
         ("random samples", f"{int(drawn.sum())} of {len(drawn)} robots have tensions inside their limits throughout"),
     ]
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...base.text import quantity
 from ..audits.audit import Audit, audit
-from ..audits.planner_step import PlannerStep
 from ..audits.violation import relative_violation
 from ..nlp.grid import Grid
 from ..nlp.guess import initial_guess, usual_guess
@@ -23,6 +22,7 @@ from ..nlp.rows import Mesh
 from ..nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
 from ..nlp.waiting import wait_for
 from ..plan import Plan
+from ..result import PlannerStep
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus

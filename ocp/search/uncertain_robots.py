@@ -17,9 +17,9 @@ from ...base.text import quantity
 from ...models import Robot
 from ...statics.robust import Spread, motion_factor
 from ..audits.excess import Excess
-from ..audits.planner_step import PlannerStep
 from ..audits.robust_margin import RobustMargin
 from ..plan import Plan
+from ..result import PlannerStep
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
@@ -57,7 +57,7 @@ def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation |
         by = f"limits tightened by up to {quantity(tightened[cable], 'N')} (cable {cable + 1})"
         narrow = np.flatnonzero(robot.t_min + tightened + task.margin > robot.t_max - tightened - task.margin)
         if narrow.size:
-            reason = f"the tension spread exceeds the range of the limits of cable {narrow[0] + 1} are apart"
+            reason = f"the tension spread exceeds the range of the tension limits of cable {narrow[0] + 1}"
             break
         again = climb(lay_out(_tightened(robot, tightened), task), plan.deviation)
         stages += [PlannerStep(f"for {quantity(100 * share, '%')} of the robots", by, 0.0), *again.stages]

@@ -13,7 +13,22 @@ from ...models.part import Finite, Part, Pose
 STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-class Initial(Part):
+class _State(Part):
+    """State at one end of a motion."""
+
+    def of(self, owner: int | None) -> Iterator[tuple[int, Pose]]:
+        """Yield the given values of the platform (None) or a carrier, each with the order of its derivative."""
+        names = ("pose", "velocity", "acceleration")
+        rows = [getattr(self, name if owner is None else f"carrier_{name}", None) for name in names]
+        pose, velocity, acceleration = rows if owner is None else [row and row[owner] for row in rows]
+        if pose is not None:
+            yield 0, pose
+            yield 1, STILL if velocity is None else velocity
+            if acceleration is not None:
+                yield 2, acceleration
+
+
+class Initial(_State):
     """The state at the start of a motion, in {G}; it overrides `tube.ends` and `base.ends` there."""
 
     pose: Pose = Field(description="(x, y, z, roll, pitch, yaw) of the platform [m, rad]")
@@ -33,19 +48,8 @@ class Initial(Part):
         "as the planner chooses",
     )
 
-    def of(self, owner: int | None) -> Iterator[tuple[int, Pose]]:
-        """Yield what is given of the platform (None) or of a carrier: the order of the derivative, and the value."""
-        if owner is None:
-            yield 0, self.pose
-            yield 1, self.velocity
-            if self.acceleration is not None:
-                yield 2, self.acceleration
-        elif self.carrier_pose is not None:
-            yield 0, self.carrier_pose[owner]
-            yield 1, STILL if self.carrier_velocity is None else self.carrier_velocity[owner]
 
-
-class Final(Part):
+class Final(_State):
     """The state at the end of a motion, in {G}; given fields override `tube.ends` and `base.ends`."""
 
     pose: Pose | None = Field(default=None, description="of the platform [m, rad]; default: as tube.ends requires")
@@ -60,20 +64,6 @@ class Final(Part):
     carrier_acceleration: tuple[Pose, ...] | None = Field(
         default=None, description="of each carrier; default: as the planner chooses"
     )
-
-    def of(self, owner: int | None) -> Iterator[tuple[int, Pose]]:
-        """Yield what is given of the platform (None) or of a carrier: the order of the derivative, and the value."""
-        if owner is None:
-            parts = self.pose, self.velocity, self.acceleration
-        else:
-            rows = self.carrier_pose, self.carrier_velocity, self.carrier_acceleration
-            parts = tuple(None if part is None else part[owner] for part in rows)
-        pose, velocity, acceleration = parts
-        if pose is not None:
-            yield 0, pose
-            yield 1, STILL if velocity is None else velocity
-            if acceleration is not None:
-                yield 2, acceleration
 
 
 def check_ends(robot: Robot, initial: Initial | None, final: Final | None, frame: str, where: str) -> None:

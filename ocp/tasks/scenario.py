@@ -27,7 +27,7 @@ from .task import Task
 from .wind_set import WindBox, as_wind, choices, decisive_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
-AUDIT_RATE = 1000.0  # [1/s]
+AUDIT_RATE = 1000.0  # [1/s]: the audit looks at every millisecond
 LEAST_INTERVALS = 200  # of the audit: short motions are audited between their ends too
 START_BAND = 1e-4  # of the force scale: how far planned tensions may start from the measured ones
 MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds

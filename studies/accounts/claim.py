@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -80,17 +80,7 @@ class Claim:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all fields for JSON."""
-        return {
-            "id": self.id,
-            "place": self.place,
-            "statement": self.statement,
-            "printed": self.printed,
-            "computed": self.computed,
-            "unit": self.unit,
-            "verdict": self.verdict.value,
-            "why": self.why,
-            "figure": self.figure,
-        }
+        return asdict(self)
 
 
 @dataclass(frozen=True)

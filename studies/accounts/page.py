@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING
 
 from ...figures import page as html
 from ...figures import style
+from .account import Account, Chapter
 from .claim import Claim, Verdict, value_text
 from .text import BY_THE_PAPER, MEANING, READ
-
-if TYPE_CHECKING:
-    from .account import Account, Chapter
 
 NOT_REPRODUCED = "What was not reproduced"
 

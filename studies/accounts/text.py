@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from .account import Account
 from .claim import Claim, Verdict, value_text
-
-if TYPE_CHECKING:
-    from .account import Account
 
 FIGURES = "figures"  # the folder beside the report
 BY_THE_PAPER = "by the paper"  # head of what it prints, or of what follows from that

@@ -19,21 +19,13 @@ TAGS = (1, 2, 2, *range(3, 39))  # numbers of the displayed equations, in order:
 IN_STEPS = (6, 11, 12, 23, 24, 39)  # equations by which steps 2 to 7 of section V compute
 # References in sections II to IV, in order.
 OUTSIDE = (6, 6, 6, 14, 15, 24, 25, 27, 28, 29, 31, 32, 33, 30, 34, 27, 35, 38)
-CAPTIONS = {
-    "trajectories of platform and quadrotor": 6,
-    "lengths and tensions in compound motion": 7,
-    "expected and superimposed trajectories": 8,
-    "length of cable 1": 9,
-    "force of cable 1": 10,
-    "ratio of cable 1": 11,
-}
-SHOWN = {
-    "trajectories of platform and quadrotor": 5,
-    "lengths and tensions in compound motion": 6,
-    "expected and superimposed trajectories": 7,
-    "length of cable 1": 8,
-    "force of cable 1": 9,
-    "ratio of cable 1": 10,
+FIGURES = {
+    "trajectories of platform and quadrotor": (6, 5),
+    "lengths and tensions in compound motion": (7, 6),
+    "expected and superimposed trajectories": (8, 7),
+    "length of cable 1": (9, 8),
+    "force of cable 1": (10, 9),
+    "ratio of cable 1": (11, 10),
 }
 """Figures by what sections VI.A and VI.B describe: the number of its caption, and the number in the text."""
 TURN = 1e-6  # of alpha_A, for a difference [rad]
@@ -66,9 +58,8 @@ def by_order(references: tuple[int, ...]) -> tuple[float, ...]:
 
 
 def _figures() -> Claim:
-    return claim("section-VI-references").compared(
-        tuple(float(CAPTIONS[what]) for what in SHOWN), printed=tuple(float(number) for number in SHOWN.values())
-    )
+    captions, shown = (tuple(map(float, numbers)) for numbers in zip(*FIGURES.values(), strict=True))
+    return claim("section-VI-references").compared(captions, printed=shown)
 
 
 def _frames() -> Claim:
