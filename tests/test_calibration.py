@@ -168,7 +168,7 @@ def test_pulleys_break_gauges_and_scales_add_one():
     assert len(result.not_identifiable) == 4
     result = calibrate("cogiro", as_built(80, 0).measurements(known=False), (*ALL_THREE, "scales"))
     assert len(result.not_identifiable) == 13
-    assert result.not_identifiable[-1].startswith("the size of everything")
+    assert result.not_identifiable[-1].startswith("the overall scale")
 
 
 def test_a_point_mass_does_not_tell_anchors_from_attachments():

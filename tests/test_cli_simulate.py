@@ -110,7 +110,7 @@ def test_many_flights_have_one_table(folder):
         assert answer["error_max"]["worst"] == pytest.approx(worst.max())
         assert answer["error_max"]["median"] == pytest.approx(np.median(worst))
         assert answer["worst_seed"] == table.seed.values[worst.argmax()]
-        assert report(table).text().splitlines()[0] == "wang-flying, 4 flights of 0.2 s: PASSED, 4 passed"
+        assert report(table).text().splitlines()[0] == "wang-flying, 4 runs of 0.2 s: PASSED, 4 passed"
 
 
 @pytest.mark.parametrize(
@@ -174,5 +174,5 @@ def test_the_viewer_plays_a_flight(folder):
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["kind"] == "flight"
     page = (folder / "short.html").read_text()
-    assert "wang-flying, flight: passed" in page
+    assert "wang-flying, simulation: passed" in page
     assert "reference of the platform" in page

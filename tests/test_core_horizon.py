@@ -1,6 +1,7 @@
 """Predictive control in C: sanitizers and compilers are silent, and all processors have the same bits."""
 
 import subprocess
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -43,8 +44,7 @@ def test_every_form_has_the_same_bits(monkeypatch, n, m, p):
 def test_a_copy_of_the_memory_has_the_same_solution():
     solver = written(random_problem(3, p=1).arrays)
     assert solver.solve()
-    build, state = solver.__reduce__()
-    copy = build(*state)
+    copy = deepcopy(solver)
     assert isinstance(copy, Horizon)
     assert copy.solve(warm=True)
     assert solver.solve(warm=True)

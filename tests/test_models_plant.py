@@ -458,7 +458,7 @@ def test_wrong_input_is_one_line():
         Plant(load("cogiro"), contacts="sampled")
     with pytest.raises(InputError, match="wind must be None for robot 'cogiro'"):
         Plant(load("cogiro")).command(np.ones(8), wind=[1, 0, 0])
-    with pytest.raises(InputError, match="lengths must be None where tensions are given"):
+    with pytest.raises(InputError, match="lengths must be None if tensions are given"):
         plant.start(tensions=np.ones(6), lengths=np.ones(6))
     with pytest.raises(InputError, match="stiffness must be finite numbers >= 0"):
         Plant(robot, stiffness=-1.0)

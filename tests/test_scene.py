@@ -31,7 +31,7 @@ def test_a_file_has_all_that_a_film_draws(name, request, tmp_path):
     saved = xr.load_dataset(result.save(tmp_path / "result.nc"), engine="h5netcdf")
     own, of_file = (dataclasses.asdict(scene(load("cogiro"), dataset, times)) for dataset in (result.trajectory, saved))
     np.testing.assert_equal(of_file, own)
-    assert own["title"] == {"planned": "cogiro, task: feasible", "simulated": "cogiro, flight: passed"}[name]
+    assert own["title"] == {"planned": "cogiro, task: feasible", "simulated": "cogiro, simulation: passed"}[name]
 
 
 def test_what_is_drawn_is_where_the_robot_was(simulated):

@@ -71,7 +71,7 @@ def test_the_description_on_a_package_index_has_no_path_of_the_clone(sdist, whee
     for metadata in (sdist / "PKG-INFO", next(wheel.glob("*.dist-info/METADATA"))):
         text = metadata.read_text(encoding="utf-8")
         assert "Description-Content-Type: text/markdown" in text
-        assert f"]({release}/docs/pictures/circle.png)" in text
+        assert f"]({release}/docs/pictures/hero.gif)" in text
         assert not re.search(r'(\]\(|src=")(docs|notebooks|examples)/', text)
         assert f"Project-URL: Repository, {PROJECT['project']['urls']['Repository']}" in text
 

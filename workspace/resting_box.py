@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from .region import surrounding_box
 STEPS = 10  # from the middle of the grid to each of its sides
 
 
-@dataclass(frozen=True)
-class RestingBox:
+class RestingBox(NamedTuple):
     """Positions of the platform at which it can rest at home's attitude, its tensions inside their limits.
 
     Attributes

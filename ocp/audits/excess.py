@@ -17,7 +17,7 @@ class Excess(Displayed):
 
     Attributes
     ----------
-        limit
+    limit
         Name of the limit in the task or the robot's file.
     about
         "cable 3", "quad1", "platform".
@@ -25,7 +25,7 @@ class Excess(Displayed):
         Instant [s]; None if the limit does not refer to one.
     value, bound
         The value and its bound, in `unit`; nan if there is no value.
-        unit
+    unit
         Unit of value and bound.
     accepted
         Side of the bound on which the value must be.
@@ -45,14 +45,15 @@ class Excess(Displayed):
     def __str__(self) -> str:
         """Return "carrier_speed of quad1 must be at most 2 m/s, is 2.5 m/s at t = 1.250 s"."""
         at = "" if self.time is None else f" at t = {self.time:.3f} s"
+        why = f" ({self.why})" if self.why else ""
         body, _, region = self.about.partition(" outside ")
         if self.limit == "keep_out" and region and self.value < 0:
             required = f" (required distance: {quantity(self.bound, self.unit)})" if self.bound > 0 else ""
-            return f"{body} is {quantity(-self.value, self.unit)} inside the keep-out region {region!r}{at}{required}"
+            depth = quantity(-self.value, self.unit)
+            return f"{body} is {depth} inside the keep-out region {region!r}{at}{required}{why}"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "
         value, bound = (quantity(number, self.unit, digits=6) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value
-        why = f" ({self.why})" if self.why else ""
         return f"{self.limit} of {self.about} must be {side}{bound}, is {value}{at}{why}"
 
     def to_dict(self) -> dict[str, Any]:

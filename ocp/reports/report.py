@@ -323,7 +323,7 @@ def _audit(plan: PlanData) -> list[Fact]:
         ("largest wrench error", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
     ]
     if names := list(dict.fromkeys(limit.name for limit in plan.scenario.limits if limit.shown)):
-        facts.append(("other limits checked", ", ".join(name.replace("_", " ") for name in names)))
+        facts.append(("other limits checked", ", ".join(names)))
     if (drift := audit.drift) is not None:
         window = _error(drift.window_position, drift.window_attitude)
         after = f"platform error after {quantity(drift.window, 's', digits=2)} with the planned tensions: {window}"
