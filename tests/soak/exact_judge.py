@@ -71,11 +71,11 @@ class Judge:
         self.columns = [self.A[c::m] for c in range(m)]
         self.norms = np.array([_norm(column) / self.unit for column in self.columns])
 
-    def excludes(self, direction: Array, orthogonal: float = 0.0) -> bool:
+    def excludes(self, direction: Array) -> bool:
         """Return whether w lies exactly beyond all that tensions can give along a direction, or along one next to it.
 
         A direction in floating point is not quite orthogonal to a cable without a limit. The exact one next to it is
-        found by taking the part along such cables away, or pulls up to `orthogonal` times their column norm are none.
+        found by taking the part along such cables away.
         """
         if not np.isfinite(direction).all() or not direction.any():
             return False
@@ -84,13 +84,7 @@ class Judge:
         basis: list[Integers] = []
         for _ in range(len(given) + 1):
             pulls = [_dot(d, column) for column in self.columns]
-            limits = [most if pull > 0 else less for pull, less, most in zip(pulls, low, high, strict=True)]
-            least = Fraction(orthogonal) ** 2 * _dot(d, d)
-            endless = [
-                c
-                for c, column in enumerate(self.columns)
-                if abs(limits[c]) == np.inf and pulls[c] ** 2 > least * _dot(column, column)
-            ]
+            endless = [c for c, pull in enumerate(pulls) if pull and abs(high[c] if pull > 0 else low[c]) == np.inf]
             if not endless:
                 break
             basis.append(_orthogonal(self.columns[endless[0]], basis))
@@ -99,9 +93,9 @@ class Judge:
             return False
         # d . w > sum of pull . limit, all over their units.
         beyond = Fraction(_dot(d, self.w), self.wrench_unit)
-        for pull, limit in zip(pulls, limits, strict=True):
-            if pull and abs(limit) < np.inf:
-                beyond -= Fraction(pull, self.unit) * Fraction(limit)
+        for pull, least, most in zip(pulls, low, high, strict=True):
+            if pull:
+                beyond -= Fraction(pull, self.unit) * Fraction(most if pull > 0 else least)
         return beyond > 0
 
     def is_nearly_orthogonal(self, direction: Array) -> bool:

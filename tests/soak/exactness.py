@@ -14,12 +14,10 @@ exported control step, which is compiled here, solve it. `exact_judge` judges th
 There are exceptions, and all are counted. A problem is `rough` if its scales differ by more than 2^8 or its cables are
 parallel to five digits. Only of such a problem "inaccurate" and "failed" are not wrong, and "singular" is right, too,
 if no cable pulls along the direction by more than 1e-11 of its column, as documented: it is listed as "singular to
-eleven digits". If w is off by more than 1000 tolerances, it may be "infeasible" along a direction along which cables
-without a limit pull by less than 1e-13 of their columns, as documented: "infeasible to thirteen digits". "infeasible"
-will do for a w off the range if it is off by less than 1000 tolerances, if the problem is rough, or if the condition of
-the matrix is above 1e5. The exported step has rounded numbers only. It may be unsure of a rough problem, if the
-condition is above 100, on the boundary of what the cables can give, and within 1000 tolerances or 1e-6 of the largest
-wrench of a cable of it.
+eleven digits". "infeasible" will do for a w off the range if it is off by less than 1000 tolerances, if the problem is
+rough, or if the condition of the matrix is above 1e5. The exported step has rounded numbers only. It may be
+unsure of a rough problem, if the condition is above 100, on the boundary of what the cables can give, and within 1000
+tolerances or 1e-6 of the largest wrench of a cable of it.
 
 The family "exact" is made of integers and powers of two, and the truth is known. The family "random" has random digits
 instead; there each answer has to prove itself. In "float" the float form of the step solves problems of 24 bits, and is
@@ -65,8 +63,6 @@ NEAR = 1000.0  # tolerances
 FAR = 1e-6  # of the largest wrench of a cable at a limit or at its t_ref
 CONDITION, WORST = 1e2, 1e5
 NEARLY = "singular to eleven digits"
-ORTHOGONAL = 1e-13  # of a column's norm
-ROUNDED = "infeasible to thirteen digits"
 PARTS = ("exact", "random", "float")
 
 
@@ -218,8 +214,8 @@ def _judged(seed: int, problem: ExactProblem, given: dict[str, Answer]) -> Repor
         reason, gap = known[key]
         if not reason and not unsure and answer.status != given["solve"].status:
             reason = f"the status of solve is {given['solve'].status}"
-        counts[solver, reason if reason in (NEARLY, ROUNDED) else answer.status] += 1
-        if reason not in ("", NEARLY, ROUNDED):
+        counts[solver, NEARLY if reason == NEARLY else answer.status] += 1
+        if reason not in ("", NEARLY):
             wrong.append(Wrong(seed, solver, f"{answer.status}: {reason}"))
         largest = max(largest, gap)
     return Report(counts, wrong, largest)
@@ -236,10 +232,7 @@ def _reason(judge: Judge, solver: str, answer: Answer) -> tuple[str, float]:
     if answer.status in ("infeasible", "singular"):
         off, loose = judge.off_range(), problem.rough or solver == "float"
         nearly = loose and answer.status == "singular" and judge.is_nearly_orthogonal(answer.direction)
-        far = problem.rough and answer.status == "infeasible" and problem.outside > NEAR * tolerance
         if problem.outside == 0.0 or not judge.excludes(answer.direction):
-            if far and solver != "float" and judge.excludes(answer.direction, ORTHOGONAL):
-                return ROUNDED, 0.0
             permits = "the limits permit w" if problem.outside == 0.0 else "the direction does not exclude w"
             return (NEARLY if nearly and solver != "float" else permits), 0.0
         if answer.status == "singular":
