@@ -53,7 +53,7 @@ pictures: .venv/core.stamp
 	mkdir -p docs/pictures build
 	cd build && ../$(BIN)/towline demo && cp towline-demo/tensions.png ../docs/pictures/circle.png
 	printf 'name: circle\npath: {kind: circle, centre: [0, 0, -1], radius: 0.8, rate: 0.8}\nbase: {kind: free, ends: periodic}\n' > build/circle.yaml
-	cd build && ../$(BIN)/towline plan wang-flying-quadrotor circle.yaml --animate ../docs/pictures/hero.gif --fps 12
+	cd build && ../$(BIN)/towline plan wang-flying-quadrotor circle.yaml --animate ../docs/pictures/hero.gif --fps 7
 	cd docs/pictures && for example in ../../examples/*.py; do ../../$(BIN)/python $$example || exit 1; done
 	printf 'name: lift\npath: {kind: line, start: [0, 0, 1], end: [0.6, 0.4, 1.6]}\nduration: 3\n' > build/lift.yaml
 	cd build && ../$(BIN)/towline plan ipanema-1 lift.yaml --vary margin=0:40:5 --vary duration=0.2:1.2:0.1 \
