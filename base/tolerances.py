@@ -35,6 +35,10 @@ NEGLIGIBLE = 1e-11
 # that gives no more along d than A t is rounded by. A larger pull may give anything, and voids the certificate.
 ORTHOGONAL = 1e-13
 
+# A pull below it counts if it is more than this part of the terms that it is the sum of: not rounding, but data. The
+# cable may have tensions up to CANCELLED times what is required, and what it gives with these is in doubt.
+ROUNDED_PULL = 1e-15
+
 # The heaviest weight of a problem, relative to the lightest: beyond it least squares have no digits left.
 WEIGHTS_APART = 1e14
 

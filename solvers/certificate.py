@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.display import Displayed, Fact
 from ..base.inputs import finite_array, required
 from ..base.text import quantity
-from ..base.tolerances import NEGLIGIBLE, ORTHOGONAL, RANK
+from ..base.tolerances import CANCELLED, NEGLIGIBLE, ORTHOGONAL, RANK, ROUNDED_PULL
 from .box_least_squares import Projection, project
 from .exact_arithmetic import exact_optimum
-from .problem import Array, TensionProblem, accepted_error
+from .problem import Array, TensionProblem, accepted_error, needed
 
 Indices = NDArray[np.intp]
 
@@ -276,7 +276,8 @@ def _support(problem: TensionProblem, direction: Array) -> tuple[float, float, I
     """Return support value along `direction` and a bound of its rounding [N], and the cables at t_max and at t_min.
 
     What a cable with a limit gives counts at any size, and so does the rounding of its pull. A cable without a limit
-    gives any amount, unless it pulls by less than the rounding of its own wrench: the support value is infinite.
+    gives any amount, unless it pulls by less than the rounding of its own wrench: the support value is infinite. A
+    smaller pull that is no rounding of its terms is in doubt, times the largest tension that counts.
     """
     pull, terms = direction @ problem.A, np.abs(direction) @ np.abs(problem.A)
     limit = np.where(pull > 0.0, problem.t_max, problem.t_min)
@@ -285,5 +286,7 @@ def _support(problem: TensionProblem, direction: Array) -> tuple[float, float, I
         return np.inf, np.inf, _NONE, _NONE
     support = float(pull[known] @ limit[known])
     rounding = (problem.n + problem.m + 2) * _UNIT_ROUNDOFF * float(terms[known] @ np.abs(limit[known]))
+    counts = ~known & (np.abs(pull) > ROUNDED_PULL * terms)
+    rounding += CANCELLED * needed(problem) * float(np.sum(np.abs(pull[counts]) / problem.column_norms[counts]))
     small = NEGLIGIBLE * problem.column_norms
     return support, rounding, np.flatnonzero(pull > small), np.flatnonzero(pull < -small)

@@ -193,11 +193,15 @@ class TensionProblem(Displayed):
         return accepted_error(self, tensions)
 
 
+def needed(problem: TensionProblem) -> float:
+    """Return |S w| and the wrench of the tensions nearest to zero, together [N]."""
+    nearest_to_zero = np.minimum(np.maximum(problem.t_min, 0.0), problem.t_max)
+    return float(np.sqrt(problem.scaled_w @ problem.scaled_w) + problem.column_norms @ np.abs(nearest_to_zero))
+
+
 def accepted_error(problem: TensionProblem, tensions: Array) -> float:
     """Return `TensionProblem.tolerance` [N] of tensions (m,) of float64 that are known to be numbers."""
-    nearest_to_zero = np.minimum(np.maximum(problem.t_min, 0.0), problem.t_max)
-    norms = problem.column_norms
-    required = np.sqrt(problem.scaled_w @ problem.scaled_w) + norms @ np.abs(nearest_to_zero)
+    norms, required = problem.column_norms, needed(problem)
     reference = norms @ np.abs(problem.t_ref)
     terms = norms @ np.abs(tensions)
     if required > 0.0:  # otherwise no tensions give the wrench too, and what others leave is rounding

@@ -26,6 +26,8 @@ INLINE void add_reach(reach *of_all, const demands *p, const matrices *M, const 
     of_all->pulls |= magnitude(pull) > NEGLIGIBLE * norm;
     of_all->usable &= known | (magnitude(pull) <= ORTHOGONAL * norm);
     of_all->support += gives;
+    const mask counts = ~known & (magnitude(pull) > ROUNDED_PULL * terms);
+    of_all->rounded += where(counts, magnitude(pull) / norm * (CANCELLED / ROUNDING) * p->required, number(0));
     of_all->rounded += norm * (magnitude(p->t_ref[c]) + magnitude(nearest(p->t_min[c], p->t_max[c])));
     of_all->rounded += REACH_OF_PULL * magnitude(gives) + REACH_OF_TERMS * terms * magnitude(limit);
 }

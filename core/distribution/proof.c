@@ -214,7 +214,8 @@ static void turn_away(const form *f, const towline_problem *problem, real *d) {
  * exceeds the most that tensions inside the limits can give along d. Fill support and shortfall.
  *
  * The doubt has in it the rounding of each pull, times the limit. Of a cable without a limit a pull is accepted that is
- * smaller than ROUNDING: whatever its tension, it gives no more along d than A t is rounded by.
+ * smaller than ROUNDING: it gives no more along d than A t is rounded by. If it is more than the rounding of its terms,
+ * the doubt has in it what it gives with the largest tension that counts.
  */
 towline_status towline_proves_infeasible(const form *f, const towline_problem *problem, const measure *known,
                                          towline_answer *answer) {
@@ -256,6 +257,8 @@ towline_status towline_proves_infeasible(const form *f, const towline_problem *p
             rounding += REACH_OF_PULL * magnitude(pull * limit) + REACH_OF_TERMS * terms * magnitude(limit);
         } else if (magnitude(pull) > ORTHOGONAL * norm) {
             return TOWLINE_INACCURATE; /* it gives any amount */
+        } else if (magnitude(pull) > ROUNDED_PULL * terms) {
+            rounding += magnitude(pull) / norm * (CANCELLED / ROUNDING) * known->required;
         }
     }
     answer->support = support;

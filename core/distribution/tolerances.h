@@ -15,6 +15,7 @@
 #define CANCELLED 1e10     /* terms of A t count up to this many times what the problem requires */
 #define NEGLIGIBLE 1e-11   /* a cable pulls along d only beyond this part of its column norm; else w is off the range */
 #define ORTHOGONAL 1e-13   /* a cable without a limit may pull by this part of its column norm: rounding */
+#define ROUNDED_PULL 1e-15 /* it counts beyond this part of its terms, with tensions up to CANCELLED */
 #define CLEAR 4.0          /* a shortfall is beyond doubt from this many tolerances */
 #define RANK 1e-12         /* singular values below this part of the largest make a problem singular */
 #define OUTSIDE 1e-10      /* part of w outside the range of A that makes a problem singular */
@@ -59,6 +60,7 @@
 #define CANCELLED 5e2F
 #define NEGLIGIBLE 4e-6F
 #define ORTHOGONAL 0.0F
+#define ROUNDED_PULL 0.0F
 #define CLEAR 4.0F
 #define RANK 6e-6F
 #define OUTSIDE 1e-5F
