@@ -50,7 +50,7 @@ class Error:
     task, controller :
         The task and the controller.
     rms_mm, max_mm :
-        Of the distance from the reference [mm]: root of the mean square, and largest of all runs.
+        Distance from the reference [mm]: root mean square, and largest of all runs.
     ratio :
         Median over the seeds of the largest error over that of computed torque with the same wind.
     soft :

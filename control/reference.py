@@ -17,7 +17,7 @@ class Reference(NamedTuple):
     pose, velocity, acceleration
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6), and its time derivatives.
     carrier_pose, carrier_velocity, carrier_acceleration
-        The same for each carrier, (..., c, 6).
+        Pose of each carrier's frame in {G}, (..., c, 6), and its time derivatives.
     tensions
         Planned tensions [N], (..., m); None if none are planned; the smallest tensions are then preferred.
     """

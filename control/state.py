@@ -17,7 +17,7 @@ class State(NamedTuple):
     pose, velocity
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6), and its time derivative.
     carrier_pose, carrier_velocity
-        The same for each carrier, (..., c, 6).
+        Pose of each carrier's frame in {G}, (..., c, 6), and its time derivative.
     tensions
         Measured tensions [N], (..., m); None if the robot has no tension sensors.
     time

@@ -10,7 +10,7 @@ LEFT = 0.25  # of its length that is drawn of a cable that has been cut
 def drawn_ends(anchors: np.ndarray, attachments: np.ndarray, cut: np.ndarray | None) -> np.ndarray:
     """Return the ends of cables in {G} [m], (..., m, 3) as anchors and attachments are; `cut` is (..., m) or None.
 
-    What is left of a cut cable hangs down from its anchor. How long it really is depends on where it broke.
+    A cut cable is drawn hanging from its anchor. Its true length depends on where it broke.
     """
     if cut is None:
         return attachments

@@ -218,7 +218,7 @@ class Planner(Displayed):
         Returns
         -------
         Plan
-            As for `plan`. If it is not feasible, the next call continues from the previous feasible plan.
+            The plan, with the status that `plan` would return. If it is not feasible, the next call continues from the previous feasible plan.
 
         Raises
         ------

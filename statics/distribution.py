@@ -47,7 +47,7 @@ def tensions(
     pose, velocity, acceleration
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivatives, (6,); default: at rest.
     carrier_pose, carrier_velocity, carrier_acceleration
-        The same for each carrier, (c, 6); default: at home, at rest.
+        Pose of each carrier's frame in {G} and its time derivatives, (c, 6); default: at home, at rest.
     wind
         Velocity of the air in {G} [m/s], (3,); default: no aerodynamic drag.
     t_ref

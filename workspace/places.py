@@ -22,7 +22,7 @@ class Places(Displayed):
     pose
         (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (n, 6).
     carriers
-        The same for each carrier, (n, c, 6).
+        Pose of each carrier in {G}, (n, c, 6).
     """
 
     pose: np.ndarray  # (n, 6)

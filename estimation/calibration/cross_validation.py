@@ -72,7 +72,7 @@ class HeldOut(Displayed):
     before
         Root mean square of the residuals with the file's parameters [m].
     after
-        The same with the parameters estimated from the other half [m].
+        Root mean square with the parameters estimated from the other half [m].
     sets
         The parameter sets, from the empty set (the file) to the full set.
     best
