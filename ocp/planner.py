@@ -218,7 +218,8 @@ class Planner(Displayed):
         Returns
         -------
         Plan
-            The plan, with the status that `plan` would return. If it is not feasible, the next call continues from the previous feasible plan.
+            The plan, with the status that `plan` would return. If it is not feasible, the next call continues from the
+            previous feasible plan.
 
         Raises
         ------
