@@ -104,6 +104,24 @@ def test_what_rounding_once_decided(status, seed):
     assert {word.split(" to ")[0] for word in report.statuses} == {status}
 
 
+# The exported step has rounded numbers only. It was unsure where a column of zeros or one parallel to another kept a
+# direction from being made orthogonal to cables without a limit, and where a cable of small weight was off by the
+# rounding of the others.
+@pytest.mark.parametrize(
+    ("status", "seed"),
+    [
+        ("infeasible", 10595203),
+        ("infeasible", 10933684),
+        ("infeasible", 10949467),
+        ("optimal", 10662599),
+        ("optimal", 10796204),
+    ],
+)
+def test_the_step_is_sure_where_nothing_is_near(status, seed, steps):
+    report = check(range(seed, seed + 1), "exact", steps["double"])
+    assert (report.wrong, report.statuses) == ([], {status})
+
+
 def test_the_core_sees_that_limits_exclude_each_other_where_their_normals_are_known_to_five_digits():
     """What rounding left of a normal that the others span counted as a way out, so that the core was unsure."""
     p = exact_problem(412526)

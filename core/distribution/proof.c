@@ -172,8 +172,9 @@ static void take_away(real *x, const real *v, int n) {
 
 /*
  * Take from a unit direction, in the rows of S A, what rounding has left of the pulls of cables without a limit: it was
- * solved for with columns divided by the roots of their weights, and is off by as much as these differ. Where these
- * columns are nearly dependent it stays as it is: what is left of them would be rounding too.
+ * solved for with columns divided by the roots of their weights, and is off by as much as these differ. A column of
+ * which the ones before it leave rounding only is left out. Where columns are nearly dependent the direction stays as it
+ * is: what is left of them would be rounding too.
  */
 static void turn_away(const form *f, const towline_problem *problem, real *d) {
     const int n = problem->n, m = problem->m;
@@ -195,6 +196,9 @@ static void turn_away(const form *f, const towline_problem *problem, real *d) {
         }
         for (int i = 0; i < n; i++) {
             left += v[i] * v[i];
+        }
+        if (left <= DEPENDENT * DEPENDENT * square) {
+            continue;
         }
         if (!(left > RANK * square)) {
             return;

@@ -15,6 +15,7 @@
 #define CANCELLED 1e10     /* terms of A t count up to this many times what the problem requires */
 #define NEGLIGIBLE 1e-11   /* a cable pulls along d only beyond this part of its column norm; else w is off the range */
 #define ORTHOGONAL 1e-13   /* a cable without a limit may pull by this part of its column norm: rounding */
+#define DEPENDENT 1e-14    /* part of a column's norm outside the span of others that is rounding */
 #define ROUNDED_PULL 1e-15 /* it counts beyond this part of its terms, with tensions up to CANCELLED */
 #define CLEAR 4.0          /* a shortfall is beyond doubt from this many tolerances */
 #define RANK 1e-12         /* singular values below this part of the largest make a problem singular */
@@ -60,6 +61,7 @@
 #define CANCELLED 5e2F
 #define NEGLIGIBLE 4e-6F
 #define ORTHOGONAL 0.0F
+#define DEPENDENT 1e-6F
 #define ROUNDED_PULL 0.0F
 #define CLEAR 4.0F
 #define RANK 6e-6F

@@ -120,6 +120,27 @@ static real wrench_error(const form *f, const towline_problem *problem, const re
     return root(square);
 }
 
+/*
+ * Take from tensions the wrench error that rounding has left where weights differ much: s is known to the rounding of
+ * its largest entry, and a cable of small weight has many newtons in a unit of s. f->s and f->b are lost.
+ */
+static void refine(form *f, const towline_problem *problem, real *t) {
+    int worst;
+    real missing;
+    for (int i = 0; i < problem->n; i++) {
+        real rest = problem->w[i];
+        for (int c = 0; c < problem->m; c++) {
+            rest -= problem->A[i * problem->m + c] * t[c];
+        }
+        f->b[i] = rest * f->scale[i];
+    }
+    towline_least_norm(f, &worst, &missing);
+    for (int i = 0; i < f->cables; i++) {
+        const int c = f->moving[i];
+        t[c] = between(problem->t_min[c], t[c] + f->unit[i] * f->s[i], problem->t_max[c]);
+    }
+}
+
 /* Solve a problem, all of `answer` but the status. */
 static towline_status solve_exactly(form *f, const towline_problem *problem, towline_answer *answer) {
     int worst;
@@ -145,8 +166,13 @@ static towline_status solve_exactly(form *f, const towline_problem *problem, tow
     write_tensions(f, problem, t);
     const measure known = towline_measure(f, problem, t);
     if (met == REACHED) {
+        const real allowed = FEASIBILITY * known.required + ROUNDING * known.rounding;
         answer->residual = wrench_error(f, problem, t);
-        if (answer->residual <= FEASIBILITY * known.required + ROUNDING * known.rounding) {
+        if (!MARGINS && !(answer->residual <= allowed)) {
+            refine(f, problem, t);
+            answer->residual = wrench_error(f, problem, t);
+        }
+        if (answer->residual <= allowed) {
             return !MARGINS || towline_proves_feasible(f, problem, t) ? TOWLINE_OPTIMAL : TOWLINE_INACCURATE;
         }
     }
