@@ -122,9 +122,11 @@ static real wrench_error(const form *f, const towline_problem *problem, const re
 
 /*
  * Take from tensions the wrench error that rounding has left where weights differ much: s is known to the rounding of
- * its largest entry, and a cable of small weight has many newtons in a unit of s. f->s and f->b are lost.
+ * its largest entry, and a cable of small weight has many newtons in a unit of s. So that they stay the optimum, a cable
+ * at a limit stays there, and a large change is not made. f->s and f->b are lost.
  */
 static void refine(form *f, const towline_problem *problem, real *t) {
+    const real size = root(dot(f->s, f->s, f->width));
     int worst;
     real missing;
     for (int i = 0; i < problem->n; i++) {
@@ -134,10 +136,14 @@ static void refine(form *f, const towline_problem *problem, real *t) {
         }
         f->b[i] = rest * f->scale[i];
     }
-    towline_least_norm(f, &worst, &missing);
+    if (!(towline_least_norm(f, &worst, &missing) <= STATIONARY * size)) {
+        return;
+    }
     for (int i = 0; i < f->cables; i++) {
         const int c = f->moving[i];
-        t[c] = between(problem->t_min[c], t[c] + f->unit[i] * f->s[i], problem->t_max[c]);
+        if (problem->t_min[c] < t[c] && t[c] < problem->t_max[c]) {
+            t[c] = between(problem->t_min[c], t[c] + f->unit[i] * f->s[i], problem->t_max[c]);
+        }
     }
 }
 
