@@ -122,13 +122,20 @@ static real wrench_error(const form *f, const towline_problem *problem, const re
 
 /*
  * Take from tensions the wrench error that rounding has left where weights differ much: s is known to the rounding of
- * its largest entry, and a cable of small weight has many newtons in a unit of s. So that they stay the optimum, a cable
- * at a limit stays there, and a large change is not made. f->s and f->b are lost.
+ * its largest entry, and a cable of small weight has many newtons in a unit of s. So that they stay the optimum, cables
+ * as near to a limit as that are put there and stay there, and a large change is not made. f->s and f->b are lost.
  */
 static void refine(form *f, const towline_problem *problem, real *t) {
     const real size = root(dot(f->s, f->s, f->width));
     int worst;
     real missing;
+    for (int i = 0; i < f->cables; i++) {
+        const int c = f->moving[i];
+        const real near = f->slack * f->unit[i];
+        t[c] = t[c] - problem->t_min[c] <= near   ? problem->t_min[c]
+               : problem->t_max[c] - t[c] <= near ? problem->t_max[c]
+                                                  : t[c];
+    }
     for (int i = 0; i < problem->n; i++) {
         real rest = problem->w[i];
         for (int c = 0; c < problem->m; c++) {
