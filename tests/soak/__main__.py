@@ -12,6 +12,7 @@ The exit code is 1 if anything is wrong, and each wrong case is printed with its
     predictive   flights of predictive control
     mujoco       both controllers in MuJoCo, on robots that differ from their files
     silence      flights with nothing wrong, which predictive control must not hand over
+    files        crafted files of every kind that a command reads
     signals      SIGINT and SIGTERM at random moments of every long command
     tasks        plans of random tasks, and what they claim
     replanning   plans of the rest of a motion, in flight
@@ -32,6 +33,7 @@ from . import (
     control_mujoco,
     control_silence,
     control_steps,
+    crafted_files,
     exactness,
     predictive_steps,
     random_families,
@@ -61,6 +63,7 @@ SOAKS = {
     "predictive": Soak(predictive_steps.soak, 100_000, available()),
     "mujoco": Soak(control_mujoco.soak, 1000, tuple(control_mujoco.TASKS)),
     "silence": Soak(control_silence.soak, 100, control_silence.ROBOTS),
+    "files": Soak(crafted_files.soak, 1000, tuple(crafted_files.KINDS)),
     "signals": Soak(signals.soak, 100, tuple(signals.CASES)),
     "tasks": Soak(random_tasks.soak, 200, tuple(random_families.FAMILIES)),
     "replanning": Soak(replanning.soak, 100, ()),
