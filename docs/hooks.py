@@ -22,6 +22,8 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parent.parent
+# Parameters that share a description, in a docstring.
+SHARED = re.compile(r"^( +)(\w+(?:, \w+)+)( :[^\n]*)?\n((?:\1    [^\n]*\n)+)", re.MULTILINE)
 SOURCES = ROOT / "build" / "docs"
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 
@@ -34,7 +36,14 @@ def on_startup(**_: object) -> None:
         folder = SOURCES.joinpath(*package.split("."))
         folder.mkdir(parents=True)
         for source in ROOT.joinpath(*package.split(".")[1:]).glob("*.py"):
-            shutil.copy(source, folder)
+            text = SHARED.sub(_each, source.read_text(encoding="utf-8"))
+            (folder / source.name).write_text(text, encoding="utf-8")
+
+
+def _each(shared: re.Match[str]) -> str:
+    """Describe each parameter apart: mkdocstrings gives those of one line the type of the first, and no defaults."""
+    indent, names, kind, description = shared.groups(default="")
+    return "".join(f"{indent}{name}{kind}\n{description}" for name in names.split(", "))
 
 
 def on_files(files: Files, config: MkDocsConfig, **_: object) -> Files:
