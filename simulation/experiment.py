@@ -43,6 +43,8 @@ class Experiment(NamedTuple):
         Faults in order of time.
     keep_out
         Outlines of the keep-out regions of the reference, see `Trajectory`.
+    doubt
+        That the reference is a plan that is not feasible, see `Trajectory`.
     """
 
     period: float
@@ -53,6 +55,7 @@ class Experiment(NamedTuple):
     noise: Noise
     faults: tuple[Fault, ...]
     keep_out: Sequence[Sequence[np.ndarray]]
+    doubt: str = ""
 
     __repr__ = record
 

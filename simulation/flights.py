@@ -99,6 +99,8 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
     }
     coordinates = {"seed": Variable(("seed",), np.array(seeds)), "answer": Variable(("answer",), np.array(ANSWERS))}
     attributes = {"title": f"towline simulations of {robot.name}", "robot": to_yaml(robot), "tolerance_m": tolerance}
+    if conditions.doubt:
+        attributes["reference"] = conditions.doubt
     return Contents(variables, coordinates, attributes).dataset()
 
 
@@ -124,7 +126,8 @@ def report(dataset: xr.Dataset) -> Report:
     longest = quantity(float(dataset["duration"].values.max()), "s")
     counts = dataset["answered"].values.sum(axis=0)
     largest, slack = short["error_max"], dataset["slack_s"].values
-    rows = {
+    doubt = dataset.attrs.get("reference")
+    rows = ({"reference": doubt} if doubt else {}) | {
         "largest error": f"median {quantity(1e3 * largest['median'], 'mm')}, 95 % below "
         f"{quantity(1e3 * largest['p95'], 'mm')}, worst {quantity(1e3 * largest['worst'], 'mm')} "
         f"(seed {short['worst_seed']})",

@@ -191,6 +191,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
         noise=required("noise", meets.noise, Noise),
         faults=read_faults(robot, meets.events, periods * period, events),
         keep_out=trajectory.keep_out,
+        doubt=trajectory.doubt,
     )
 
 

@@ -54,6 +54,7 @@ class Simulation(SimulationData, Filmed, Reported):
             "slack_s": self.slack_s,
             "answered": self.answered,
             "handed_over": self.handed_over,
+            "reference": self.conditions.doubt or None,
             "shortfall_max": None if np.isnan(shortfall).all() else float(np.nanmax(shortfall)),
             "duration": self.lasted * self.period,
         }
@@ -184,7 +185,8 @@ class Simulation(SimulationData, Filmed, Reported):
 
     def _facts(self) -> list[Fact]:
         merit, happened = self.figures_of_merit(), events(self)
-        rows = {"events": sentence(happened)} if happened else {}
+        rows = {"reference": self.conditions.doubt} if self.conditions.doubt else {}
+        rows |= {"events": sentence(happened)} if happened else {}
         rows |= {
             "position error": f"{quantity(1e3 * merit['error_rms'], 'mm', digits=3)} rms, "
             f"{quantity(1e3 * merit['error_max'], 'mm', digits=3)} at most",

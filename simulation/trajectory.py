@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ACCEPTED = "a plan, the NetCDF file of one, a path or a pose (6,)"
+DOUBTS = {  # by the status of a plan
+    "infeasible": "a plan that is infeasible: no motion of its task keeps every limit",
+    "not-found": "a plan that breaks a limit: no feasible one was found",
+}
 SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -40,12 +44,15 @@ class Trajectory(NamedTuple):
         Function of times that returns the planned tensions, (n, m) [N]; None if none are planned.
     keep_out
         For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
+    doubt
+        What a user must know of the reference: that a plan is not feasible; else empty.
     """
 
     duration: float | None
     at: Callable[[np.ndarray], tuple[Motion, Motion]]
     tensions: Callable[[np.ndarray], np.ndarray] | None = None
     keep_out: Sequence[Sequence[np.ndarray]] = ()
+    doubt: str = ""
 
 
 def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
@@ -148,15 +155,16 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
         return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
 
     keep_out = outlines_from(dataset, "reference")
+    doubt = DOUBTS.get(str(dataset.attrs.get("status")), "")
     planned = read("tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():
-        return Trajectory(float(nodes[-1]), at, keep_out=keep_out)
+        return Trajectory(float(nodes[-1]), at, keep_out=keep_out, doubt=doubt)
 
     def tensions(times: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
-    return Trajectory(float(nodes[-1]), at, tensions, keep_out)
+    return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt)
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

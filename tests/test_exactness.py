@@ -73,8 +73,8 @@ def test_small_pulls_of_cables_without_a_limit_void_a_certificate():
 # Problems in which rounding once decided: tensions of 1e15 N and more whose own rounding exceeded w; a null space known
 # to eight digits, whose noise was taken for limits, at a multiple of the least cost; a matrix of lower rank that the
 # lanes took for full; an optimum that the exact search ended short of; a certificate that was not found; a cable that
-# pulls along nothing, with 4.7e6 N instead of none; a direction along which cables without a limit pulled by rounding; a
-# wrench error that was corrected with a cable at its limit.
+# pulls along nothing, with 4.7e6 N instead of none; a direction along which cables without a limit pulled by rounding;
+# a wrench error that was corrected with a cable at its limit.
 ONCE_WRONG = {
     "singular": (505187, 6674, 468858, 5134550),
     "infeasible": (996016, 5172282, 10349914, 10298160, 10417452),

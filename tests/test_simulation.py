@@ -12,6 +12,7 @@ from towline.models import Dynamics, Robot
 from towline.ocp import Task
 from towline.plant import Plant, layout
 from towline.simulation import simulate
+from towline.simulation.flights import report
 from towline.simulation.steps import steps_in
 from towline.simulation.trajectory import read_trajectory
 
@@ -73,6 +74,17 @@ def test_references_are_the_plan_also_between_its_samples(crane):
     np.testing.assert_allclose(pose, crane.audit.motion.pose, atol=1e-9)
     np.testing.assert_allclose(velocity, crane.audit.motion.velocity, atol=1e-7)
     np.testing.assert_allclose(acceleration, crane.audit.motion.acceleration, atol=1e-4)
+
+
+def test_the_report_says_that_the_plan_is_infeasible(tmp_path, crane):
+    task = {"path": {"kind": "line", "start": [0, 0, -1], "end": [0, 0, -3]}, "duration": 0.5}
+    dropped = plan("wang-flying", task)
+    assert dropped.status == "infeasible"
+    flight = simulate("wang-flying", dropped.save(tmp_path / "dropped.nc"), duration=0.05)
+    assert "reference          a plan that is infeasible" in str(flight.report())
+    assert flight.to_dict()["reference"].startswith("a plan that is infeasible")
+    assert "a plan that is infeasible" in report(simulate("wang-flying", dropped, duration=0.05, runs=2)).text()
+    assert "infeasible" not in str(simulate("ipanema-1", crane, duration=0.05).report())
 
 
 NOISE = {"position": 1e-3, "attitude": 1e-3, "velocity": 5e-3, "tension": 0.1, "delay": 2e-3}
