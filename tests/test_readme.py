@@ -198,6 +198,9 @@ def test_errata_are_current(study):
 )
 def test_every_public_name_is_in_the_reference(package):
     page = PAGES[f"docs/api/{package.split('.')[-1]}.md"]
+    page += "".join(
+        PAGES[f"docs/api/{linked}.md"] for linked in re.findall(r"^\[`\w+`\]\(([\w-]+)\.md\):", page, re.MULTILINE)
+    )
     for name in importlib.import_module(f"towline.{package}").__all__:
         # A name that its module has too is given by its full path: `towline.solvers.solve.solve`.
         assert re.search(rf"^::: towline\.{re.escape(package)}\.((solve|simulate)\.)?{name}$", page, re.MULTILINE), name
