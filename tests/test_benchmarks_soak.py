@@ -29,6 +29,7 @@ def run(monkeypatch, *arguments):
         ("predictive", 200, "flycrane,cogiro", "| cogiro | "),
         ("silence", 1, "cogiro", "0 of 1 runs were handed over"),
         ("signals", 1, "export", "export: "),
+        ("files", 6, "task,xml", "6 files, 0 wrong"),
         ("tasks", 2, "ordinary,lift", "all       2 feasible"),
     ],
 )

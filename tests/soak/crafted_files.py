@@ -12,10 +12,10 @@ What a sound plan or simulation takes is not the reader's: those kinds are read 
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import random
-import resource
 import shlex
 import sys
 import tempfile
@@ -66,13 +66,12 @@ class Kind(NamedTuple):
 def soak(start: int, count: int, parts: Sequence[str]) -> bool:
     """Read `count` files from seed `start` on, print what is wrong, and return whether nothing is."""
     codes, wrong, slowest, largest = Counter[str](), 0, 0.0, 0.0
-    with tempfile.TemporaryDirectory() as folder:
-        os.chdir(folder)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         plan(ROBOT, REST).save("rest.nc")
         Path("caspr").mkdir()
         for name, text in BESIDE.items():
             Path(name).write_text(text)
-        for kind in KINDS.values():  # what the commands import is not counted
+        for kind in (KINDS[name] for name in parts):  # what the commands import is not counted
             Path(kind.file).write_bytes(kind.sound(random.Random(0)))
             CliRunner().invoke(app, shlex.split(kind.command))
         for number in range(start, start + count):
@@ -127,8 +126,11 @@ def _read(kind: Kind, number: int) -> Answer:
 
 def _run(arguments: list[str], write: int) -> None:
     """Run a command and end this process with its code; what it prints on standard error goes to `write`."""
+    import resource  # Windows has neither this nor fork
+
     os.dup2(write, 2)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")  # a test has put others there
     resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
     sys.argv = ["towline", *arguments]
     code = 3
