@@ -44,7 +44,7 @@ class Experiment(NamedTuple):
     keep_out
         Outlines of the keep-out regions of the reference, see `Trajectory`.
     doubt
-        That the reference is a plan that is not feasible, see `Trajectory`.
+        Row of the report that says that the reference is a plan with a broken limit, see `Trajectory`.
     """
 
     period: float

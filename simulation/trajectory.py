@@ -45,7 +45,7 @@ class Trajectory(NamedTuple):
     keep_out
         For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
     doubt
-        What a user must know of the reference: that a plan is not feasible; else empty.
+        Row of the report that says that the reference is a plan with a broken limit; empty if it is not.
     """
 
     duration: float | None

@@ -46,7 +46,7 @@
  * - d has a rounded pull of (n + 1) u from each column of norm one, before that of solving for it: NEGLIGIBLE = 64 u.
  *   It tells singular from infeasible only: each pull counts, and its rounding and that of their sum, (n + m + 2) u =
  *   24 u of its terms times the limit, are below CLEAR times half a ROUNDING = 64 u. A cable without a limit along d
- *   leaves all in doubt unless its pull is exactly zero.
+ *   leaves all in doubt unless its pull is exactly zero. DEPENDENT is 16 u: the rounding of a difference of columns.
  * - FEASIBILITY bounds the wrench error of what is called optimal, as for double, and it is no proof: an infeasible
  *   problem may be missed by less. The proof is a margin; see `towline_proves_feasible`.
  * - ACCURACY keeps the error below what a user may expect, 1e-4 of the largest tension. SLACK and STATIONARY, and with
