@@ -5,7 +5,7 @@
 A file is sound, damaged (bytes changed, cut, doubled) or made to hurt: arrays that are declared larger than any memory,
 external storage, virtual datasets, entities that grow, hundreds of thousands of wrong items, words for numbers. A
 command reads it in a process of its own. Wrong is another exit code than 0, 1 or 2, a traceback or more than one line
-on standard error with code 2, more than 5 s of processor time, or more than 500 MB.
+on standard error with code 2, more than 5 s of processor time, or more than 300 MB besides what the commands import.
 
 What a sound plan or simulation takes is not the reader's: those kinds are read by commands that do little else.
 """
@@ -32,7 +32,7 @@ from towline import Dynamics, load, plan
 from towline.cli.entry import main
 from towline.cli.main import app
 
-SECONDS, MEMORY = 5.0, 500e6
+SECONDS, MEMORY = 5.0, 300e6
 ROBOT = "wang-flying"
 REST = {"name": "rest", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.3, "output_rate": 50}
 NUMBERS = (
@@ -88,7 +88,7 @@ def soak(start: int, count: int, parts: Sequence[str]) -> bool:
 
 
 class Answer(NamedTuple):
-    """The exit code, what was printed on standard error, processor time [s] and largest memory [bytes]."""
+    """The exit code, what was printed on standard error, processor time [s] and memory beyond the start's [bytes]."""
 
     code: int
     text: str
@@ -118,16 +118,22 @@ def _read(kind: Kind, number: int) -> Answer:
         _run(shlex.split(kind.command), write)
     os.close(write)
     with os.fdopen(read, "rb") as pipe:
-        text = pipe.read().decode(errors="replace")
+        held, text = int(pipe.readline()), pipe.read().decode(errors="replace")
     _, status, used = os.wait4(child, 0)
     Path(kind.file).unlink()
-    return Answer(os.waitstatus_to_exitcode(status), text, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024.0)
+    return Answer(
+        os.waitstatus_to_exitcode(status), text, used.ru_utime + used.ru_stime, (used.ru_maxrss - held) * 1024.0
+    )
 
 
 def _run(arguments: list[str], write: int) -> None:
-    """Run a command and end this process with its code; what it prints on standard error goes to `write`."""
+    """Run a command and end this process with its code.
+
+    The memory that the process holds before [KiB], a line, and what the command prints on standard error go to `write`.
+    """
     import resource  # Windows has neither this nor fork
 
+    os.write(write, b"%d\n" % resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     os.dup2(write, 2)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     sys.stdout, sys.stderr = os.fdopen(1, "w"), os.fdopen(2, "w")  # a test has put others there
