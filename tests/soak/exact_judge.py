@@ -37,7 +37,8 @@ class Tolerances(NamedTuple):
     negligible :
         Pulls below this part of a column's norm are called zero by the status "singular".
     distance :
-        Distance from the optimum, relative to the largest tension; float alone states one.
+        Distance from the optimum, relative to the largest tension; float alone states one. The cost of float is the
+        square of a norm that may be off by as much, so that its gap may be twice that.
     """
 
     required: float
@@ -49,7 +50,7 @@ class Tolerances(NamedTuple):
 
 
 DOUBLE = Tolerances(1e-9, 1e-13, 1e10, 1e-8, 1e-11, np.inf)
-FLOAT = Tolerances(1e-5, 2e-6, 5e2, 1e-4, 4e-6, 1e-4)
+FLOAT = Tolerances(1e-5, 2e-6, 5e2, (1.0 + 1e-4) ** 2 - 1.0, 4e-6, 1e-4)
 ROUNDED = 1.0 + 1e-9  # of a tolerance: it is computed with rounding
 
 
