@@ -62,6 +62,7 @@ BLOCK = 2000
 NEAR = 1000.0  # tolerances
 FAR = 1e-6  # of the largest wrench of a cable at a limit or at its t_ref
 CONDITION, WORST = 1e2, 1e5
+BEYOND = 1e15  # of this size limits are infinite in float [N]; a tension of at least that is refused
 NEARLY = "singular to eleven digits"
 PARTS = ("exact", "random", "float")
 
@@ -240,6 +241,9 @@ def _reason(judge: Judge, solver: str, answer: Answer) -> tuple[str, float]:
         either = loose or off <= NEAR * tolerance or judge.condition() > WORST
         return ("" if either else "w is off the range"), 0.0
     if answer.status in ("inaccurate", "failed") and (problem.rough or solver == "float"):
+        return "", 0.0
+    beyond = problem.t_min.max() > BEYOND or problem.t_max.min() < -BEYOND
+    if answer.status == "invalid" and solver == "float" and beyond:
         return "", 0.0
     if answer.status == "inaccurate" and solver == "step":
         near = 0.0 < problem.outside <= max(NEAR * tolerance, FAR * judge.largest()) or tolerance == 0.0
