@@ -156,7 +156,7 @@ def test_carriers_with_two_cables_have_one_coordinate():
     control_coordinates(record_of(robot), controller._moved.tethers, both, found)
     np.testing.assert_allclose(found[0], motion[:, 6:], atol=1e-5)
     push = 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0.05, 0])
-    flight = simulate(robot, robot.home, duration=3.0, controller=controller, disturbance=push)
+    flight = simulate(robot, robot.home, duration=1.5, controller=controller, disturbance=push)
     assert flight.error[-1] < 1e-3
 
 
@@ -184,8 +184,8 @@ def test_quadrotors_with_winches_correct_the_errors_of_their_load():
     robot = load("multi-quadrotor-3").model_copy(update={"drive": "both"})
     push = 0.05 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
     laws = Predictive(robot, bandwidth=8, carrier_bandwidth=16), ComputedTorque(robot)
-    flights = [simulate(robot, robot.home, duration=2.0, controller=law, disturbance=push) for law in laws]
-    assert flights[0].error[1500:].max() < 1e-3 < 5e-3 < flights[1].error[1500:].max()
+    flights = [simulate(robot, robot.home, duration=1.2, controller=law, disturbance=push) for law in laws]
+    assert flights[0].error[1000:].max() < 1e-3 < 5e-3 < flights[1].error[1000:].max()
 
 
 def test_the_cost_of_what_no_control_reaches_is_that_of_a_series():
@@ -198,8 +198,8 @@ def test_the_cost_of_what_no_control_reaches_is_that_of_a_series():
 def test_a_team_carries_its_load_though_it_is_pushed_and_a_quadrotor_heavier_than_in_its_file():
     """At 1 m/s and 1 m/s^2: what is measured as thrust is what the quadrotor with 30 % more mass needs more."""
     robot = load("multi-quadrotor-3")
-    line = {"kind": "line", "start": [0, 0, 0], "end": [2, 0, 0.2]}
-    made = plan(robot, {"path": line, "duration": 3.6, "base": {"kind": "free"}, "steps": 25})
+    line = {"kind": "line", "start": [0, 0, 0], "end": [1, 0, 0.1]}
+    made = plan(robot, {"path": line, "duration": 2.6, "base": {"kind": "free"}, "steps": 20})
     first, *others = robot.carriers
     lighter = robot.model_copy(update={"carriers": (first.model_copy(update={"mass": first.mass / 1.3}), *others)})
     push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0.05, 0])
@@ -325,7 +325,7 @@ def test_a_tube_is_kept_that_a_push_would_leave():
     push = 0.1 * 9.81 * robot.platform.mass * np.array([1, 0.5, -0.5, 0, 0, 0])
     flights = [
         simulate(
-            robot, robot.home, duration=1.5, controller=Predictive(robot, bandwidth=3, tube=tube), disturbance=push
+            robot, robot.home, duration=0.8, controller=Predictive(robot, bandwidth=3, tube=tube), disturbance=push
         )
         for tube in (None, 0.02)
     ]
@@ -341,7 +341,7 @@ def test_a_platform_goes_around_a_body_on_its_way():
     nearest = []
     for bodies in ([], [post]):
         controller = Predictive(robot, keep_out=bodies)
-        flight = simulate(robot, line, duration=3.0, controller=controller)
+        flight = simulate(robot, line, duration=2.0, controller=controller)
         (shape,) = Surroundings(robot, None, [post])._bodies
         nearest.append(_distance(shape, placed(flight.record.motions[:, 0, :6], points))[0].min())
         assert flight.error[-1] < 1e-3

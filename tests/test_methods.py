@@ -330,7 +330,7 @@ CONTINUOUS = [name for name, method in methods().items() if method.continuous]
 @pytest.mark.parametrize("method", CONTINUOUS)
 def test_methods_that_claim_continuity_do_not_jump(method):
     """Check twenty motions; `python -m tests.soak continuity` takes a hundred."""
-    result = continuity(method, range(20))
+    result = continuity(method, range(8))
     print(method, result)
     assert result.worst <= JUMP
     assert result.unanswered == 0
@@ -344,7 +344,7 @@ def test_the_continuity_test_can_see():
 
 @pytest.mark.parametrize("options", [{}, {"rho": 1.0}])
 def test_soft_wrench_does_not_jump_as_the_wrench_leaves_the_set(options):
-    result = leaving("soft-wrench", range(20), **options)
+    result = leaving("soft-wrench", range(8), **options)
     assert result.worst <= JUMP
     assert result.unanswered == 0
     assert result.inaccurate > 100
@@ -354,7 +354,7 @@ def test_soft_wrench_does_not_jump_as_the_wrench_leaves_the_set(options):
     ("method", "smooth"), [("log-barrier", True), ("analytic-centre", True), ("active-set", False)]
 )
 def test_barrier_methods_have_a_continuous_derivative_and_least_squares_has_not(method, smooth):
-    worst = smoothness(method, range(20), **SMOOTH.get(method, {})).worst
+    worst = smoothness(method, range(8), **SMOOTH.get(method, {})).worst
     print(f"{method}: {worst:.1e} of a change of the derivative left")
     assert worst <= JUMP if smooth else worst > 0.1
 

@@ -70,7 +70,7 @@ print(*sys.modules)
 def test_damaged_files_are_refused_in_one_line_and_leave_no_traceback(tmp_path, capfd):
     """Closing a file that h5netcdf could open only half prints a traceback as soon as it is collected."""
     whole, draw, refusals = save_netcdf(CONTENTS, tmp_path / "whole.nc").read_bytes(), np.random.default_rng(5), []
-    for _ in range(25):
+    for _ in range(10):
         content = bytearray(whole[: int(draw.integers(0, 3 * len(whole)))])
         for at in draw.integers(0, max(len(content), 1), 30 if content else 0):
             content[at] = draw.integers(256)
@@ -79,7 +79,7 @@ def test_damaged_files_are_refused_in_one_line_and_leave_no_traceback(tmp_path, 
             load_netcdf(tmp_path / "damaged.nc", "file must be a plan")
         except InputError as error:
             refusals.append(str(error))
-    assert len(refusals) > 15
+    assert len(refusals) > 5
     assert all(line.startswith("file must be a plan (") and line.isprintable() for line in refusals)
     gc.collect()
     assert capfd.readouterr() == ("", "")

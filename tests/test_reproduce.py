@@ -306,7 +306,7 @@ def test_the_command_reproduces_the_paper(tmp_path):
     towline = Path(sys.executable).with_name("towline")
     command = [str(towline), "reproduce", "flying", "--out", str(tmp_path / "out"), "--json"]
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     printed = json.loads(done.stdout)
     assert printed["complete"]

@@ -82,10 +82,10 @@ def test_the_zoo_has_the_optimum_that_enumeration_finds(name):
         np.testing.assert_allclose(tensions, expected, rtol=0, atol=1e-6 * size, err_msg=f"{method} {backend}")
 
 
-def test_methods_and_a_linear_program_agree_on_500_feasible_problems():
+def test_methods_and_a_linear_program_agree_on_feasible_problems():
     rng = np.random.default_rng(500)
     worst = dict.fromkeys(CONTENDERS, 0.0)
-    for k in range(500):
+    for k in range(80):
         problem = random_feasible(rng, m=3 + k % 6)
         assert linear_program_status(problem.A, problem.w, problem.t_min, problem.t_max) == "optimal"
         solutions = {contender: solve(problem, *contender) for contender in CONTENDERS}
@@ -98,10 +98,10 @@ def test_methods_and_a_linear_program_agree_on_500_feasible_problems():
     assert max(worst.values()) <= 1e-6
 
 
-def test_methods_and_a_linear_program_agree_on_200_infeasible_problems():
+def test_methods_and_a_linear_program_agree_on_infeasible_problems():
     rng = np.random.default_rng(200)
     statuses = set()
-    for k in range(200):
+    for k in range(80):
         problem = random_infeasible(rng, m=3 + k % 6)
         expected = linear_program_status(problem.A, problem.w, problem.t_min, problem.t_max)
         statuses.add(expected)
@@ -212,7 +212,7 @@ def random_problem(seed, m, n):
 
 
 SEEDS = st.integers(0, 2**32 - 1)
-HYPOTHESIS = settings(max_examples=150, deadline=None, derandomize=True)
+HYPOTHESIS = settings(max_examples=60, deadline=None, derandomize=True)
 
 
 @HYPOTHESIS

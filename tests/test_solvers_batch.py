@@ -24,8 +24,8 @@ def mixture(count, m):
     return [(random_feasible, random_infeasible)[k % 2](rng, m) for k in range(count)]
 
 
-def test_a_thousand_awkward_problems_are_right():
-    report = check(range(1000), "random")
+def test_awkward_problems_are_right():
+    report = check(range(400), "random")
     print(report.line())
     assert report.statuses == {"optimal", "infeasible", "singular"}
     assert report.wrong == []
@@ -188,7 +188,7 @@ def test_wrong_arguments_are_told(change, message):
         solve_batch(**given)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=80, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_never_nan_never_outside_and_every_certificate_verifies(seed):
     problem = TensionProblem(*awkward_problem(seed)[:4])
@@ -234,7 +234,7 @@ def nearly_unavailable(seed):
 
 def test_no_infeasible_answer_is_without_its_certificate():
     counts = {True: 0, False: 0}
-    for seed in range(500):
+    for seed in range(200):
         for problem in nearly_unavailable(seed):
             solution = solve(problem)
             proven = solution.status in (Status.INFEASIBLE, Status.SINGULAR)
@@ -244,7 +244,7 @@ def test_no_infeasible_answer_is_without_its_certificate():
                 assert solution.certificate.verify(problem)
                 assert solution.certificate.singular is (solution.status is Status.SINGULAR)
     print("proven and not:", counts)
-    assert min(counts.values()) > 160
+    assert min(counts.values()) > 60
 
 
 def in_shapes(seeds):

@@ -30,6 +30,9 @@ from towline.workspace import StaticEquilibrium, sample, save
 from .chromium import PATIENCE, chromium, playwright
 from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
 
+# Software draws each frame, and would draw as many as it can on all processors.
+SLOWLY = "{const next = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => next(f), 100)}"
+
 
 @pytest.fixture(scope="module")
 def browser():
@@ -41,6 +44,7 @@ def browser():
 def page(browser):
     """A page that fails the test if anything is wrong in it, or if it asks another machine for something."""
     opened = browser.new_page(viewport={"width": 640, "height": 480})
+    opened.add_init_script(SLOWLY)
     wrong = []
     opened.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     opened.on("pageerror", lambda error: wrong.append(str(error)))
@@ -183,9 +187,7 @@ def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     pytest.fail(f"nothing in the picture has the colour of the first cable, {drawn[0]}")
 
 
-@pytest.mark.parametrize(
-    "name", ["cogiro", "wang-ctmrts", "multi-quadrotor-4", "fast", "line.nc", "flight.nc", "space.nc"]
-)
+@pytest.mark.parametrize("name", ["cogiro", "multi-quadrotor-4", "fast", "flight.nc", "space.nc"])
 def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_path):
     """On a desk and on a phone: at every corner of the platform a click would reach the scene."""
     subject = read(str(folder / name) if name.endswith(".nc") else name)

@@ -12,7 +12,7 @@ from towline import load, plan, read_task
 from towline.base.errors import InputError
 from towline.ocp.tasks.paths import LinePath, WaypointPath
 
-LISTS = 120
+LISTS = 60
 SHARES = np.linspace(0.0, 1.0, 2001)
 
 
