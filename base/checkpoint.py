@@ -8,8 +8,6 @@ The table `record` has numbered results with the CRC-32 of both, and as number -
 results depend on, as JSON. The database's `application_id` is the kind of results. One process at a time has the file.
 """
 
-from __future__ import annotations
-
 import json
 import sqlite3
 import time
@@ -32,18 +30,10 @@ WRITE = "INSERT OR IGNORE INTO record VALUES (?1, ?2, crc32(?2, ?1))"
 
 
 class Kind(NamedTuple):
-    """The kind of results in a checkpoint.
+    """The kind of results in a checkpoint."""
 
-    Attributes
-    ----------
-    what
-        What computes them, such as "workspace".
-    unit
-        What a result is called in messages, such as "chunk".
-    """
-
-    what: str
-    unit: str
+    what: str  # what computes them, such as "workspace"
+    unit: str  # what a result is called in messages, such as "chunk"
 
 
 class Checkpoint:
@@ -72,10 +62,7 @@ class Checkpoint:
     def put(self, number: int, content: bytes) -> None:
         """Store a result unless there is one of this number.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written, as on a full disk. The file can be resumed.
+        Raises `InputError` if it cannot be written, as on a full disk. The file can be resumed.
         """
         try:
             self.stored += self._database.execute(WRITE, (number, content)).rowcount
@@ -112,11 +99,8 @@ def open_checkpoint(path: Path, kind: Kind, header: dict[str, Any], resume: bool
     resume
         False: create a new file. True: continue the file, or create it if there is none or an empty one.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written; if it exists and `resume` is False; if it is no checkpoint, of another run,
-        damaged, or in use. The file is not changed then.
+    Raises `InputError` if the file cannot be written; if it exists and `resume` is False; if it is no checkpoint,
+    of another run, damaged, or in use. The file is not changed then.
     """
     target = check_writable(path)
     try:

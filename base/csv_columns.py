@@ -1,7 +1,5 @@
 """Columns of numbers in CSV, with the unit of each in the header: `read_columns`."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Callable, Mapping

@@ -93,11 +93,8 @@ def check_hdf5(
     always
         Memory that the contents may take, however small the file is [bytes].
 
-    Raises
-    ------
-    InputError
-        If part of it is in another file, if it declares or expands to much more than its size, or is compressed in
-        another way than gzip.
+    Raises `InputError` if part of it is in another file, if it declares or expands to much more than its size, or
+    is compressed in another way than gzip.
     """
     import h5py
 
@@ -207,10 +204,7 @@ def _has_any_length(kind: Any) -> bool:
 def check_zarr(folder: Path) -> None:
     """Check a Zarr folder before any array of it is read.
 
-    Raises
-    ------
-    InputError
-        If it has anything but plain files, or its arrays declare much more than their size.
+    Raises `InputError` if it has anything but plain files, or its arrays declare much more than their size.
     """
     import zarr
 

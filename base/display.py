@@ -1,7 +1,5 @@
 """`Displayed`: what a terminal or a notebook shows of a result: a headline, its facts and one small picture."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from html import escape

@@ -4,8 +4,6 @@ Each of the three is an executor of `concurrent.futures`. Enough jobs are submit
 no more: memory does not grow with the number of jobs.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -114,20 +112,14 @@ class Workers:
     def map(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
         """Yield `function(*job)` of each job, in their order, while the next ones are being evaluated.
 
-        Raises
-        ------
-        SolverError
-            If workers end before their work is done.
+        Raises `SolverError` if workers end before their work is done.
         """
         return self._results(function, jobs, self._next)
 
     def as_completed(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
         """Yield `function(*job)` of each job as soon as it is there, so that no worker waits for a slow one.
 
-        Raises
-        ------
-        SolverError
-            If workers end before their work is done.
+        Raises `SolverError` if workers end before their work is done.
         """
         return self._results(function, jobs, self._done)
 
@@ -180,10 +172,7 @@ class Workers:
 def check_workers(workers: object, scheduler: object) -> None:
     """Check the arguments of `start_workers`, before anything is started.
 
-    Raises
-    ------
-    InputError
-        If `workers` is not a whole number from 1, or `scheduler` neither a text nor None.
+    Raises `InputError` if `workers` is not a whole number from 1, or `scheduler` neither a text nor None.
     """
     whole_number("workers", workers, 1, MOST_WORKERS)
     if scheduler is not None and not (isinstance(scheduler, str) and scheduler):
@@ -201,10 +190,7 @@ def start_workers(workers: int, scheduler: str | None) -> Iterator[Workers]:
     scheduler
         Address of a Dask scheduler, which has workers of its own; default: this machine.
 
-    Raises
-    ------
-    InputError
-        If there is no such scheduler.
+    Raises `InputError` if there is no such scheduler.
     """
     if scheduler is not None:
         with _cluster(scheduler) as started:

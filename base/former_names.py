@@ -1,7 +1,5 @@
 """Former names of packages, most of which can be imported for one more release: `install`, `renamed`, `moved_name`."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from importlib import import_module

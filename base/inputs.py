@@ -41,10 +41,7 @@ def printable(text: str, longest: int = LONGEST_TEXT) -> str:
 def with_fields(function: str, given: dict[str, Any], *objects: Any) -> list[Any]:
     """Return dataclasses with the fields that are `given`, each in the one that has it.
 
-    Raises
-    ------
-    InputError
-        If none has a field: `function` has no such argument.
+    Raises `InputError` if none has a field: `function` has no such argument.
     """
     names = [field.name for one in objects for field in fields(one)]
     for name in given:
@@ -162,10 +159,7 @@ def check_dimensions(name: str, count: int) -> None:
 def leading(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
     """Return the common leading dimensions of arguments, from those of each.
 
-    Raises
-    ------
-    InputError
-        If they differ where none is 1, or are more than NumPy has.
+    Raises `InputError` if they differ where none is 1, or are more than NumPy has.
     """
     for name, shape in shapes.items():
         check_dimensions(name, len(shape))

@@ -65,12 +65,8 @@ class Contents(NamedTuple):
 def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()) -> Path:
     """Save contents as NetCDF 4 atomically; `xarray.load_dataset` reads them.
 
-    Equal contents are equal files. The variables named by `compressed` are compressed.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written to, or the disk is full.
+    Equal contents are equal files. The variables named by `compressed` are compressed. Raises `InputError` if the
+    folder cannot be written to, or the disk is full.
     """
     import h5netcdf
     import h5py
@@ -111,10 +107,7 @@ def save_netcdf(contents: Contents, path: Path, compressed: Collection[str] = ()
 def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
     """Load a NetCDF file into memory; `check_hdf5` looks at all that it declares first.
 
-    Raises
-    ------
-    InputError
-        If it cannot or must not be read: `refusal`, and the reason in brackets.
+    Raises `InputError` if it cannot or must not be read: `refusal`, and the reason in brackets.
     """
     import h5py
     import xarray as xr

@@ -67,10 +67,8 @@ class _Spawning(SpawnContext):
     def launch(self, process: SpawnProcess) -> Any:
         """Start a process.
 
-        Raises
-        ------
-        InterruptedError
-            If they are ended: what interrupts the main thread does not wait for the thread that starts one.
+        Raises `InterruptedError` if they are ended: what interrupts the main thread does not wait for the
+        thread that starts one.
         """
         with self._launching:
             if self._ended:

@@ -1,7 +1,5 @@
 """Keep other libraries' reports of what others do to a connection off standard error."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Write numbers for people: about four digits, a prefix of the unit instead of an exponent, never "-0.000"."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection, Iterable, Sequence

@@ -1,7 +1,5 @@
 """Write files and folders atomically: complete or not at all."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -22,12 +20,8 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def whole_file(path: Path) -> Iterator[Path]:
     """Yield a temporary file beside `path`; it is renamed to `path` when the block ends without an exception.
 
-    A link is followed to its file; missing folders are created.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written. An existing file is not changed.
+    A link is followed to its file; missing folders are created. Raises `InputError` if the file cannot be written.
+    An existing file is not changed.
     """
     target = check_writable(path)
 
@@ -44,10 +38,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 def whole_folder(path: Path) -> Iterator[Path]:
     """Yield a temporary folder beside `path`; it is renamed to `path` when the block ends without an exception.
 
-    Raises
-    ------
-    InputError
-        If `path` exists already, or cannot be written.
+    Raises `InputError` if `path` exists already, or cannot be written.
     """
     try:
         there = path.exists() or path.is_symlink()
@@ -110,10 +101,7 @@ def _remove_empty(folders: list[Path]) -> None:
 def check_writable(path: Path) -> Path:
     """Return the file that `path` leads to; call this before computing its contents, and before writing anything.
 
-    Raises
-    ------
-    InputError
-        If it is a folder, a device or a pipe, or its folder cannot be written or created.
+    Raises `InputError` if it is a folder, a device or a pipe, or its folder cannot be written or created.
     """
     where = printable(str(path))
     try:

@@ -7,8 +7,6 @@ conversion to NumPy, and SciPy's least squares, pose by pose. Lengths have 1 mm 
 1 mrad away per axis.
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 

@@ -7,8 +7,6 @@ the steps of each controller take, whole steps from state to command; how long e
 predictive control had in such a run, alternating every few programs; and how far each controller lets the platform go.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -99,10 +97,7 @@ def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progres
     progress :
         Called with the task's name and how many of how many parts are done.
 
-    Raises
-    ------
-    InputError
-        If a number is out of range.
+    Raises `InputError` if a number is out of range.
     """
     for name, value, most in (("steps", steps, 1_000_000), ("seeds", seeds, 10_000)):
         if not 1 <= value <= most:

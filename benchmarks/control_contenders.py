@@ -4,8 +4,6 @@ Each contender has a function that writes a program into the layout which its so
 that solves it, which is. What solvers keep from one program to the next they keep: working sets, last solutions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Measure solvers at the programs of a predictive controller, alternating, against the best solution that is known."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass

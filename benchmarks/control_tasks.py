@@ -1,7 +1,5 @@
 """Robots in winds for `benchmarks.control`, their controllers, and the programs of predictive control in a run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -123,10 +121,7 @@ class Recording(Predictive):
 def record(task: Task, robot: Robot, steps: int) -> list[Program]:
     """Return the programs of a run.
 
-    Raises
-    ------
-    InputError
-        If predictive control does not accept the robot.
+    Raises `InputError` if predictive control does not accept the robot.
     """
     controller = Recording(robot, **task.options)
     simulate(robot, robot.home, controller, duration=steps * 1e-3, **task.conditions())

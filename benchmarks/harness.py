@@ -1,7 +1,5 @@
 """What all benchmarks share: the machine that their figures come from, turns, medians, ratios and tables."""
 
-from __future__ import annotations
-
 import gc
 import os
 import platform

@@ -7,8 +7,6 @@ pass ends the benchmark with code 1. "Again" is the same program solved once mor
 alternate; times are medians of the runs, and ratios, to towline, medians of those in one turn.
 """
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

@@ -14,8 +14,6 @@ taken.
   iteration a tenth faster and the first solve four times slower.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -80,10 +80,8 @@ def solve_problem(
     method :
         One of `towline.solvers.methods()` that ends at the optimum.
 
-    Raises
-    ------
-    InputError
-        If the QP has inequality rows, a cost matrix that is not diagonal and positive, or no equations.
+    Raises `InputError` if the QP has inequality rows, a cost matrix that is not diagonal and positive, or no
+    equations.
     """
     import qpsolvers
 

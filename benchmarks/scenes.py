@@ -11,8 +11,6 @@ quadrotor, 10 g of the load), thrust (0.6 N) and duration (8 s) are assumed.
 Each row has what the planner reports: status, CPU time, the largest violation of the audit and the reason.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

@@ -7,8 +7,6 @@ solves the problems of a task one after the other, in blocks that take turns, so
 down does so for all. A ratio is the median over the turns of a block's median to that of `daqp.solve` in the same turn.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -107,10 +105,7 @@ def run(
     progress :
         Called with the task's name and how many of how many turns at all tasks are done.
 
-    Raises
-    ------
-    InputError
-        If a number is out of range.
+    Raises `InputError` if a number is out of range.
     """
     for name, value in (("count", count), ("repeats", repeats)):
         if not 1 <= value <= MOST:

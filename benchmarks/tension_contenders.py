@@ -6,8 +6,6 @@ with the tensions. All are set to 1e-9 absolute, nothing relative, and are bound
 ever on infeasible problems.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from importlib import import_module

@@ -5,8 +5,6 @@ Kinds: "feasible"; "infeasible", a wrench beyond the available wrench set by 0.0
 as the variables (t, e) with A t + e = w. The largest tension is 1, the unit.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

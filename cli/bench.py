@@ -1,7 +1,5 @@
 """`towline bench`: towline against other solvers, measured on this machine."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator

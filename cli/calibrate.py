@@ -1,7 +1,5 @@
 """`towline calibrate`: geometric calibration from a log of cable lengths."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -118,10 +116,7 @@ def _sigma(text: str) -> Any:
 def _by_name(option: str, text: str) -> dict[str, float]:
     """Read "anchors=0.02,offsets=0.05" as a mapping.
 
-    Raises
-    ------
-    InputError
-        If the text is anything else.
+    Raises `InputError` if the text is anything else.
     """
     result: dict[str, float] = {}
     for part in text.split(","):

@@ -1,7 +1,5 @@
 """`towline demo`: plan a circle of the flying cable robot, and simulate it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

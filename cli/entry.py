@@ -1,7 +1,5 @@
 """The command `towline`: from its first import on Ctrl-C and SIGTERM end it."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

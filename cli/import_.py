@@ -1,7 +1,5 @@
 """`towline import`: robots of other programs as towline robot files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -7,8 +7,6 @@ towline itself; 130, stopped by Ctrl-C; 143, by SIGTERM; 141, the reader of the 
 does.
 """
 
-from __future__ import annotations
-
 import difflib
 import os
 import select
@@ -59,10 +57,7 @@ class Commands(TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Import a command by its name.
 
-        Raises
-        ------
-        InputError
-            If no command has that name.
+        Raises `InputError` if no command has that name.
         """
         if cmd_name not in COMMANDS:
             if ctx.resilient_parsing:

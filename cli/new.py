@@ -1,7 +1,5 @@
 """`towline new`: a commented robot file and a feasible task for it, to edit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from string import Template
 from typing import Annotated

@@ -115,10 +115,7 @@ def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], align: s
 def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.ndarray:
     """Read "1 2 3" or "1,2,3" as an array of `count` numbers, or as `rows` of them separated by ";".
 
-    Raises
-    ------
-    InputError
-        If the text is anything else.
+    Raises `InputError` if the text is anything else.
     """
     import numpy as np
 

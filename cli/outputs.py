@@ -1,7 +1,5 @@
 """The files that a command writes: none of them may be one that it reads, under whatever name or link."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,10 +18,7 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path 
     inputs
         Files by their meaning; files that have been read so far may be omitted.
 
-    Raises
-    ------
-    InputError
-        If one cannot be written, or is one of the other files.
+    Raises `InputError` if one cannot be written, or is one of the other files.
     """
     from ..base.inputs import printable
     from ..base.reading import files_read

@@ -1,7 +1,5 @@
 """`towline plan`: a trajectory for a robot and a task file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Long runs on workers and with a checkpoint: their options, and the hint how to resume after an interrupt."""
 
-from __future__ import annotations
-
 import os
 import shlex
 from collections.abc import Callable, Mapping
@@ -47,10 +45,7 @@ def check_unused(options: Mapping[str, object], without: str, many: str) -> None
 def checkpoint_of(checkpoint: Path | None, resume: Path | None) -> Path | None:
     """Return the file of --checkpoint or --resume.
 
-    Raises
-    ------
-    InputError
-        If both are given.
+    Raises `InputError` if both are given.
     """
     if checkpoint is not None and resume is not None:
         raise InputError(f"--checkpoint must not be given with --resume, got {checkpoint} and {resume}")

@@ -6,8 +6,6 @@ processes may be waited for. So a thread listens too, which the signal wakes at 
 moment later.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -1,7 +1,5 @@
 """The sweeps of `towline plan --vary`: many plans, one table and one figure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

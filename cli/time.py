@@ -1,7 +1,5 @@
 """`towline time`: the fastest time law along a task's path."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

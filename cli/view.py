@@ -1,7 +1,5 @@
 """`towline view`: show a robot, plan, simulation or workspace in the browser, or write a page that needs no server."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Check the arguments of a controller: `as_floats`, a state or a reference as arrays; `rows_of`, `is_time`."""
 
-from __future__ import annotations
-
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -29,10 +27,7 @@ def is_time(value: object) -> bool:
 def rows_of(state: State) -> int | None:
     """Return the number of robots of a state, or None if its arrays have no leading dimension.
 
-    Raises
-    ------
-    InputError
-        If its pose is no array of (6,) or (N, 6) numbers.
+    Raises `InputError` if its pose is no array of (6,) or (N, 6) numbers.
     """
     pose = _array("state.pose", state.pose, (6,))
     if pose.ndim > 2:

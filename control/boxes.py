@@ -1,7 +1,5 @@
 """`boxes`: the positions that may be commanded to carriers; `stay_inside` keeps motions inside them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..models.robot import Robot

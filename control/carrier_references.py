@@ -1,7 +1,5 @@
 """Coordinates of carriers that a predictive controller moves: deviations from references, or remaining freedoms."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Any
 
@@ -238,10 +236,7 @@ class Tethered(Late):
 def _tethers(robot: Robot) -> np.ndarray:
     """Return the carriers held by cables of fixed length, (c,) of `TETHER`.
 
-    Raises
-    ------
-    InputError
-        If a carrier has no cable or more than three of them.
+    Raises `InputError` if a carrier has no cable or more than three of them.
     """
     lengths: Any = robot.fixed_lengths
     anchors, attachments = dynamics_of(robot).points(robot.home, robot.carrier_home)

@@ -1,7 +1,5 @@
 """`Command`: the output of a controller until its next step."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

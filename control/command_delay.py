@@ -1,7 +1,5 @@
 """`Pending`: a queue of commands that have not taken effect yet, or are not visible in measurements yet."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`ComputedTorque`: desired acceleration, the wrench required for it, and the tensions that produce this wrench."""
 
-from __future__ import annotations
-
 import os
 from math import ceil
 from typing import Any

@@ -1,7 +1,5 @@
 """`uncontrolled`: wrench directions that neither tensions nor carriers can change."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..models.dynamics import dynamics_of

@@ -1,7 +1,5 @@
 """`Controller`: the base class of all controllers."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """`Surroundings`: a tube and keep-out bodies for the platform."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, Any
 
@@ -36,10 +34,7 @@ class Surroundings:
     rows
         Number of rows in each stage.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value.
+    Raises `InputError` if an argument has a wrong value.
     """
 
     def __init__(self, robot: Robot, tube: float | None, keep_out: Sequence[Shape | dict[str, Any]]):

@@ -1,7 +1,5 @@
 """`OpenLoop`: the plan without feedback."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

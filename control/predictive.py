@@ -1,7 +1,5 @@
 """`Predictive`: model predictive control with limits of tensions and carriers."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from math import isfinite

@@ -1,7 +1,5 @@
 """The future references of a predictive controller: `Preview`, one for each stage; `rows_at` interpolates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -45,10 +43,7 @@ class Preview:
     def follow(self, references: Sequence[Reference], period: float, start: float) -> None:
         """Receive references, one for each period, from `start` [s] on.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong type or value.
+        Raises `InputError` if an argument has a wrong type or value.
         """
         if (
             not isinstance(references, Sequence)

@@ -1,7 +1,5 @@
 """`Reference`: the desired motion and tensions of a robot at one time."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

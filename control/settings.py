@@ -1,7 +1,5 @@
 """`settings_of`: check the arguments of a controller and convert them to the record of the core."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,10 +49,7 @@ def settings_of(
 ) -> np.ndarray:
     """Return the settings of `ComputedTorque`, whose arguments these are, a record (); the reach is zero.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value.
+    Raises `InputError` if an argument has a wrong value.
     """
     settings = np.zeros((), CONTROLLER)
     w, z = positive("bandwidth", bandwidth, 6), positive("damping", damping, 6)

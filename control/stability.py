@@ -1,7 +1,5 @@
 """`grows`: whether small errors at home grow in the whole closed loop."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..models.robot import Robot

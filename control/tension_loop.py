@@ -1,7 +1,5 @@
 """`TensionLoop`: correct the commands to winches until sensors report the desired tensions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """`Watch`: compare a robot's motion with its model; `HandOver`: when and why another controller took over."""
 
-from __future__ import annotations
-
 from collections import deque
 from math import sqrt
 from typing import NamedTuple
@@ -21,18 +19,10 @@ KNOWN = 0.5  # of an acceleration that sensors find missing in the tensions: obs
 
 
 class HandOver(NamedTuple):
-    """A hand-over to computed torque.
+    """A hand-over to computed torque."""
 
-    Attributes
-    ----------
-    time
-        Time [s]; minus infinity: from the start.
-    reason
-        Reason.
-    """
-
-    time: float
-    reason: str
+    time: float  # time [s]; minus infinity: from the start
+    reason: str  # reason
 
 
 class Watch:

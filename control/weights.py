@@ -1,7 +1,5 @@
 """Costs of a predictive controller: `Weights`, from bandwidths, and `terminal`, the cost after the last stage."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -32,18 +30,10 @@ DISCOUNT = 0.95  # of the cost of each stage, if it does not settle without
 
 
 class Weights(NamedTuple):
-    """Weights of the squared errors of each stage.
+    """Weights of the squared errors of each stage."""
 
-    Attributes
-    ----------
-    states
-        Weights of the errors of pose and rate, and of the carriers' positions and rates, (n,).
-    controls
-        Weights of the deviations from planned tensions, and of the carriers' accelerations, (u,).
-    """
-
-    states: np.ndarray
-    controls: np.ndarray
+    states: np.ndarray  # weights of the errors of pose and rate, and of the carriers' positions and rates, (n,)
+    controls: np.ndarray  # weights of the deviations from planned tensions, and of the carriers' accelerations, (u,)
 
 
 def weights(

@@ -11,8 +11,6 @@ or, if some of its coordinates cannot move, a joint for each that can. Air, elas
 Angles are in radians, frames as in `models.rotation`. Source: MuJoCo's XML reference.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
@@ -28,14 +26,10 @@ SMALLEST_INERTIA = 1e-14  # [kg m^2], just above what MuJoCo refuses
 def to_mjcf(robot: Robot) -> str:
     """Return the MJCF text of `robot`, with bodies, sites, tendons and motors named after its parts.
 
-    Names: body "platform", a body for each moving carrier with its name, sites "anchor1" and "attachment1", tendon and
-    motor "cable1", and so on; motors "NAME thrust", "NAME torque x".
-
-    Raises
-    ------
-    InputError
-        If MuJoCo cannot express the robot: it has pulleys, an impossible inertia, a carrier named "platform", or a
-        rotated home of a platform with fewer than six coordinates.
+    Names: body "platform", a body for each moving carrier with its name, sites "anchor1" and "attachment1", tendon
+    and motor "cable1", and so on; motors "NAME thrust", "NAME torque x". Raises `InputError` if MuJoCo cannot
+    express the robot: it has pulleys, an impossible inertia, a carrier named "platform", or a rotated home of a
+    platform with fewer than six coordinates.
     """
     _check(robot)
     root = ET.Element("mujoco", model=robot.name)

@@ -4,8 +4,6 @@ Fixed parts are drawn once; each frame is a copy of them with the moving parts a
 take ten times as long.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,21 +26,11 @@ SLOWEST, FASTEST = 1e-6, 1e6  # seconds of the motion in one of the film
 
 
 class Timing(NamedTuple):
-    """The times of the frames.
+    """The times of the frames."""
 
-    Attributes
-    ----------
-    times
-        Times of the motion, one for each frame, (k,) [s].
-    rate
-        Frames per second of the film.
-    speed
-        Seconds of the motion per second of the film.
-    """
-
-    times: np.ndarray
-    rate: float
-    speed: float
+    times: np.ndarray  # times of the motion, one for each frame, (k,) [s]
+    rate: float  # frames per second of the film
+    speed: float  # seconds of the motion per second of the film
 
 
 @dataclass(frozen=True)
@@ -93,10 +81,7 @@ class Scene:
 def check_film(path: Path, speed: float, fps: float) -> float:
     """Return the frame rate [1/s] of a film at `path`; call this before computing the motion.
 
-    Raises
-    ------
-    InputError
-        If the suffix, the speed or the frame rate is invalid.
+    Raises `InputError` if the suffix, the speed or the frame rate is invalid.
     """
     number("speed", speed, SLOWEST, FASTEST)
     return film.frame_rate(path, fps)
@@ -105,10 +90,7 @@ def check_film(path: Path, speed: float, fps: float) -> float:
 def timing(path: Path, duration: float, speed: float, fps: float) -> Timing:
     """Return the times of the frames for a motion of `duration` [s] and a film at `path`.
 
-    Raises
-    ------
-    InputError
-        If `check_film` raises it, or the film would be too long.
+    Raises `InputError` if `check_film` raises it, or the film would be too long.
     """
     rate = check_film(path, speed, fps)
     count = duration * rate / speed + 1

@@ -1,7 +1,5 @@
 """Where cables end as they are drawn: at the platform, or hanging from their anchors once they have been cut."""
 
-from __future__ import annotations
-
 import numpy as np
 
 LEFT = 0.25  # of its length that is drawn of a cable that has been cut

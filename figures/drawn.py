@@ -36,10 +36,7 @@ class Drawn:
         format
             png, pdf or svg.
 
-        Raises
-        ------
-        InputError
-            If the format is another, or a file cannot be written.
+        Raises `InputError` if the format is another, or a file cannot be written.
         """
         from .style import save_all
 
@@ -79,10 +76,7 @@ class Filmed(Drawn):
             Frames per second. GIF counts in hundredths of a second: the nearest rate is taken, at most 50, and the
             motion keeps its speed.
 
-        Raises
-        ------
-        InputError
-            If the suffix, the speed or the rate is not valid, or the file cannot be written.
+        Raises `InputError` if the suffix, the speed or the rate is not valid, or the file cannot be written.
         """
         from . import animation
 

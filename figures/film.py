@@ -1,7 +1,5 @@
 """Write films as GIF with Pillow or as MP4 with ffmpeg, as the suffix of the file states."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import tempfile
@@ -24,10 +22,7 @@ Draw = Callable[[int], np.ndarray]  # the k-th frame, (height, width, 3) of byte
 def frame_rate(path: Path, rate: float) -> float:
     """Return the frame rate [1/s] nearest to `rate` that the format of `path` supports.
 
-    Raises
-    ------
-    InputError
-        If the suffix is unknown, the rate is invalid, or ffmpeg is needed and missing.
+    Raises `InputError` if the suffix is unknown, the rate is invalid, or ffmpeg is needed and missing.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -43,10 +38,7 @@ def frame_rate(path: Path, rate: float) -> float:
 def ffmpeg(path: Path) -> str:
     """Return the path of ffmpeg, from the setting `animation.ffmpeg_path` of matplotlib.
 
-    Raises
-    ------
-    InputError
-        If ffmpeg is not installed.
+    Raises `InputError` if ffmpeg is not installed.
     """
     from matplotlib import rcParams
 
@@ -59,12 +51,8 @@ def ffmpeg(path: Path) -> str:
 def write(path: Path, draw: Draw, count: int, rate: float) -> Path:
     """Write `count` frames at `rate` (from `frame_rate`); a failure leaves no partial file.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    TowlineError
-        If ffmpeg fails; the message has its last line.
+    Raises `InputError` if the file cannot be written; `TowlineError` if ffmpeg fails; the message has its last
+    line.
     """
     with whole_file(path) as temporary:
         if path.suffix.lower() == ".gif":

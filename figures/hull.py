@@ -1,7 +1,5 @@
 """Compute the faces of the convex hull of a body, for pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 
 FLAT = 1e-6  # of the largest singular value: thinner bodies are drawn as a plane or a line

@@ -30,10 +30,7 @@ def outline_variables(regions: Sequence[Sequence[np.ndarray]]) -> dict[str, Vari
 def outlines_from(dataset: xr.Dataset, where: str) -> list[list[np.ndarray]]:
     """Return the lines of each region that a dataset, named `where` in errors, has; none without regions.
 
-    Raises
-    ------
-    InputError
-        If its variables are no outlines.
+    Raises `InputError` if its variables are no outlines.
     """
     if "keep_out" not in dataset:
         return []

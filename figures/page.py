@@ -3,8 +3,6 @@
 All text passes `html.escape`; the figures are images, in which no script can run.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable, Sequence
 from html import escape

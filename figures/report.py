@@ -1,7 +1,5 @@
 """`Report`: what a result says to people, as text, page or data; `Reported`: the base of results that have one."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -135,11 +133,7 @@ class Reported:
         """Write the report atomically, by the file's suffix: as text (.txt), data (.json), or else an HTML page.
 
         The page has the figures inside and loads nothing from anywhere, so that it can be mailed and kept.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises `InputError` if the file cannot be written.
         """
         path, report = file_path("file", file), self._report()
         with whole_file(path) as temporary:

@@ -220,10 +220,7 @@ def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes]
 def check_format(name: str) -> str:
     """Return the format of a figure, one of `FORMATS`.
 
-    Raises
-    ------
-    InputError
-        If it is none of them.
+    Raises `InputError` if it is none of them.
     """
     return one_of("format", name, FORMATS)
 
@@ -231,10 +228,7 @@ def check_format(name: str) -> str:
 def check_picture(path: Path) -> Path:
     """Return the path of a figure, whose suffix is one of `FORMATS`.
 
-    Raises
-    ------
-    InputError
-        If the suffix is none of them.
+    Raises `InputError` if the suffix is none of them.
     """
     if path.suffix[1:].lower() not in FORMATS:
         accepted = ", ".join(f".{name}" for name in FORMATS)
@@ -271,10 +265,7 @@ def save_all(
 ) -> list[Path]:
     """Save the figures that `draw` returns by the names of their files, and return their paths.
 
-    Raises
-    ------
-    InputError
-        If the format is none of `FORMATS`, before anything is drawn, or a file cannot be written.
+    Raises `InputError` if the format is none of `FORMATS`, before anything is drawn, or a file cannot be written.
     """
     into, suffix = file_path("folder", folder), check_format(format)
     return [save(drawn, into / f"{name}.{suffix}") for name, drawn in draw().items()]

@@ -24,18 +24,10 @@ NOTHING = "#eeeeee"  # behind marks in a map
 
 
 class Axis(NamedTuple):
-    """A varied field.
+    """A varied field."""
 
-    Attributes
-    ----------
-    label
-        Its name, with the unit.
-    values
-        Numbers or words.
-    """
-
-    label: str
-    values: Sequence[float] | Sequence[str]
+    label: str  # its name, with the unit
+    values: Sequence[float] | Sequence[str]  # numbers or words
 
     @property
     def texts(self) -> list[str]:

@@ -3,8 +3,6 @@
 Each is a function of times and returns (n, 3) in [m/s]. Random parts are seeded: the same seed gives the same wind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 
@@ -77,10 +75,7 @@ def dryden(
     scale
         Scale lengths L along, across and up [m].
 
-    Raises
-    ------
-    InputError
-        If the mean wind has no horizontal part, or the times do not rise in equal steps.
+    Raises `InputError` if the mean wind has no horizontal part, or the times do not rise in equal steps.
     """
     times, mean_wind = _numbers("times", times, None), _numbers("mean", mean, 3)
     sigmas, lengths = _numbers("intensity", intensity, 3, 0.0), _numbers("scale", scale, 3, 1e-9)

@@ -1,7 +1,5 @@
 """A robot's functions as C code that needs only a C compiler, for a controller's own processor."""
 
-from __future__ import annotations
-
 import casadi as ca
 
 from .dynamics import Dynamics

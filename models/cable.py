@@ -1,7 +1,5 @@
 """A cable as data: from its anchor to its attachment, with pulley, winch and encoder."""
 
-from __future__ import annotations
-
 from typing import Self
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Data with which a carrier describes itself: its limits, its body, its actuators and efforts, and how it is drawn."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from .part import Box, Inertia

@@ -5,8 +5,6 @@ robot files accept it as soon as the class is defined. Coordinates are numbered 
 pitch and yaw.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache, reduce
 from operator import or_
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args

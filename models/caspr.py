@@ -92,11 +92,8 @@ def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> 
     cable_set
         Id of the set of cables; default: the file's default_cable_set.
 
-    Raises
-    ------
-    InputError
-        If a file is missing or wrong, or towline cannot express the robot: one line that names the file and the
-        element.
+    Raises `InputError` if a file is missing or wrong, or towline cannot express the robot: one line that names the
+    file and the element.
     """
     place = Path(folder)
     notes = Counter[str]()

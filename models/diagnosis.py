@@ -1,7 +1,5 @@
 """Diagnose a robot at its home pose: the rank of its wrench matrix and the reason, and implausible numbers."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

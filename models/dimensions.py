@@ -1,7 +1,5 @@
 """`dimensions`: the coordinates of a robot's datasets over time, the same in plans and simulations."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..base.netcdf import Variable

@@ -1,7 +1,5 @@
 """`DisplayedRobot`: what a terminal or a notebook shows of a robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import combinations
 from typing import Any

@@ -1,7 +1,5 @@
 """The default `drive` of a robot, and the lengths of cables of fixed length."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np
@@ -24,10 +22,7 @@ def usual_drive(carriers: Iterable[Carrier], cables: Iterable[Cable]) -> Drive:
 def lengths_to_keep(cables: tuple[Cable, ...], at_home: np.ndarray) -> tuple[Cable, ...]:
     """Return the cables of a robot with fixed lengths; one without a length has its distance at home, (m,) [m].
 
-    Raises
-    ------
-    ValueError
-        If a cable without a length runs over a pulley.
+    Raises `ValueError` if a cable without a length runs over a pulley.
     """
     for index, cable in enumerate(cables):
         if cable.length is None and cable.pulley is not None:

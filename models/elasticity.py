@@ -13,8 +13,6 @@ Source: Behzadipour and Khajepour, "Stiffness of cable-based parallel manipulato
 analysis", 2006, for the split; the derivative is CasADi's.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

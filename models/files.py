@@ -1,7 +1,5 @@
 """Robot files: the library that ships with towline, and any YAML file of the same form."""
 
-from __future__ import annotations
-
 import difflib
 import os
 from pathlib import Path
@@ -42,10 +40,7 @@ def load(name: str | os.PathLike[str]) -> Robot:
 def as_robot(robot: object) -> Robot:
     """Return a robot as it is, or load it by its name or path.
 
-    Raises
-    ------
-    InputError
-        If it is neither, or `load` refuses it.
+    Raises `InputError` if it is neither, or `load` refuses it.
     """
     if isinstance(robot, Robot):
         return robot

@@ -10,8 +10,6 @@ carrier back (`rigid_motion` has how a quadrotor moves with it). Coordinates are
 derivatives. Source: Newton and Euler.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

@@ -9,8 +9,6 @@ Poses and points are CasADi SX, MX or DM; geometry is NumPy arrays with one row 
 paper C, Eqs. 1, 2, 5, 6 as corrected.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """`Mechanics`: a robot's mechanics on arrays, by the numeric core; `world_functions` has the same for symbols."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -7,8 +7,6 @@
 Cables count from 0, as in error messages about robot files.
 """
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 
@@ -31,10 +29,8 @@ class Parameter(NamedTuple):
 def locate(name: object, cables: tuple[Cable, ...] | None = None) -> Parameter:
     """Return which number a name stands for.
 
-    Raises
-    ------
-    ValueError
-        If it is not such a name or, if `cables` are given, they have no such number: "must be ..., got ...".
+    Raises `ValueError` if it is not such a name or, if `cables` are given, they have no such number: "must be ...,
+    got ...".
     """
     match = _NAME.fullmatch(name) if isinstance(name, str) else None
     if match is None:

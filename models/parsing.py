@@ -1,7 +1,5 @@
 """YAML text into a pydantic model, with every failure as one line: where, which field, its value, what is accepted."""
 
-from __future__ import annotations
-
 import difflib
 import io
 import os
@@ -43,10 +41,7 @@ def to_yaml(model: BaseModel) -> str:
 def save_yaml(model: BaseModel, file: str | os.PathLike[str], argument: str = "file") -> Path:
     """Save the YAML text of a model atomically, and return the path; errors name the `argument`.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written, or its name does not end in .yaml or .yml.
+    Raises `InputError` if the file cannot be written, or its name does not end in .yaml or .yml.
     """
     path = check_ending(argument, file_path(argument, file), *ENDINGS)
     with whole_file(path) as temporary:
@@ -57,10 +52,8 @@ def save_yaml(model: BaseModel, file: str | os.PathLike[str], argument: str = "f
 def read_yaml(path: Path, model: type[Model]) -> Model:
     """Read a YAML file as a `model`.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is too large, is not YAML or is not a valid `model`: one line that names the file.
+    Raises `InputError` if the file cannot be read, is too large, is not YAML or is not a valid `model`: one line
+    that names the file.
     """
     where = printable(str(path))
     try:

@@ -4,8 +4,6 @@ SI units throughout: metres, kilograms, seconds, newtons, radians. Poses are (x,
 R = Rz(yaw) Ry(pitch) Rx(roll).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 

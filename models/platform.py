@@ -1,7 +1,5 @@
 """The platform of a robot as data: its mass, its aerodynamics and the coordinates in which it moves."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator

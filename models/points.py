@@ -4,8 +4,6 @@
 and its record filled, with what is here, so that it can use neither.
 """
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`Polyhedron`: the convex hull of points, as its faces and edges."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,24 +11,12 @@ SAME_PLANE = 1e-6  # difference of unit normals, and of distances relative to th
 
 
 class Polyhedron(NamedTuple):
-    """A convex body between planes.
+    """A convex body between planes."""
 
-    Attributes
-    ----------
-    normals
-        Outward, of length one, one row a face, (f, 3) [-].
-    offsets
-        Distance of each face's plane from the origin along its normal, (f,) [m].
-    edges
-        The two ends of each edge, (e, 2, 3) [m].
-    corners
-        (k, 3) [m].
-    """
-
-    normals: np.ndarray
-    offsets: np.ndarray
-    edges: np.ndarray
-    corners: np.ndarray
+    normals: np.ndarray  # outward, of length one, one row a face, (f, 3) [-]
+    offsets: np.ndarray  # distance of each face's plane from the origin along its normal, (f,) [m]
+    edges: np.ndarray  # the two ends of each edge, (e, 2, 3) [m]
+    corners: np.ndarray  # (k, 3) [m]
 
     @property
     def size(self) -> float:
@@ -51,10 +37,7 @@ def polyhedron(points: tuple[tuple[float, float, float], ...]) -> Polyhedron:
 def convex_hull(points: np.ndarray) -> Polyhedron:
     """Return the convex hull of points (n, 3) [m]; faces that lie in one plane up to `SAME_PLANE` are one.
 
-    Raises
-    ------
-    ValueError
-        If the points lie in one plane, or the hull has more than `MOST_FACES` faces.
+    Raises `ValueError` if the points lie in one plane, or the hull has more than `MOST_FACES` faces.
     """
     from scipy.spatial import ConvexHull  # loads for longer than most tasks take, which need none
 

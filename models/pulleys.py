@@ -1,7 +1,5 @@
 """`check_pulleys`: whether the cables of a robot can run over their pulleys at home."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .cable import Cable

@@ -1,7 +1,5 @@
 """Ranges of one number, as files give them: `{min: ..., max: ...}`."""
 
-from __future__ import annotations
-
 from typing import Self
 
 from pydantic import Field, model_validator

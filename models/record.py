@@ -1,7 +1,5 @@
 """A robot as the plain record that the numeric core reads: `record_of`, and the layout of core/robot.h."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 
@@ -68,12 +66,8 @@ def fits(robot: Robot) -> bool:
 def record_of(robot: Robot) -> np.ndarray:
     """Return the record of a robot, of `RECORD`, shape (); it is kept for the next call and cannot be written to.
 
-    Stiffness and damping are those of the file, 0 where it has none.
-
-    Raises
-    ------
-    InputError
-        If the robot has more cables, carriers or actuators than the core has room for.
+    Stiffness and damping are those of the file, 0 where it has none. Raises `InputError` if the robot has more
+    cables, carriers or actuators than the core has room for.
     """
     key: Any = robot  # frozen, so it has a hash, unknown to a type checker
     return _record_of(key)

@@ -11,8 +11,6 @@ alpha_A = dP_a dTheta_a + P_a ddTheta_a. Without the carrier's motion D_B is the
 Source: paper F, Eqs. 26 to 38 as corrected.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 
 from .motion import Motion

@@ -1,7 +1,5 @@
 """`RelativeDynamics`: paper F's form of the dynamics as CasADi Functions, called with arrays or with symbols."""
 
-from __future__ import annotations
-
 import os
 from functools import cached_property
 

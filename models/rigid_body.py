@@ -9,8 +9,6 @@ Eq. 4, which omits the gyroscopic term, and Eq. 12, which takes ddTheta for the 
 A load that the platform carries needs the same about its own CoM, and the moment of its force about the platform's.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 
 from .robot import Robot

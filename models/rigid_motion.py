@@ -7,8 +7,6 @@ for thrust f along its z axis, torque tau, and the pull of its cables: F in {G},
 Coordinates are (x, y, z, roll, pitch, yaw) and their derivatives. Source: Newton and Euler.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

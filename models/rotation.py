@@ -7,8 +7,6 @@
 Source: paper F, Eqs. 1, 27, 28, 31 as corrected.
 """
 
-from __future__ import annotations
-
 from typing import Any, TypeAlias
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """`rotor_discs`: the circles in which the rotors of carriers turn, as figures and films draw them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .points import placed

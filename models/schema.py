@@ -1,7 +1,5 @@
 """`json_schema`: the JSON Schema of what a file describes."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

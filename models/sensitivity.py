@@ -1,7 +1,5 @@
 """How the wrench matrix depends on the numbers that place the cables, by their names."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -31,12 +29,8 @@ def derivatives(
     -------
     The derivative by each number of the column of its cable, (n, 6, p) [1/m, -], and the index of that cable, (p,).
 
-    Raises
-    ------
-    ValueError
-        If the robot has no such number.
-    InputError
-        If the robot has more cables or carriers than the numeric core has room for.
+    Raises `ValueError` if the robot has no such number; `InputError` if the robot has more cables or carriers than
+    the numeric core has room for.
     """
     places = [locate(name, robot.cables) for name in names]
     cables = np.array([place.cable for place in places], dtype=int)

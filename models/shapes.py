@@ -1,7 +1,5 @@
 """Bodies in space as data, which cables, platform and carriers must avoid."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, Literal, Self, TypeAlias
 

@@ -6,8 +6,6 @@ same with the same values share it, which changes no bit) and does the operation
 rounds where CasADi does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -33,10 +31,7 @@ def dense(function: ca.Function) -> ca.Function:
 def scalar(function: ca.Function) -> ca.Function:
     """Return the Function as one of scalar instructions; an MX Function is expanded.
 
-    Raises
-    ------
-    InputError
-        If it cannot be expanded.
+    Raises `InputError` if it cannot be expanded.
     """
     if function.is_a("SXFunction"):
         return function
@@ -68,10 +63,7 @@ def straight_line(
     variables, stores
         The name of each expression's variable, and that of each output's element (output, row, column).
 
-    Raises
-    ------
-    InputError
-        If the tape has an operation that is not among `operations`.
+    Raises `InputError` if the tape has an operation that is not among `operations`.
     """
     work: dict[int, str] = {}  # what each slot of the work vector holds now
     variables: dict[str, str] = {}

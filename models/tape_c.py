@@ -4,8 +4,6 @@ It has one local variable for each distinct value, no branches, no work arrays, 
 defines `real`, the type of its numbers, `C(x)`, a constant of that type, and `MATH(sin)`, a function for it.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 
 import casadi as ca
@@ -52,10 +50,7 @@ def to_c_function(function: ca.Function, name: str) -> str:
     name
         The name of the C function.
 
-    Raises
-    ------
-    InputError
-        If an MX Function cannot be expanded, or the tape has an operation that is not known here.
+    Raises `InputError` if an MX Function cannot be expanded, or the tape has an operation that is not known here.
     """
     function = tape.scalar(tape.dense(function))
     inputs, outputs = function.name_in(), function.name_out()

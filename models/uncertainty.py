@@ -1,7 +1,5 @@
 """How well the numbers of a robot file are known: `Uncertainty`, a covariance, and robots drawn from it."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 import numpy as np

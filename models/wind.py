@@ -6,8 +6,6 @@ V is the air's velocity relative to the platform's CoM, along the axes of {G}. S
 for V_x |V_x| and so never pushes backwards; that form is kept under `form: printed`.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 
 from ..base.errors import InputError
@@ -26,10 +24,7 @@ def aerodynamic_wrench(robot: Robot, pose: Matrix, velocity: Matrix, wind: Matri
     wind
         (3, 1): velocity of the air in {G} [m/s].
 
-    Raises
-    ------
-    InputError
-        If the robot's file has no `platform.aero`.
+    Raises `InputError` if the robot's file has no `platform.aero`.
     """
     aero = robot.platform.aero
     if aero is None:

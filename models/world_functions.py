@@ -1,7 +1,5 @@
 """`WorldFunctions`: kinematics and dynamics of a robot in {G} as CasADi Functions, each built when it is first used."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 

@@ -13,8 +13,6 @@ The planner works in stages and stops at the first that decides:
    result.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from dataclasses import replace

@@ -34,21 +34,11 @@ MOST_WARNED = 100_000  # times that are looked at for warnings, or less than twi
 
 
 class PlannerStep(NamedTuple):
-    """One step of the planner.
+    """One step of the planner."""
 
-    Attributes
-    ----------
-    name
-        What was computed: "ends and path", "timing", "nonlinear program, 100 steps".
-    message
-        Its result, as text with units; empty if it has no result worth a line.
-    seconds
-        Wall time [s].
-    """
-
-    name: str
-    message: str
-    seconds: float
+    name: str  # what was computed: "ends and path", "timing", "nonlinear program, 100 steps"
+    message: str  # its result, as text with units; empty if it has no result worth a line
+    seconds: float  # wall time [s]
 
 
 @dataclass(frozen=True)
@@ -222,10 +212,7 @@ class PlanData(Displayed):
         seed
             Seed of the random numbers.
 
-        Raises
-        ------
-        InputError
-            If an argument is wrong, or the robot has no uncertainty.
+        Raises `InputError` if an argument is wrong, or the robot has no uncertainty.
         """
         audit, scenario = self.audit, self.scenario
         rows = np.unique(np.linspace(0, len(audit.times) - 1, DRAWN_AT).round().astype(int))

@@ -1,7 +1,5 @@
 """Settings and motions as the records and rows that the plant reads."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

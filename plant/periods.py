@@ -1,7 +1,5 @@
 """`Periods`: run a plant period by period, in arrays of the caller and without checks, for closed loops."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core import run_plant

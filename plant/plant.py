@@ -1,7 +1,5 @@
 """`Plant`: simulate a robot with slack cables, winches, wind and disturbances."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """`Reading`: read states of a plant in towline's coordinates."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derive missing velocities and accelerations of carriers from the poses of a sequence of commands."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from . import layout

@@ -1,7 +1,5 @@
 """`check_command`: refuse invalid commands of a user's controller with a one-line error."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -15,10 +13,8 @@ from ..models.robot import Robot
 def check_command(command: Any, robot: Robot, flights: int, time: float) -> None:
     """Check a command of all runs, or of a single one.
 
-    Raises
-    ------
-    InputError
-        If it is no `Command`, or has wrong shapes, numbers that are not finite or an unknown status.
+    Raises `InputError` if it is no `Command`, or has wrong shapes, numbers that are not finite or an unknown
+    status.
     """
     if not isinstance(command, Command):
         raise InputError(f"controller must return a Command from step, got {shown(command)} at t = {time:g} s")

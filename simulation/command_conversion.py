@@ -1,7 +1,5 @@
 """`Orders`: convert controller commands and wind to plant commands."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`Conditions`: wind, sensors and events of a simulation, its time and its steps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """`SimulationData`: the numbers of a simulation, which events, figures and reports use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

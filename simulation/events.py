@@ -1,7 +1,5 @@
 """Events of a simulation in order of time: faults, and the first instants at which limits were exceeded."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

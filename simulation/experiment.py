@@ -1,7 +1,5 @@
 """`Experiment`: the settings of all runs, for one robot and one reference."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 

@@ -1,7 +1,5 @@
 """`Fault`: a fault during a simulation, from a string such as "cut 3 at 2.5"."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -50,10 +48,8 @@ def read_faults(robot: Robot, faults: Sequence[str], duration: float, name: str 
     name
         Name of the argument, for errors.
 
-    Raises
-    ------
-    InputError
-        If a string has another form, there is no such cable or carrier, or the simulation ends earlier.
+    Raises `InputError` if a string has another form, there is no such cable or carrier, or the simulation ends
+    earlier.
     """
     if isinstance(faults, str) or not isinstance(faults, Sequence):
         raise InputError(f"{name} must be a list of strings, each {ACCEPTED}, got {shown(faults)}")

@@ -42,10 +42,7 @@ FIGURES = np.dtype(
 def copies(controller: Controller, count: int) -> list[Controller]:
     """Return a controller for each of `count` runs, or the given one if it accepts batches.
 
-    Raises
-    ------
-    InputError
-        If it cannot be copied.
+    Raises `InputError` if it cannot be copied.
     """
     if controller.batches:
         return [controller]

@@ -1,7 +1,5 @@
 """Close the loop of plant, sensors and controller, for one run or many in parallel: `fly`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import isfinite
 from time import perf_counter
@@ -75,10 +73,7 @@ def fly(
         Number of simulated periods of each run, (N,), smaller than the number of references if it diverged (at least
         1); and the computing times of the controller's steps [s].
 
-    Raises
-    ------
-    InputError
-        If the controller returns an invalid command.
+    Raises `InputError` if the controller returns an invalid command.
     """
     robot, m, flights, period = plant.robot, plant.robot.m, len(seeds), conditions.period
     first = conditions.references[0]

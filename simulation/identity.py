@@ -1,7 +1,5 @@
 """`identity`: a text that identifies objects in a later process, for checkpoints."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import io
@@ -28,10 +26,7 @@ class _Pickler(pickle.Pickler):
 def identity(something: Any) -> str:
     """Return a hash of an object's content and of the source of its class or function, as far as there is one.
 
-    Raises
-    ------
-    pickle.PicklingError, AttributeError, TypeError
-        If the object cannot be pickled.
+    Raises `pickle.PicklingError, AttributeError, TypeError` if the object cannot be pickled.
     """
     stream = io.BytesIO()
     _Pickler(stream).dump(something)

@@ -1,7 +1,5 @@
 """`Record`: the complete history of one run."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..base.display import Displayed

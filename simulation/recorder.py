@@ -1,7 +1,5 @@
 """`Recorder`: the interface of objects that record runs, `Period` by `Period`."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, Protocol
 
 import numpy as np

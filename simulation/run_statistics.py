@@ -1,7 +1,5 @@
 """`Extremes`: statistics of each of many runs: errors, extreme tensions, slack, and the status of control steps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..control import ANSWERS

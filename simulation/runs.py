@@ -1,7 +1,5 @@
 """Simulate one reference many times with different seeds, on workers and with a checkpoint: `fly_many`."""
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator
@@ -39,13 +37,9 @@ def fly_many(
 ) -> np.ndarray:
     """Return the statistics of one run per seed, (N,) of `FIGURES`; they do not depend on the workers.
 
-    Raises
-    ------
-    InputError
-        If the controller cannot be copied, controller or wind cannot be sent to a process or stored, the checkpoint
-        cannot be used, or the scheduler does not exist.
-    SolverError
-        If workers end before their work is done.
+    Raises `InputError` if the controller cannot be copied, controller or wind cannot be sent to a process or
+    stored, the checkpoint cannot be used, or the scheduler does not exist; `SolverError` if workers end before
+    their work is done.
     """
     copies(controller, 1)  # before anything else that needs one: this is the message that names what to do
     everything = plant, controller, conditions

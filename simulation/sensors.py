@@ -1,7 +1,5 @@
 """`Sensors` and their `Noise`: errors and delay."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`steps_in`: the number of Runge-Kutta steps per period."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -58,10 +58,7 @@ class Trajectory(NamedTuple):
 def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
     """Return `reference` as a trajectory.
 
-    Raises
-    ------
-    InputError
-        If it has another type, or belongs to another robot.
+    Raises `InputError` if it has another type, or belongs to another robot.
     """
     if isinstance(reference, str | os.PathLike):
         reference = _loaded(reference)

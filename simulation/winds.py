@@ -1,7 +1,5 @@
 """Winds of simulations: constant, with gusts, or a user's function."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -49,10 +47,7 @@ class Gusts(ConstantWind):
 def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
     """Return the wind from the arguments of `simulate`, see there.
 
-    Raises
-    ------
-    InputError
-        If the robot has no `platform.aero`, or an argument has a wrong value.
+    Raises `InputError` if the robot has no `platform.aero`, or an argument has a wrong value.
     """
     if wind is None:
         if gusts:

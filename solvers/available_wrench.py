@@ -5,8 +5,6 @@ and the facets lie at the support values along them: hyperplane shifting (Boucha
 Krut 2010). `solvers.capacity_margin` has the nearest of them for one wrench; here are all of them for many matrices.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import comb
 

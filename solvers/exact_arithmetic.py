@@ -29,18 +29,10 @@ _ERROR = 2.0**-73
 
 
 class ExactOptimum(NamedTuple):
-    """Tensions of least cost inside their limits whose wrench is w or the nearest to it, rounded once.
+    """Tensions of least cost inside their limits whose wrench is w or the nearest to it, rounded once."""
 
-    Attributes
-    ----------
-    tensions :
-        The tensions [N], shape (m,).
-    missing :
-        What they miss of the wrench before they are rounded, S (w - A t) [N], shape (n,).
-    """
-
-    tensions: Array
-    missing: Array
+    tensions: Array  # tensions [N], shape (m,)
+    missing: Array  # what they miss of the wrench before they are rounded, S (w - A t) [N], shape (n,)
 
 
 def exact_optimum(problem: TensionProblem, nearest: Array) -> ExactOptimum:

@@ -3,8 +3,6 @@
 The method, its conditions and its sources are described in `docs/horizon.md`.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

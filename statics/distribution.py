@@ -82,10 +82,7 @@ def pose_problem(
 ) -> TensionProblem:
     """Build the tension problem of one instant, with the arguments of `tensions`.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, shape or value, or a cable has no length.
+    Raises `InputError` if an argument has a wrong type, shape or value, or a cable has no length.
     """
     from ..models.motion import Motion
 

@@ -17,8 +17,6 @@ with the stiffness K at constant tensions. The same matrix gives the derivative 
 Source: the energy form of the direct geometrico-static problem of Berti, Merlet and Carricato (2016).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -93,10 +91,7 @@ def equilibria(
     list
         Solutions with a residual below 1e-6 of the weight; empty if no pose has these lengths.
 
-    Raises
-    ------
-    InputError
-        If `lengths` or `carrier_pose` has a wrong shape or value, or the robot has no gravity.
+    Raises `InputError` if `lengths` or `carrier_pose` has a wrong shape or value, or the robot has no gravity.
     """
     robot = required("robot", robot, Robot)
     starts = whole_number("starts", starts, 1, 1_000_000)

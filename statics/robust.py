@@ -43,10 +43,7 @@ ROUNDING = 1e-9  # of the force scale, in comparisons of tensions
 def check_share(robot: Robot, share: object) -> float:
     """Check and return the fraction of robots for which limits must hold.
 
-    Raises
-    ------
-    InputError
-        If it is no number above 0 and below 1, or the robot has no uncertainty.
+    Raises `InputError` if it is no number above 0 and below 1, or the robot has no uncertainty.
     """
     value = _share("robust", share)
     uncertainty_of(robot)
@@ -79,10 +76,8 @@ class Spread:
     rows
         Wrench rows that the cables balance; default: those of the coordinates that can move.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or shape, or the robot has no uncertainty or fewer cables than rows.
+    Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty or fewer cables
+    than rows.
     """
 
     def __init__(self, robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike, rows: ArrayLike | None = None):
@@ -147,10 +142,7 @@ def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: Arr
     carrier_pose
         Poses of the carriers, (n, c, 6); default: at home.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or shape, or the robot has no uncertainty.
+    Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty.
     """
     poses, carriers = _places(robot, pose, carrier_pose)
     values = finite_array("tensions", tensions, (len(poses), robot.m))
@@ -167,10 +159,7 @@ def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
     share
         Fraction of the robots, above 0 and below 1.
 
-    Raises
-    ------
-    InputError
-        If an argument is wrong.
+    Raises `InputError` if an argument is wrong.
     """
     from ..models.uncertainty import Uncertainty
 
@@ -187,10 +176,7 @@ def motion_factor(changes: ArrayLike, share: float) -> float:
     share
         Fraction of the robots, above 0 and below 1.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, shape or value.
+    Raises `InputError` if an argument has a wrong type, shape or value.
     """
     from scipy.special import erfc
 
@@ -275,10 +261,7 @@ def share_of_robots(
     seed
         Seed of the random numbers.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or shape, or the robot has no uncertainty.
+    Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty.
     """
     from ..models.dynamics import Dynamics
     from ..solvers import solve_batch

@@ -1,7 +1,5 @@
 """The papers that `towline reproduce` recomputes, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from .accounts.account import Account, Progress

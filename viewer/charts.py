@@ -1,7 +1,5 @@
 """Chart tensions and margin over time in the panel, with spans without tensions and the time that the scene shows."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Convert a workspace to coloured points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,10 +42,7 @@ class Cloud(Displayed):
 def cloud(dataset: xr.Dataset, where: str) -> Cloud:
     """Return the points of a dataset of `workspace.sample`; with `keep="none"`, the centres of the reached cells.
 
-    Raises
-    ------
-    InputError
-        If the dataset has no such points.
+    Raises `InputError` if the dataset has no such points.
     """
     if "position" not in dataset:
         return _cells(dataset, where)

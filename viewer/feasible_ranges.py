@@ -1,7 +1,5 @@
 """Shade where the platform could rest along each slider, with all other coordinates as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from threading import Condition, Thread
 

@@ -1,7 +1,5 @@
 """Draw a film of a replay, as `towline plan --animate` does, independently of any browser."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

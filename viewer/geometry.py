@@ -61,10 +61,7 @@ class Geometry:
     extent
         The smallest box around home, anchors and reach boxes.
 
-    Raises
-    ------
-    InputError
-        If the robot is too large, too small or too far away to be drawn.
+    Raises `InputError` if the robot is too large, too small or too far away to be drawn.
     """
 
     def __init__(self, robot: Robot):

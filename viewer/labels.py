@@ -3,8 +3,6 @@
 Names come from files, so every text that is not a number passes `html.escape`.
 """
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Write what stands beside the scene of a page without a server: title, tensions of the shown instant, legend."""
 
-from __future__ import annotations
-
 import json
 from html import escape
 from pathlib import Path

@@ -240,10 +240,7 @@ def home_at_rest(robot: Robot) -> np.ndarray:
 def at_rest_with(robot: Robot, lengths: np.ndarray, pose: np.ndarray, carriers: np.ndarray) -> np.ndarray:
     """Return the pose (6,) near `pose` (6,) at which the platform rests with cables of `lengths` (m,) [m].
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises `InputError` if there is none.
     """
     rest = rest_near(robot, lengths, pose, carriers)
     if rest is None:

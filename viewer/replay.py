@@ -1,7 +1,5 @@
 """Replay a saved plan or simulation without interpolation: every instant shown was audited, or simulated."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cached_property
@@ -52,10 +50,7 @@ class Replay:
     obstacles
         Lines (k, 3) in {G} [m] that outline each of the regions to keep out of.
 
-    Raises
-    ------
-    InputError
-        If a variable of a plan is missing, or does not fit its robot.
+    Raises `InputError` if a variable of a plan is missing, or does not fit its robot.
     """
 
     def __init__(self, dataset: xr.Dataset, where: str):

@@ -1,7 +1,5 @@
 """Compute the lines of parts that make a robot recognisable: rotors, sheaves of pulleys, posts."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..models import Robot

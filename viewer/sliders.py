@@ -1,7 +1,5 @@
 """Choose the range of a slider for each coordinate of platform and carriers that can move."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Describe a robot at one instant: its points, and its tensions or a certificate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,10 +61,7 @@ class Snapshot(Displayed):
 def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Snapshot:
     """Return the robot at rest at `pose` (6,) with its carriers at (c, 6), and the tensions of least norm that hold it.
 
-    Raises
-    ------
-    InputError
-        If a cable has no length there, or cannot pass over its pulley.
+    Raises `InputError` if a cable has no length there, or cannot pass over its pulley.
     """
     robot = dynamics.robot
     problem = pose_problem(dynamics, pose, carrier_pose=carriers)

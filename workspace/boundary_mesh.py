@@ -1,7 +1,5 @@
 """The boundary of a workspace as a mesh of triangles: marching cubes (scikit-image) on a grid, saved as STL."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -121,10 +121,8 @@ def condition_from(data: Any) -> Condition:
 def for_robots(condition: Condition, share: float | None) -> Condition:
     """Return a condition for a fraction of the uncertain robots, or unchanged if `share` is None.
 
-    Raises
-    ------
-    InputError
-        If `share` is no number between 0 and 1, or no part of the condition is about tension limits.
+    Raises `InputError` if `share` is no number between 0 and 1, or no part of the condition is about tension
+    limits.
     """
     if share is None:
         return condition

@@ -41,10 +41,7 @@ class Domain(Displayed):
     def of(cls, robot: Robot, region: Region) -> Domain:
         """Return the domain of a region for a robot.
 
-        Raises
-        ------
-        InputError
-            If the robot cannot be in the region, or nothing in it varies.
+        Raises `InputError` if the robot cannot be in the region, or nothing in it varies.
         """
         boxes = _carrier_boxes(robot, region)
         home = robot.carrier_home[:, :3]

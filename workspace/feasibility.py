@@ -4,8 +4,6 @@ The wrench rows are those of the coordinates that can move, with moments divided
 newtons. A few thousand configurations are processed at a time, so that their matrices stay in the cache.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

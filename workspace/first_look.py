@@ -1,7 +1,5 @@
 """A first look at the workspace: random positions about home, and whether tensions hold the platform there."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..base.inputs import required, whole_number

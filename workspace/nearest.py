@@ -1,7 +1,5 @@
 """Search for the feasible pose closest to an infeasible one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..models import Robot

@@ -4,8 +4,6 @@ The corners of all cells lie on a lattice, twice as fine on each level; known co
 with equal corners is treated as all inside or all outside, so parts thinner than the first cells can be missed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from itertools import product
 

@@ -1,7 +1,5 @@
 """`Region`: ranges of the positions, attitudes, carriers' positions or cable lengths to sample, as data."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The largest box of positions about home at which tensions hold the platform at rest: where a first path may lead."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

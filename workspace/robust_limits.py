@@ -6,8 +6,6 @@ iteration keep their own spread from the limits. For a robot with more cables th
 solution, so the result may be too small, but never too large.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..base.errors import InputError
@@ -34,10 +32,7 @@ class Tightened:
     rows
         Wrench rows that the cables give.
 
-    Raises
-    ------
-    InputError
-        If the robot has no uncertainty, or fewer cables than rows, or the share is none.
+    Raises `InputError` if the robot has no uncertainty, or fewer cables than rows, or the share is none.
     """
 
     def __init__(self, robot: Robot, share: float, rows: np.ndarray):

@@ -4,8 +4,6 @@ Random streams are counter-based (Salmon et al. 2011): Philox keyed by seed and 
 scrambled by the seed and advanced to the start of the chunk. A grid has the midpoints of equal cells.
 """
 
-from __future__ import annotations
-
 import threading
 from dataclasses import dataclass
 from functools import cached_property

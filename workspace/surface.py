@@ -88,13 +88,9 @@ def surface(dataset: xr.Dataset, robot: Robot, within: float = np.inf) -> Surfac
     It has none if it is flat, if it has no usable counts or cells, if a coordinate of a cell is above `within` [m], or
     if no cell has at least half of its samples accepted.
 
-    Cells are joined into blocks that have enough samples. The surface encloses the blocks in which at least half of the
-    samples are accepted, or any sample if attitudes or carriers vary.
-
-    Raises
-    ------
-    InputError
-        If scikit-image is not installed.
+    Cells are joined into blocks that have enough samples. The surface encloses the blocks in which at least half of
+    the samples are accepted, or any sample if attitudes or carriers vary. Raises `InputError` if scikit-image is
+    not installed.
     """
     if not _has_counts(dataset, within):
         return None

@@ -1,7 +1,5 @@
 """Position of a platform on three cables with given attitude and cable lengths."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..models import Robot

@@ -4,8 +4,6 @@ Of n independent samples, uniform in a box of volume V, k lie in the workspace: 
 interval of p is that of Clopper and Pearson, which covers at least as often as its level states.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,10 +58,7 @@ def volume(accepted: int, samples: int, box: float, level: float = LEVEL) -> Vol
     level
         Confidence level, between 0 and 1.
 
-    Raises
-    ------
-    InputError
-        If a number is out of its range.
+    Raises `InputError` if a number is out of its range.
     """
     samples = whole_number("samples", samples, 1, MOST_SAMPLES)
     accepted = whole_number("accepted", accepted, 0, samples)

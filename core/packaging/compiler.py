@@ -1,7 +1,5 @@
 """Find the C compiler of the core: that of the machine, or the package ziglang."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys
@@ -27,10 +25,7 @@ def required() -> list[str]:
 def choose() -> None:
     """Let setuptools use ziglang where the machine has no compiler.
 
-    Raises
-    ------
-    SystemExit
-        If there is neither, in one line.
+    Raises `SystemExit` if there is neither, in one line.
     """
     if _of_the_machine():
         return

@@ -1,7 +1,5 @@
 """An initial value of the clock offset: repeating motions cause local minima, so many values are tried."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ The record is cut into blocks in time, every other block is fitted, and the leng
 poses are estimated again). Then the two halves are swapped.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -122,14 +120,9 @@ def compare(
 def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[str, ...]:
     """Return the smallest parameter set whose cross-validation error is close to the best.
 
-    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales and pulley radii;
-    with a clock offset if times and poses of a motion were measured. With `outliers`, slips and outliers are removed
-    first.
-
-    Raises
-    ------
-    InputError
-        If there are too few measurements even for the offsets.
+    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales and pulley
+    radii; with a clock offset if times and poses of a motion were measured. With `outliers`, slips and outliers are
+    removed first. Raises `InputError` if there are too few measurements even for the offsets.
     """
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
     check_enough(robot, measurements, ("offsets",), {})

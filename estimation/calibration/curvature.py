@@ -9,8 +9,6 @@ attachment, the second-order change of the length by a shift d and a rotation w 
 as for a cable between points; with a pulley it hardly differs.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .model import Derivatives, Residuals

@@ -1,7 +1,5 @@
 """`next_poses`: the most informative poses to measure next (D-optimal design)."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import replace

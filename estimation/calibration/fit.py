@@ -4,8 +4,6 @@ Without a prior some directions of the parameters may be unobservable. A very we
 only these: the change from the file is the smallest possible (inner constraints).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -29,22 +27,12 @@ RELATIVE = 1e-13  # of an eigenvalue to the largest, below which it is rounding
 
 
 class Fit(NamedTuple):
-    """The state with the smallest sum of squares.
-
-    Attributes
-    ----------
-    cost
-        Sum of squares.
-    converged
-        True if no step reduces it notably.
-    steps
-        Number of steps tried.
-    """
+    """The state with the smallest sum of squares."""
 
     state: State
-    cost: float
-    converged: bool
-    steps: int
+    cost: float  # sum of squares
+    converged: bool  # True if no step reduces it notably
+    steps: int  # number of steps tried
 
 
 def unobservable_below(eigenvalues: np.ndarray, length: float) -> float:

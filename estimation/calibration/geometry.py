@@ -1,7 +1,5 @@
 """Cable lengths and their derivatives by the numeric core, for varying parameters of a robot."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

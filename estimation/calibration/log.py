@@ -5,8 +5,6 @@ t (time); tension0, tension1, ... CSV: the first line has "name [unit]" for each
 with these names and the attribute `units`, or, as towline writes them, cable_lengths, pose, tensions and time.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import re

@@ -13,8 +13,6 @@ The pose of sample k is the pose measured at t_k + clock, or an initial one, plu
 {G}. These increments are unknowns if the pose was measured with an error or not at all.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

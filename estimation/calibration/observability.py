@@ -6,8 +6,6 @@ is tested on the normal equations, because pulleys with given axes, locked coord
 some. Other directions are named by the parameters that they change most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -6,8 +6,6 @@ distributed, and the largest of a sample marks the outlier (Baarda). A slip chan
 sample on. Cumulative sums test this additional parameter for every cable and sample at once.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ The vector x has nine numbers for each cable, in this order, then the clock offs
     anchor x y z  attachment x y z  offset  scale  radius
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,10 +105,7 @@ class Parameters(Displayed):
         covariance
             Covariance of the free parameters, (p, p); default: the robot has no uncertainty.
 
-        Raises
-        ------
-        InputError
-            If no robot can have these values.
+        Raises `InputError` if no robot can have these values.
         """
         data = self.robot.model_dump(mode="json")
         before = self.table(self.first)

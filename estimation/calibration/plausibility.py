@@ -11,8 +11,6 @@ of another convention, of variance s^2, the sum of e^2 - e'^2 is |e - e'|^2 if t
 deviation 2 s |e - e'| (a likelihood ratio). Conventions that cannot be distinguished are named together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import permutations
 from typing import NamedTuple

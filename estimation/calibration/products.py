@@ -4,8 +4,6 @@ With many threads such products are hardly faster, wait for busy processors, and
 machines.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 ONE_THREAD = 200_000  # multiplications in a block; OpenBLAS starts threads from 262 144 on

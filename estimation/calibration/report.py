@@ -1,7 +1,5 @@
 """The report of a calibration."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np

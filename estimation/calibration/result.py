@@ -1,7 +1,5 @@
 """`CalibrationData`: the numbers of a calibrated robot, with their covariance."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -246,10 +244,7 @@ class CalibrationData(Displayed):
     def lengths(self, readings: ArrayLike) -> np.ndarray:
         """Convert winch readings (..., m) to cable lengths [m], (..., m), with the offsets after the last slip.
 
-        Raises
-        ------
-        InputError
-            If the readings have another number of cables.
+        Raises `InputError` if the readings have another number of cables.
         """
         of, x = self._solved.model.parameters, self._solved.fit.state.x
         values = np.asarray(real_array("readings", readings), dtype=float)

@@ -1,7 +1,5 @@
 """`calibrate`: estimate robot parameters from measurements."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """`settled`: fit poses with fixed parameters, each with its own step length."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .model import Model, State

@@ -1,7 +1,5 @@
 """`solve`: fit the parameters of a robot to measurements, excluding outliers and modelling slips of winches."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ minimum. So a first fit treats the orientation as roughly measured at its value 
 parameters as close to the file. The second fit drops these assumptions.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 

@@ -5,8 +5,6 @@ cables one remains, and others whose lengths differ by less than the noise. No m
 Descents from attitudes spread evenly over SO(3) find most of them.
 """
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`pose_from_lengths`: the pose of the platform from the lengths of its cables."""
 
-from __future__ import annotations
-
 import os
 from functools import lru_cache
 

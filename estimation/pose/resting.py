@@ -1,7 +1,5 @@
 """Poses from lengths for robots with fewer cables than coordinates: equilibrium poses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -18,12 +16,8 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
     """Return estimates from lengths (N, m): the equilibrium if these do not determine the pose well.
 
     An equilibrium is near `starts` (N, 6) or, without any, near the pose from lengths alone. With fewer cables than
-    coordinates it is anywhere.
-
-    Raises
-    ------
-    InputError
-        If the robot has no gravity and too few cables, so that the pose is undetermined.
+    coordinates it is anywhere. Raises `InputError` if the robot has no gravity and too few cables, so that the pose
+    is undetermined.
     """
     robot, few = problem.robot, problem.robot.m < problem.freedoms
     if few and robot.weight == 0.0:

@@ -1,7 +1,5 @@
 """Poses in which the cables can hold the weight at rest, since measured cables are taut."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...models.dynamics import dynamics_of

@@ -1,7 +1,5 @@
 """`PoseTracker`: the pose of a moving platform from a stream of cable lengths."""
 
-from __future__ import annotations
-
 import os
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bounds of iterations and of floating-point operations of one control step, from the loops of the C code."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 ROWS = 6

@@ -1,7 +1,5 @@
 """`export_step`: write the files of a robot's control step."""
 
-from __future__ import annotations
-
 import os
 import re
 import textwrap

@@ -1,7 +1,5 @@
 """The mechanics of one control step as a CasADi Function: wrench matrix and required wrench."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

@@ -1,7 +1,5 @@
 """Check the numbers that describe a cable."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -8,8 +8,6 @@ F = T + dT. The cable's part is in `element_chain`, the platform's in `Dynamics.
 Source: paper F, section V, steps 1 to 8, where step 7 prints T' for dT; Eqs. 8 to 23 and 38.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -119,11 +117,8 @@ def driving_force(
         paper's Eq. 13 to the letter, where each element is lengthened by (l(t + dt) - l(t)) / n in every step (the
         last one repeats); at any usual speed this alone is far more than T.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value, or the robot has several carriers, a pulley, or a cable without
-        stiffness or damping.
+    Raises `InputError` if an argument has a wrong shape or value, or the robot has several carriers, a pulley, or a
+    cable without stiffness or damping.
     """
     stiffness, damping = _cable_constants(robot)
     time_step = checks.positive("time_step", time_step)

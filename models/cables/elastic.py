@@ -8,8 +8,6 @@ All of it is element by element, for NumPy arrays that broadcast and for CasADi 
 and 11; physics.md, section 3.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 Value = Any  # float, np.ndarray or a CasADi expression, in and out

@@ -16,8 +16,6 @@ what the energy gains and the dampers lose, at every state; with resting ends th
 Source: point-mass cables as in any textbook of multibody dynamics; elasticity and damping as in `elastic`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

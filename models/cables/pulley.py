@@ -24,8 +24,6 @@ Source: the usual model of a swivel pulley, as in A. Pott, Cable-Driven Parallel
 the second order by algorithmic differentiation.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import casadi as ca

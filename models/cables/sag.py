@@ -16,8 +16,6 @@ Newton's method with a line search finds it from any start.
 Source: H. M. Irvine, Cable Structures, MIT Press, 1981 (the elastic catenary); its form here is derived anew.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -4,8 +4,6 @@ Inverse dynamics in {G} and the exact tension solver evaluate each instant separ
 program does not use. `tensions` computes tensions and violation, `checks` all other limits.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -112,10 +110,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     to_show
         True for a motion that is known to be infeasible and only shown: at the output times, without its drift.
 
-    Raises
-    ------
-    InputError
-        If a cable has zero length somewhere.
+    Raises `InputError` if a cable has zero length somewhere.
     """
     intervals = scenario.output_samples * (1 if to_show else _audits_per_output(scenario))
     times = np.linspace(0.0, scenario.duration, intervals + 1)

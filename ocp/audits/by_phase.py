@@ -4,8 +4,6 @@ On the ground the support forces are further unknowns of each instant: columns i
 the lower limit 0.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

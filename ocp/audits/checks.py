@@ -6,8 +6,6 @@ the limit's own unit, with no use of the program's points; all else is computed 
 and by differences, and shares nothing with the program.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compute the cost of a plan of which only the time law was free, by its task's objective, from its audit: `cost`."""
 
-from __future__ import annotations
-
 from ..result import PlanData
 
 

@@ -5,8 +5,6 @@ time between. That is estimated from the instants around, twice as large as ther
 quantity may jump between two instants, nothing is smooth: they are the sides of the jump, or not neighbours at all.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 SAME = 1e-7  # of the whole time: nearer instants are the two sides of a jump

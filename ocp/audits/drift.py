@@ -7,8 +7,6 @@ smallest error grows without bound: that is a property of the system as much as 
 started on the plan, the drift is the plan's own error: the missing wrench, integrated twice. Both are reported.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import casadi as ca

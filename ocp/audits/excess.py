@@ -1,7 +1,5 @@
 """`Excess`: a limit that a motion exceeds: which, by what, when, and by how much."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """`infeasible_spans`: when a motion requires more than the cables can give, and along which direction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

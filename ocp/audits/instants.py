@@ -66,10 +66,7 @@ class Instants(AuditedMotion):
 def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray) -> Instants:
     """Evaluate a motion at `times` (n,).
 
-    Raises
-    ------
-    InputError
-        If somewhere a cable has no length.
+    Raises `InputError` if somewhere a cable has no length.
     """
     motion, carriers = scenario.motion(times, deviation)
     _check_lengths(scenario, times, motion, carriers)

@@ -6,8 +6,6 @@ looked at too, until it is decided. Where the motion's derivatives have corners 
 and where phases meet, instants are on both sides.
 """
 
-from __future__ import annotations
-
 from functools import reduce
 
 import numpy as np

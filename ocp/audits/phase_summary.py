@@ -1,7 +1,5 @@
 """`summaries`: load, tensions and ground reaction of each phase of a motion, for reports and files."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

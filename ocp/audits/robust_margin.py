@@ -1,7 +1,5 @@
 """`RobustMargin`: the spread of tensions along a plan due to geometric uncertainty."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

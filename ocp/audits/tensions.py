@@ -5,8 +5,6 @@ requires to those that the cables can give inside their limits less the task's m
 largest such distance of the winds that decide (`wind_set`), and if that is none, of winds inside the box too.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple, Protocol

@@ -1,7 +1,5 @@
 """`relative_violation`: how far a motion is from being feasible, as one number, to compare motions by."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..tasks.scenario import Scenario

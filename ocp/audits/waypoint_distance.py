@@ -1,7 +1,5 @@
 """`waypoint_distance`: the distance at which a motion passes the waypoints of its path."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

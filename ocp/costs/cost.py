@@ -5,8 +5,6 @@ time of sum (values / amount)^2 over all its costs. So `amount` adds 1 to the ob
 amount makes a cost less important.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The costs in the `objective` of a task file."""
 
-from __future__ import annotations
-
 import casadi as ca
 from typing_extensions import override
 

@@ -1,7 +1,5 @@
 """`ClearSpace`: which configurations are clear, and how far straight pieces between them are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import cached_property
 

@@ -7,8 +7,6 @@ kept by a reserve (`at_rest`). A straight piece between two is clear if no dista
 configurations that are checked (`clear_space`). Motion is left to the program.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Whether a motion needs a global path, and whether its task leaves one: `guess_exceeds`, `is_open`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

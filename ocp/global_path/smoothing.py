@@ -1,7 +1,5 @@
 """Make a path of straight pieces shorter and smoother, as far as it stays clear: `shortened`, `rounded`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 

@@ -12,8 +12,6 @@ Coordinates that the task gives at each time are not searched. They depend on ho
 to the end, along the line between them: as they do in a motion that goes straight, and nearly so in others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

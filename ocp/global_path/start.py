@@ -1,7 +1,5 @@
 """Where a program starts: at a motion past what the usual guess collides with."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -4,8 +4,6 @@ Which faces count is decided by comparisons, which have no derivatives. The dist
 a program differentiates some twenty products, however many pairs of faces there are.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any, TypeAlias
 

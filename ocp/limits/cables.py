@@ -1,7 +1,5 @@
 """Limits of the cables: speeds, lengths, and distances between cables."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Limits of the carriers: motion, positions, and distances between carriers."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 

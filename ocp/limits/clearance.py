@@ -4,8 +4,6 @@ Points are (3, 1), CasADi SX or DM. Distances are the true ones, except within 1
 corners of a box they are rounded, so that a program can pass them. Inside a box or a mesh the nearest face counts.
 """
 
-from __future__ import annotations
-
 from typing import Any, TypeAlias
 
 import casadi as ca

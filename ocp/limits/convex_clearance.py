@@ -4,8 +4,6 @@ Which face, edge or end is nearest is decided by comparisons, which have no deri
 of that one alone, so that its derivatives cost no more than those of two lines, however many faces there are.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias
 

@@ -1,7 +1,5 @@
 """`Distance`: a limit of distances between bodies that move, each the hull of one or two points, and other bodies."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ figures evaluate the same formula on a dense grid. Subclasses for vectors (`Magn
 change (`Rate`) derive differentiable rows and readable values from the formula.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from copy import copy
 from typing import NamedTuple, Self

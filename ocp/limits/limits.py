@@ -140,10 +140,7 @@ class Limits(Displayed):
     def hull(self, limit: Limit) -> ca.Function:
         """Return the function of the values of a convex limit from what its hull is about, (6, 1).
 
-        Raises
-        ------
-        InputError
-            If the values depend on more than that.
+        Raises `InputError` if the values depend on more than that.
         """
         state, hull = self._state, limit.hull
         if hull is None:

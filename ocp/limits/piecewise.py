@@ -1,7 +1,5 @@
 """Expressions that distances are made of: the share of a segment, and the largest of several values."""
 
-from __future__ import annotations
-
 from functools import reduce
 from typing import Any
 

@@ -3,8 +3,6 @@
 A region that moves with the platform is its body, and its limits have separate names.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 

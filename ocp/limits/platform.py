@@ -1,7 +1,5 @@
 """Limits of the platform: speed, acceleration, angular velocity, tilt and position."""
 
-from __future__ import annotations
-
 import casadi as ca
 from typing_extensions import override
 

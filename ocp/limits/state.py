@@ -1,7 +1,5 @@
 """`State`: the state at one instant, as CasADi symbols, on which a limit may depend."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Limits of the tensions besides t_min and t_max: margin and rates."""
 
-from __future__ import annotations
-
 import casadi as ca
 from typing_extensions import override
 

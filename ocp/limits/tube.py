@@ -1,7 +1,5 @@
 """Limits of the tube: the distance of the platform from its path."""
 
-from __future__ import annotations
-
 import casadi as ca
 from typing_extensions import override
 

@@ -1,7 +1,5 @@
 """`Columns`: the arguments of the functions of nodes and intervals, for all of them or for some."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca

@@ -83,27 +83,13 @@ class Mapped(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Rows of the same kind, one column per stage.
+    """Rows of the same kind, one column per stage."""
 
-    Attributes
-    ----------
-    values
-        (r, k).
-    rows
-        Names and bounds, r.
-    stages
-        (k,).
-    mapped
-        What the values are computed by, where it is a function of places among the unknowns.
-    slopes
-        The derivatives of values that are linear, (r k, unknowns).
-    """
-
-    values: ca.MX
-    rows: list[Row]
-    stages: np.ndarray
-    mapped: Mapped | None = None
-    slopes: ca.MX | None = None
+    values: ca.MX  # (r, k)
+    rows: list[Row]  # names and bounds, r
+    stages: np.ndarray  # (k,)
+    mapped: Mapped | None = None  # what the values are computed by, where it is a function of places among the unknowns
+    slopes: ca.MX | None = None  # the derivatives of values that are linear, (r k, unknowns)
 
 
 class _Entries(NamedTuple):

@@ -1,7 +1,5 @@
 """Guess the motion that the planner starts from: `initial_guess`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ exists. From such an instant on, a program is tightened by as much as a motion f
 power of the time.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import TypeAlias
 

@@ -5,8 +5,6 @@ CasADi calls Python while it converts the operands of an expression, and takes a
 happened.
 """
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator
@@ -21,12 +19,8 @@ _arrived = threading.Event()
 def heeding() -> Iterator[None]:
     """Remember an interrupt that arrives in the block, and raise it no later than at the end of the block.
 
-    Nothing changes if the program has its own handler, or in threads other than the main one.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If one was swallowed.
+    Nothing changes if the program has its own handler, or in threads other than the main one. Raises
+    `KeyboardInterrupt` if one was swallowed.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -50,10 +44,7 @@ def heeding() -> Iterator[None]:
 def raise_if_swallowed() -> None:
     """Raise the interrupt that arrived, if any; in the main thread, as Python does.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        If one arrived that nobody raised since.
+    Raises `KeyboardInterrupt` if one arrived that nobody raised since.
     """
     if _arrived.is_set() and threading.current_thread() is threading.main_thread():
         _arrived.clear()

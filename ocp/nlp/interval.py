@@ -1,7 +1,5 @@
 """Write the rows of an interval: exact integration, and limits that hold at every time in between."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache

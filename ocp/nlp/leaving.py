@@ -5,8 +5,6 @@ acceleration there, which may be free. The nodes alone would permit a slope that
 the next one, in steps of any length.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import casadi as ca

@@ -6,8 +6,6 @@ curvature bends the Lagrangian the wrong way, take a hundred. A motion that keep
 and what a few of these passes lead to is near a local optimum of the true program, which starts from it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import casadi as ca

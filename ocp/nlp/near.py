@@ -4,8 +4,6 @@ Most of a motion is far from most obstacles, and distances cost more than all el
 it leaves out are evaluated once for its solution; if one is exceeded there, the program is solved again with more.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 

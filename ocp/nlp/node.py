@@ -1,7 +1,5 @@
 """Write the rows and the cost of one node: the balance A t = w, and the limits that hold at an instant."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

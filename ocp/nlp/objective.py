@@ -1,7 +1,5 @@
 """Evaluate the costs of a task in the columns of a program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Let the linear algebra of IPOPT's factorisations run in one thread: `run_in_one_thread`."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 from functools import cache

@@ -1,7 +1,5 @@
 """Run IPOPT on a program, from a guess, a motion or the last solution: `Solver`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -138,17 +136,11 @@ class Solver:
     ) -> Outcome:
         """Solve from `guess`; default: from the last solution and its multipliers, or else from a guess of our own.
 
-        A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT stops
-        with the best that it has. A run without a solution is a result, not an error. `parameters` are
-        those of the program, if it has any; default: its own. A guess that is `near` the last solution starts with its
-        multipliers.
-
-        Raises
-        ------
-        SolverError
-            If CasADi or IPOPT break.
-        KeyboardInterrupt
-            If an interrupt arrives; the solver's thread ends at its next iteration.
+        A guess is `coarser` if it is the same task's optimum on a coarser mesh. After so many `seconds` IPOPT
+        stops with the best that it has. A run without a solution is a result, not an error. `parameters` are
+        those of the program, if it has any; default: its own. A guess that is `near` the last solution starts
+        with its multipliers. Raises `SolverError` if CasADi or IPOPT break; `KeyboardInterrupt` if an interrupt
+        arrives; the solver's thread ends at its next iteration.
         """
         program, watch = self.program, self._watch
         start: dict[str, Any] = {
@@ -211,10 +203,7 @@ class Solver:
 def check_progress(progress: Any) -> None:
     """Check that a user's `progress` is a function or None.
 
-    Raises
-    ------
-    InputError
-        If it is something else.
+    Raises `InputError` if it is something else.
     """
     if progress is not None and not callable(progress):
         accepted = "a function of (iteration, objective, infeasibility)"

@@ -1,7 +1,5 @@
 """Decide which regions are so thin that a motion may jump over them between two nodes: `swept`."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

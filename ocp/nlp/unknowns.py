@@ -1,7 +1,5 @@
 """The unknowns of a program, point after point, and its rows with their bounds, one below the other."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import casadi as ca
@@ -15,22 +13,12 @@ from .layout import Layout
 
 
 class Unknowns(NamedTuple):
-    """A program's unknowns, and the columns that they make.
-
-    Attributes
-    ----------
-    columns
-        (width, points).
-    ends
-        (width, N), the column at the end of each interval.
-    where
-        (width, points), the place of each entry of the columns in x.
-    """
+    """A program's unknowns, and the columns that they make."""
 
     x: ca.MX
-    columns: ca.MX
-    ends: ca.MX
-    where: np.ndarray
+    columns: ca.MX  # (width, points)
+    ends: ca.MX  # (width, N), the column at the end of each interval
+    where: np.ndarray  # (width, points), the place of each entry of the columns in x
 
 
 def unknowns_of(scenario: Scenario, layout: Layout, steps: int) -> Unknowns:

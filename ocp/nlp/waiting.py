@@ -29,10 +29,8 @@ def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Resu
     errands
         What `work` puts here is called in the caller's thread, in order, while it waits.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        If an interrupt arrives meanwhile. Exceptions of `work` or of an errand are raised as well.
+    Raises `KeyboardInterrupt` if an interrupt arrives meanwhile. Exceptions of `work` or of an errand are raised as
+    well.
     """
     raise_if_swallowed()
     queue: Errands = SimpleQueue() if errands is None else errands

@@ -9,8 +9,6 @@ velocities. The X for which tensions inside their limits exist are then an inter
 (t, X) give; a duration must lie in the intervals of all points.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ task fixes all of platform and carriers, or whether all cables together can carr
 obstacle changes by at most the distance that points of the platform can move inside the tube.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

@@ -5,8 +5,6 @@ of angles. A distance changes by at most what points of the platform move, so on
 that it does not prove are halved along each angle, until all are proven or an attitude keeps all distances.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..audits.excess import Excess

@@ -6,8 +6,6 @@ acceleration, if it is at rest at both times, at least four times the distance d
 a tube, second differences bound the acceleration.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -5,8 +5,6 @@ weight with its load. No cable gives more than its largest tension in any direct
 largest force. If the carriers are at rest at both times too, their actuators hold the weight of all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

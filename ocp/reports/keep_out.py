@@ -1,7 +1,5 @@
 """`outline`: lines along the surface of a keep-out region, as figures and viewer draw it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.robot import box_edges

@@ -1,7 +1,5 @@
 """`limited`: the limited quantities of a plan, except tensions, as curves over time with their bounds."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.limits import Limited

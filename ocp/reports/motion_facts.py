@@ -1,7 +1,5 @@
 """`motion_facts`: duration, path, tracking error, waypoints, speeds and wind of a plan, as its report names them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.text import quantity, quantity_row

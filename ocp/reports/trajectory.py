@@ -1,7 +1,5 @@
 """A plan over time as a dataset: the motion in {G} and the audited tensions, with units."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Solve a program from the solutions of easier ones: slower, coarser, with linear distances (`from_easier`)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..nlp.guess import balanced

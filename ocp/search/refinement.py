@@ -1,7 +1,5 @@
 """Solve a program again as long as the audit of its solution reports violations: `refine`."""
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 import numpy as np

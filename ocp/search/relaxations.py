@@ -1,7 +1,5 @@
 """Search for feasible tasks near an infeasible one, by another duration or looser limits, and audit each."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, NamedTuple
 

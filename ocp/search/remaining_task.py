@@ -1,7 +1,5 @@
 """Set up the remainder of a planned motion for a robot with a tracking error: `remainder`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, NamedTuple
 

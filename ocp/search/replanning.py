@@ -1,7 +1,5 @@
 """Replan the remainder of a motion from measured states: `Replanner`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -36,10 +34,7 @@ class Replanner:
     climb
         Plans from scratch: whenever the program with parameters does not lead to a plan.
 
-    Raises
-    ------
-    InputError
-        If the remainder of its task cannot be planned.
+    Raises `InputError` if the remainder of its task cannot be planned.
     """
 
     def __init__(self, first: Plan, climb: Callable[[Search, Deviation | None], Plan]):
@@ -52,10 +47,7 @@ class Replanner:
     def search(self, state: Any, time: Any, settle: Any, progress: Progress | None) -> tuple[Search, Deviation | None]:
         """Return the search for the remainder of the motion from `time` [s] on, and a guess.
 
-        Raises
-        ------
-        InputError
-            If an argument does not fit.
+        Raises `InputError` if an argument does not fit.
         """
         at = number("time", time, self._begun, self._whole.duration - LEAST)
         return_s = number("settle", settle, LEAST, 1e6)

@@ -1,7 +1,5 @@
 """Solve the programs of a scenario, audit the solutions, and record them: `Search`."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Turn what a user lets the planner start from, a plan or a path, into a deviation from the references."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -28,10 +26,7 @@ class _Start(Part):
 def deviation_from(scenario: Scenario, start: Plan | AnyPath | dict[str, Any]) -> Deviation | None:
     """Return the deviation of a start from the references of `scenario`; None if the task fixes the motion.
 
-    Raises
-    ------
-    InputError
-        If the start is not one of the accepted types, or does not fit the scenario.
+    Raises `InputError` if the start is not one of the accepted types, or does not fit the scenario.
     """
     if isinstance(start, Plan):
         return _of_plan(scenario, start)

@@ -5,8 +5,6 @@ duration is impossible, and its law is a plan if it keeps the task's other limit
 it differs from the true one by the grid's interval, some tenths of a per cent, so that `BOUND` of it is proven.
 """
 
-from __future__ import annotations
-
 from ...base.errors import InputError, SolverError
 from ...base.text import quantity
 from ..plan import Plan

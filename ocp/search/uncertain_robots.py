@@ -6,8 +6,6 @@ tighten its limits by this, and plan again from there, until the requested fract
 all audited instants. The spread grows with the tensions, so the limits are tightened by a little more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

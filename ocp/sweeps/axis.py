@@ -1,7 +1,5 @@
 """`Axis`: one field and the values that it takes in a sweep; from lists of values, or from the text of an option."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter
@@ -59,10 +57,8 @@ class Axis(Displayed):
 def read_axes(vary: object) -> tuple[Axis, ...]:
     """Return the axes of a mapping from dotted keys to values.
 
-    Raises
-    ------
-    InputError
-        If it is anything else, a value appears twice, a key lies inside another one, or there are too many plans.
+    Raises `InputError` if it is anything else, a value appears twice, a key lies inside another one, or there are
+    too many plans.
     """
     if not isinstance(vary, Mapping) or not vary:
         accepted = "a mapping from dotted keys of a task file to lists of values"
@@ -117,13 +113,9 @@ class _Values(Part):
 def read_option(options: Sequence[str]) -> dict[str, list[Any]]:
     """Read texts such as "margin=0:20:5" as keys with their values.
 
-    Values are separated by commas. Each is a range start:stop:step, with the stop if the steps meet it, or what a task
-    file could have there: a number, a word, [a, list] or {a: mapping}.
-
-    Raises
-    ------
-    InputError
-        If a text has another form, or a key appears twice.
+    Values are separated by commas. Each is a range start:stop:step, with the stop if the steps meet it, or what a
+    task file could have there: a number, a word, [a, list] or {a: mapping}. Raises `InputError` if a text has
+    another form, or a key appears twice.
     """
     vary: dict[str, list[Any]] = {}
     for option in options:
@@ -162,10 +154,7 @@ def _expanded(key: str, value: Any) -> list[Any]:
 def check_figure(axes: Sequence[Axis]) -> None:
     """Check that a figure can show all varied fields.
 
-    Raises
-    ------
-    InputError
-        If there are too many, or too many values of the third.
+    Raises `InputError` if there are too many, or too many values of the third.
     """
     if len(axes) > MOST_AXES:
         raise InputError(f"a figure must be of at most {MOST_AXES} varied fields, got {len(axes)}")

@@ -1,7 +1,5 @@
 """`Cases`: the robot and the task of each plan of a sweep, for all combinations of the varied values."""
 
-from __future__ import annotations
-
 from math import prod
 from typing import Any
 
@@ -53,10 +51,7 @@ class Cases:
     def case(self, number: int) -> tuple[Robot, Task]:
         """Return robot and task of a combination, validated like a robot and task file.
 
-        Raises
-        ------
-        InputError
-            If the values are not valid.
+        Raises `InputError` if the values are not valid.
         """
         data = self._data
         indices = self.indices(number)

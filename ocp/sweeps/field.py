@@ -31,10 +31,7 @@ class Field(Displayed):
     def of(cls, key: object) -> Field:
         """Return the field of a key.
 
-        Raises
-        ------
-        InputError
-            If it is no dotted key.
+        Raises `InputError` if it is no dotted key.
         """
         if not isinstance(key, str) or not _KEY.fullmatch(key):
             accepted = "dotted keys of a task file, such as tube.position"
@@ -64,10 +61,7 @@ class Field(Displayed):
     def set(self, data: Any, value: Any) -> Any:
         """Return data of a task or robot with another value of this field.
 
-        Raises
-        ------
-        InputError
-            If the data have no such place.
+        Raises `InputError` if the data have no such place.
         """
         return self._set(data, self.steps, value, ())
 

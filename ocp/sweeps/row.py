@@ -1,7 +1,5 @@
 """`Row`: the results of one plan in the table of a sweep; `plan_case` computes it, in any process."""
 
-from __future__ import annotations
-
 import math
 import time
 from pathlib import Path
@@ -21,36 +19,16 @@ FAILED = "failed"  # the status of a plan that ended with an error, beside those
 
 
 class Row(NamedTuple):
-    """The results of one plan in the table of a sweep; missing numbers are nan.
+    """The results of one plan in the table of a sweep; missing numbers are nan."""
 
-    Attributes
-    ----------
-    status
-        See `MotionStatus`; or `failed` if planning raised an error.
-    reason
-        Reason why it is not feasible, in one line; empty if it is.
-    cost
-        The task's objective, for a feasible plan.
-    duration
-        Duration [s].
-    margin
-        Smallest distance of any tension from its limits [N].
-    tension_max
-        Largest tension [N].
-    iterations
-        Iterations of the last run of the solver.
-    seconds
-        Wall time to plan [s].
-    """
-
-    status: str
-    reason: str
-    cost: float
-    duration: float
-    margin: float
-    tension_max: float
-    iterations: int
-    seconds: float
+    status: str  # see `MotionStatus`; or `failed` if planning raised an error
+    reason: str  # reason why it is not feasible, in one line; empty if it is
+    cost: float  # the task's objective, for a feasible plan
+    duration: float  # duration [s]
+    margin: float  # smallest distance of any tension from its limits [N]
+    tension_max: float  # largest tension [N]
+    iterations: int  # iterations of the last run of the solver
+    seconds: float  # wall time to plan [s]
 
 
 _NO_PLAN = Row(FAILED, "", math.nan, math.nan, math.nan, math.nan, iterations=0, seconds=0.0)
@@ -68,10 +46,7 @@ def plan_case(number: int, robot: Robot, task: Task, file: Path | None) -> tuple
     file
         Where to save the plan, or None.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written. An error of planning is a row.
+    Raises `InputError` if the file cannot be written. An error of planning is a row.
     """
     start = time.perf_counter()
     try:

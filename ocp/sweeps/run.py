@@ -1,7 +1,5 @@
 """`sweep`: plan a task for all combinations of some values, on processes or a cluster, with resumption."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -11,8 +11,6 @@ so of an acceleration that is a polynomial, speed and position are known exactly
 Points are NumPy arrays or CasADi expressions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from math import comb

@@ -1,7 +1,5 @@
 """`carrier_paths`: the paths that a task gives to carriers, checked, by the index of the carrier."""
 
-from __future__ import annotations
-
 from ...base.errors import InputError
 from ...models import Robot
 from .paths import AnyPath, RestPath
@@ -11,10 +9,8 @@ from .task import GivenBase, HoldBase, Task
 def carrier_paths(robot: Robot, task: Task) -> dict[int, AnyPath]:
     """Return the carriers' reference paths by the index of the carrier; the others stay at home.
 
-    Raises
-    ------
-    InputError
-        If a name is unknown or that of a carrier that never moves, or if a path is not given in {G}.
+    Raises `InputError` if a name is unknown or that of a carrier that never moves, or if a path is not given in
+    {G}.
     """
     base = task.base
     if isinstance(base, HoldBase):

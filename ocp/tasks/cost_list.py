@@ -1,7 +1,5 @@
 """List the costs of a task: those of its `objective`, and those of the user's own."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...models import Robot

@@ -1,7 +1,5 @@
 """Decide how platform and carriers start and end, and which values this fixes: `fixed_values`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import remainder
 from typing import Literal, NamedTuple, TypeAlias
@@ -20,24 +18,12 @@ Word: TypeAlias = Literal["free", "rest", "periodic", "exact"]
 
 
 class FixedValue(NamedTuple):
-    """A value that the deviation of one free coordinate has at an end.
+    """A value that the deviation of one free coordinate has at an end."""
 
-    Attributes
-    ----------
-    end
-        0 for the start, -1 for the end.
-    column
-        The free coordinate.
-    order
-        0 for its value [m, rad], 1 and 2 for the time derivatives.
-    value
-        What it is, less that of the reference.
-    """
-
-    end: int
-    column: int
-    order: int
-    value: float
+    end: int  # 0 for the start, -1 for the end
+    column: int  # the free coordinate
+    order: int  # 0 for its value [m, rad], 1 and 2 for the time derivatives
+    value: float  # what it is, less that of the reference
 
 
 def platform_ends(task: Task) -> Word:

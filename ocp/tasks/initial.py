@@ -1,7 +1,5 @@
 """`Initial` and `Final`: the measured state from which a motion starts, and the state in which it ends."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from pydantic import Field

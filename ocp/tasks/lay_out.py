@@ -1,7 +1,5 @@
 """`lay_out`: lay a task out for one robot, checked."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`lay_out_phases`: check that the phases of a task fit its robot, and lay them out."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.errors import InputError

@@ -1,7 +1,5 @@
 """`limit_list`: all limits of a task and of the robot that it is laid out for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

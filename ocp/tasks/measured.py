@@ -4,8 +4,6 @@ A state is anything with the fields of `control.State`. That class belongs to a 
 one may not import, and a state estimator of another kind works as well.
 """
 
-from __future__ import annotations
-
 from math import remainder
 from typing import Any, Protocol
 

@@ -1,7 +1,5 @@
 """`Phase`: a part of a task with a path, a load and, optionally, the ground under it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -67,10 +65,8 @@ class Phase(Part):
 def path_of(phases: Sequence[Phase]) -> SequencePath:
     """Return the paths of phases as a sequence.
 
-    Raises
-    ------
-    ValueError
-        If a path is missing, does not begin where the one before ends, or has no duration; one line that names it.
+    Raises `ValueError` if a path is missing, does not begin where the one before ends, or has no duration; one line
+    that names it.
     """
     joined: list[tuple[SinglePath, float]] = []
     for index, phase in enumerate(phases):

@@ -6,8 +6,6 @@ the ground meets one without ground, S n is the difference of the wrenches that 
 the load stays, its weight where the load is left on the ground or not yet fixed to the platform.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise

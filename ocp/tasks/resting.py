@@ -8,8 +8,6 @@ Where a phase without ground comes before or after, its tensions there are those
 the task, and between two phases on the ground, the cables carry as little as they can.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...solvers import TensionProblem, solve

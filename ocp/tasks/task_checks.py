@@ -1,7 +1,5 @@
 """Check that a task fits a robot: `check_task` before it is laid out, `check_scenario` after."""
 
-from __future__ import annotations
-
 from math import remainder
 
 import casadi as ca

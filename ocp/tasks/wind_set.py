@@ -15,8 +15,6 @@ corners do. With the form "printed" X is never negative, Z is linear in X and Y,
 the rectangle.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any, Self
 

@@ -4,8 +4,6 @@ Along the fastest time law some limit is always active: a speed, a carrier's acc
 wrench lies on a facet of the available wrench set and the cables across that facet are at their limits.
 """
 
-from __future__ import annotations
-
 from itertools import groupby
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """`FastestLaw`: the fastest time law along a path, or the point where none exists."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -82,10 +80,7 @@ class FastestLaw(Displayed):
     def timed(self, path: Curve) -> TimedPath:
         """Return a path of the platform or of a carrier with the time law.
 
-        Raises
-        ------
-        InputError
-            If `path` is not a path.
+        Raises `InputError` if `path` is not a path.
         """
         required("path", path, PathBase)
         law = {"s": tuple(self.s.tolist()), "speeds": tuple((self.sd if self.exists else self._shown()).tolist())}

@@ -1,7 +1,5 @@
 """`geometry`: the curve of a path, parametrised so that it rests nowhere unless it turns at once there."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.errors import InputError
@@ -15,10 +13,8 @@ ON_PATH = 2e-6  # of a path's length: how far that spline may be off
 def geometry(path: AnyPath, *, alone: bool) -> Curve:
     """Return the curve of a path; `alone` if no other path is followed with the same s.
 
-    Raises
-    ------
-    InputError
-        If a spline or samples turn so sharply that they must rest, or move nowhere, or for a sequence or a return.
+    Raises `InputError` if a spline or samples turn so sharply that they must rest, or move nowhere, or for a
+    sequence or a return.
     """
     if isinstance(path, SequencePath):
         raise InputError("path.kind must be that of one path to be timed, got sequence; time its parts one by one")

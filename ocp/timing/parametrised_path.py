@@ -9,8 +9,6 @@ an acceleration, b that of p'(s) as a velocity and p''(s) as an acceleration. In
 only through the wrench matrix, so their motion along s enters A(s) and, if the path is given in a carrier's frame, p.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -65,10 +63,7 @@ class ParametrisedPath:
     wind
         Zeros for still air; default: no air.
 
-    Raises
-    ------
-    InputError
-        If robot and paths do not fit one another.
+    Raises `InputError` if robot and paths do not fit one another.
     """
 
     def __init__(

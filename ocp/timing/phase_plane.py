@@ -4,8 +4,6 @@ With u = d2s/dt2 and x = (ds/dt)^2 the needed wrench is a u + b x + c (`parametr
 available wrench set (`solvers.available_wrench`) is a half-plane, as is each limit of a speed or an acceleration.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -96,13 +94,9 @@ def phase_plane(
 ) -> PhasePlane:
     """Return the limits at the points s (N,).
 
-    Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other limits
-    reduced by the share `shrink`.
-
-    Raises
-    ------
-    InputError
-        If motion along the path needs wrenches outside the span of the cables.
+    Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other
+    limits reduced by the share `shrink`. Raises `InputError` if motion along the path needs wrenches outside the
+    span of the cables.
     """
     robot = parametrised.robot
     platform, carriers = parametrised.at(s)

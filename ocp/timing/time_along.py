@@ -6,8 +6,6 @@ the fastest law inside all of them (`toppra_law`). It is audited as any plan is;
 removed by a finer grid and by a little distance from the limits.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import replace
 from typing import Any, NamedTuple

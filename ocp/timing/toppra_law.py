@@ -6,8 +6,6 @@ constant and the limits of both points hold (the Interpolation scheme). Source: 
 time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Carriers whose bodies enter keep-out regions or overlap: `into_places`, `into_each_other`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 

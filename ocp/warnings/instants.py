@@ -1,7 +1,5 @@
 """`Instants`: the instants of a motion that warnings are about."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

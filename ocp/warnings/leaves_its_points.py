@@ -1,7 +1,5 @@
 """`leaves_its_points`: whether a path leaves the box of its points, as splines do."""
 
-from __future__ import annotations
-
 from ...base.text import quantity
 from ..tasks.paths import PathBase, WaypointPath
 

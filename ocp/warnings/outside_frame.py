@@ -1,7 +1,5 @@
 """`outside_frame`: where the platform leaves the box of the robot's anchors and the floor."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

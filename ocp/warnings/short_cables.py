@@ -1,7 +1,5 @@
 """`short_cables`: where winches reel in almost all of a cable."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.text import quantity

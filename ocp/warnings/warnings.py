@@ -1,7 +1,5 @@
 """`warnings`: all warnings of a motion."""
 
-from __future__ import annotations
-
 from .inside_bodies import into_each_other
 from .instants import Instants
 from .outside_frame import outside_frame

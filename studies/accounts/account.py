@@ -5,8 +5,6 @@ them one after the other. A chapter whose solver breaks does not stop the others
 complete.
 """
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping

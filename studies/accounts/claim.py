@@ -6,8 +6,6 @@ paper does not print, `repaired` what is possible in place of an impossible stat
 its own.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

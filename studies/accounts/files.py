@@ -1,7 +1,5 @@
 """An account as files: reports, errata, claims and figures."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -14,12 +12,7 @@ from .account import Account
 def write(account: Account, folder: Path, form: str = "png") -> list[Path]:
     """Write report (Markdown and HTML), errata, claims (JSON) and figures into `folder`; return their paths.
 
-    Each file is written atomically.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written to.
+    Each file is written atomically. Raises `InputError` if the folder cannot be written to.
     """
     name = account.paper.name
     texts = {

@@ -1,7 +1,5 @@
 """An account as one HTML file that contains its figures and loads nothing."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from ...figures import page as html

@@ -1,7 +1,5 @@
 """An account as Markdown: the report, and the errata from the same claims."""
 
-from __future__ import annotations
-
 from .account import Account
 from .claim import Claim, Verdict, value_text
 

@@ -1,7 +1,5 @@
 """Paper F's balance of forces and moments: Eqs. 24, 26, 29 and 33 to 38, compared with Newton and Euler in {G}."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...models import Dynamics, load

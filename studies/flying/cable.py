@@ -1,7 +1,5 @@
 """Paper F's cable: its elongation (Eq. 6) and its tension increment by finite elements (Eqs. 12 to 22)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...models import Dynamics, Robot, load

@@ -6,8 +6,6 @@ would have to push. With the quadrotor free (acceleration up to 3 m/s^2) the pla
 cable taut.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

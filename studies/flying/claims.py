@@ -1,7 +1,5 @@
 """`claim`: a statement of paper F, from `claims.yaml`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ..accounts.claim import Statement, statements

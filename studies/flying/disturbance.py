@@ -6,8 +6,6 @@ pitching by 0.1 sin(0.2 pi t) rad, with the surge that a quadrotor has when its 
 weight alone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.curve_in_space import curve_in_space

@@ -5,8 +5,6 @@ the forces that hold its nodes are minus and plus that. The equations are evalua
 are printed, and their products are formed with the sizes that are printed.
 """
 
-from __future__ import annotations
-
 from functools import cache, reduce
 
 import numpy as np

@@ -6,8 +6,6 @@ level and outside the ring of anchors, so each cable, whichever points it joins,
 carries upwards.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import permutations
 from typing import NamedTuple
@@ -28,18 +26,10 @@ TURN = np.linspace(0.0, SECONDS, 24, endpoint=False)  # [s], an instant every 15
 
 
 class Inward(NamedTuple):
-    """The horizontal force towards the axis of the circle [N].
+    """The horizontal force towards the axis of the circle [N]."""
 
-    Attributes
-    ----------
-    least
-        What cables that carry the platform give at least, with any pairing.
-    needed
-        What the circle requires.
-    """
-
-    least: float
-    needed: float
+    least: float  # what cables that carry the platform give at least, with any pairing
+    needed: float  # what the circle requires
 
 
 class AtCentre(NamedTuple):

@@ -9,8 +9,6 @@ The quadrotor of the paper hovers or flies straight, so these flights reproduce 
 repairs. Its motion is prescribed, level whatever its acceleration, and no cable pulls it off.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple, get_args
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Paper F's section VI.A: the quadrotor flies straight, the platform circles below it (figures 6 and 7)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.curve_in_space import curve_in_space

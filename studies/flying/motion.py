@@ -1,7 +1,5 @@
 """Paper F's circle relative to the quadrotor, and the steady tensions of a motion, inside their limits or not."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...models import Dynamics

@@ -5,8 +5,6 @@ cos a_i and sin a_i, a_i = 60 degrees (i - 1): their only products of second ord
 cos^2 a_i + sin^2 a_i, a constant. Six points of three functions, 1, cos a_i and sin a_i, span three dimensions at most.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.drawing import Drawing

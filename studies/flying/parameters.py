@@ -1,7 +1,5 @@
 """Paper F's Table 1: the parameters of this run, and whether they are consistent."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...models import Robot, load

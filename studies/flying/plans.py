@@ -12,8 +12,6 @@ is not known here. Assumed: VI.A's line at its mean velocity, pitching by `PITCH
 surge that a quadrotor has when its thrust pitches: ddx = g tan(pitch).
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Literal
 

@@ -6,8 +6,6 @@ The paper prints no result of a step, so that both agree is no verdict on the pa
 of a vibrating cable is checked by its plant (`shaken`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import accumulate
 

@@ -5,8 +5,6 @@ tension falls with the radius, so bisection gives the largest feasible one. The 
 anchors and attachments (`every_pairing`), not for crossed pairs alone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.curves import Panel, curves

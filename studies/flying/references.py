@@ -4,8 +4,6 @@ Eq. 2 is printed twice, and the text refers to equations by their place among al
 VI.B refer to figures by numbers that are one less than those of the captions, except once.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...models import load

@@ -3,8 +3,6 @@
 The quadrotor of the paper hovers or flies straight, so a plan with a free one reproduces nothing: it is a repair.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures import plan as figures

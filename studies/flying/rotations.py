@@ -1,7 +1,5 @@
 """Paper F's rotations: Eqs. 1, 9, 27, 28, 30, 31 and 32, compared with derivatives of rotation matrices."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import casadi as ca

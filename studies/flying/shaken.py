@@ -9,8 +9,6 @@ the time step, which is no part of the vibration. If the displacement is instead
 right and the elasticity is not.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Paper F's robot: figures 1 and 2 drawn from its numbers, Eqs. 2 and 3, and a small displacement (Eq. 8)."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation

@@ -1,7 +1,5 @@
 """Paper F recomputed, claim by claim: `towline reproduce flying`."""
 
-from __future__ import annotations
-
 from ..accounts.account import Account, Paper, Progress, gather
 from . import (
     balance,

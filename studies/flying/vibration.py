@@ -7,8 +7,6 @@ The printed pairing has no inverse, so its tensions are not determined; what dep
 its place is computed for the other pairings too (`every_pairing`).
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

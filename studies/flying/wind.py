@@ -1,7 +1,5 @@
 """Paper F's wind (figure 5) and its force on the platform (Eq. 25)."""
 
-from __future__ import annotations
-
 from math import erfc, sqrt
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The elastic plant with the lengths of a motion commanded: the paper's steady winding, without any control."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

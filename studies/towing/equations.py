@@ -1,7 +1,5 @@
 """Paper C's model, equations 3 to 13, compared with the model of this toolkit."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -4,8 +4,6 @@ The plant moves the load forward in time, on cables that only pull and do not st
 the plant keeps them and the robot-ends alone move the load; otherwise the winches give the commanded tensions.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.curves import Panel, curves

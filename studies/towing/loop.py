@@ -4,8 +4,6 @@ Step (d) is among the tensions (`tensions`), step (g) among the ranges that 60 0
 lengths are computed here from points and scipy's rotations, apart from the conditions that the loops use.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Paper C's three drives for m = 3 to 6: a load is carried between two rest poses with least effort."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.curves import Panel, curves

@@ -6,8 +6,6 @@ shifted together; or, where winches change the lengths, with 1.25 m and 1.1 m. T
 between, including the attitude of the load.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Paper C's figures 2 to 6: the workspaces of the three system types, their ranges, shapes, volumes and inclusion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Paper C recomputed, claim by claim: `towline reproduce ctmrts`."""
 
-from __future__ import annotations
-
 from ..accounts.account import Account, Paper, Progress, gather
 from . import equations, flights, loop, modes, ranges, tensions
 

@@ -1,7 +1,5 @@
 """Paper C's tensions, equations 11, 16 and 17 and step (d): least norm, null space and rank."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...figures.curves import Panel, curves

@@ -21,8 +21,6 @@ the printed x and y and at 1 m, their lowest height, cables of 1.2 m hold the lo
 W1 is printed as 0.6 m.
 """
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 

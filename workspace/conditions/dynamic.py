@@ -1,7 +1,5 @@
 """Dynamic: from rest, the cables can give the platform every acceleration of a set."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -9,8 +9,6 @@ least norm, with tensions in units of the weight, and the resulting attitude is 
 If the drive keeps the cable lengths, the position is unknown too, and l_i(x, theta) = L_i are three more equations.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

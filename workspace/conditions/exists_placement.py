@@ -6,8 +6,6 @@ same for every configuration, so the result does not depend on other configurati
 that the condition holds, but a search without a result proves nothing.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Annotated, Literal
 

@@ -4,8 +4,6 @@ Three cables balance all six rows exactly only on a set of measure zero, so the 
 sample. Its prisms follow from the forces alone.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

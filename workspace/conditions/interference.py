@@ -4,8 +4,6 @@ Cables are the straight segments from anchor to attachment. Sources: Ericson, Re
 (distance of segments) and 5.3.3 (segments that enter a box).
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Length limits: every cable is as long as its winch allows."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Capacity margin: the additional wrench that the cables can balance in every direction, at rest."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Static equilibrium: tensions inside their limits hold the platform at rest."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -4,8 +4,6 @@ That holds if and only if the columns of A span all wrench rows and some positiv
 t > 0. The tensions can be scaled, so t >= 1 is the same condition.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

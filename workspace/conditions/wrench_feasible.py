@@ -4,8 +4,6 @@ The wrenches that the cables can give are a convex set. So they can balance ever
 they can balance each of its vertices.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import ClassVar, Literal, Self
 

@@ -1,7 +1,5 @@
 """Wrench with a tolerance, the second of paper C's conditions: the weight is balanced up to a tolerance."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -9,8 +9,6 @@ shares a and b done, R = R_k exp(a w_k) exp(b w_k+1), with the body rate and its
 from which Euler rates follow by the rate matrix (`models.rotation`).
 """
 
-from __future__ import annotations
-
 from functools import cache, cached_property
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """`PathBase`: what every path has: a frame, a duration or none, and a pose at every time."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Annotated
 

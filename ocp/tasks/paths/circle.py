@@ -1,7 +1,5 @@
 """`CirclePath`: a circle or a helix."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`Curve`: a path of any kind but `timed`."""
 
-from __future__ import annotations
-
 from typing import Annotated, TypeAlias
 
 from pydantic import Field

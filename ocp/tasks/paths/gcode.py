@@ -1,7 +1,5 @@
 """`read_gcode`: a list of points in G-code: moves G0 and G1, dwell G4, units G20 and G21, G90 and G91."""
 
-from __future__ import annotations
-
 import math
 import re
 from typing import Any

@@ -5,8 +5,6 @@ smooth step 3 x^2 - 2 x^3. Its peak is 4.98 ways per squared duration: 4 is the 
 `rest_to_rest` has 7.51. As in `rest_to_rest` acceleration and jerk are zero at both ends.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 RAMP = 0.1  # of the leg, in which the acceleration rises from zero to its peak; it changes sign in twice that

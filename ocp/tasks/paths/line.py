@@ -1,7 +1,5 @@
 """`LinePath`: a straight line."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -4,8 +4,6 @@
 positions [m/s^2] and of rotations [rad/s^2] are compared each on its own: `size` is the larger of the two.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

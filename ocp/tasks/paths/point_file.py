@@ -1,7 +1,5 @@
 """Lists of points in files: `read_points` by the ending of the name, `read_csv` for CSV with units in its header."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

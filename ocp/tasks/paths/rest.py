@@ -1,7 +1,5 @@
 """`RestPath`: a pose that is held."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -6,8 +6,6 @@ derivative: where fewer than six cables hold a platform on an exact path, its ac
 the cables, hence the positions of the quadrotors; and these rest only if their jerk, which turns their thrust, is zero.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """`ReturnPath`: the remainder of a path plus a decaying offset, for a robot with a tracking error."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`SamplePath`: a path through samples at given times."""
 
-from __future__ import annotations
-
 from typing import Literal, Self
 
 import numpy as np

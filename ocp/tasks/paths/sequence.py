@@ -1,7 +1,5 @@
 """`SequencePath`: a sequence of paths."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """`TimedPath`: a path with a time law of its own."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal, Self

@@ -1,7 +1,5 @@
 """`WaypointSpline`: a curve of degree 5 through points, from rest to rest."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`WaypointPath`: a path through given poses, of straight legs or as a spline."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from itertools import pairwise
 from math import remainder
