@@ -31,7 +31,7 @@ from .chromium import PATIENCE, chromium, playwright
 from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
 
 # Software draws each frame, and would draw as many as it can on all processors.
-SLOWLY = "{const next = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => next(f), 100)}"
+SLOWLY = "{const next = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => next(f), 50)}"
 
 
 @pytest.fixture(scope="module")
@@ -136,11 +136,15 @@ def test_a_picture_is_saved(page, tmp_path):
     with serve(read("caroca-pulleys"), port=0) as url:
         page.goto(url)
         page.wait_for_selector(".towline-readout")
-        with page.expect_download() as download:
-            page.get_by_role("button", name="Save picture").click()
-        assert download.value.suggested_filename == "caroca-pulleys.png"
-        download.value.save_as(tmp_path / "saved.png")
-    pixels = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB"))
+        for _ in range(20):  # what appears fades in
+            with page.expect_download() as download:
+                page.get_by_role("button", name="Save picture").click()
+            assert download.value.suggested_filename == "caroca-pulleys.png"
+            download.value.save_as(tmp_path / "saved.png")
+            pixels = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB"))
+            if (pixels.max(axis=2) < 100).sum() > 100:
+                break
+            page.wait_for_timeout(250)
     assert pixels.shape[0] == 480
     assert (pixels == 255).all(axis=2).mean() > 0.2  # white, not transparent, between what is drawn
     assert (pixels.max(axis=2) < 100).sum() > 100
