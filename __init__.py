@@ -1,12 +1,12 @@
 """Optimal control and tension distribution of cable robots.
 
 `import towline` costs nothing: each name below loads its package when it is first used (PEP 562). Packages, from the
-ground up: `towline.base` (what all stand on), `towline.models` (robots and their mechanics), `towline.solvers` (tension
-distribution on plain arrays), `towline.figures` (matplotlib), `towline.statics` (one instant of a robot),
-`towline.plant` (motion in time), `towline.workspace` (reachable poses), `towline.estimation` (the pose from lengths,
-the robot as built), `towline.control` (one step of a controller), `towline.ocp` (planning), `towline.simulation`
-(runs), `towline.export` (a control step as C), `towline.studies` (the papers), `towline.benchmarks`, `towline.viewer`,
-`towline.cli`.
+ground up: `towline.base` (what all others use), `towline.models` (robots and their mechanics), `towline.solvers`
+(tension distribution on plain arrays), `towline.figures` (matplotlib), `towline.statics` (one instant of a robot),
+`towline.plant` (motion in time), `towline.workspace` (poses at which a condition holds), `towline.estimation` (the pose
+from lengths, the calibrated robot), `towline.control` (one step of a controller), `towline.ocp` (planning),
+`towline.simulation` (closed loops), `towline.export` (a control step as C), `towline.studies` (the papers),
+`towline.benchmarks`, `towline.viewer`, `towline.cli`.
 """
 
 from importlib import import_module

@@ -40,7 +40,7 @@ def results_alone() -> Iterator[None]:
 def tension(
     count: Annotated[int, typer.Option(help="Random problems per task.")] = 100,
     repeats: Annotated[int, typer.Option(help="Runs of each solver on each task.")] = 5,
-    m: Annotated[str, typer.Option("--m", help="Numbers of cables of the problems.")] = "6,7,8,12",
+    m: Annotated[str, typer.Option("--m", help="How many cables the problems have, separated by commas.")] = "6,7,8,12",
     limit: Annotated[float, typer.Option(help="Longest time for one solver on one task [s].")] = 5.0,
     out: Annotated[Path | None, typer.Option("--out", help="Folder for tension.md and tension.png.")] = None,
     as_json: JsonOption = False,

@@ -34,7 +34,7 @@ PriorOption = Annotated[
     str | None,
     typer.Option(
         metavar="NAME=SIGMA,...",
-        help="Standard deviations about the file's values [m], of scales [1], of the clock [s], as "
+        help="Standard deviations of the file's values [m] (scales [1], clock [s]), as "
         "'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.",
     ),
 ]

@@ -31,7 +31,7 @@ COMMANDS = {
     "plan": "Plan a motion that keeps every tension inside its limits.",
     "time": "Compute the fastest motion along a path.",
     "simulate": "Simulate a plan in closed loop, with wind, noise and faults.",
-    "workspace": "Sample the poses that a robot can reach.",
+    "workspace": "Sample the poses at which a condition holds.",
     "calibrate": "Calibrate a robot from measured cable lengths.",
     "view": "Show robots, plans, simulations and workspaces in the browser.",
     "import": "Convert a robot of another program to a robot file.",

@@ -169,7 +169,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
 
     from ..base.text import quantity_range, quantity_row
 
-    attitude = "at home's attitude"
+    attitude = "in its home attitude"
     if box is None:
         return [f"  can rest, {attitude} and with its carriers at home, at none of the positions that were sampled"]
     sides = [

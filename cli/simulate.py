@@ -44,7 +44,10 @@ CONTROLLERS = ("computed-torque", "predictive", "open-loop")
 
 
 PlanArgument = Annotated[
-    Path, typer.Argument(metavar="PLAN", help="A plan of this robot: a file that `towline plan` wrote (NetCDF).")
+    Path,
+    typer.Argument(
+        metavar="PLAN", help="A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF)."
+    ),
 ]
 ControllerOption = Annotated[
     str, typer.Option(help=f"The controller: {', '.join(CONTROLLERS)}; Python accepts controllers of your own.")

@@ -229,7 +229,7 @@ class Robot(DisplayedRobot):
 
     @property
     def home(self) -> np.ndarray:
-        """Return the home pose of the platform in {G}, (6,) [m, rad]: the file's, or else amid or below the anchors."""
+        """Return the platform's home pose in {G}, (6,) [m, rad]: the file's, or else between or below the anchors."""
         return np.array(self.platform.home or points.default_home(self.home_anchors, self.attachments))  # (6,)
 
     @property

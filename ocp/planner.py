@@ -69,8 +69,8 @@ def plan(
     """Plan a motion of platform and carriers that keeps every tension inside its limits.
 
     The platform follows the task's path, exactly or inside a tube. The carriers hold, move as given, or are free inside
-    their limits. Free quantities are chosen by inverse-dynamics transcription and IPOPT (`program`). Only the audit on
-    a dense grid (`audit`) decides that a plan is feasible.
+    their limits. Free quantities are chosen by inverse-dynamics transcription and IPOPT. Only the audit on a dense grid
+    decides that a plan is feasible.
 
     If the duration alone is free, so is the time law along the path: the path's own time law, stretched, competes with
     the fastest one (`time_along`, if the extra `timing` is installed), and the task's objective decides.
@@ -151,8 +151,8 @@ class Planner(Displayed):
         """Return the audited best attempt of an interrupted call of `plan`, or None.
 
         The attempt is the best motion of the solver that met all constraints at its nodes, or one that was audited
-        before; `feasible` is the result of its audit. The audit runs on first access, since the interrupt does not
-        wait.
+        before; `feasible` is the result of its audit. The audit runs on first access, so that the interrupt is not
+        delayed.
         """
         search = self._search
         plan = None if search is None else search.best_of_interrupted()
@@ -199,8 +199,7 @@ class Planner(Displayed):
         The new plan starts with the measured pose and velocity of the platform, and of carriers that the planner moves.
         Its path is the remainder of the task's path plus the current tracking error, which decays to zero within
         `settle`. If the state contains tensions, the plan starts with them and the acceleration that they cause;
-        otherwise with the acceleration of the last plan. Times of the new plan start at 0, at `time` of the whole
-        motion.
+        otherwise with the acceleration of the last plan. Time 0 of the new plan is `time` of the whole motion.
 
         Parameters
         ----------

@@ -34,7 +34,7 @@ def events(flight: SimulationData) -> list[Event]:
         found.append(Event(float(flight.times[row]), "tension", f"cable {cable + 1} was the first above its t_max"))
     if (beyond := ~(flight.error <= flight.tolerance)).any():
         within = quantity(1e3 * flight.tolerance, "mm")
-        found.append(Event(float(flight.times[np.argmax(beyond)]), "error", f"the error left {within}"))
+        found.append(Event(float(flight.times[np.argmax(beyond)]), "error", f"the error exceeded {within}"))
     if flight.lasted < len(flight.references):
         found.append(Event(flight.lasted * flight.period, "end", "the simulation diverged"))
     shown = [event for event in found if event.at <= max(flight.lasted, 1) * flight.period]

@@ -38,7 +38,7 @@ class TensionProblem(Displayed):
         Wrench matrix, shape (n, m), any n and m from 1 up. Usually n = 6: rows 0 to 2 are forces [N per N of tension],
         rows 3 to 5 moments [N m per N].
     w :
-        Required wrench, shape (n,), [N] and [N m]; like A, of entries below 1e50.
+        Required wrench, shape (n,), [N] and [N m]. The entries of w and of A must be below 1e50.
     t_min, t_max :
         Tension limits [N], shape (m,) or one number for all cables. Equal limits fix a tension; t_min may be -inf and
         t_max +inf.
@@ -160,9 +160,9 @@ class TensionProblem(Displayed):
     def null_space(self) -> Array:
         """Return N, shape (m, m - rank): orthonormal columns that span the null space of A.
 
-        All tensions that give w, limits or not, are A^+ w + N lambda; `TensionSolution.lambda_` is the lambda of some.
-        The first entry of each column is positive, or the first that is not zero. Singular values of S A below 1e-10
-        of the largest are zero.
+        All tensions that give w, inside the limits or not, are A^+ w + N lambda; `TensionSolution.lambda_` is the
+        lambda of a solution. The first nonzero entry of each column is positive. Singular values of S A below 1e-10 of
+        the largest are treated as zero.
         """
         _, sigma, rows = np.linalg.svd(self.scaled_A)
         null = rows[int(np.count_nonzero(sigma > DOUBTFUL * sigma[0])) :].T
@@ -177,10 +177,10 @@ class TensionProblem(Displayed):
         + 10^{-13} \sum_i |S a_i| \, (|t_i| + |t_{\text{ref},i}|)
         $$
 
-        with $\hat t_i$ the tension inside the limits that is nearest to 0: the first part is relative to what the
-        problem requires, never to a limit that happens to be huge; the second is the rounding of A t itself.
-        There the terms of t count up to those of t_ref and 1e10 times what is required: where more digits than that
-        cancel, rounding could pass for any wrench.
+        with $\hat t_i$ the tension inside the limits that is nearest to 0. The first part is relative to what the
+        problem requires, so a huge limit does not raise it. The second is the rounding error of A t. In it, the terms
+        of t are limited to 1e10 times the sum in brackets plus the terms of t_ref: if larger terms cancelled, rounding
+        alone could give any wrench.
 
         Parameters
         ----------

@@ -90,7 +90,7 @@ class TensionSolution(Displayed):
         Raises
         ------
         SolverError
-            If neither proves the status. No problem is known that leads here.
+            If neither certificate proves the status. No problem is known for which this happens.
         """
         if callable(self.proof):
             proof = self.proof(self.problem)

@@ -75,14 +75,14 @@ def test_robots_draws_and_tells_whether_it_can_rest(tmp_path):
     assert "cannot rest at home (singular)" in falling.stdout
     assert "short by" in falling.stdout
     assert (
-        "can rest, at home's attitude and with its carriers at home, in the box\n    x -0.146 to 0.146 m"
+        "can rest, in its home attitude and with its carriers at home, in the box\n    x -0.146 to 0.146 m"
         in resting.stdout
     )
     assert "at none of the positions that were sampled" in falling.stdout
     box = json.loads(run("robots", "multi-quadrotor-3", "--json").stdout)["resting_box"]
     assert (box["min"], box["about"], box["samples"]) == ([None] * 3, [0, 0, 0], 0)
     assert (
-        "can rest, at home's attitude, at any position\n    (the carriers move along"
+        "can rest, in its home attitude, at any position\n    (the carriers move along"
         in run("robots", "multi-quadrotor-3").stdout
     )
 

@@ -26,7 +26,7 @@ def test_a_failed_flight_names_the_fault_and_what_came_after(failed):
     happened = failed.to_dict()["events"]
     left = 1e-3 * np.argmax(failed.error > 0.05)
     assert [(event["kind"], event["at_s"]) for event in happened] == [("fault", 0.3), ("fault", 0.8), ("error", left)]
-    assert "cable 3 was cut at 0.8 s; the error left 50 mm at 1." in failed.report()
+    assert "cable 3 was cut at 0.8 s; the error exceeded 50 mm at 1." in failed.report()
     assert json.loads(json.dumps(happened)) == happened
 
 

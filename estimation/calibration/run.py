@@ -38,8 +38,8 @@ def calibrate(
         anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the smallest set
         whose cross-validation error is close to the best (`select`), which may be empty.
     prior
-        Standard deviations about the file's values by the names of `free`, [m], of scales [1], of the clock [s], such
-        as {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
+        Standard deviations of the file's values [m] (scales [1], clock [s]), by the names of `free`, such as
+        {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
     outliers
         True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after the slip.
 

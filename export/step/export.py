@@ -47,8 +47,8 @@ def export_step(
     """Write one control step of a robot as C: from its state and a desired acceleration to tensions and certificate.
 
     The folder gets `towline_step.h` and `towline_step.c`, which need only a C99 compiler with `sin`, `cos` and `sqrt`,
-    an example `main.c` that computes steps from its standard input, a `Makefile` and a `README.md`. All or nothing is
-    written.
+    an example `main.c` that computes steps from its standard input, a `Makefile` and a `README.md`. The folder is
+    written atomically.
 
     Parameters
     ----------
