@@ -329,7 +329,7 @@ CONTINUOUS = [name for name, method in methods().items() if method.continuous]
 
 @pytest.mark.parametrize("method", CONTINUOUS)
 def test_methods_that_claim_continuity_do_not_jump(method):
-    """Check twenty motions; `python -m tests.soak continuity` takes a hundred."""
+    """Check eight motions; `python -m tests.soak continuity` takes a hundred."""
     result = continuity(method, range(8))
     print(method, result)
     assert result.worst <= JUMP

@@ -191,7 +191,9 @@ def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
     pytest.fail(f"nothing in the picture has the colour of the first cable, {drawn[0]}")
 
 
-@pytest.mark.parametrize("name", ["cogiro", "multi-quadrotor-4", "fast", "flight.nc", "space.nc"])
+@pytest.mark.parametrize(
+    "name", ["cogiro", "wang-ctmrts", "multi-quadrotor-4", "fast", "line.nc", "flight.nc", "space.nc"]
+)
 def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_path):
     """On a desk and on a phone: at every corner of the platform a click would reach the scene."""
     subject = read(str(folder / name) if name.endswith(".nc") else name)

@@ -5,7 +5,7 @@
 A file is sound, damaged (bytes changed, cut, doubled) or made to hurt: arrays that are declared larger than any memory,
 external storage, virtual datasets, entities that grow, hundreds of thousands of wrong items, words for numbers. A
 command reads it in a process of its own. Wrong is another exit code than 0, 1 or 2, a traceback or more than one line
-on standard error with code 2, more than 5 s of processor time, or more than 300 MB besides what the commands import.
+on standard error with code 2, more than 5 s of processor time, or more than 200 MB besides what the commands import.
 
 What a sound plan or simulation takes is not the reader's: those kinds are read by commands that do little else.
 """
@@ -32,7 +32,7 @@ from towline import Dynamics, load, plan
 from towline.cli.entry import main
 from towline.cli.main import app
 
-SECONDS, MEMORY = 5.0, 300e6
+SECONDS, MEMORY = 5.0, 200e6
 ROBOT = "wang-flying"
 REST = {"name": "rest", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.3, "output_rate": 50}
 NUMBERS = (
