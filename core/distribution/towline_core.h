@@ -33,8 +33,8 @@ extern "C" {
  * Minimise sum_i weights_i (t_i - t_ref_i)^2 subject to A t = w and t_min <= t <= t_max.
  *
  * With n == 6 rows, rows 3 to 5 are moments [N m]; they are divided by `length` [m] wherever newtons and newton metres
- * are compared. It never changes which tensions are optimal. From 1e50 on (1e15 in float) numbers count as infinite:
- * such a limit is none, and anything else of that size is invalid.
+ * are compared. It never changes which tensions are optimal. Limits beyond 1e50 (1e15
+ * in float) count as infinite. Any other number of that size is invalid, and so is a tension that must be that large.
  */
 typedef struct {
     int n;                       /* rows of the wrench, 1 to TOWLINE_ROWS */
