@@ -21,8 +21,8 @@ KNOWN = 0.5  # of an acceleration that sensors find missing in the tensions: obs
 class HandOver(NamedTuple):
     """A hand-over to computed torque."""
 
-    time: float  # time [s]; minus infinity: from the start
-    reason: str  # reason
+    time: float  # [s]; minus infinity: from the start
+    reason: str
 
 
 class Watch:

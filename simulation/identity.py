@@ -26,7 +26,7 @@ class _Pickler(pickle.Pickler):
 def identity(something: Any) -> str:
     """Return a hash of an object's content and of the source of its class or function, as far as there is one.
 
-    Raises `pickle.PicklingError, AttributeError, TypeError` if the object cannot be pickled.
+    Raises `pickle.PicklingError`, `AttributeError` or `TypeError` if the object cannot be pickled.
     """
     stream = io.BytesIO()
     _Pickler(stream).dump(something)

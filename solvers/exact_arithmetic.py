@@ -31,8 +31,8 @@ _ERROR = 2.0**-73
 class ExactOptimum(NamedTuple):
     """Tensions of least cost inside their limits whose wrench is w or the nearest to it, rounded once."""
 
-    tensions: Array  # tensions [N], shape (m,)
-    missing: Array  # what they miss of the wrench before they are rounded, S (w - A t) [N], shape (n,)
+    tensions: Array  # [N], (m,)
+    missing: Array  # what they miss of the wrench before they are rounded, S (w - A t) [N], (n,)
 
 
 def exact_optimum(problem: TensionProblem, nearest: Array) -> ExactOptimum:

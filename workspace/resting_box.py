@@ -13,7 +13,7 @@ STEPS = 10  # from the middle of the grid to each of its sides
 
 
 class RestingBox(NamedTuple):
-    """Positions of the platform at which it can rest at home's attitude, its tensions inside their limits.
+    """Positions of the platform at which it can rest in its home attitude, its tensions inside their limits.
 
     Attributes
     ----------

@@ -22,12 +22,12 @@ class Row(NamedTuple):
     """The results of one plan in the table of a sweep; missing numbers are nan."""
 
     status: str  # see `MotionStatus`; or `failed` if planning raised an error
-    reason: str  # reason why it is not feasible, in one line; empty if it is
+    reason: str  # why it is not feasible, in one line; empty if it is
     cost: float  # the task's objective, for a feasible plan
-    duration: float  # duration [s]
+    duration: float  # [s]
     margin: float  # smallest distance of any tension from its limits [N]
-    tension_max: float  # largest tension [N]
-    iterations: int  # iterations of the last run of the solver
+    tension_max: float  # largest [N]
+    iterations: int  # of the last run of the solver
     seconds: float  # wall time to plan [s]
 
 
