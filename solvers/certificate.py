@@ -20,7 +20,7 @@ from ..base.text import quantity
 from ..base.tolerances import CANCELLED, NEGLIGIBLE, ORTHOGONAL, RANK, ROUNDED_PULL
 from .box_least_squares import Projection, project
 from .exact_arithmetic import exact_optimum
-from .problem import Array, TensionProblem, accepted_error, needed
+from .problem import Array, TensionProblem, accepted_error
 
 Indices = NDArray[np.intp]
 
@@ -287,6 +287,6 @@ def _support(problem: TensionProblem, direction: Array) -> tuple[float, float, I
     support = float(pull[known] @ limit[known])
     rounding = (problem.n + problem.m + 2) * _UNIT_ROUNDOFF * float(terms[known] @ np.abs(limit[known]))
     counts = ~known & (np.abs(pull) > ROUNDED_PULL * terms)
-    rounding += CANCELLED * needed(problem) * float(np.sum(np.abs(pull[counts]) / problem.column_norms[counts]))
+    rounding += CANCELLED * problem.wrench_scale * float(np.sum(np.abs(pull[counts]) / problem.column_norms[counts]))
     small = NEGLIGIBLE * problem.column_norms
     return support, rounding, np.flatnonzero(pull > small), np.flatnonzero(pull < -small)

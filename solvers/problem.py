@@ -157,6 +157,12 @@ class TensionProblem(Displayed):
         return np.sqrt(np.einsum("ij,ij->j", self.scaled_A, self.scaled_A))
 
     @cached_property
+    def wrench_scale(self) -> float:
+        """Return |S w| and the wrench of the tensions nearest to zero, together [N]: errors are measured by it."""
+        nearest_to_zero = np.minimum(np.maximum(self.t_min, 0.0), self.t_max)
+        return float(np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero))
+
+    @cached_property
     def null_space(self) -> Array:
         """Return N, shape (m, m - rank): orthonormal columns that span the null space of A.
 
@@ -193,15 +199,9 @@ class TensionProblem(Displayed):
         return accepted_error(self, tensions)
 
 
-def needed(problem: TensionProblem) -> float:
-    """Return |S w| and the wrench of the tensions nearest to zero, together [N]."""
-    nearest_to_zero = np.minimum(np.maximum(problem.t_min, 0.0), problem.t_max)
-    return float(np.sqrt(problem.scaled_w @ problem.scaled_w) + problem.column_norms @ np.abs(nearest_to_zero))
-
-
 def accepted_error(problem: TensionProblem, tensions: Array) -> float:
     """Return `TensionProblem.tolerance` [N] of tensions (m,) of float64 that are known to be numbers."""
-    norms, required = problem.column_norms, needed(problem)
+    norms, required = problem.column_norms, problem.wrench_scale
     reference = norms @ np.abs(problem.t_ref)
     terms = norms @ np.abs(tensions)
     if required > 0.0:  # otherwise no tensions give the wrench too, and what others leave is rounding
