@@ -8,8 +8,22 @@ from .command import ANSWERS, Command
 from .computed_torque import ComputedTorque
 from .controller import Controller
 from .open_loop import OpenLoop
+from .planned_references import references
 from .predictive import Predictive
 from .reference import Reference
 from .state import State
+from .stops import Stop, stop
 
-__all__ = ["ANSWERS", "Command", "ComputedTorque", "Controller", "OpenLoop", "Predictive", "Reference", "State"]
+__all__ = [
+    "ANSWERS",
+    "Command",
+    "ComputedTorque",
+    "Controller",
+    "OpenLoop",
+    "Predictive",
+    "Reference",
+    "State",
+    "Stop",
+    "references",
+    "stop",
+]

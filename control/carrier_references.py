@@ -158,7 +158,7 @@ class Late(Moved):
     @override
     def rest(self, stage: float, carriers: np.ndarray) -> None:
         """Leave carriers to their reference."""
-        self._pending.add(np.zeros(self.count))
+        self._pending.add(np.zeros(self.count).tobytes())
 
 
 class Flown(Late, Freed):
@@ -186,7 +186,7 @@ class Flown(Late, Freed):
 
     @override
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
-        self._pending.add(more)
+        self._pending.add(more.tobytes())
         super().order(planned, more, platform, carriers)
 
 
@@ -223,7 +223,7 @@ class Tethered(Late):
 
     @override
     def order(self, planned: np.ndarray, more: np.ndarray, platform: np.ndarray, carriers: np.ndarray) -> None:
-        self._pending.add(more)
+        self._pending.add(more.tobytes())
         motion = np.zeros((3, 6 + self.count))
         motion[:2, :6], motion[:2, 6:] = self._measured[0].reshape(2, 6), self._now[0, :2]
         motion[2, :6], motion[2, 6:] = platform, planned + more

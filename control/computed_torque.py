@@ -9,7 +9,7 @@ from typing_extensions import override
 
 from ..base.errors import InputError
 from ..base.inputs import number, required, shown
-from ..core import control_move_on, control_problem, control_take, control_thrusts
+from ..core import control_move_on, control_step, control_take, control_thrusts
 from ..models.files import as_robot
 from ..models.record import record_of
 from ..models.robot import Robot
@@ -17,7 +17,7 @@ from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
 from .as_floats import as_floats, is_time, rows_of
 from .boxes import boxes, stay_inside
-from .command import HOLD, PLANNED, SOFT, Command
+from .command import HOLD, NOTHING, NOWHERE, PLANNED, SOFT, Command
 from .command_delay import Pending
 from .controllability import uncontrolled
 from .controller import Controller
@@ -129,6 +129,7 @@ class ComputedTorque(Controller):
         self._robot = record_of(self.robot)
         self._flies = bool(self._settings["by_wrench"].any())
         self._moves_carriers = self._flies or bool(far.any())
+        self._is_plain = not self._moves_carriers and self._loop is None
         self._negligible = NEGLIGIBLE * self.robot.force_scale
         self._begin(1)
 
@@ -172,7 +173,8 @@ class ComputedTorque(Controller):
         self._first: float | None = None  # time of the first step
         self._seen, self._commanded = 0.0, Pending(2 * OLDEST)
         self._commanded.reset(rows * m)
-        self._accelerations = np.zeros((rows, count, 6))  # of carriers, as ordered last
+        self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
+        self._last = bytes(8 * rows * m)  # tensions that were commanded last
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
         self._carriers = np.zeros((rows, count, 3, 6))  # how they should move, where they have a command of their own
         self._cables, self._platform = np.zeros((rows, m), CABLE), np.zeros(rows, PLATFORM)
@@ -184,12 +186,13 @@ class ComputedTorque(Controller):
         orders = self._carriers if self._moves_carriers else None
         memory = self._cables, self._platform, self._of_carriers
         self._inputs = self._robot, self._measured, self._cables, self._wanted, orders, problems.t_ref
-        self._arrays = self._wanted, problems.t_ref, orders, *memory, problems.A, problems.w, problems.bounds
+        self._arrays = self._measured, self._wanted, orders, *memory, problems.memory
         if self._loop is not None:
             self._loop.reset()
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
         self._paused = False  # whether the integral of a row does
         self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
+        self._is_as_planned = self._as_planned[0] if rows else None, NOWHERE, NOTHING
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
@@ -205,84 +208,110 @@ class ComputedTorque(Controller):
             return self._step(time, state, reference)
 
     def _step(self, time: float, state: State, reference: Reference) -> Command:
-        _, state, reference = self._measure(time, state, reference)
-        tensions, answered, proof = self._distribute()
-        if answered is not self._as_planned:
+        _, state, reference = self._measure(time, state, reference, self._problems.solves)
+        problems, proof = self._problems, self._nowhere
+        if self._optimal == len(self._wanted):
+            if self._paused:
+                self._platform["integrates"] = 1
+            self._paused = False
+            if self._is_plain and self._is_one and not self._has_cut:  # the rest, at a fifth of the time
+                tensions = problems.tensions[0].copy()
+                self._last = tensions.tobytes()
+                self._accelerations = memoryview(reference.carrier_acceleration).tobytes()
+                return Command(tensions, *reference[3:6], *self._is_as_planned)
+            tensions, answered = problems.tensions.copy(), self._as_planned
+        else:
+            problems.solve_others()
+            answered = self._answer_others()
+            tensions, proof = problems.tensions.copy(), (problems.direction.copy(), problems.shortfall.copy())
             self._platform["integrates"] = answered == PLANNED
-        elif self._paused:
-            self._platform["integrates"] = 1
         self._paused = answered is not self._as_planned
-        return self._command(reference, tensions, answered, proof, np.ndim(state.pose) == 1)
+        return self._command(reference, tensions, answered, proof, self._is_one)
 
-    def _distribute(self) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
-        """Return the tensions of this step's problem, (N, m) [N], the status of each row, and the missing wrench."""
-        problems = self._problems
-        if problems.solve():
-            return problems.tensions.copy(), self._as_planned, self._nowhere
-        answered = self._answer_others()
-        return problems.tensions.copy(), answered, (problems.direction.copy(), problems.shortfall.copy())
-
-    def _measure(self, time: float, state: State, reference: Reference) -> tuple[float, State, Reference]:
-        """Update the memory, and write the problem of this step.
+    def _measure(
+        self, time: float, state: State, reference: Reference, solves: int = 0
+    ) -> tuple[float, State, Reference]:
+        """Update the memory, write the problem of this step, and solve it if wanted, see `core.control_step`.
 
         Return the time since the last one [s], or 0, and the state and the reference as arrays.
         """
-        required("state", state, State)
-        required("reference", reference, Reference)
+        if not isinstance(state, State):
+            required("state", state, State)
+        if not isinstance(reference, Reference):
+            required("reference", reference, Reference)
         if not is_time(time):
             raise InputError(f"time must be a finite number [s], got {shown(time)}")
         time, rows = float(time), rows_of(state)
-        if (rows if rows is not None else 1) != len(self._wanted):
-            self._begin(1 if rows is None else rows)
+        self._is_one = rows is None
+        count = 1 if rows is None else rows
+        if count != len(self._wanted):
+            self._begin(count)
         dt = 0.0 if self._time is None else time - self._time
         if not (dt > 0 or self._time is None):
             raise InputError(
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
-        state, reference = self._take(state, reference)
-        since, late = self._move_on(time, state, dt)
-        own = self._robot, self._settings, self._measured, late, *self._arrays
-        self._has_cut = control_problem(dt, since, *own) > 0
+        self._senses = state.tensions is not None
+        seen = time if state.time is None else self._time_of(state, time)
+        since = 0.0 if self._time is None else seen - self._seen
+        own = self._robot, self._settings
+        if time - seen <= ROUNDING and since == dt:
+            fixed = dt, since, self._problems.length, solves
+            try:
+                done = control_step(*fixed, state, reference, *own, None, *self._arrays)
+            except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
+                state, reference = self._as_floats(state, reference)
+                done = control_step(*fixed, state, reference, *own, None, *self._arrays)
+            self._remember(time, dt)
+        else:
+            state, reference = self._take(state, reference)
+            self._remember(time, dt)
+            late = self._move_on(time - seen, since, dt)
+            done = control_step(dt, since, self._problems.length, solves, None, None, *own, late, *self._arrays)
+        self._has_cut, self._optimal = done[0] > 0, done[1]
         self._first = time if self._time is None else self._first
-        self._time, self._elapsed = time, dt
+        self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
 
-    def _move_on(self, time: float, state: State, dt: float) -> tuple[float, np.ndarray | None]:
-        """Predict the current state; return the time since the last measurement [s], and the measured state if late.
+    def _time_of(self, state: State, time: float) -> float:
+        """Return when a state was measured, if that is a time up to the step's [s]."""
+        if not is_time(state.time) or not float(state.time) <= time + ROUNDING:
+            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(state.time)}")
+        return float(state.time)
+
+    def _remember(self, time: float, dt: float) -> None:
+        """Add the command that has acted since the last step to those that states may be too old to show."""
+        last = self._last
+        if dt > 0 and self._time == self._first:  # whose command is taken for that of the time before
+            self._commanded.add(last)
+            self._commanded.wait(OLDEST)
+        self._commanded.add(last)
+        self._commanded.wait(dt)
+
+    def _move_on(self, age: float, since: float, dt: float) -> np.ndarray | None:
+        """Predict the current state from one that is `age` old [s]; return the measured state if it is late.
 
         The observers use the measured state. With a predicted state they would correct their own prediction and be
         unstable for delays beyond the inverse of their bandwidth.
         """
         cables, measured = self._cables, self._measured
-        seen = time if state.time is None else state.time
-        if not is_time(seen) or not float(seen) <= time + ROUNDING:
-            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
-        age, since = time - float(seen), 0.0 if self._time is None else float(seen) - self._seen
-        self._seen = float(seen)
-        first = dt > 0 and self._time == self._first  # whose command is taken for that of the time before
-        for lasted in (OLDEST, dt) if first else (dt,):
-            self._commanded.add(cables["last"].flatten())
-            self._commanded.wait(lasted)
-        on_time = age <= ROUNDING
-        otherwise = None if on_time else cables["known"] - cables["then"]
-        if on_time and since == dt:
-            cables["then"] = cables["last"]
-        elif dt > 0:
+        otherwise = cables["known"] - cables["then"]
+        if dt > 0:
             window = since if since > 0 else dt
             cables["then"] = self._commanded.means(age + window, 1, window).reshape(cables.shape)
         if not self._senses:
             cables["measured"] = cables["then"]
-        if otherwise is None:
-            return since, None
+        if age <= ROUNDING:
+            return None
         late = measured.copy()
         if age > OLDEST:
             measured[:] = np.nan
         else:
             parts = ceil(age / PART)
             tensions = self._commanded.means(age, parts, age / parts).reshape(parts, *otherwise.shape) + otherwise
-            given = self._platform["disturbance"].copy(), np.maximum(tensions, 0.0), self._accelerations
+            given = self._platform["disturbance"].copy(), np.maximum(tensions, 0.0), np.frombuffer(self._accelerations)
             control_move_on(age / parts, self._robot, *given, measured)
-        return since, late
+        return late
 
     def _command(
         self,
@@ -296,14 +325,15 @@ class ComputedTorque(Controller):
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
         if self._has_cut:
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
-        rows, self._cables["last"] = len(tensions), tensions
+        rows, self._cables["last"], self._last = len(tensions), tensions, tensions.tobytes()
         if self._moves_carriers:
             own = self._carriers.copy()
             if self._boxes is not None:
                 stay_inside(own, *self._boxes)
             own = own[0] if alone else own
             carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
-        self._accelerations[:] = carriers[2]
+        ordered = carriers[2]
+        self._accelerations = (ordered if self._moves_carriers else _for_all(ordered, rows)).tobytes()
         actuation = None
         if self._flies:
             memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation
@@ -336,14 +366,16 @@ class ComputedTorque(Controller):
 
     def _take(self, state: State, reference: Reference) -> tuple[State, Reference]:
         """Copy a state and a reference to the memory of the core, and return them as arrays."""
-        self._senses = state.tensions is not None
         try:
             control_take(state, reference, *self._inputs)
         except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
-            rows = len(self._wanted)
-            state, reference = as_floats(state, self.robot, rows), as_floats(reference, self.robot, rows)
+            state, reference = self._as_floats(state, reference)
             control_take(state, reference, *self._inputs)
         return state, reference
+
+    def _as_floats(self, state: State, reference: Reference) -> tuple[State, Reference]:
+        rows = len(self._wanted)
+        return as_floats(state, self.robot, rows), as_floats(reference, self.robot, rows)
 
     def _answer_others(self) -> np.ndarray:
         """Give rows without tensions a command, and return the status of each row."""
@@ -366,4 +398,6 @@ class ComputedTorque(Controller):
 
 
 def _for_all(value: np.ndarray, rows: int) -> np.ndarray:
-    return np.broadcast_to(value, (rows, *np.shape(value)[-2:]))
+    """Return the motion of carriers for each row, (rows, c, 6), from one for each or one for all, (c, 6)."""
+    value = np.asarray(value, dtype=float)
+    return value if value.ndim == 3 else value[None].repeat(rows, axis=0)

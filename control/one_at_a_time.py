@@ -14,16 +14,17 @@ class OneAtATime:
     """
 
     def __init__(self):
-        self._lock = threading.RLock()  # a step of a predictive controller is made of others
+        lock = threading.RLock()  # a step of a predictive controller is made of others
+        self._enter, self._leave = lock.acquire, lock.release
 
     def __enter__(self) -> None:
         """Enter, or raise InputError if another thread is inside."""
-        if not self._lock.acquire(blocking=False):
+        if not self._enter(False):
             raise InputError("controller must be used by one thread at a time, got two; each robot needs its own")
 
     def __exit__(self, *_: object) -> None:
         """Leave to others."""
-        self._lock.release()
+        self._leave()
 
     def __reduce__(self) -> tuple[type[OneAtATime], tuple[()]]:
         """Copy and pickle without the lock, which belongs to this process and its threads."""

@@ -300,7 +300,7 @@ class Predictive(ComputedTorque):
     def _agree(sender: ComputedTorque, other: ComputedTorque) -> None:
         """Tell another controller of the same robot the command that was sent, as if it were its own."""
         other._cables["last"], other._actuation[:] = sender._cables["last"], sender._actuation
-        other._accelerations[:] = sender._accelerations
+        other._last, other._accelerations = sender._last, sender._accelerations
         other._platform["attitude"] = sender._platform["attitude"]
         other._of_carriers["ordered"] = sender._of_carriers["ordered"]
 

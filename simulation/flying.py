@@ -20,6 +20,8 @@ from .sensors import Sensors
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
 FEW = 1000  # numbers that BLAS adds with one thread
+# Pose and velocity of the platform, and of the carriers, in motions (..., 1 + c, 12).
+_PARTS = [(..., body, part) for body in (0, slice(1, None)) for part in (slice(0, 6), slice(6, 12))]
 
 
 class Pilot:
@@ -49,8 +51,9 @@ class Pilot:
 
 
 def _state(motions: np.ndarray, tensions: np.ndarray) -> State:
-    pose, velocity = motions[..., :6], motions[..., 6:]
-    return State(pose[..., 0, :], velocity[..., 0, :], pose[..., 1:, :], velocity[..., 1:, :], tensions)
+    """Return a state with arrays of its own, which a controller may keep."""
+    motions = motions.copy()
+    return State(*[motions[part] for part in _PARTS], tensions)
 
 
 def _stacked(commands: list[Command]) -> Command:
@@ -82,6 +85,7 @@ def fly(
     states = np.tile(plant.start(*motion, tensions=start), (flights, 1))
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
     history, tensions = np.zeros((flights, 2, states.shape[1])), np.zeros((flights, 2, m))
+    end, numbers = history[:, 1], history.reshape(-1)
     pulls = np.tile(start, (flights, 1))  # means of the last period
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
     orders = Orders(plant, conditions, seeds)
@@ -105,7 +109,7 @@ def fly(
         else:
             command = _held(command, period)
         # Only shapes are compared in each period, since all checks take longer than a step: NumPy broadcasts silently.
-        shapes = [_shape_of(part) for part in command] if isinstance(command, Command) else None
+        shapes = _shapes_of(command)
         if shapes is None or shapes != expected:
             check_command(command, robot, flights, time)
             expected = shapes
@@ -115,11 +119,12 @@ def fly(
             check_command(command, robot, flights, time)
             raise
         periods.run(states, row, history, tensions)
-        pulls = 0.5 * (tensions[:, 0] + tensions[:, 1])
-        if not isfinite(_square(history)):
+        pulls = np.add(tensions[:, 0], tensions[:, 1])
+        pulls *= 0.5
+        if not isfinite(_square(numbers)):
             check_command(command, robot, flights, time)
-            alive &= (np.abs(history[:, 1]) < BEYOND).all(axis=1)
-            history[~alive, 1] = states[~alive]
+            alive &= (np.abs(end) < BEYOND).all(axis=1)
+            end[~alive] = states[~alive]
             going = bool(alive.any())
         if k == 0 or going:
             lived = alive if k else np.ones(flights, dtype=bool)
@@ -131,7 +136,7 @@ def fly(
         if not going:
             break
         lasted += alive
-        states = history[:, 1].copy()
+        states[:] = end
     return np.maximum(lasted, 1), pilot.seconds
 
 
@@ -150,11 +155,16 @@ def _held(command: Command, period: float) -> Command:
     )
 
 
-def _shape_of(part: Any) -> tuple[int, ...] | None:
-    """Return the shape of a part of a command, or None if it is missing."""
-    return part.shape if type(part) is np.ndarray else None if part is None else np.shape(part)
+def _shapes_of(command: Any) -> list[Any] | None:
+    """Return the shape of each part of a command, None for a missing one; None if it is no command."""
+    if not isinstance(command, Command):
+        return None
+    try:
+        return [None if part is None else part.shape for part in command]
+    except AttributeError:
+        return [None if part is None else np.shape(part) for part in command]
 
 
 def _square(values: np.ndarray) -> float:
     """Return the sum of squares, without BLAS for large arrays, since its threads would wait for each other."""
-    return float(np.vdot(values, values) if values.size < FEW else np.einsum("ijk,ijk->", values, values))
+    return float(np.vdot(values, values) if values.size < FEW else np.einsum("i,i->", values, values))

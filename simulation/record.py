@@ -4,6 +4,7 @@ import numpy as np
 
 from ..base.display import Displayed
 from ..control import ANSWERS
+from ..control.command import NOTHING
 from ..models.robot import Robot
 from .recorder import Period
 
@@ -30,6 +31,7 @@ class Record(Displayed):
             if not 0 < command.answered < len(ANSWERS):
                 raise IndexError(command.answered)
             self.direction[k], self.shortfall[k] = command.direction, command.shortfall
-        self.unexplained[k] = command.unexplained
+        if command.unexplained is not NOTHING:
+            self.unexplained[k] = command.unexplained
         if command.actuation is not None:
             self.actuation[k] = command.actuation

@@ -49,7 +49,7 @@ class Extremes:
         self._most[rows] = np.maximum(self._most[rows], tensions, where=whole, out=self._most[rows])
         if not tensions.min() > 0:
             self.slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
-        answered = np.broadcast_to(command.answered, len(self._rows))[rows]
+        answered = np.atleast_1d(command.answered)[rows]
         if answered.any():
             self.answers[self._rows[rows], answered] += 1
         else:

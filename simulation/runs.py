@@ -83,20 +83,21 @@ class _Sizes:
 
     def choose(self, left: int) -> int:
         """Return the number of runs of the next block if `left` runs remain."""
-        if self._workers is not None:
-            left = max(FEWEST, -(-left // (self._workers() * PARTS)))
+        parts = 2 if self._workers is None else self._workers() * PARTS
+        left = min(left, max(FEWEST, -(-left // parts)))
         return max(1, min(SIDE_BY_SIDE, left, self._longest, int(BLOCK_TIME / max(self._each, 1e-9))))
 
 
 def _estimated(everything: tuple[Plant, Controller, Experiment], seeds: range) -> float:
-    """Return the estimated time of a single run [s], from its first periods."""
+    """Return the estimated time of a run [s], among as many as can be side by side, from their first periods."""
     plant, controller, conditions = everything
+    some = seeds[: SIDE_BY_SIDE if controller.batches else 1]
 
     def lasts(periods: int) -> float:  # the first of two loads what flights need
         short = plant, controller, conditions._replace(references=conditions.references[:periods])
-        return min(fly_part(short, 0, seeds[:1])[2] for _ in range(2))
+        return min(fly_part(short, 0, some)[2] for _ in range(2))
 
-    return max(lasts(1 + TRIED) - lasts(1), 0.0) / TRIED * len(conditions.references)
+    return max(lasts(1 + TRIED) - lasts(1), 0.0) / TRIED * len(conditions.references) / len(some)
 
 
 def fly_part(everything: tuple[Plant, Controller, Experiment], first: int, seeds: range) -> Part:

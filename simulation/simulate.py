@@ -14,12 +14,13 @@ from typing_extensions import Unpack
 from ..base.errors import InputError
 from ..base.execution import Execution, ExecutionOptions
 from ..base.inputs import required, shown, whole_number, with_fields
-from ..control import ComputedTorque, Controller, Reference
-from ..models.dynamics import dynamics_of
+from ..control import ComputedTorque, Controller
+from ..control.planned_references import references_at
+from ..control.trajectory import read_trajectory
 from ..models.files import as_robot
+from ..models.parsing import validate
 from ..models.robot import Robot
 from ..plant import Plant
-from ..solvers import solve_batch
 from .command_conversion import Orders
 from .conditions import Conditions
 from .experiment import Experiment
@@ -31,14 +32,12 @@ from .runs import fly_many
 from .sensors import Noise
 from .simulation import Simulation
 from .steps import steps_in
-from .trajectory import Motion, Trajectory, read_trajectory
 from .winds import read_wind
 
 if TYPE_CHECKING:
     import xarray as xr
 
 LONGEST = 1e6  # periods of one flight
-SOFT = 1e8  # weight of the wrench where no tensions give it
 MOST_RUNS = 10_000_000
 
 
@@ -173,6 +172,10 @@ def simulate(
 
 def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> tuple[Plant, Experiment]:
     """Return the plant, and the conditions along the reference; `events` is their name in error messages."""
+    if isinstance(reference, dict):
+        from ..ocp import Task
+
+        reference = validate({"path": reference}, Task, "reference").path
     trajectory = read_trajectory(robot, reference, meets.duration)
     if meets.duration is None and trajectory.duration is None:
         raise InputError("duration must be the simulated time [s] if the reference is a pose, got None")
@@ -185,7 +188,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
     return plant, Experiment(
         period=period,
         substeps=meets.substeps or steps_in(period, plant),
-        references=_references(robot, trajectory, period * np.arange(periods)),
+        references=references_at(robot, trajectory, period * np.arange(periods)),
         wind=read_wind(robot, meets.wind, meets.gusts),
         disturbance=meets.disturbance,
         noise=required("noise", meets.noise, Noise),
@@ -201,21 +204,6 @@ def _drive(robot: Robot) -> str:
     if robot.fixed_lengths is not None:
         return "lengths"
     return "lengths" if all(cable.stiffness for cable in robot.cables) else "tensions"
-
-
-def _references(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> list[Reference]:
-    platform, carriers = trajectory.at(times)
-    planned = trajectory.tensions(times) if trajectory.tensions else _tensions_along(robot, platform, carriers)
-    rows = zip(*platform, *carriers, planned, strict=True)
-    return [Reference(*row) for row in rows]
-
-
-def _tensions_along(robot: Robot, platform: Motion, carriers: Motion) -> np.ndarray:
-    """Return the smallest tensions for a reference, (n, m) [N]; where none exist, those with the closest wrench."""
-    dynamics, mask = dynamics_of(robot), robot.dof_mask
-    A = dynamics.wrench_matrix(platform[0], carriers[0]) * mask[:, None]
-    w = dynamics.required_wrench(*platform, *carriers) * mask
-    return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=SOFT).tensions
 
 
 def _one(plant: Plant, controller: Controller, experiment: Experiment, seed: int, tolerance: float) -> Simulation:

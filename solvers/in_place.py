@@ -1,5 +1,6 @@
 """Solve batches of one shape again and again, in arrays of its own and with tensions in every case: `InPlace`."""
 
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -43,37 +44,41 @@ class InPlace:
         The tensions [N], shape (rows, m); nan where the numbers of a row are no problem.
     code :
         Status of each row, shape (rows,): `STATUSES[int(code)]`.
+    memory :
+        All of these arrays in one, as `core.control_step` writes and solves them;
+    solves :
+        How it does so: one after another (1), in lanes (2), or not at all (0).
     direction, shortfall :
         Where no tensions give w: a verified direction, shape (rows, n), along which they miss it, and by how much
         [N].
     """
 
     def __init__(self, rows: int, n: int, m: int, length: float):
-        self.A, self.w = np.zeros((rows, n, m)), np.zeros((rows, n))  # (rows, n, m), (rows, n)
-        self.bounds, self.t_ref = np.zeros((2, rows, m)), np.zeros((rows, m))  # (2, rows, m), (rows, m)
-        self.tensions = np.zeros((rows, m))  # (rows, m)
-        self.code = np.zeros(rows)  # (rows,)
-        self.direction, self._info = np.zeros((rows, n)), np.zeros((rows, 2))  # (rows, n), (rows, 2)
-        self._residual, self._spare = np.zeros(rows), (np.zeros((rows, n)), np.zeros((rows, 2)))
-        self._lengths = np.array([length])
-        self._has_core = n <= ROWS and m <= CABLES
+        self._shape, self.length = (rows, n, m), float(length)
+        self.memory = np.zeros(rows * (n * m + 2 * n + 4 * m + 4))
+        self._spare, self._has_core = (np.zeros((rows, n)), np.zeros((rows, 2))), n <= ROWS and m <= CABLES
         self._arrange()
 
     def _arrange(self) -> None:
-        """Set the arguments of the core, which are these arrays and parts of them."""
-        _, n, m = self.A.shape
-        results = (self.tensions, self.direction, self._info)
+        """Set the arrays, parts of the memory, and the arguments of the core, which are these."""
+        rows, n, m = self._shape
+        shapes = (rows, n, m), (rows, n), (2, rows, m), (rows, m), (rows, m), (rows, n), (rows, 2), (rows,), (rows,)
+        ends = np.cumsum([prod(shape) for shape in shapes])
+        parts = [part.reshape(shape) for part, shape in zip(np.split(self.memory, ends[:-1]), shapes, strict=True)]
+        self.A, self.w, self.bounds, self.t_ref, self.tensions, self.direction, self._info, residual, self.code = parts
         per = np.array([n * m, n, m, m, m, 0, 0], dtype=float)  # one length and equal weights for all rows
-        given = (self.A, self.w, *self.bounds, self.t_ref, np.empty(0), self._lengths, per)
-        self._exact = (n, m, 0.0, m - n <= IN_LANES, *given, *results, self._residual, self.code)
-        self._soft = (n, m, RHO, False, *given, self.tensions, *self._spare, self._residual, self.code)
+        given = (self.A, self.w, *self.bounds, self.t_ref, np.empty(0), np.array([self.length]), per)
+        in_lanes = m - n <= IN_LANES
+        self.solves = 0 if not self._has_core else 2 if in_lanes else 1
+        self._exact = (n, m, 0.0, in_lanes, *given, self.tensions, self.direction, self._info, residual, self.code)
+        self._soft = (n, m, RHO, False, *given, self.tensions, *self._spare, residual, self.code)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what copies and pickles hold: without the arguments of the core, parts of arrays no longer."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_exact", "_soft")}
+        """Return what copies and pickles hold: the memory without its parts."""
+        return {name: self.__dict__[name] for name in ("_shape", "length", "memory", "_spare", "_has_core")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore the arrays, and the arguments of the core as parts of them."""
+        """Restore the memory, and the arrays as its parts."""
         self.__dict__.update(state)
         self._arrange()
 
@@ -87,10 +92,10 @@ class InPlace:
         self.code.fill(UNSURE)
         if self._has_core and solve_rows(*self._exact) == len(self.code):
             return True
-        self._solve_others()
+        self.solve_others()
         return not self.code.any()
 
-    def _solve_others(self) -> None:
+    def solve_others(self) -> None:
         """Answer the rows whose tensions the core did not prove optimal."""
         self._prove_without_core()
         exact = self.code.copy()
@@ -111,11 +116,11 @@ class InPlace:
         if not rows.size:
             return
         batch = solve_batch(
-            self.A[rows], self.w[rows], *self.bounds[:, rows], t_ref=self.t_ref[rows], length=self._lengths
+            self.A[rows], self.w[rows], *self.bounds[:, rows], t_ref=self.t_ref[rows], length=self.length
         )
         self.code[rows], self.tensions[rows], self.direction[rows] = batch.code, batch.tensions, batch.direction
         self._info[rows] = np.stack([batch.support, batch.shortfall], axis=1)
 
     def _problem(self, row: int) -> TensionProblem:
         given = (self.A[row], self.w[row], *self.bounds[:, row])
-        return TensionProblem(*given, t_ref=self.t_ref[row], length=float(self._lengths[0]))
+        return TensionProblem(*given, t_ref=self.t_ref[row], length=self.length)

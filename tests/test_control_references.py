@@ -6,9 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
 from towline.control.carrier_references import Freed
+from towline.control.trajectory import read_trajectory
 from towline.models import Dynamics, load
 from towline.simulation import simulate
-from towline.simulation.trajectory import read_trajectory
 
 RATE, PERIOD = 1.0, 1e-3  # [rad/s], [s]
 

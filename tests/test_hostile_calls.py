@@ -78,6 +78,7 @@ NOT_CALLED = {
     "Command",  # what an author of a controller gets and writes
     "Reference",
     "State",
+    "Stop",
     "Sweep",
     "TensionSolution",
     "evaluate",  # of a condition: `holds` checks the arguments and calls it
@@ -252,6 +253,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "load.name": lambda: ROBOT,
     "task": lambda: TASK,
     "time_along.task": lambda: {"path": LINE},
+    "plan": a_plan,
+    "references.start": lambda: 0.0,
     "start": lambda: None,
     "initial": lambda: None,
     "robust": lambda: None,

@@ -7,6 +7,7 @@ from scipy.optimize import linprog
 from towline import load, plan
 from towline.base.errors import InputError
 from towline.control import Command, ComputedTorque, Controller, State
+from towline.control.trajectory import read_trajectory
 from towline.core._core import sense, winch_lengths
 from towline.models import Dynamics, Robot
 from towline.ocp import Task
@@ -14,7 +15,6 @@ from towline.plant import Plant, layout
 from towline.simulation import simulate
 from towline.simulation.flights import report
 from towline.simulation.steps import steps_in
-from towline.simulation.trajectory import read_trajectory
 
 
 def planned(name, change, **task):

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "batch/batch.h"
 #include "python/arrays.h"
 #include "python/extension.h"
 
@@ -68,9 +69,11 @@ enum {
     MOST_PARTS = 1000000
 }; /* numbers of pose and velocity, and of these and the acceleration */
 
+enum { TENSIONS_OF_STATE = 4 }; /* place in its tuple */
+
 /* Put the pose and the velocity of all bodies in a state, and its tensions; return 0 with an exception if they do not fit. */
 static int put_state(PyObject *state, const towline_robot *robot, Py_ssize_t rows, double *measured, double *cables) {
-    enum { POSE, CARRIER_POSE = 2, TENSIONS = 4 };
+    enum { POSE, CARRIER_POSE = 2 };
     const Py_ssize_t c = robot->carriers, m = robot->cables, motions = MOTION * (1 + c);
     for (int order = 0; order < 2; order++) {
         double *motion = measured + 6 * order;
@@ -80,7 +83,7 @@ static int put_state(PyObject *state, const towline_robot *robot, Py_ssize_t row
             return 0;
         }
     }
-    PyObject *tensions = PyTuple_GetItem(state, TENSIONS);
+    PyObject *tensions = PyTuple_GetItem(state, TENSIONS_OF_STATE);
     return tensions == Py_None || put(tensions, rows, (place){cables, m * PER_CABLE, 0, PER_CABLE, 0, m});
 }
 
@@ -101,13 +104,17 @@ static int put_reference(PyObject *reference, const towline_robot *robot, Py_ssi
     return tensions == Py_None || put(tensions, rows, (place){t_ref, m, 0, 1, 0, m});
 }
 
+/* Whether state and reference are tuples as of control/state.py and control/reference.py. */
+static int are_given(PyObject *state, PyObject *reference) {
+    return PyTuple_Check(state) && PyTuple_Size(state) >= 5 && PyTuple_Check(reference) && PyTuple_Size(reference) >= 7;
+}
+
 PyObject *towline_py_control_take(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     enum { ROBOT, MEASURED, CABLES, REFERENCE, CARRIERS, T_REF, ALL };
     arrays given;
     PyObject *state = count > 1 ? arguments[0] : NULL, *reference = count > 1 ? arguments[1] : NULL;
-    if (!state || !PyTuple_Check(state) || PyTuple_Size(state) < 5 || !PyTuple_Check(reference) ||
-        PyTuple_Size(reference) < 7) {
+    if (!state || !are_given(state, reference)) {
         PyErr_SetString(PyExc_TypeError, "the function takes a state, a reference and arrays");
         return NULL;
     }
@@ -155,50 +162,151 @@ static int take_numbers(PyObject *const *arguments, Py_ssize_t count, int wanted
     return !PyErr_Occurred();
 }
 
-PyObject *towline_py_control_problem(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+/* The rows of problems of tension distribution in one block of memory, which solvers/in_place.py has as arrays. */
+typedef struct {
+    double *A, *w, *low, *high, *t_ref, *tensions, *direction, *info, *residual, *status;
+} problems;
+
+enum { WRENCH = 6, INFO = 2 };
+
+/* How many numbers the problem of one row has. */
+static Py_ssize_t numbers_of_problem(Py_ssize_t m) { return WRENCH * m + WRENCH + 4 * m + WRENCH + INFO + 2; }
+
+static problems problems_in(double *block, Py_ssize_t rows, Py_ssize_t m) {
+    problems at;
+    at.A = block;
+    at.w = at.A + rows * WRENCH * m;
+    at.low = at.w + rows * WRENCH;
+    at.high = at.low + rows * m;
+    at.t_ref = at.high + rows * m;
+    at.tensions = at.t_ref + rows * m;
+    at.direction = at.tensions + rows * m;
+    at.info = at.direction + rows * WRENCH;
+    at.residual = at.info + rows * INFO;
+    at.status = at.residual + rows;
+    return at;
+}
+
+/* Solve the problems of all rows; return how many are optimal. */
+static Py_ssize_t solve_all(problems at, Py_ssize_t rows, int m, double length, int in_lanes) {
+    const towline_batch batch = {
+        .n = WRENCH,
+        .m = m,
+        .A = {at.A, WRENCH * m},
+        .w = {at.w, WRENCH},
+        .t_min = {at.low, m},
+        .t_max = {at.high, m},
+        .t_ref = {at.t_ref, m},
+        .length = {&length, 0},
+        .tensions = at.tensions,
+        .direction = at.direction,
+        .info = at.info,
+        .residual = at.residual,
+        .status = at.status,
+    };
+    return towline_solve_batch(&batch, rows, in_lanes);
+}
+
+/* Take it that the command of the last step has acted since then, and was delivered if nothing is `sensed`. */
+static void hear_command(towline_cable_memory *cables, Py_ssize_t count, int sensed) {
+    for (Py_ssize_t i = 0; i < count; i++) {
+        cables[i].then = cables[i].last;
+        cables[i].measured = sensed ? cables[i].measured : cables[i].then;
+    }
+}
+
+/* The arrays of a step, after its numbers. */
+enum { ROBOT, CONTROLLER, LATE, MEASURED, REFERENCE, CARRIERS, CABLES, PLATFORM, MEMORY, PROBLEMS, STEP_ARRAYS };
+
+/* Update the memory of all rows, and write their problems. */
+static void write_problems(const towline_robot *robot, const towline_controller *controller, double dt, double since,
+                           Py_ssize_t rows, const arrays *given, problems at) {
+    const Py_ssize_t m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
+    double *const *of = given->of;
+    for (Py_ssize_t row = 0; row < rows; row++) {
+        const towline_row here = {
+            .measured = of[MEASURED] + row * motions,
+            .late = of[LATE] ? of[LATE] + row * motions : NULL,
+            .reference = of[REFERENCE] + row * ORDER,
+            .t_ref = at.t_ref + row * m,
+            .carriers = of[CARRIERS] ? of[CARRIERS] + row * c * ORDER : NULL,
+            .cables = (towline_cable_memory *)(void *)of[CABLES] + row * m,
+            .platform = (towline_platform_memory *)(void *)of[PLATFORM] + row,
+            .carrier_memory = of[MEMORY] ? (towline_carrier_memory *)(void *)of[MEMORY] + row * c : NULL,
+            .A = at.A + row * WRENCH * m,
+            .w = at.w + row * WRENCH,
+            .low = at.low + row * m,
+            .high = at.high + row * m,
+        };
+        towline_write_problem(robot, controller, dt, since, here);
+    }
+}
+
+/* Whether the arrays of a step fit the robot, of so many rows. */
+static int are_of_step(const arrays *given, const towline_robot *robot, const towline_controller *controller,
+                       Py_ssize_t rows) {
+    const Py_ssize_t m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
+    const Py_ssize_t sizes[STEP_ARRAYS] = {
+        0, 0, motions, motions, ORDER, ORDER * c, m * PER_CABLE, PER_PLATFORM, c * PER_CARRIER, numbers_of_problem(m),
+    };
+    int fits = have_rows(given, LATE, STEP_ARRAYS, rows, sizes);
+    for (int i = MEASURED; i < STEP_ARRAYS; i++) {
+        const int optional = i == CARRIERS || i == MEMORY;
+        fits = fits && (given->of[i] || (optional && !controller->reacts));
+    }
+    return fits;
+}
+
+PyObject *towline_py_control_step(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
-    enum { ROBOT, CONTROLLER, MEASURED, LATE, REFERENCE, T_REF, CARRIERS, CABLES, PLATFORM, MEMORY, A, W, BOUNDS, ALL };
+    enum { DT, SINCE, LENGTH, NUMBERS, SOLVES = NUMBERS, STATE, TAKEN, BEFORE };
     arrays given;
-    double times[2] = {0, 0};
-    Py_ssize_t cut = 0;
-    if (!take_numbers(arguments, count, 2, times) || !take(&given, arguments + 2, count - 2, ALL, CARRIERS)) {
+    double numbers[NUMBERS] = {0, 0, 0};
+    Py_ssize_t cut = 0, optimal = 0;
+    if (count != BEFORE + STEP_ARRAYS) {
+        PyErr_SetString(PyExc_TypeError, "the function takes three numbers, a flag, state, reference, and arrays");
+        return NULL;
+    }
+    const long solves = PyLong_AsLong(arguments[SOLVES]);
+    PyObject *state = arguments[STATE], *reference = arguments[TAKEN];
+    if (!take_numbers(arguments, count, NUMBERS, numbers) ||
+        !take(&given, arguments + BEFORE, count - BEFORE, STEP_ARRAYS, MEASURED)) {
         return NULL;
     }
     const towline_robot *robot = robot_of(&given);
     const towline_controller *controller = controller_of(&given);
     double *const *of = given.of;
-    int fits = robot && controller && of[MEASURED] && of[REFERENCE] && of[T_REF] && of[CABLES] && of[PLATFORM] &&
-               of[A] && of[W] && of[BOUNDS] && (!controller->reacts || (of[CARRIERS] && of[MEMORY]));
-    if (fits) {
-        const Py_ssize_t rows = given.size[W] / 6, m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
-        const Py_ssize_t sizes[ALL] = {
-            0, 0, motions, motions, ORDER, m, ORDER * c, m * PER_CABLE, PER_PLATFORM, c * PER_CARRIER, 6 * m, 6, 2 * m,
-        };
-        fits = have_rows(&given, MEASURED, ALL, rows, sizes);
-        Py_BEGIN_ALLOW_THREADS;
-        for (Py_ssize_t row = 0; fits && row < rows; row++) {
-            const towline_row here = {
-                .measured = of[MEASURED] + row * motions,
-                .late = of[LATE] ? of[LATE] + row * motions : NULL,
-                .reference = of[REFERENCE] + row * ORDER,
-                .t_ref = of[T_REF] + row * m,
-                .carriers = of[CARRIERS] ? of[CARRIERS] + row * c * ORDER : NULL,
-                .cables = (towline_cable_memory *)(void *)of[CABLES] + row * m,
-                .platform = (towline_platform_memory *)(void *)of[PLATFORM] + row,
-                .carrier_memory = of[MEMORY] ? (towline_carrier_memory *)(void *)of[MEMORY] + row * c : NULL,
-                .A = of[A] + row * 6 * m,
-                .w = of[W] + row * 6,
-                .low = of[BOUNDS] + row * m,
-                .high = of[BOUNDS] + (rows + row) * m,
-            };
-            towline_write_problem(robot, controller, times[0], times[1], here);
-            for (Py_ssize_t i = 0; i < m; i++) {
-                cut += here.cables[i].is_cut != 0;
-            }
-        }
-        Py_END_ALLOW_THREADS;
+    const Py_ssize_t rows = given.size[REFERENCE] / ORDER;
+    if (!robot || !controller || !are_of_step(&given, robot, controller, rows) ||
+        (state != Py_None && !are_given(state, reference))) {
+        return done(&given, 0);
     }
-    return number_done(&given, fits, (double)cut);
+    const Py_ssize_t m = robot->cables;
+    const problems at = problems_in(of[PROBLEMS], rows, m);
+    towline_cable_memory *cables = (void *)of[CABLES];
+    if (state != Py_None) {
+        if (!put_state(state, robot, rows, of[MEASURED], of[CABLES]) ||
+            !put_reference(reference, robot, rows, of[REFERENCE], of[CARRIERS], at.t_ref)) {
+            release(&given);
+            return NULL;
+        }
+        hear_command(cables, rows * m, PyTuple_GetItem(state, TENSIONS_OF_STATE) != Py_None);
+    }
+    Py_BEGIN_ALLOW_THREADS;
+    write_problems(robot, controller, numbers[DT], numbers[SINCE], rows, &given, at);
+    for (Py_ssize_t row = 0; row < rows; row++) {
+        at.status[row] = TOWLINE_UNSURE;
+    }
+    if (solves && m <= TOWLINE_CABLES) {
+        optimal = solve_all(at, rows, robot->cables, numbers[LENGTH], solves > 1);
+    }
+    for (Py_ssize_t i = 0; i < rows * m; i++) {
+        cut += cables[i].is_cut != 0;
+        cables[i].last = optimal == rows ? at.tensions[i] : cables[i].last;
+    }
+    Py_END_ALLOW_THREADS;
+    release(&given);
+    return Py_BuildValue("(nn)", cut, optimal);
 }
 
 PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {

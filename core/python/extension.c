@@ -61,11 +61,12 @@ static PyMethodDef functions[] = {
     {"control_take", (PyCFunction)(void (*)(void))towline_py_control_take, METH_FASTCALL,
      "control_take(state, reference, robot, measured, cables, wanted, carriers, t_ref)\n--\n\n"
      "Copy a state and a reference, arrays of float64, to where the other functions read them."},
-    {"control_problem", (PyCFunction)(void (*)(void))towline_py_control_problem, METH_FASTCALL,
-     "control_problem(dt, since, robot, controller, measured, late, wanted, t_ref, carriers, "
-     " cables, platform, memory, A, w, bounds)\n--\n\n"
-     "Update the memory of each row, and write the problem of tension distribution of this step; return how many "
-     "cables count as cut."},
+    {"control_step", (PyCFunction)(void (*)(void))towline_py_control_step, METH_FASTCALL,
+     "control_step(dt, since, length, solves, state, reference, robot, controller, late, measured, wanted, carriers, "
+     "cables, platform, memory, problems)\n--\n\n"
+     "Take a state and a reference unless they are None, update the memory of each row, write the problem of tension "
+     "distribution of this step, and solve it if `solves` is 1, or 2: in lanes. Return how many cables count as cut, "
+     "and how many rows are optimal."},
     {"control_thrusts", (PyCFunction)(void (*)(void))towline_py_control_thrusts, METH_FASTCALL,
      "control_thrusts(dt, robot, controller, measured, carriers, tensions, cables, platform, memory, turning, "
      "actuation)\n--\n\n"

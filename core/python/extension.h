@@ -35,7 +35,7 @@ PyObject *towline_py_horizon_solve(PyObject *module, PyObject *const *arguments,
 
 /* control.c */
 PyObject *towline_py_control_take(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
-PyObject *towline_py_control_problem(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_control_step(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_control_move_on(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 

@@ -14,13 +14,13 @@ from typing import NamedTuple, get_args
 import numpy as np
 
 from ...control import ComputedTorque
+from ...control.trajectory import read_trajectory
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...models.air import trapezoid
 from ...ocp.tasks.paths import CirclePath, Motion
 from ...simulation import Simulation, simulate
-from ...simulation.trajectory import read_trajectory
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim
 from .claims import claim

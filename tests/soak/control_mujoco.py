@@ -17,10 +17,10 @@ import numpy as np
 
 from towline.benchmarks.harness import head, row
 from towline.control import ANSWERS, ComputedTorque, Controller, Predictive, Reference
+from towline.control.trajectory import read_trajectory
 from towline.models import Robot, air, load
 from towline.models.dynamics import dynamics_of
 from towline.ocp import plan
-from towline.simulation.trajectory import read_trajectory
 from towline.solvers import solve_batch
 
 from .mujoco_plant import Hardware, World

@@ -1,11 +1,11 @@
-"""`Trajectory`: the reference of a simulation over time, from a plan, its file, a path or a pose."""
+"""`Trajectory`: the reference of a controller over time, from a plan, its file, a path or a pose."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from ..base.errors import InputError
 from ..base.inputs import file_path, number, real_array, shown
 from ..base.netcdf import load_netcdf, numbers_of
 from ..figures.outlines import outlines_from
-from ..models.parsing import validate
 from ..models.part import LARGEST
 from ..models.robot import Robot
 
@@ -55,21 +54,34 @@ class Trajectory(NamedTuple):
     doubt: str = ""
 
 
+class HasTrajectory(Protocol):
+    """An object with the samples of a motion: a `Plan`, a `Simulation` or a `Stop`."""
+
+    @property
+    def trajectory(self) -> xr.Dataset:
+        """Return the samples, as a plan's `trajectory` has them."""
+        ...
+
+
+def samples_of(name: str, given: object) -> xr.Dataset | None:
+    """Return the samples of a plan, also of one that is in a file; None if it has none.
+
+    Raises `InputError`, with the `name` of the argument, if no such file can be read.
+    """
+    samples: Any = _loaded(name, given) if isinstance(given, str | os.PathLike) else given
+    if not hasattr(samples, "data_vars"):
+        samples = getattr(given, "trajectory", None)
+    return samples if hasattr(samples, "data_vars") else None
+
+
 def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
     """Return `reference` as a trajectory.
 
     Raises `InputError` if it has another type, or belongs to another robot.
     """
-    if isinstance(reference, str | os.PathLike):
-        reference = _loaded(reference)
-    elif isinstance(reference, dict):
-        from ..ocp import Task
-
-        reference = validate({"path": reference}, Task, "reference").path
-    elif hasattr(reference, "trajectory"):
-        reference = reference.trajectory
-    if hasattr(reference, "data_vars"):
-        return _of_dataset(robot, reference)
+    samples = samples_of("reference", reference)
+    if samples is not None:
+        return _of_dataset(robot, samples)
     if callable(getattr(reference, "at", None)):
         return _of_path(robot, reference, duration)
     try:
@@ -81,15 +93,15 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
     return Trajectory(None, lambda times: (_still(times, pose), _still(times, robot.carrier_home)))
 
 
-def _loaded(file: str | os.PathLike[str]) -> xr.Dataset:
-    path = file_path("reference", file)
+def _loaded(name: str, file: str | os.PathLike[str]) -> xr.Dataset:
+    path = file_path(name, file)
     try:
         there = path.is_file()
     except OSError:  # too long for a file name
         there = False
     if not there:
-        raise InputError(f"reference must be {ACCEPTED}, got {shown(str(path))}: no such file")
-    return load_netcdf(path, f"reference must be {ACCEPTED}, got {shown(str(path))}")
+        raise InputError(f"{name} must be {ACCEPTED}, got {shown(str(path))}: no such file")
+    return load_netcdf(path, f"{name} must be {ACCEPTED}, got {shown(str(path))}")
 
 
 def _still(times: np.ndarray, pose: np.ndarray) -> Motion:

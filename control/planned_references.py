@@ -1,0 +1,84 @@
+"""References for each period of a controller: `references` from a plan, `references_at` from a trajectory."""
+
+import os
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.inputs import number, shown
+from ..models.dynamics import dynamics_of
+from ..models.parsing import parse_yaml
+from ..models.robot import Robot
+from ..solvers import solve_batch
+from .reference import Reference
+from .trajectory import HasTrajectory, Motion, Trajectory, read_trajectory, samples_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST = 1e6  # periods
+SOFT = 1e8  # weight of the wrench where no tensions give it
+
+
+def references(
+    plan: "HasTrajectory | xr.Dataset | str | os.PathLike[str]", period: float, start: float = 0.0
+) -> list[Reference]:
+    """Return the reference of each period of a plan, as `Predictive.follow` and a control loop take them.
+
+    The one of period k is that at the time start + k period; the last one is the first at or after the end.
+
+    Parameters
+    ----------
+    plan
+        A `Plan`, a `Stop`, another object with a `trajectory`, such a dataset, or the NetCDF file of one.
+    period
+        Period of the controller [s].
+    start
+        Time in the plan at which they begin [s].
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or value, or there are more than a million periods.
+    """
+    robot, trajectory, _ = planned(plan)
+    assert trajectory.duration is not None  # of samples
+    period, start = number("period", period, 1e-6, 1e3), number("start", start, 0.0, 1e9)
+    count = max(0.0, np.ceil((trajectory.duration - start) / period - 1e-9))
+    if count > MOST:
+        raise InputError(f"period must be such that there are at most {MOST:g} of them, got {period:g} s")
+    return references_at(robot, trajectory, start + period * np.arange(int(count) + 1))
+
+
+def planned(plan: "HasTrajectory | xr.Dataset | str | os.PathLike[str]") -> tuple[Robot, Trajectory, bool]:
+    """Return the robot of a plan, its trajectory, and whether it is feasible. Raises `InputError` if it is none."""
+    samples = samples_of("plan", plan)
+    if samples is None or "robot" not in samples.attrs:
+        raise InputError(f"plan must be a plan, its dataset or its NetCDF file, got {shown(plan)}")
+    robot = getattr(getattr(plan, "scenario", plan), "robot", None)
+    robot = robot if isinstance(robot, Robot) else _robot(str(samples.attrs["robot"]))
+    return robot, read_trajectory(robot, samples, None), samples.attrs.get("status") == "feasible"
+
+
+@lru_cache(maxsize=4)
+def _robot(text: str) -> Robot:
+    """Return the robot of a file's text, which takes longer to read than a stop to compute."""
+    return parse_yaml(text, Robot, "plan")
+
+
+def references_at(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> list[Reference]:
+    """Return a reference for each of the times (n,) [s]."""
+    platform, carriers = trajectory.at(times)
+    tensions = trajectory.tensions(times) if trajectory.tensions else _tensions_along(robot, platform, carriers)
+    rows = zip(*platform, *carriers, tensions, strict=True)
+    return [Reference(*row) for row in rows]
+
+
+def _tensions_along(robot: Robot, platform: Motion, carriers: Motion) -> np.ndarray:
+    """Return the smallest tensions for a reference, (n, m) [N]; where none exist, those with the closest wrench."""
+    dynamics, mask = dynamics_of(robot), robot.dof_mask
+    A = dynamics.wrench_matrix(platform[0], carriers[0]) * mask[:, None]
+    w = dynamics.required_wrench(*platform, *carriers) * mask
+    return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=SOFT).tensions

@@ -1,0 +1,165 @@
+"""Stops: on the path, inside the limits, as short as a linear program at each instant permits."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.optimize import linprog
+
+from towline import Dynamics, InputError, Robot, load, plan, simulate
+from towline.control import Stop, references, stop
+from towline.models.parsing import to_yaml
+
+PLANS = {
+    "cogiro": {"path": {"kind": "line", "start": [-3, -1, 1.5], "end": [3, 1, 2]}, "duration": 2.5},
+    "ipanema-2": {"path": {"kind": "circle", "centre": [0, 0, 2], "radius": 0.8, "rate": 0.8}},
+    "point-mass-3": {"path": {"kind": "line", "start": [-0.3, 0, 1], "end": [0.3, 0.2, 1.3]}, "duration": 1.2},
+}
+
+
+@pytest.fixture(scope="module", params=PLANS)
+def made(request):
+    robot = load(request.param)
+    found = plan(robot, {"name": "way", "margin": 1.0, **PLANS[request.param]})
+    assert found.feasible
+    return robot, found
+
+
+def has_tensions(robot, dynamics, reference):
+    """Ask a linear program whether tensions inside their limits give the wrench of a reference."""
+    mask = robot.dof_mask > 0
+    A = dynamics.wrench_matrix(reference.pose, reference.carrier_pose)[mask]
+    w = dynamics.required_wrench(reference.pose, reference.velocity, reference.acceleration)[mask]
+    scale = robot.wrench_scale[mask]
+    rows = np.hstack([np.vstack([A, -A]) * np.r_[scale, scale][:, None], -np.ones((2 * len(w), 1))])
+    bounds = [*zip(robot.t_min, robot.t_max, strict=True), (0, None)]
+    found = linprog(np.r_[np.zeros(robot.m), 1.0], rows, np.r_[w, -w] * np.r_[scale, scale], bounds=bounds)
+    return found.fun <= 1e-5 * robot.force_scale
+
+
+def test_stops_keep_the_path_and_the_limits_and_end_at_rest(made):
+    robot, found = made
+    dynamics, rng = Dynamics(robot), np.random.default_rng(3)
+    fine = np.stack([each.pose for each in references(found, 2e-4)])
+    for time in [0.0, *rng.uniform(0, found.duration, 12), found.duration, found.duration + 1]:
+        its = stop(found, time)
+        assert its.feasible
+        each = references(its, 1e-3)
+        for reference in each:
+            assert has_tensions(robot, dynamics, reference)
+            if its.ends <= found.duration:
+                assert np.linalg.norm(fine[:, :3] - reference.pose[:3], axis=1).min() <= 1e-3
+        assert (its.tensions >= robot.t_min - 1e-9).all()
+        assert (its.tensions <= robot.t_max + 1e-9).all()
+        first, last = references(found, 1e-3, start=min(time, found.duration))[0], each[-1]
+        np.testing.assert_allclose(each[0].pose, first.pose, atol=1e-9)
+        np.testing.assert_allclose(each[0].velocity, first.velocity, atol=1e-9)
+        np.testing.assert_allclose(last.velocity, 0.0, atol=1e-9)
+        np.testing.assert_allclose(last.acceleration, 0.0, atol=1e-9)
+
+
+def test_a_stop_is_nearly_as_short_as_linear_programs_permit():
+    robot, found = load("cogiro"), plan("cogiro", {"name": "way", **PLANS["cogiro"]})
+    dynamics, time = Dynamics(robot), 1.1
+    dense = references(found, 1e-3)
+    tau, rate, took, step = time, 1.0, 0.0, 0.01
+    while rate > 0:
+        here = dense[round(tau / 1e-3)]
+        still = np.zeros(6)
+        A = dynamics.wrench_matrix(here.pose, here.carrier_pose)
+        c = dynamics.required_wrench(here.pose, still, still)
+        a = dynamics.required_wrench(here.pose, still, here.velocity) - c
+        w = dynamics.required_wrench(here.pose, rate * here.velocity, rate**2 * here.acceleration)
+        bounds = [(None, None), *zip(robot.t_min, robot.t_max, strict=True)]
+        least = linprog(np.r_[1.0, np.zeros(robot.m)], A_eq=np.c_[-a, A], b_eq=w, bounds=bounds).fun
+        tau, rate, took = tau + step * rate, rate + step * least, took + step
+    assert took - step <= stop(found, time).duration <= 1.1 * took + 0.03
+
+
+SLING = {
+    "name": "sling",
+    "source": "made up",
+    "platform": {"mass": 10.0, "dof": ["x", "y", "z"], "home": [0, 0, -2, 0, 0, 0]},
+    "carriers": [{"name": "base", "kind": "ground"}],
+    "cables": [
+        {
+            "anchor": [float(np.cos(angle)), float(np.sin(angle)), 0.0],
+            "attachment": [0.0, 0.0, 0.0],
+            "carrier": "base",
+            "t_min": 1.0,
+            "t_max": 500.0,
+        }
+        for angle in 2 * np.pi * np.arange(3) / 3
+    ],
+}
+
+
+def spiral():
+    """Return a motion that swings around outside of the anchors, where it cannot rest, and then spirals in to rest."""
+    turn, end = np.sqrt(9.81 / 2.0), 24.0
+    t = np.arange(0.0, end + 1e-9, 0.002)
+    s = np.clip((t - 4) / (end - 6), 0, 1)
+    law = np.polyval([-20, 70, -84, 35, 0, 0, 0, 0], s)
+    radius = 1.4 * (1 - law)
+    pose = np.stack(
+        [radius * np.cos(turn * t), radius * np.sin(turn * t), np.full_like(t, -2.0), *np.zeros((3, len(t)))], 1
+    )
+    velocity = np.gradient(pose, t, axis=0, edge_order=2)
+    acceleration = np.gradient(velocity, t, axis=0, edge_order=2)
+    robot = Robot.model_validate(SLING)
+    still = np.zeros((len(t), 1, 6))
+    parts = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
+    variables = {name: (("time", "coordinate"), part) for name, part in parts.items()}
+    variables |= {f"carrier_{name}": (("time", "carrier", "coordinate"), still) for name in parts}
+    return robot, xr.Dataset(variables, {"time": t}, {"robot": to_yaml(robot)})
+
+
+def test_a_robot_that_cannot_rest_where_it_is_goes_on_to_where_it_can():
+    robot, motion = spiral()
+    dynamics = Dynamics(robot)
+    its = stop(motion, 2.0)
+    assert its.feasible
+    each = references(its, 5e-3)
+    assert all(has_tensions(robot, dynamics, reference) for reference in each)
+    assert np.linalg.norm(each[0].pose[:2]) == pytest.approx(1.4, abs=1e-3)
+    assert np.linalg.norm(each[-1].pose[:2]) < 0.7  # in the triangle of the anchors
+    np.testing.assert_allclose(each[-1].velocity, 0.0, atol=1e-9)
+
+
+def test_where_no_stop_is_possible_the_result_has_a_certificate():
+    _, motion = spiral()
+    its = stop(motion.isel(time=slice(0, 1500)), 2.5)  # ends while it swings, outside of the anchors
+    assert not its.feasible
+    assert its.certificate.shortfall > 0
+    assert "stop beyond limits" in str(its)
+
+
+def test_a_stop_is_simulated_as_a_plan_is(made):
+    robot, found = made
+    its = stop(found, 0.4 * found.duration)
+    assert isinstance(its, Stop)
+    run = simulate(robot, its, duration=its.duration + 0.5)
+    assert run.passed
+
+
+@pytest.mark.parametrize(
+    ("given", "time", "message"),
+    [
+        ("none.nc", 0.1, "plan must be a plan.*no such file"),
+        (7, 0.1, "plan must be a plan, its dataset or its NetCDF file, got 7"),
+        (None, -1.0, "time must be"),
+        (None, float("nan"), "time must be"),
+    ],
+)
+def test_wrong_arguments_are_one_line(given, time, message):
+    found = spiral()[1] if given is None else given
+    with pytest.raises(InputError, match=message) as error:
+        stop(found, time)
+    assert "\n" not in str(error.value)
+
+
+def test_flying_carriers_are_refused():
+    found = plan(
+        "wang-flying-quadrotor", {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1, "base": {"kind": "free"}}
+    )
+    with pytest.raises(InputError, match="carriers of kind ground, prescribed or mobile, got 'wang-flying-quadrotor'"):
+        stop(found, 0.5)
