@@ -37,6 +37,7 @@ from .plan import Plan
 from .proofs.durations import Durations, durations
 from .proofs.infeasible_ends import infeasible_ends
 from .search.homotopy import from_easier
+from .search.phase_durations import shortest_phases
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion, near_motion
 from .search.replanning import Replanner
@@ -170,7 +171,10 @@ class Planner(Displayed):
             If `progress` is not a function, or `start` does not fit.
         """
         check_progress(progress)
+        with heeding():
+            self.scenario, chosen = shortest_phases(self.scenario)
         self._search = search = Search(self.scenario, self._solvers, progress)
+        search.stages += [] if chosen is None else [chosen]
         with heeding():
             guess = None if start is None else deviation_from(self.scenario, start)
             plan = replace(_climb(search, guess, self._last), stages=tuple(search.stages))

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 
 from ...models.part import AT_ORIGIN, Inertia, Name, Part, Pose, Positive, Vector3, inertia_matrix
+from ...models.ranges import PositiveRange
 from .paths import RestPath, SequencePath, SinglePath
 from .paths.sequence import Piece, check_continuity, lasting
 
@@ -55,7 +56,11 @@ class Phase(Part):
 
     name: Name = Field(description="of the phase, in reports")
     path: SinglePath | None = Field(default=None, description="default: rest at the end of the previous phase")
-    duration: Positive | None = Field(default=None, description="[s], at least 0.01; default: the path's own")
+    duration: Positive | PositiveRange | None = Field(
+        default=None,
+        description="[s], at least 0.01; or a range {min, max}, of which the planner takes the shortest that is "
+        "feasible; default: the path's own",
+    )
     load: Load | None = Field(default=None, description="load fixed to the platform; default: none")
     ground: Ground | None = Field(
         default=None, description="the platform or its load rests on the ground; default: it hangs"
@@ -85,7 +90,8 @@ def path_of(phases: Sequence[Phase]) -> SequencePath:
         if phase.ground is not None and not isinstance(path, RestPath):
             raise ValueError(f"{key}.path must be of kind rest in a phase on the ground, got {path.kind}")
         try:
-            joined.append((path, lasting(path, phase.duration)))
+            longest = phase.duration.max if isinstance(phase.duration, PositiveRange) else phase.duration
+            joined.append((path, lasting(path, longest)))
         except ValueError as error:
             raise ValueError(f"{key}.{error}") from None
     check_continuity(joined, "phases")

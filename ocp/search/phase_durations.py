@@ -1,0 +1,89 @@
+"""Choose durations of phases from their ranges, each the shortest that is feasible: `shortest_phases`."""
+
+import time
+from collections.abc import Callable
+
+from ...base.errors import InputError
+from ...base.text import quantity
+from ...models.ranges import PositiveRange
+from ..audits.audit import audit
+from ..result import PlannerStep
+from ..tasks.lay_out import lay_out
+from ..tasks.lay_out_phases import LEAST_INSTANTS
+from ..tasks.paths import SequencePath
+from ..tasks.scenario import AUDIT_RATE, Scenario
+from ..tasks.task import Task
+
+LEAST = LEAST_INSTANTS / AUDIT_RATE  # [s], that a phase may last
+CLOSE = 1e-3  # relative: from the shortest duration that is feasible
+
+
+def shortest_phases(scenario: Scenario) -> tuple[Scenario, PlannerStep | None]:
+    """Return the scenario with a number for each duration of a phase, and the stage that chose them.
+
+    A phase is audited alone, at durations that double, and then halve the range in which the shortest lies. What its
+    neighbours require of it, such as loads that the ground takes up, is only known to the audit of the whole. A phase
+    that is not even feasible at its longest duration keeps this, and so do those left when the task's time limit has
+    passed.
+
+    Parameters
+    ----------
+    scenario
+        Of a task; without a range of a phase it is returned as it is.
+
+    Raises
+    ------
+    InputError
+        If a phase has a range although tube or base leave the motion free.
+    """
+    start, task = time.perf_counter(), scenario.task
+    ranged = [index for index, phase in enumerate(task.phases or ()) if isinstance(phase.duration, PositiveRange)]
+    if not ranged or task.phases is None:
+        return scenario, None
+    if scenario.count:
+        raise InputError(
+            f"task {task.name!r}: phases[{ranged[0]}].duration must be a number where tube or base leave the motion "
+            "free, got a range"
+        )
+    phases, message = list(task.phases), ""
+    for index in ranged:
+
+        def lasts(seconds: float, index: int = index) -> bool:
+            return audit(lay_out(scenario.robot, _alone(task, index, seconds)), None).passed
+
+        if time.perf_counter() - start > task.time_limit:
+            message, seconds = "time limit", phases[index].duration.max
+        else:
+            seconds = _shortest(phases[index].duration, lasts)
+        phases[index] = phases[index].model_copy(update={"duration": seconds})
+    chosen = lay_out(scenario.robot, task.model_copy(update={"phases": tuple(phases)}))
+    message = ", ".join(filter(None, [message, f"{quantity(chosen.duration, 's')} in all"]))
+    return chosen, PlannerStep("durations of phases", message, time.perf_counter() - start)
+
+
+def _shortest(of: PositiveRange, feasible: Callable[[float], bool]) -> float:
+    """Return the shortest feasible duration of a range [s], or its longest if that is not feasible either."""
+    low = min(max(of.min, LEAST), of.max)
+    high = min(2 * low, of.max)
+    if feasible(low):
+        return low
+    while not feasible(high):  # short motions are audited sooner
+        if high == of.max:
+            return high
+        low, high = high, min(2 * high, of.max)
+    while high > (1 + CLOSE) * low:
+        middle = (low * high) ** 0.5
+        low, high = (low, middle) if feasible(middle) else (middle, high)
+    return high
+
+
+def _alone(task: Task, index: int, seconds: float) -> Task:
+    """Return the task of one phase, with a duration [s]."""
+    assert task.phases is not None
+    assert isinstance(task.path, SequencePath)
+    phase = task.phases[index].model_copy(update={"duration": seconds, "path": task.path.parts[index].path})
+    ends = {
+        "initial": task.initial if index == 0 else None,
+        "final": task.final if index == len(task.phases) - 1 else None,
+    }
+    return task.model_copy(update={"phases": (phase,), **ends})
