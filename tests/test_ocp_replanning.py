@@ -219,7 +219,7 @@ def test_what_does_not_fit_is_one_line(change, message):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"final": {"velocity": [0] * 6}}, "final.velocity must be left out without final.pose"),
+        ({"final": {"acceleration": 0}}, "final.acceleration must be left out without final.pose or final.velocity"),
         ({"final": {"pose": [1, 0, 1, 0, 0, 0]}}, "final must have the x of the platform"),
         ({"final": {"carrier_pose": [[0] * 6] * 2}}, "final.carrier_pose must have a row"),
     ],

@@ -143,6 +143,12 @@ def _initial(audited: AuditedMotion) -> list[Excess]:
                     why = f"away from the {'given end' if end else 'measured start'}"
                     time = float(audited.times[end])
                     exceeded.append(Excess(name, about, time, worst, 0.0, unit, "exactly", why))
+    if task.final is not None and task.final.rests_anywhere:
+        kept = [at_rest_without_acceleration(audited.scenario.robot, None, i) for i in range(6)]
+        worst = float(np.abs(audited.motion.acceleration[-1, kept]).max())
+        if not worst <= END_ACCELERATION_TOLERANCE:
+            facts = (float(audited.times[-1]), worst, 0.0, "m/s^2, rad/s^2", "exactly", "at the end, at rest")
+            exceeded.append(Excess("final", "platform", *facts))
     return exceeded + _start_tensions(audited)
 
 
@@ -167,7 +173,8 @@ def _tube_ends(audited: AuditedMotion) -> list[Excess]:
     if word not in ("rest", "exact"):
         return []
     ends = [(0.0, 1.0)] if scenario.task.initial is None else []
-    ends += [(scenario.duration, -1.0)] if scenario.task.final is None or scenario.task.final.pose is None else []
+    final = scenario.task.final
+    ends += [(scenario.duration, -1.0)] if final is None or (final.pose is None and final.velocity is None) else []
     for end, inwards in ends:
         step = _end_step(audited, 0 if inwards > 0 else -1)
         places = _off_path(audited, end + inwards * step * np.arange(len(FIRST)))

@@ -57,6 +57,9 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
                 off = value[coordinate] - float(reference[order][end, coordinate])
                 turns = order == 0 and coordinate not in POSITION
                 yield FixedValue(end, column, order, remainder(off, 2 * np.pi) if turns else off)
+            halts = owner is None and end == -1 and task.final is not None and task.final.rests_anywhere
+            if halts and at_rest_without_acceleration(scenario.robot, owner, coordinate):
+                yield FixedValue(end, column, 2, -float(reference[2][end, coordinate]))
             if given:
                 continue
             if owner is None and rests and rests[end]:

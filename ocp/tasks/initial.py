@@ -1,14 +1,22 @@
 """`Initial` and `Final`: the measured state from which a motion starts, and the state in which it ends."""
 
 from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from ...base.errors import InputError
 from ...models import Robot
 from ...models.part import Finite, Part, Pose
 
 STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def _six_zeros(value: Any) -> Any:
+    return STILL if isinstance(value, int | float) and not isinstance(value, bool) and value == 0 else value
+
+
+OrZero = Annotated[Pose, BeforeValidator(_six_zeros, json_schema_input_type=Pose | Literal[0])]
 
 
 class _State(Part):
@@ -21,7 +29,9 @@ class _State(Part):
         pose, velocity, acceleration = rows if owner is None else [row and row[owner] for row in rows]
         if pose is not None:
             yield 0, pose
-            yield 1, STILL if velocity is None else velocity
+            velocity = STILL if velocity is None else velocity
+        if velocity is not None:
+            yield 1, velocity
             if acceleration is not None:
                 yield 2, acceleration
 
@@ -50,9 +60,17 @@ class Initial(_State):
 class Final(_State):
     """The state at the end of a motion, in {G}; given fields override `tube.ends` and `base.ends`."""
 
-    pose: Pose | None = Field(default=None, description="of the platform [m, rad]; default: as tube.ends requires")
-    velocity: Pose | None = Field(default=None, description="its time derivative; default: at rest, if pose is given")
-    acceleration: Pose | None = Field(default=None, description="the second one; default: as the planner chooses")
+    pose: Pose | None = Field(
+        default=None,
+        description="of the platform [m, rad]; default: anywhere in the tube if velocity is given, else as tube.ends "
+        "requires",
+    )
+    velocity: OrZero | None = Field(
+        default=None, description="its time derivative, or 0: at rest; default: at rest, if pose is given"
+    )
+    acceleration: OrZero | None = Field(
+        default=None, description="the second one, or 0; default: 0 at rest without a pose, else as the planner chooses"
+    )
     carrier_pose: tuple[Pose, ...] | None = Field(
         default=None, description="of each carrier [m, rad]; default: as base.ends requires"
     )
@@ -62,6 +80,11 @@ class Final(_State):
     carrier_acceleration: tuple[Pose, ...] | None = Field(
         default=None, description="of each carrier; default: as the planner chooses"
     )
+
+    @property
+    def rests_anywhere(self) -> bool:
+        """Return whether the platform comes to rest where the planner chooses."""
+        return self.pose is None and self.velocity == STILL and self.acceleration is None
 
 
 def check_ends(robot: Robot, initial: Initial | None, final: Final | None, frame: str, where: str) -> None:
@@ -88,9 +111,8 @@ def check_ends(robot: Robot, initial: Initial | None, final: Final | None, frame
                 )
             if state.carrier_pose is None:
                 raise InputError(f"{where}: {name}.{field} must be left out without {name}.carrier_pose")
-    for field in ("velocity", "acceleration"):
-        if final is not None and final.pose is None and getattr(final, field) is not None:
-            raise InputError(f"{where}: final.{field} must be left out without final.pose")
+    if final is not None and final.acceleration is not None and final.pose is None and final.velocity is None:
+        raise InputError(f"{where}: final.acceleration must be left out without final.pose or final.velocity")
     tensions = None if initial is None else initial.tensions
     if tensions is not None and len(tensions) != robot.m:
         raise InputError(

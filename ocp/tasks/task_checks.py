@@ -11,7 +11,7 @@ from ...models.part import COORDINATES
 from ...models.ranges import PositiveRange
 from ..limits.clearance import point_outside
 from ..limits.limits import Limits
-from .ends import carrier_ends
+from .ends import carrier_ends, platform_ends
 from .initial import Final, Initial, check_ends
 from .paths import WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, Scenario
@@ -56,6 +56,7 @@ def check_scenario(scenario: Scenario) -> None:
     for end, key, state in ((0, "initial", task.initial), (-1, "final", task.final)):
         if state is not None:
             _check_state(scenario, where, end, key, state)
+    _check_ends_of_range(scenario, where)
 
 
 def _check_frame(robot: Robot, task: Task, where: str) -> None:
@@ -203,6 +204,22 @@ def _check_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:
                         f"{where}: limits.keep_out {place.name!r} must leave all attachments outside by as much as "
                         f"cables, {place.cables:g} m, got {outside:.3g} m for cable {index + 1}"
                     )
+
+
+def _check_ends_of_range(scenario: Scenario, where: str) -> None:
+    """Refuse a free duration where the path moves, as fast as that allows, at an end with a given velocity."""
+    task = scenario.task
+    if scenario.duration_range is None or not scenario.platform_free:
+        return
+    velocity = scenario.references(np.array([0.0, scenario.duration]))[0].velocity
+    rests = platform_ends(task) == "rest"
+    for end, name, state in ((0, "start", task.initial), (-1, "end", task.final)):
+        given = rests if state is None else any(order for order, _ in state.of(None))
+        if given and np.abs(velocity[end]).max() > TOLERANCE:
+            raise InputError(
+                f"{where}: duration must be a number where a velocity is given at the {name} and the path moves there, "
+                "got a range; a line rests there with path.timing smooth, a circle moves"
+            )
 
 
 def _check_state(scenario: Scenario, where: str, end: int, key: str, state: Initial | Final) -> None:
