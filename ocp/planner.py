@@ -25,7 +25,7 @@ from ..base.inputs import number
 from ..base.text import quantity
 from ..models import Robot
 from ..models.files import as_robot
-from .audits.audit import audit, other_tensions_exist, other_tensions_may_pass
+from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
 from .audits.cost import cost
 from .audits.violation import relative_violation
 from .global_path.space import Space
@@ -36,6 +36,7 @@ from .nlp.solver import Progress, Solver, check_progress
 from .plan import Plan
 from .proofs.durations import Durations, durations
 from .proofs.infeasible_ends import infeasible_ends
+from .result import Relaxed
 from .search.homotopy import from_easier
 from .search.phase_durations import shortest_phases
 from .search.refinement import refine
@@ -43,6 +44,7 @@ from .search.relaxations import near_fixed_motion, near_motion
 from .search.replanning import Replanner
 from .search.search import Search
 from .search.start import deviation_from
+from .search.stronger_or_nearer import stronger_or_nearer
 from .search.time_law import BOUND, fastest
 from .search.uncertain_robots import for_robots, judged
 from .tasks.deviation import Deviation
@@ -282,7 +284,12 @@ def _fixed_motion(search: Search) -> Plan:
         chosen = _free_motion(search, None)
         return chosen if chosen.feasible and cost(chosen) < cost(plan) else plan
     left = _durations(search, search.scenario)
-    return replace(plan, offers=partial(near_fixed_motion, search, search.scenario, left, audit))
+    return replace(plan, offers=partial(_offers, search, search.scenario, left, audit))
+
+
+def _offers(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+    """Return feasible variations of a task that fixes the motion, or else of where it ends and of the robot."""
+    return near_fixed_motion(search, scenario, left, audit) or stronger_or_nearer(search, scenario, audit)
 
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:

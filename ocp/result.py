@@ -261,6 +261,8 @@ class Relaxed(Displayed):
         Value in the task, and the closest value with a known feasible plan.
     plan
         The plan of the varied task.
+    detail
+        What is said of it behind the value, such as the end of a shorter line; may be empty.
     """
 
     name: str
@@ -268,7 +270,14 @@ class Relaxed(Displayed):
     requested: float
     possible: float
     plan: Any  # a `Plan`, which is above this file
+    detail: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return {"name", "unit", "requested", "possible"} for JSON."""
-        return {"name": self.name, "unit": self.unit, "requested": self.requested, "possible": self.possible}
+        """Return {"name", "unit", "requested", "possible", "detail"} for JSON."""
+        return {
+            "name": self.name,
+            "unit": self.unit,
+            "requested": self.requested,
+            "possible": self.possible,
+            "detail": self.detail,
+        }

@@ -16,6 +16,7 @@ from .motion_facts import Fact, motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
 RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding
+LEVEL = 1e-3  # [rad]: of a smaller attitude nothing is said
 
 
 def headline(plan: PlanData) -> str:
@@ -35,6 +36,7 @@ def sections(plan: PlanData) -> list[Section]:
     titles = {"infeasible": "Why it is infeasible", "not-found": "What the closest motion violates"}
     every = [
         Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
+        Section("What you can try", [_relaxation(plan, relaxed) for relaxed in plan.relaxations]),
         Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
         Section("Active limits along the path (s = 0 at its start, 1 at its end)", _bottlenecks(plan)),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
@@ -183,6 +185,7 @@ def _reasons(plan: PlanData) -> list[Fact]:
         text, phase = certificate.text(_up(plan)), _in_phase(plan, certificate.time)
         facts += [
             ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}{phase}"),
+            ("pose", _pose_then(plan, certificate.time)),
             *([("wind", wind(certificate.wind))] if certificate.wind is not None else []),
             ("direction", text.along),
             ("needed", text.needed),
@@ -191,11 +194,20 @@ def _reasons(plan: PlanData) -> list[Fact]:
             ("limits", _bounds(plan, certificate) or text.limits),
         ]
     facts += [("limit exceeded", f"{excess}{_in_phase(plan, excess.time)}") for excess in plan.audit.excess]
-    return facts + [_relaxation(plan, relaxed) for relaxed in plan.relaxations]
+    return facts
+
+
+def _pose_then(plan: PlanData, time: float | None) -> str:
+    """Return where the platform is at a time, and its attitude if it is not level."""
+    row = int(np.argmin(np.abs(plan.audit.times - (0.0 if time is None else time))))
+    pose = plan.audit.motion.pose[row]
+    place = f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(pose[:3], 6))}) m"
+    turned = ", ".join(f"{np.rad2deg(value) + 0.0:.3g}" for value in np.round(pose[3:], 6))
+    return place if np.abs(pose[3:]).max() < LEVEL else f"{place}, roll, pitch, yaw ({turned}) degrees"
 
 
 def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
-    fact = f"{quantity(relaxed.possible, relaxed.unit)} (audited)"
+    fact = f"{quantity(relaxed.possible, relaxed.unit)}{relaxed.detail and f' {relaxed.detail}'} (audited)"
     if relaxed.name == "duration":
         longer = relaxed.possible > relaxed.requested
         side, other = ("shortest", "; `towline time` computes the fastest time law") if longer else ("longest", "")

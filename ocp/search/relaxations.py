@@ -75,11 +75,11 @@ def _other_duration(search: Search, scenario: Scenario, left: Durations | None, 
     if left is not None:
         near = min(max(near, LONGER * left.shortest), left.longest / LONGER)
     for _ in range(TRIES):
-        factor = max((_slower(excess) for excess in audit.excess), default=1.0)
+        factor = max((slower(excess) for excess in audit.excess), default=1.0)
         near = max(near, LONGER * factor * lasts) if factor > 1 else near
         if near == lasts:  # no duration changes what is exceeded, and this one is audited
             return []
-        lasts = near = _rounded(near, up=near >= requested)
+        lasts = near = rounded(near, up=near >= requested)
         if (left is not None and not left.shortest <= near <= left.longest) or near > LONGEST * requested:
             return []
         longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
@@ -92,7 +92,7 @@ def _other_duration(search: Search, scenario: Scenario, left: Durations | None, 
     return []
 
 
-def _slower(excess: Excess) -> float:
+def slower(excess: Excess) -> float:
     """Return the factor of the duration that brings a speed or an acceleration to its bound; 1 for other limits."""
     if not excess.bound or not excess.value / excess.bound > 1:
         return 1.0
@@ -133,7 +133,7 @@ def _other_limits(
             middle = (low + high) / 2
             _, tried = _audited(search, scenario, given | {"margin": middle}, deviation)
             low, high = (middle, high) if tried.passed else (low, middle)
-        changes["margin"] = Change("margin", "N", least, _rounded(low, up=False))
+        changes["margin"] = Change("margin", "N", least, rounded(low, up=False))
         looser, audit = _audited(search, scenario, given | {"margin": changes["margin"].possible}, deviation)
     plan = Plan(looser, MotionStatus.FEASIBLE, deviation, audit, 0.0, 0.0)
     return [Relaxed(*change, plan) for change in changes.values()]
@@ -182,7 +182,7 @@ def _longer_duration(search: Search) -> list[Relaxed]:
     for attempt in range(TRIES):
         if not outcome.success:
             break
-        near = _rounded(LONGER_CHOSEN * max(outcome.duration, requested), up=True)
+        near = rounded(LONGER_CHOSEN * max(outcome.duration, requested), up=True)
         mesh = Mesh(task.steps * 2**attempt, shrink=SHRINK * (1 + attempt))
         longer = lay_out(scenario.robot, task.model_copy(update={"duration": near}))
         outcome = _solved(search, longer, outcome.deviation.stretched(near / outcome.duration), mesh)
@@ -200,7 +200,7 @@ def _solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: M
     return beside.solve("program of a relaxation", mesh, guess)
 
 
-def _rounded(value: float, up: bool) -> float:
+def rounded(value: float, up: bool) -> float:
     """Return a number of as many digits as reports print, on the side that keeps what it is for."""
     if not value:
         return value
@@ -226,7 +226,7 @@ def _audited(
 def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond: float) -> Change | None:
     """Return the change of a task's field that accepts an excess, made in `given`; None if there is no such field."""
     limits, above = given["limits"], excess.value > excess.bound
-    value = _rounded(excess.value + beyond * (excess.value - excess.bound), above)
+    value = rounded(excess.value + beyond * (excess.value - excess.bound), above)
     name, bound = f"limits.{excess.limit}", limits.get(excess.limit)
     if excess.limit == "tube.position":
         given["tube"]["position"], name = value, excess.limit

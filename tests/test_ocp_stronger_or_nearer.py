@@ -1,0 +1,76 @@
+"""Advice where no duration is feasible: a nearer end, a lighter platform, stronger cables; each is planned."""
+
+import numpy as np
+import pytest
+
+from towline import Robot, load, plan
+
+WAYS = {
+    "beyond the frame": ("cogiro", [0, 0, 2], [9, 0, 2], {}),
+    "too high": ("ipanema-2", [0, 0, 2], [0.4, 0.3, 4.4], {}),
+    "too high, too fast": ("cogiro", [-3, -2, 1], [3, 2, 5.5], {"limits": {"cable_speed": 2}}),
+    "a point mass": ("point-mass-3", [0, 0, 1], [1.5, 0.5, 1], {}),
+}
+
+
+@pytest.fixture(scope="module", params=WAYS)
+def refused(request):
+    name, start, end, others = WAYS[request.param]
+    task = {"name": "way", "path": {"kind": "line", "start": start, "end": end}, "duration": 5, "margin": 1} | others
+    found = plan(name, task)
+    assert not found.feasible
+    return found
+
+
+def test_there_is_advice_and_all_of_it_is_feasible_when_planned_anew(refused):
+    assert refused.relaxations
+    for offer in refused.relaxations:
+        assert offer.plan.feasible
+        varied = offer.plan.scenario
+        robot = Robot.model_validate(varied.robot.model_dump())
+        again = plan(robot, varied.task.model_dump())
+        assert again.feasible
+        value = {
+            "length of the line": lambda task=varied.task: np.linalg.norm(
+                np.subtract(task.path.end, task.path.start)[:3]
+            ),
+            "platform.mass": lambda robot=robot: robot.platform.mass,
+            "cables.t_max": lambda robot=robot: robot.t_max.max(),
+        }[offer.name]()
+        assert value == pytest.approx(offer.possible, rel=2e-3)
+
+
+def test_a_nearer_end_is_nearly_the_farthest(refused):
+    offer = next(each for each in refused.relaxations if each.name == "length of the line")
+    path, task = refused.scenario.task.path, offer.plan.scenario.task
+    way = np.subtract(path.end, path.start)
+    farther = np.array(path.start) + way * min(1.15 * offer.possible / np.linalg.norm(way[:3]), 1.0)
+    longer = task.model_copy(update={"path": path.model_copy(update={"end": tuple(farther)})})
+    assert not plan(offer.plan.scenario.robot, longer).feasible
+
+
+def test_the_report_says_what_can_be_tried_and_where_it_fails(refused):
+    text = refused.report()
+    assert "What you can try" in text
+    assert f"feasible {refused.relaxations[0].name}" in text
+    assert refused.relaxations[0].detail in text
+    row = int(np.argmin(np.abs(refused.audit.times - refused.certificate.time)))
+    x = refused.audit.motion.pose[row, 0]
+    assert f"({round(x, 6) + 0.0:.4g}, " in text
+    assert refused.to_dict()["relaxations"][0]["detail"] == refused.relaxations[0].detail
+
+
+def test_a_load_that_is_too_heavy_has_the_heaviest_that_is_not():
+    robot = load("cogiro")
+    data = robot.model_dump()
+    data["platform"] |= {"mass": 3000.0}
+    found = plan(
+        Robot.model_validate(data), {"path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 3]}, "duration": 6}
+    )
+    assert not found.feasible
+    mass = next(each for each in found.relaxations if each.name == "platform.mass")
+    strength = next(each for each in found.relaxations if each.name == "cables.t_max")
+    data["platform"] |= {"mass": 1.05 * mass.possible}
+    assert not plan(Robot.model_validate(data), found.scenario.task).feasible
+    assert 91 < mass.possible < 3000
+    assert robot.t_max.max() < strength.possible < 3000 / mass.possible * 1.2 * robot.t_max.max()
