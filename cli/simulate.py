@@ -75,8 +75,8 @@ EventOption = Annotated[
         "--fault",
         metavar="EVENT",
         help="Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
-        "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s). Repeat the "
-        "option for more.",
+        "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'stop at 3' "
+        "(the reference stops on its path). Repeat the option for more.",
     ),
 ]
 DurationOption = Annotated[

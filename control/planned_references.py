@@ -43,7 +43,7 @@ def references(
     InputError
         If an argument has a wrong type or value, or there are more than a million periods.
     """
-    robot, trajectory, _ = planned(plan)
+    robot, trajectory = planned(plan)
     assert trajectory.duration is not None  # of samples
     period, start = number("period", period, 1e-6, 1e3), number("start", start, 0.0, 1e9)
     count = max(0.0, np.ceil((trajectory.duration - start) / period - 1e-9))
@@ -52,14 +52,14 @@ def references(
     return references_at(robot, trajectory, start + period * np.arange(int(count) + 1))
 
 
-def planned(plan: "HasTrajectory | xr.Dataset | str | os.PathLike[str]") -> tuple[Robot, Trajectory, bool]:
-    """Return the robot of a plan, its trajectory, and whether it is feasible. Raises `InputError` if it is none."""
+def planned(plan: "HasTrajectory | xr.Dataset | str | os.PathLike[str]") -> tuple[Robot, Trajectory]:
+    """Return the robot of a plan, and its trajectory. Raises `InputError` if it is none."""
     samples = samples_of("plan", plan)
     if samples is None or "robot" not in samples.attrs:
         raise InputError(f"plan must be a plan, its dataset or its NetCDF file, got {shown(plan)}")
     robot = getattr(getattr(plan, "scenario", plan), "robot", None)
     robot = robot if isinstance(robot, Robot) else _robot(str(samples.attrs["robot"]))
-    return robot, read_trajectory(robot, samples, None), samples.attrs.get("status") == "feasible"
+    return robot, read_trajectory(robot, samples, None)
 
 
 @lru_cache(maxsize=4)

@@ -141,17 +141,22 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     InputError
         If an argument has a wrong type or value, or the robot has flying carriers, whose thrust no facet bounds.
     """
-    robot, trajectory, feasible = planned(plan)
-    if not feasible:  # its tensions say nothing of the wind
-        trajectory = trajectory._replace(tensions=None)
-    trajectory = _continued(trajectory, trajectory.duration or 0.0)
-    begins = min(number("time", time, 0.0, 1e9), trajectory.duration or 0.0)
+    robot, trajectory = planned(plan)
+    return stop_along(robot, trajectory, number("time", time, 0.0, 1e9))
+
+
+def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
+    """Stop as `stop` does, on a trajectory with a duration. Raises `InputError` if the robot has flying carriers."""
     for carrier in robot.carriers:
         if carrier.efforts:
             raise InputError(
-                "plan must be of a robot with carriers of kind ground, prescribed or mobile, got "
+                "a stop must be of a robot with carriers of kind ground, prescribed or mobile, got "
                 f"{robot.name!r} with {carrier.name!r} of kind {carrier.kind}"
             )
+    end = trajectory.duration or 0.0
+    if not trajectory.is_feasible:  # its tensions say nothing of the wind
+        trajectory = trajectory._replace(tensions=None)
+    trajectory, begins = _continued(trajectory, end), min(time, end)
     best: tuple[tuple[int, float], Stop] | None = None
     for reserve, goes_on in ATTEMPTS:
         law = _with_middles(_braking(_Limits(robot, trajectory, begins, reserve, goes_on)))

@@ -45,6 +45,8 @@ class Trajectory(NamedTuple):
         For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
     doubt
         Row of the report that says that the reference is a plan with a broken limit; empty if it is not.
+    is_feasible
+        Whether it is a feasible plan: its tensions then give what the motion needs, in its wind.
     """
 
     duration: float | None
@@ -52,6 +54,7 @@ class Trajectory(NamedTuple):
     tensions: Callable[[np.ndarray], np.ndarray] | None = None
     keep_out: Sequence[Sequence[np.ndarray]] = ()
     doubt: str = ""
+    is_feasible: bool = False
 
 
 class HasTrajectory(Protocol):
@@ -173,7 +176,7 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     def tensions(times: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
-    return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt)
+    return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt, dataset.attrs.get("status") == "feasible")
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

@@ -28,7 +28,8 @@ class Conditions(Displayed):
         Sensor noise, a `Noise` or a mapping (default: none).
     events
         Events, a string each: "cut 3 at 2.5", cable 3 breaks (counted from 1; times in [s]); "stick 2 at 1", its winch
-        stops; "lose quad-1 at 2", the actuators of a carrier stop; "miss 0.05 at 1.2", the controller does not respond.
+        stops; "lose quad-1 at 2", the actuators of a carrier stop; "miss 0.05 at 1.2", the controller does not respond;
+        "stop at 3", the reference stops on its path as `control.stop` does.
     disturbance
         Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
     duration

@@ -11,7 +11,7 @@ from .data import SimulationData
 class Event(NamedTuple):
     """An event at a time [s].
 
-    Its kind is "fault", "slack", "tension", "error" or "end".
+    Its kind is "fault" (also of a stop), "slack", "tension", "error" or "end".
     """
 
     at: float
@@ -53,4 +53,6 @@ def _words(fault: Any, flight: SimulationData) -> str:
         return f"the winch of cable {fault.part + 1} stuck"
     if fault.kind == "lose":
         return f"the actuators of {flight.robot.carriers[fault.part].name} were lost"
+    if fault.kind == "stop":
+        return "the reference began to stop"
     return f"the controller missed {quantity(fault.lasting, 's')}"

@@ -1,4 +1,4 @@
-"""`Fault`: a fault during a simulation, from a string such as "cut 3 at 2.5"."""
+"""`Fault`: a fault or a stop during a simulation, from a string such as "cut 3 at 2.5"."""
 
 import re
 from collections.abc import Sequence
@@ -8,8 +8,11 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from ..models.robot import Robot
 
-ACCEPTED = "'cut CABLE at SECONDS', 'stick CABLE at SECONDS', 'lose CARRIER at SECONDS' or 'miss DURATION at SECONDS'"
-_FORM = re.compile(r"(cut|stick|lose|miss)\s+(\S+)\s+at\s+(\S+)")
+ACCEPTED = (
+    "'cut CABLE at SECONDS', 'stick CABLE at SECONDS', 'lose CARRIER at SECONDS', 'miss DURATION at SECONDS' or "
+    "'stop at SECONDS'"
+)
+_FORM = re.compile(r"(?:(cut|stick|lose|miss)\s+(\S+)|(stop))\s+at\s+(\S+)")
 
 
 class Fault(NamedTuple):
@@ -19,11 +22,11 @@ class Fault(NamedTuple):
     ----------
     kind
         "cut": a cable breaks; "stick": its winch holds its length; "lose": the actuators of a carrier stop, such as the
-        thrust of a quadrotor; "miss": the controller does not respond.
+        thrust of a quadrotor; "miss": the controller does not respond; "stop": the reference stops.
     at
         Time at which it begins [s].
     part
-        Index of the cable or, for "lose", of the carrier, from 0; -1 for "miss".
+        Index of the cable or, for "lose", of the carrier, from 0; -1 for "miss" and "stop".
     lasting
         Time during which the controller does not respond [s].
     """
@@ -42,7 +45,8 @@ def read_faults(robot: Robot, faults: Sequence[str], duration: float, name: str 
     robot
         The robot. In `faults` its cables count from 1, and its carriers are named.
     faults
-        Strings: "cut 3 at 2.5", "stick 2 at 1", "lose quad-1 at 2", "miss 0.05 at 1.2" (times in [s]).
+        Strings: "cut 3 at 2.5", "stick 2 at 1", "lose quad-1 at 2", "miss 0.05 at 1.2", "stop at 3" (times in
+        [s]).
     duration
         Simulated time [s]; faults must begin before its end.
     name
@@ -64,8 +68,10 @@ def _read(robot: Robot, text: object, where: str) -> Fault:
     match = _FORM.fullmatch(text.strip()) if isinstance(text, str) else None
     if match is None:
         raise InputError(f"{where} must be {ACCEPTED}, got {shown(text)}")
-    kind, what, when = match.groups()
+    kind, what, stops, when = match.groups()
     at = _seconds(where, when)
+    if stops:
+        return Fault(stops, at)
     if kind == "miss":
         return Fault(kind, at, lasting=_seconds(where, what))
     if kind == "lose":

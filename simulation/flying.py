@@ -100,7 +100,7 @@ def fly(
                 silent_until = max(silent_until, fault.at + fault.lasting)
             elif fault.kind == "lose":
                 periods.lose(fault.part)
-            else:
+            elif fault.kind != "stop":  # which the references have
                 states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.part)
         sense(plant.record, states, motions, lengths)
         reported = sensors.report(k, motions, pulls)

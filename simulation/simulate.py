@@ -14,9 +14,10 @@ from typing_extensions import Unpack
 from ..base.errors import InputError
 from ..base.execution import Execution, ExecutionOptions
 from ..base.inputs import required, shown, whole_number, with_fields
-from ..control import ComputedTorque, Controller
+from ..control import ComputedTorque, Controller, Reference
 from ..control.planned_references import references_at
-from ..control.trajectory import read_trajectory
+from ..control.stops import Stop, stop_along
+from ..control.trajectory import Trajectory, read_trajectory
 from ..models.files import as_robot
 from ..models.parsing import validate
 from ..models.robot import Robot
@@ -24,7 +25,7 @@ from ..plant import Plant
 from .command_conversion import Orders
 from .conditions import Conditions
 from .experiment import Experiment
-from .faults import read_faults
+from .faults import Fault, read_faults
 from .flights import flights
 from .flying import fly
 from .record import Record
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LONGEST = 1e6  # periods of one flight
+BEYOND = "a stop that needs tensions beyond their limits"
 MOST_RUNS = 10_000_000
 
 
@@ -185,17 +187,34 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
     if periods > LONGEST:
         raise InputError(f"duration must be at most {LONGEST:g} periods of {period:g} s, got {lasting:g} s")
     plant = Plant(robot, drive=_drive(robot) if meets.drive is None else meets.drive)
+    faults = read_faults(robot, meets.events, periods * period, events)
+    halt = _stop(robot, trajectory, faults)
     return plant, Experiment(
         period=period,
         substeps=meets.substeps or steps_in(period, plant),
-        references=references_at(robot, trajectory, period * np.arange(periods)),
+        references=_references(robot, trajectory, period * np.arange(periods), halt),
         wind=read_wind(robot, meets.wind, meets.gusts),
         disturbance=meets.disturbance,
         noise=required("noise", meets.noise, Noise),
-        faults=read_faults(robot, meets.events, periods * period, events),
+        faults=faults,
         keep_out=trajectory.keep_out,
-        doubt=trajectory.doubt,
+        doubt=trajectory.doubt or ("" if halt is None or halt.feasible else BEYOND),
     )
+
+
+def _stop(robot: Robot, trajectory: Trajectory, faults: Sequence[Fault]) -> Stop | None:
+    """Return the stop of the first event of that kind; None if there is none, or if the reference is a pose."""
+    begins = next((fault.at for fault in faults if fault.kind == "stop"), None)
+    return None if begins is None or trajectory.duration is None else stop_along(robot, trajectory, begins)
+
+
+def _references(robot: Robot, trajectory: Trajectory, times: np.ndarray, halt: Stop | None) -> list[Reference]:
+    """Return the reference at each of the times (n,) [s]."""
+    if halt is None:
+        return references_at(robot, trajectory, times)
+    after = times > halt.begins
+    stopping = read_trajectory(robot, halt, None)
+    return references_at(robot, trajectory, times[~after]) + references_at(robot, stopping, times[after] - halt.begins)
 
 
 def _drive(robot: Robot) -> str:

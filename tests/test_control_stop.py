@@ -141,6 +141,26 @@ def test_a_stop_is_simulated_as_a_plan_is(made):
     assert run.passed
 
 
+def test_a_simulation_stops_at_an_event(made):
+    robot, found = made
+    at = 0.4 * found.duration
+    run = simulate(robot, found, events=[f"stop at {at:.6f}"])
+    assert run.passed
+    its = stop(found, at)
+    last = run.references[-1]
+    np.testing.assert_allclose(last.pose, its.platform[0][-1], atol=1e-6)
+    np.testing.assert_allclose(last.velocity, 0.0, atol=1e-9)
+    assert "the reference began to stop" in run.report()
+    both = simulate(robot, found, events=[f"stop at {at:.6f}"], runs=2)
+    assert both["passed"].values.all()
+
+
+def test_a_stop_beyond_limits_is_said_in_the_report():
+    robot, motion = spiral()
+    run = simulate(robot, motion.isel(time=slice(0, 1500)), events=["stop at 2.5"], drive="tensions")
+    assert "a stop that needs tensions beyond their limits" in run.report()
+
+
 @pytest.mark.parametrize(
     ("given", "time", "message"),
     [
