@@ -192,7 +192,7 @@ class ComputedTorque(Controller):
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
         self._paused = False  # whether the integral of a row does
         self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
-        self._is_as_planned = self._as_planned[0] if rows else None, NOWHERE, NOTHING
+        self._is_as_planned: tuple[Any, np.ndarray, np.ndarray] = (np.int8(PLANNED), NOWHERE, NOTHING)
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
@@ -217,7 +217,8 @@ class ComputedTorque(Controller):
             if self._is_plain and self._is_one and not self._has_cut:  # the rest, at a fifth of the time
                 tensions = problems.tensions[0].copy()
                 self._last = tensions.tobytes()
-                self._accelerations = memoryview(reference.carrier_acceleration).tobytes()
+                ordered: Any = reference.carrier_acceleration  # any array that the core can read
+                self._accelerations = memoryview(ordered).tobytes()
                 return Command(tensions, *reference[3:6], *self._is_as_planned)
             tensions, answered = problems.tensions.copy(), self._as_planned
         else:
@@ -252,7 +253,7 @@ class ComputedTorque(Controller):
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
         self._senses = state.tensions is not None
-        seen = time if state.time is None else self._time_of(state, time)
+        seen = time if state.time is None else self._time_of(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
         own = self._robot, self._settings
         if time - seen <= ROUNDING and since == dt:
@@ -273,11 +274,12 @@ class ComputedTorque(Controller):
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
 
-    def _time_of(self, state: State, time: float) -> float:
+    @staticmethod
+    def _time_of(seen: Any, time: float) -> float:
         """Return when a state was measured, if that is a time up to the step's [s]."""
-        if not is_time(state.time) or not float(state.time) <= time + ROUNDING:
-            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(state.time)}")
-        return float(state.time)
+        if not is_time(seen) or not float(seen) <= time + ROUNDING:
+            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
+        return float(seen)
 
     def _remember(self, time: float, dt: float) -> None:
         """Add the command that has acted since the last step to those that states may be too old to show."""

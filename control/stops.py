@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 STEP = 0.008  # [s] between two instants of a stop, in which u is linear
+PARTS = 8  # of a step, between which a stop is audited and given
 FASTEST = 0.5 / STEP  # [1/s], of u
 WINDOW, INSTANTS = 0.8, 80  # [s] of the plan that limits are computed for at once, and at how many instants
 LEVELS = np.linspace(0.0, 1.0, 65)  # of r^2, at which is asked how slow a stop may become
@@ -46,9 +47,9 @@ LITTLE = 1e-3  # of the robot's forces: a wrench that is missed by less matters 
 ROOM = 1.0  # [1/s], between the least and the largest u
 LONGEST = 60.0  # [s]
 STILL = 1e-9  # of the rate
+RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
 FLAT = 1e-12  # of the robot's forces: a facet along which u changes less does not bound it
 MISSING = 1e-7  # of the robot's forces: a wrench that is missed by less is given
-WIND = 1e-3  # of the robot's forces: what planned tensions give beside the motion's wrench, if it is more
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,12 +155,10 @@ def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
                 f"{robot.name!r} with {carrier.name!r} of kind {carrier.kind}"
             )
     end = trajectory.duration or 0.0
-    if not trajectory.is_feasible:  # its tensions say nothing of the wind
-        trajectory = trajectory._replace(tensions=None)
     trajectory, begins = _continued(trajectory, end), min(time, end)
     best: tuple[tuple[int, float], Stop] | None = None
     for reserve, goes_on in ATTEMPTS:
-        law = _with_middles(_braking(_Limits(robot, trajectory, begins, reserve, goes_on)))
+        law = _refined(_braking(_Limits(robot, trajectory, begins, reserve, goes_on)))
         missing, found = _audited(robot, trajectory, law)
         if found.feasible:
             return found
@@ -173,7 +172,7 @@ def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
 def _continued(trajectory: Trajectory, end: float) -> Trajectory:
     """Return a trajectory that goes on after its end with its last acceleration, unless the robot rests there."""
     last = trajectory.at(np.array([end]))
-    if not any(motion[1].any() for motion in last):
+    if max(np.abs(motion[1]).max() for motion in last) < RESTS:
         return trajectory
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
@@ -250,7 +249,8 @@ class _Limits:
         least, most = self._rows.of(slice(k, k + 2)).range_of(np.full(2, rate * rate))
         low, high = float(least.max()), float(most.min())
         if low > high:  # none is possible: of those between, the one nearest to the rate of now
-            return (min(max(0.0, high), low),) * 2
+            u = min(max(0.0, high), low)
+            return u, u
         floor = float(self._lowest[k + 2])
         if floor > 0:  # reached in time, from one to two instants before
             low = min(max(low, (floor - rate * rate) / (2 * self._apart * (k + 2 - place))), high)
@@ -298,10 +298,11 @@ def _bounds(robot: Robot, trajectory: Trajectory, tau: np.ndarray, reserve: floa
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     scale, still = robot.wrench_scale[rows], np.zeros_like(platform[0])
     whole = dynamics.wrench_matrix(platform[0], carriers[0])
-    c = dynamics.required_wrench(platform[0], still, still)
-    a = dynamics.required_wrench(platform[0], still, platform[1]) - c
-    b = dynamics.required_wrench(*platform) - c
-    c = c + _unplanned(robot, trajectory, tau, whole, b + c)
+    c, a, b = (
+        dynamics.required_wrench(platform[0], *motion, wind=trajectory.wind)
+        for motion in ((still, still), (still, platform[1]), platform[1:])
+    )
+    a, b = a - c, b - c
     available = facets(whole[:, rows] * scale[:, None], robot.t_min, robot.t_max)
     a, b, c = (np.einsum("nki,ni->nk", available.normals, part[:, rows] * scale) for part in (a, b, c))
     a[np.abs(a) < FLAT * robot.force_scale] = np.nan
@@ -315,15 +316,6 @@ def _bounds(robot: Robot, trajectory: Trajectory, tau: np.ndarray, reserve: floa
     v, g = (part[:, limited, :3] / largest[:, None] for part in carriers[1:])
     vv, vg, gg = (np.einsum("nci,nci->nc", *two) for two in ((v, v), (v, g), (g, g)))
     return _Bounds(a, b, low, high, np.where(vv > STILL, vv, np.nan), vg, gg)
-
-
-def _unplanned(robot: Robot, trajectory: Trajectory, tau: np.ndarray, A: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Return what the tensions of a feasible plan give beside the wrench of its motion, (n, 6): that of its wind."""
-    if trajectory.tensions is None:
-        return np.zeros_like(w)
-    rest = ((A @ trajectory.tensions(tau)[:, :, None])[..., 0] - w) * robot.dof_mask
-    size = np.linalg.norm(rest * robot.wrench_scale, axis=1)
-    return rest * ((size > WIND * robot.force_scale) & np.isfinite(size))[:, None]
 
 
 def _braking(limits: _Limits) -> _Law:
@@ -345,20 +337,18 @@ def _braking(limits: _Limits) -> _Law:
     return _Law(*np.array(rows).T)
 
 
-def _with_middles(law: _Law) -> _Law:
-    """Return a law with an instant more in the middle of each step."""
-    t, tau, rate, u = (part[:-1] for part in law)
-    step, after = np.diff(law.times), law.slope[1:]
-    middles = (
-        t + step / 2,
-        tau + rate * step / 2 + step**2 * (5 * u + after) / 48,
-        rate + step * (3 * u + after) / 8,
-        (u + after) / 2,
+def _refined(law: _Law) -> _Law:
+    """Return a law with more instants in each step, in which u is linear."""
+    t, tau, rate, u = (part[:-1, None] for part in law)
+    into = np.diff(law.times)[:, None] * np.arange(PARTS) / PARTS
+    jerk = np.diff(law.slope)[:, None] / np.diff(law.times)[:, None]
+    inside = (
+        t + into,
+        tau + into * (rate + into * (u / 2 + into * jerk / 6)),
+        rate + into * (u + into * jerk / 2),
+        u + into * jerk,
     )
-    both = (
-        np.append(np.stack([part[:-1], its], axis=1).ravel(), part[-1]) for part, its in zip(law, middles, strict=True)
-    )
-    return _Law(*both)
+    return _Law(*(np.append(its.ravel(), part[-1]) for part, its in zip(law, inside, strict=True)))
 
 
 def _slowed(motion: Motion, law: _Law) -> Motion:
@@ -373,8 +363,7 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[float, St
     platform, carriers = trajectory.at(law.tau)
     slowed, dynamics, mask = _slowed(platform, law), dynamics_of(robot), robot.dof_mask
     A = dynamics.wrench_matrix(platform[0], carriers[0])
-    w = dynamics.required_wrench(*slowed)
-    w = w + _unplanned(robot, trajectory, law.tau, A, dynamics.required_wrench(*platform))
+    w = dynamics.required_wrench(*slowed, wind=trajectory.wind)
     A, w = A * mask[:, None], w * mask
     near = None if trajectory.tensions is None else np.nan_to_num(trajectory.tensions(law.tau))
     tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=SOFT).tensions

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.inputs import file_path, number, real_array, shown
+from ..base.inputs import file_path, finite_array, number, real_array, shown
 from ..base.netcdf import load_netcdf, numbers_of
 from ..figures.outlines import outlines_from
 from ..models.part import LARGEST
@@ -45,8 +45,8 @@ class Trajectory(NamedTuple):
         For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
     doubt
         Row of the report that says that the reference is a plan with a broken limit; empty if it is not.
-    is_feasible
-        Whether it is a feasible plan: its tensions then give what the motion needs, in its wind.
+    wind
+        Velocity of the air in {G} for which it is planned, (3,) [m/s]; None without air.
     """
 
     duration: float | None
@@ -54,7 +54,7 @@ class Trajectory(NamedTuple):
     tensions: Callable[[np.ndarray], np.ndarray] | None = None
     keep_out: Sequence[Sequence[np.ndarray]] = ()
     doubt: str = ""
-    is_feasible: bool = False
+    wind: np.ndarray | None = None
 
 
 class HasTrajectory(Protocol):
@@ -166,17 +166,19 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
 
+    air = dataset.attrs.get("wind")
+    wind = None if air is None or robot.platform.aero is None else finite_array("reference.wind", air, (3,))
     keep_out = outlines_from(dataset, "reference")
     doubt = DOUBTS.get(str(dataset.attrs.get("status")), "")
     planned = read("tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():
-        return Trajectory(float(nodes[-1]), at, keep_out=keep_out, doubt=doubt)
+        return Trajectory(float(nodes[-1]), at, keep_out=keep_out, doubt=doubt, wind=wind)
 
     def tensions(times: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
-    return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt, dataset.attrs.get("status") == "feasible")
+    return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt, wind)
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

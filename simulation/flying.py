@@ -53,7 +53,8 @@ class Pilot:
 def _state(motions: np.ndarray, tensions: np.ndarray) -> State:
     """Return a state with arrays of its own, which a controller may keep."""
     motions = motions.copy()
-    return State(*[motions[part] for part in _PARTS], tensions)
+    pose, velocity, carrier_pose, carrier_velocity = (motions[part] for part in _PARTS)
+    return State(pose, velocity, carrier_pose, carrier_velocity, tensions)
 
 
 def _stacked(commands: list[Command]) -> Command:

@@ -177,6 +177,18 @@ def test_wrong_arguments_are_one_line(given, time, message):
     assert "\n" not in str(error.value)
 
 
+def test_the_wind_of_a_plan_acts_on_its_stop(tmp_path):
+    robot, wind = load("wang-flying"), [1.0, 0.5, 0.0]
+    path = {"kind": "line", "start": [0, 0, -1], "end": [0.1, 0, -0.9]}
+    found = plan(robot, {"path": path, "duration": 1, "wind": wind})
+    assert found.feasible
+    dynamics, its = Dynamics(robot), stop(found.save(tmp_path / "plan.nc"), 0.4)
+    A = dynamics.wrench_matrix(its.platform[0], its.carriers[0])
+    given = (A @ its.tensions[:, :, None])[..., 0]
+    np.testing.assert_allclose(given, dynamics.required_wrench(*its.platform, wind=wind), atol=1e-5)
+    assert np.abs(given - dynamics.required_wrench(*its.platform)).max() > 0.01  # which the wind makes
+
+
 def test_flying_carriers_are_refused():
     found = plan(
         "wang-flying-quadrotor", {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1, "base": {"kind": "free"}}

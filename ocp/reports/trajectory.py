@@ -1,6 +1,7 @@
 """A plan over time as a dataset: the motion in {G} and the audited tensions, with units."""
 
 import json
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from ...figures.outlines import outline_variables
 from ...models.dimensions import dimensions
 from ...models.parsing import to_yaml
 from ..result import PlanData
+from ..tasks.wind_set import WindBox
 from .keep_out import outline
 
 
@@ -48,7 +50,7 @@ def trajectory(plan: PlanData) -> Contents:
             values = np.array([getattr(phase, name) for phase in phases])
             variables[f"phase_{name}"] = over(("phase",), values, unit, f"{about} of each phase")
         coordinates["phase"] = Variable(("phase",), np.array([phase.name for phase in phases]))
-    attributes = {
+    attributes: dict[str, Any] = {
         "title": f"{robot.name}, {task.name}: {plan.status.value}",
         "status": plan.status.value,
         "robot": to_yaml(robot),
@@ -57,6 +59,8 @@ def trajectory(plan: PlanData) -> Contents:
     }
     if plan.law is not None and not plan.feasible:
         attributes["no_reference"] = "one of time_along without a feasible time law"
+    if task.wind is not None and not isinstance(task.wind, WindBox):
+        attributes["wind"] = np.array(task.wind)  # [m/s] in G
     coordinates |= dimensions(robot, audit.times[rows])
     return Contents(variables, coordinates, attributes)
 

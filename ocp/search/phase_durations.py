@@ -37,24 +37,27 @@ def shortest_phases(scenario: Scenario) -> tuple[Scenario, PlannerStep | None]:
         If a phase has a range although tube or base leave the motion free.
     """
     start, task = time.perf_counter(), scenario.task
-    ranged = [index for index, phase in enumerate(task.phases or ()) if isinstance(phase.duration, PositiveRange)]
-    if not ranged or task.phases is None:
+    phases = list(task.phases or ())
+    ranged = [
+        (index, phase.duration) for index, phase in enumerate(phases) if isinstance(phase.duration, PositiveRange)
+    ]
+    if not ranged:
         return scenario, None
     if scenario.count:
         raise InputError(
-            f"task {task.name!r}: phases[{ranged[0]}].duration must be a number where tube or base leave the motion "
+            f"task {task.name!r}: phases[{ranged[0][0]}].duration must be a number where tube or base leave the motion "
             "free, got a range"
         )
-    phases, message = list(task.phases), ""
-    for index in ranged:
+    message = ""
+    for index, span in ranged:
 
         def lasts(seconds: float, index: int = index) -> bool:
             return audit(lay_out(scenario.robot, _alone(task, index, seconds)), None).passed
 
         if time.perf_counter() - start > task.time_limit:
-            message, seconds = "time limit", phases[index].duration.max
+            message, seconds = "time limit", span.max
         else:
-            seconds = _shortest(phases[index].duration, lasts)
+            seconds = _shortest(span, lasts)
         phases[index] = phases[index].model_copy(update={"duration": seconds})
     chosen = lay_out(scenario.robot, task.model_copy(update={"phases": tuple(phases)}))
     message = ", ".join(filter(None, [message, f"{quantity(chosen.duration, 's')} in all"]))
