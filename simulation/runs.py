@@ -55,7 +55,7 @@ def fly_many(
             figures[first : first + len(block)] = block
             done[first : first + len(block)] = True
         shares = None if packed is None else started.limit if scheduler is not None else lambda: workers
-        sizes = _Sizes(_estimated(everything, seeds), shares)
+        sizes = _Sizes(_estimated(everything, seeds), shares, stored is not None or progress is not None)
         fly = (lambda *job: fly_part(everything, *job)) if packed is None else fly_packed
         jobs = ((some.start, seeds[some.start : some.stop]) for some in _blocks(done, sizes))
         jobs = jobs if packed is None else ((packed, *job) for job in jobs)
@@ -74,8 +74,9 @@ def fly_many(
 class _Sizes:
     """Choose the number of runs of the next block from the time per run so far."""
 
-    def __init__(self, each: float, workers: Callable[[], int] | None):
+    def __init__(self, each: float, workers: Callable[[], int] | None, awaited: bool):
         self._each, self._longest, self._workers = each, SIDE_BY_SIDE, workers
+        self._alone = 2 if awaited else 1  # blocks of a process alone, at least, if something is told after each
 
     def learn(self, count: int, seconds: float) -> None:
         """Update the estimate: a block of `count` runs took `seconds`."""
@@ -83,7 +84,7 @@ class _Sizes:
 
     def choose(self, left: int) -> int:
         """Return the number of runs of the next block if `left` runs remain."""
-        parts = 2 if self._workers is None else self._workers() * PARTS
+        parts = self._alone if self._workers is None else self._workers() * PARTS
         left = min(left, max(FEWEST, -(-left // parts)))
         return max(1, min(SIDE_BY_SIDE, left, self._longest, int(BLOCK_TIME / max(self._each, 1e-9))))
 
