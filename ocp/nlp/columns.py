@@ -7,7 +7,6 @@ import numpy as np
 
 from ..tasks.scheme import Scheme
 from .derivatives import Mapped
-from .unknowns import Unknowns
 
 
 class Columns:
@@ -16,7 +15,7 @@ class Columns:
     Parameters
     ----------
     unknowns
-        Of all points, (width, points), and of the intervals' ends.
+        Of all points, (width, points), one point after the other.
     scheme
         Which selects points and groups them into intervals.
     references
@@ -28,23 +27,17 @@ class Columns:
     """
 
     def __init__(
-        self,
-        unknowns: Unknowns,
-        scheme: Scheme,
-        references: ca.DM | ca.MX,
-        carried: np.ndarray,
-        intervals: ca.DM | ca.MX,
+        self, unknowns: ca.MX, scheme: Scheme, references: ca.DM | ca.MX, carried: np.ndarray, intervals: ca.DM | ca.MX
     ):
-        X, given, size = unknowns.columns, references, scheme.size
-        self._of_nodes = {"x": X, "p": given, "carried": ca.DM(carried)}
+        size, where = scheme.size, np.arange(unknowns.numel()).reshape(-1, unknowns.shape[0]).T
+        self._of_nodes = {"x": unknowns, "p": references, "carried": ca.DM(carried)}
         self._of_intervals = {
-            "x": _groups(X, size),
-            "x_end": unknowns.ends,
-            "p": _groups(given, size),
-            "p_end": given[:, size::size],
+            "x": _groups(unknowns, size),
+            "x_end": unknowns[:, size::size],
+            "p": _groups(references, size),
+            "p_end": references[:, size::size],
             "grid": intervals,
         }
-        where = unknowns.where
         self._at_nodes = where
         self._between = np.vstack([where[:, :-1].T.reshape(-1, len(where) * size).T, where[:, size::size]])
 

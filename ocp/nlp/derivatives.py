@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from .held import eased
 from .rows import Row
 
 
@@ -25,60 +26,50 @@ class Mapped(NamedTuple):
     inputs
         (., k) each.
     places
-        (u, k), the place of each entry of the first inputs among all unknowns; -1: it is zero. None where they are
-        more than unknowns: then there are no derivatives.
+        (u, k), the place of each entry of the first inputs among all unknowns.
     """
 
     function: ca.Function
     inputs: list[Any]
-    places: np.ndarray | None
+    places: np.ndarray
 
     @property
     def values(self) -> ca.MX:
         """Return the values, (r, k)."""
         return self.function.map(self.inputs[0].shape[1])(*self.inputs)
 
-    @property
-    def _places(self) -> np.ndarray:
-        if self.places is None:
-            raise TypeError(f"{self.function.name()} is a function of more than unknowns")
-        return self.places
-
     def _expressions(self) -> tuple[list[ca.SX], ca.SX, ca.SX]:
         """Return symbols for one set of inputs, those that are unknown as one column, and the values."""
         function = self.function
         inputs = [ca.SX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
-        unknown = ca.vertcat(*inputs)[: len(self._places)]
+        unknown = ca.vertcat(*inputs)[: len(self.places)]
         return inputs, unknown, function(*inputs)
 
     def slopes(self, width: int) -> ca.MX:
         """Return the derivatives of all values with respect to all unknowns, (r k, width)."""
         inputs, unknown, values = self._expressions()
-        places = self._places
         jacobian = ca.jacobian(values, unknown)
         rows, columns = (np.array(part, dtype=int) for part in jacobian.sparsity().get_triplet())
-        count = places.shape[1]
+        count = self.places.shape[1]
         function = ca.Function("slopes", inputs, [jacobian.nz[:]], {"cse": True})
         entries = _Entries(
             ca.vec(function.map(count)(*self.inputs)),
             (rows[:, None] + values.numel() * np.arange(count)).ravel(order="F"),
-            places[columns].ravel(order="F"),
+            self.places[columns].ravel(order="F"),
         )
         return _matrix([entries], values.numel() * count, width)
 
     def curvature(self, multipliers: ca.MX) -> _Entries:
         """Return the second derivatives of the values times `multipliers` (r, k), those above the diagonal."""
         inputs, unknown, values = self._expressions()
-        places = self._places
         multiplier = ca.SX.sym("multiplier", values.numel())
         hessian = ca.triu(ca.hessian(ca.dot(multiplier, values), unknown)[0])
-        first, second = (places[np.array(part, dtype=int)] for part in hessian.sparsity().get_triplet())
+        first, second = (self.places[np.array(part, dtype=int)] for part in hessian.sparsity().get_triplet())
         function = ca.Function("curvature", [*inputs, multiplier], [hessian.nz[:]], {"cse": True})
-        there = np.minimum(first, second) >= 0
         return _Entries(
-            ca.vec(function.map(places.shape[1])(*self.inputs, multipliers)),
-            np.where(there, np.minimum(first, second), -1).ravel(order="F"),
-            np.where(there, np.maximum(first, second), -1).ravel(order="F"),
+            ca.vec(function.map(self.places.shape[1])(*self.inputs, multipliers)),
+            np.minimum(first, second).ravel(order="F"),
+            np.maximum(first, second).ravel(order="F"),
         )
 
 
@@ -91,9 +82,22 @@ class Block(NamedTuple):
     mapped: Mapped | None = None  # what the values are computed by, where it is a function of places among the unknowns
     slopes: ca.MX | None = None  # the derivatives of values that are linear, (r k, unknowns)
 
+    def bounds(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the bounds of the rows, one stage after the other, (r k, 2): tightened where the task permits it.
+
+        `nodes` are where the stages begin, as shares of the duration. A row of a stage may be about all of it.
+        """
+        first, last = nodes[self.stages], nodes[np.minimum(self.stages + 1, len(nodes) - 1)]
+        parts = {held: eased(held, first, last) for held in {row.held for row in self.rows}}
+        bounds = np.empty((len(self.stages), len(self.rows), 2))
+        for i, row in enumerate(self.rows):
+            bounds[:, i, 0] = row.low + parts[row.held] * row.tighter[0]
+            bounds[:, i, 1] = row.high - parts[row.held] * row.tighter[1]
+        return bounds.reshape(-1, 2)
+
 
 class _Entries(NamedTuple):
-    """Entries of a sparse matrix, in which those of the same place add up; -1: an entry that does not count."""
+    """Entries of a sparse matrix, in which those of the same place add up."""
 
     values: ca.MX
     rows: np.ndarray
@@ -143,14 +147,13 @@ def derivatives(
 def _matrix(entries: Sequence[_Entries], height: int, width: int) -> ca.MX:
     """Return the sparse matrix of these entries."""
     rows, columns = (np.concatenate([getattr(each, part) for each in entries]) for part in ("rows", "columns"))
-    there = np.flatnonzero(columns >= 0)
-    places, which = np.unique(columns[there] * height + rows[there], return_inverse=True)
+    places, first, which = np.unique(columns * height + rows, return_index=True, return_inverse=True)
     values = ca.vertcat(*(each.values for each in entries))
-    if len(places) == len(there):
-        order = np.empty(len(there), dtype=int)
-        order[which] = there
-        values = values[order.tolist()]
+    if len(places) == len(rows):
+        values = values[first.tolist()]
     else:
-        values = ca.DM(ca.Sparsity.triplet(len(places), len(rows), which.tolist(), there.tolist()), 1.0) @ values
+        values = (
+            ca.DM(ca.Sparsity.triplet(len(places), len(rows), which.tolist(), list(range(len(rows)))), 1.0) @ values
+        )
     starts = np.searchsorted(places, height * np.arange(width + 1))
     return ca.MX(ca.Sparsity(height, width, starts.tolist(), (places % height).tolist()), values)

@@ -37,13 +37,12 @@ from .columns import Columns
 from .derivatives import Block, Mapped, derivatives
 from .grid import Grid
 from .held import eased, held_wrench
-from .interval import Interval, Points, interval_of, points
+from .interval import Interval, interval_of, points
 from .layout import DURATION, MARGIN, Layout
 from .leaving import leaving_rows
 from .near import Near
 from .node import Node, node_of
 from .rows import Mesh, Row, stretch
-from .unknowns import stacked, unknowns_of
 
 
 @dataclass(frozen=True)
@@ -173,9 +172,9 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         shown, lengths = _made_to_vary(scenario, references), np.hstack([lengths, lengths * [[2.0], [1.0]]])
     node = node_of(scenario, mesh, layout, shown, carried)
     interval = interval_of(scenario, mesh, layout, shown, lengths)
-    unknowns = unknowns_of(scenario, layout, steps)
-    X, X_end = unknowns.columns, unknowns.ends
-    columns = Columns(unknowns, scheme, given, carried, intervals)
+    x = ca.MX.sym("x", len(times) * layout.width)
+    X = ca.reshape(x, layout.width, len(times))
+    columns = Columns(X, scheme, given, carried, intervals)
     costs = [
         (columns.at_nodes(node.cost), grid.weights),
         (columns.between(interval.cost), grid.steps / scenario.duration),
@@ -190,17 +189,19 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         *local,
         Block(everywhere.values, node.rows, np.arange(len(times)) // scheme.size, everywhere),
         Block(between.values, interval.rows, np.arange(steps), between),
-        *_single_rows(scenario, layout, X, X_end, grid.steps),
+        *_single_rows(scenario, layout, X, grid.steps),
         *([] if movable else leaving_rows(scenario, layout, references, columns)),
     ]
-    g, bounds = stacked(blocks, grid)
+    starts = np.concatenate([[0.0], np.cumsum(grid.steps)]) / grid.steps.sum()
+    bounds = np.concatenate([block.bounds(starts) for block in blocks])
+    g = ca.vertcat(*(ca.vec(block.values) for block in blocks))
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
     return Program(
         scenario=scenario,
         mesh=mesh,
         layout=layout,
         shares=grid.shares,
-        problem={"x": unknowns.x, "f": objective, "g": g} | ({} if p is None else {"p": p}),
+        problem={"x": x, "f": objective, "g": g} | ({} if p is None else {"p": p}),
         lower=lower,
         upper=upper,
         lower_g=bounds[:, 0],
@@ -266,10 +267,9 @@ def _carried(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
     return np.hstack([phases.loads_at(nodes), columns]).T
 
 
-def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, lengths: np.ndarray) -> list[Block]:
+def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, lengths: np.ndarray) -> list[Block]:
     """Return the rows that occur once: periodic ends, waypoints, start and end of the acceleration."""
-    steps = len(lengths)
-    blocks = _waypoint_rows(scenario, layout, X, X_end, lengths)
+    blocks = _waypoint_rows(scenario, layout, X, lengths)
     carriers: list[int] = []
     if carrier_ends(scenario.task) == "periodic":
         carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
@@ -279,32 +279,26 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, len
     if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in carriers]):
         # Values at the nodes leave a cubic spline one freedom at each end, which would be used where nobody looks.
         rows = [Row("snap", 0.0, 0.0)] * len(ending)
-        for k in (0, steps - 1):
-            change = (X_end[layout.snap, k] - X[layout.snap, k])[ending]
+        for k in (0, len(lengths) - 1):
+            change = (X[layout.snap, k + 1] - X[layout.snap, k])[ending]
             blocks.append(Block(change, rows, np.array([k])))
     return blocks
 
 
-def _polynomials(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, lengths: np.ndarray, k: int) -> Points:
-    """Return the Bernstein points of interval k."""
-    size = scenario.scheme.size
-    given = scenario.duration / len(lengths)
-    columns = [*(X[:, k * size + i] for i in range(size)), X_end[:, k]]
-    return points(scenario, layout, float(lengths[k]) * stretch(layout, columns[0]), given, columns)
-
-
-def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, X_end: ca.MX, lengths: np.ndarray) -> list[Block]:
+def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, lengths: np.ndarray) -> list[Block]:
     """Return rows that lead the platform through the waypoints, by the polynomial of the interval of each."""
     path = scenario.task.path
     platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
         return []
-    blocks, steps = [], len(lengths)  # of equal lengths: phases have no exact waypoints
+    blocks, steps, size = [], len(lengths), scenario.scheme.size  # of equal lengths: phases have no exact waypoints
+    given = scenario.duration / steps
     coordinates = [coordinate for owner, coordinate in scenario.owners() if owner is None]
     shares, missed = path.knots(scenario.duration) / scenario.duration, path.missed(scenario.duration)[:, coordinates]
     for share, off in zip(shares[1:-1], missed[1:-1], strict=True):
         k = min(int(share * steps), steps - 1)
-        position = _polynomials(scenario, layout, X, X_end, lengths, k).position
+        its = [X[:, k * size + i] for i in range(size + 1)]
+        position = points(scenario, layout, float(lengths[k]) * stretch(layout, its[0]), given, its).position
         rows = [Row("waypoint", float(value), float(value)) for value in off]
         blocks.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
     return blocks
