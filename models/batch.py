@@ -1,14 +1,12 @@
 """Call a CasADi Function with NumPy arrays that have leading batch dimensions, or with symbols.
 
-One row goes through CasADi's buffers, more rows through `Function.map`.
+Arrays go through `Function.map`. What is called for every step of a loop is in the numeric core, see `mechanics`.
 """
 
 from __future__ import annotations
 
 import math
-import threading
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
@@ -16,9 +14,7 @@ import numpy as np
 from ..base.errors import InputError, SolverError
 from ..base.inputs import check_dimensions, float64, leading, shown
 from ..core import finite
-from .tape import dense
 
-ROWS_OF_MAP = 64  # to make a map of n costs as much as to evaluate it, so one of this size is kept
 SYMBOLIC = (ca.SX, ca.MX)
 
 _FLOAT = np.dtype(np.float64)
@@ -52,7 +48,7 @@ def call(function: ca.Function, arguments: dict[str, Any], matrices: tuple[str, 
     if any(is_symbolic(value) for value in arguments.values()):
         outputs = function(**_as_symbols(function, arguments))
         return {name: outputs[name] for name in function.name_out()}  # CasADi's are in the order of the alphabet
-    outputs = _evaluator(function)(arguments)
+    outputs = _evaluated(function, arguments)
     for name in matrices:
         if name in outputs and function.size_out(name)[1] == 1:
             outputs[name] = outputs[name][..., None]
@@ -93,109 +89,37 @@ def arrays(values: dict[str, tuple[Any, tuple[int, ...]]]) -> list[np.ndarray]:
     return list(checked.values())
 
 
-class _Evaluator:
-    """The data that the numeric calls of one Function share."""
-
-    def __init__(self, function: ca.Function):
-        self._function = ca.Function(dense(function))  # a handle of its own: see _evaluators
-        self.name: str = function.name()
-        self.inputs: dict[str, tuple[int, int]] = {name: function.size_in(name) for name in function.name_in()}
-        self.outputs: dict[str, tuple[int, int]] = {name: function.size_out(name) for name in function.name_out()}
-        self._cores = {name: _core(size) for name, size in self.inputs.items()}
-        self._defaults = {name: float(function.default_in(i)) for i, name in enumerate(self.inputs)}
-        self._own = threading.local()  # a buffer serves one thread at a time
-
-    def __call__(self, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
-        arrays = self._arrays(arguments)
-        if all(array.shape == core for array, core in zip(arrays.values(), self._cores.values(), strict=True)):
-            return self._single(arrays)
-        batch = leading({name: array.shape[: array.ndim - len(self._cores[name])] for name, array in arrays.items()})
-        count = math.prod(batch)
-        rows = [_rows(arrays[name], batch, size) for name, size in self.inputs.items()]
-        outputs = {name: np.empty((count, *size)) for name, size in self.outputs.items()}
-        self._map(count, rows, list(outputs.values()))
-        return {name: value.reshape(batch + _core(self.outputs[name])) for name, value in outputs.items()}
-
-    def _arrays(self, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
-        """Return all inputs in their order, as arrays of shape (..., *core) with finite values."""
-        for name in arguments:
-            if name not in self.inputs:
-                raise InputError(f"{name} must be an input of {self.name}, which has {', '.join(self.inputs)}")
-        return {
-            name: as_array(name, arguments[name], core) if name in arguments else np.full(core, self._defaults[name])
-            for name, core in self._cores.items()
-        }
-
-    def _single(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        buffers = self._buffers(1)
-        for array, place in zip(arrays.values(), buffers.inputs, strict=True):
-            place[0] = array.reshape(place.shape[1:])
-        buffers.evaluate()
-        return {
-            name: value[0, :, 0].copy() if value.shape[2] == 1 else value[0].copy()
-            for name, value in zip(self.outputs, buffers.outputs, strict=True)
-        }
-
-    def _map(self, count: int, rows: list[np.ndarray], outputs: list[np.ndarray]) -> None:
-        """Evaluate whole blocks through a map, and the rest row by row."""
-        done = 0
-        while done < count:
-            step = ROWS_OF_MAP if count - done >= ROWS_OF_MAP else 1
-            buffers = self._buffers(step)
-            for array, place in zip(rows, buffers.inputs, strict=True):
-                place[:] = array[done : done + step]
-            buffers.evaluate()
-            for array, place in zip(outputs, buffers.outputs, strict=True):
-                array[done : done + step] = place
-            done += step
-
-    def _buffers(self, count: int) -> _Buffers:
-        """Return the buffers of the calling thread, for so many rows at once."""
-        name = f"of_{count}"
-        if not hasattr(self._own, name):
-            function = self._function if count == 1 else self._function.map(count)
-            inputs, outputs = list(self.inputs.values()), list(self.outputs.values())
-            setattr(self._own, name, _Buffers(function, count, inputs, outputs))
-        return getattr(self._own, name)
+def _evaluated(function: ca.Function, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Evaluate a Function on arrays, all rows of a batch in one call."""
+    sizes = {name: function.size_in(name) for name in function.name_in()}
+    for name in arguments:
+        if name not in sizes:
+            raise InputError(f"{name} must be an input of {function.name()}, which has {', '.join(sizes)}")
+    arrays = {
+        name: as_array(name, arguments.get(name, np.full(_core(size), function.default_in(index))), _core(size))
+        for index, (name, size) in enumerate(sizes.items())
+    }
+    batch = leading({name: array.shape[: array.ndim - len(_core(sizes[name]))] for name, array in arrays.items()})
+    count = math.prod(batch)
+    outputs = {name: function.size_out(name) for name in function.name_out()}
+    if not count:
+        return {name: np.empty(batch + _core(size)) for name, size in outputs.items()}
+    beside = [ca.DM(_beside(arrays[name], batch, size)) for name, size in sizes.items()]
+    try:
+        values = function.map(count).call(beside)
+    except RuntimeError:
+        raise SolverError(f"{function.name()}: CasADi could not evaluate it") from None
+    return {
+        name: value.full().reshape(rows, count, columns).swapaxes(0, 1).reshape(batch + _core((rows, columns)))
+        for (name, (rows, columns)), value in zip(outputs.items(), values, strict=True)
+    }
 
 
-class _Buffers:
-    """Arrays that CasADi reads and writes in place, `inputs` and `outputs`, (count, r, c) each."""
-
-    def __init__(self, function: ca.Function, count: int, sizes_in: list[Any], sizes_out: list[Any]):
-        self._name = function.name()
-        buffer: Any  # CasADi's type hints require a size beside a memoryview, CasADi itself refuses it
-        buffer, self._evaluate = function.buffer()
-        self._failed = buffer.ret
-        # One row of a map after the other, each column by column.
-        memory_in = [np.zeros((count, columns, rows)) for rows, columns in sizes_in]
-        memory_out = [np.zeros((count, columns, rows)) for rows, columns in sizes_out]
-        for i, memory in enumerate(memory_in):
-            buffer.set_arg(i, memory.data)
-        for i, memory in enumerate(memory_out):
-            buffer.set_res(i, memory.data)
-        self.inputs = [memory.transpose(0, 2, 1) for memory in memory_in]
-        self.outputs = [memory.transpose(0, 2, 1) for memory in memory_out]
-
-    def evaluate(self) -> None:
-        try:
-            self._evaluate()
-            failed = self._failed()
-        except RuntimeError:
-            failed = True
-        if failed:
-            raise SolverError(f"{self._name}: CasADi could not evaluate it")
-
-
-# An entry goes when the caller's handle of its Function goes, which it must not hold itself.
-_evaluators: WeakKeyDictionary[ca.Function, _Evaluator] = WeakKeyDictionary()
-
-
-def _evaluator(function: ca.Function) -> _Evaluator:
-    evaluator = _evaluators.get(function)
-    if evaluator is None:
-        evaluator = _evaluators[function] = _Evaluator(function)
-    return evaluator
+def _beside(array: np.ndarray, batch: tuple[int, ...], size: tuple[int, int]) -> np.ndarray:
+    """Return (..., *core) as the matrices of all rows of a batch beside each other, (r, count c)."""
+    rows, columns = size
+    every = np.broadcast_to(array, batch + _core(size)).reshape(math.prod(batch), *size)
+    return every.swapaxes(0, 1).reshape(rows, math.prod(batch) * columns)
 
 
 def _core(size: tuple[int, int]) -> tuple[int, ...]:
@@ -226,12 +150,3 @@ def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, A
 
 def _shape(core: tuple[int, ...]) -> str:
     return f"(..., {', '.join(str(size) for size in core)})"
-
-
-def _rows(array: np.ndarray, batch: tuple[int, ...], size: tuple[int, int]) -> np.ndarray:
-    """Bring (..., *core) to (N, r, c) without a copy where possible: one row for all of a batch is not repeated."""
-    count = math.prod(batch)
-    array = np.require(array, requirements="A")
-    if array.size == math.prod(size):
-        return np.broadcast_to(array.reshape(1, *size), (count, *size))
-    return np.broadcast_to(array, batch + _core(size)).reshape(count, *size)

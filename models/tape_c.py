@@ -1,15 +1,20 @@
 """A CasADi Function's instruction tape as a C function.
 
-It has one local variable for each distinct value, no branches, no work arrays, and no warnings. A file that includes it
-defines `real`, the type of its numbers, `C(x)`, a constant of that type, and `MATH(sin)`, a function for it.
+An SX Function is a straight list of scalar instructions on a work vector: load an input's element, compute, store an
+output's element. The C function has one local variable for each distinct value on the tape (two instructions that do
+the same with the same values share it, which changes no bit) and does the operations in the tape's order, so that it
+rounds where CasADi does. It has no branches, no work arrays, and no warnings. A file that includes it defines `real`,
+the type of its numbers, `C(x)`, a constant of that type, and `MATH(sin)`, a function for it.
 """
 
 from collections import Counter
+from typing import NamedTuple
 
 import casadi as ca
 
-from . import tape
+from ..base.errors import InputError
 
+_NAMES = {getattr(ca, name): name.removeprefix("OP_") for name in dir(ca) if name.startswith("OP_")}
 _UNARY = (
     *("sqrt", "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "asin", "acos", "atan"),
     *("sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "fabs", "floor", "ceil"),
@@ -40,44 +45,67 @@ _OPERATIONS = {
 }
 
 
+class _Value(NamedTuple):
+    """A distinct value on a tape: the name of its variable, and the operation that computes it."""
+
+    variable: str
+    operation: str
+
+
 def to_c_function(function: ca.Function, name: str) -> str:
     """Return C text of `static void NAME(inputs, outputs)`, matrices row by row.
 
     Parameters
     ----------
     function
-        A Function, of which inputs and outputs become arrays of their names.
+        An SX Function with dense inputs and outputs, which become arrays of their names.
     name
         The name of the C function.
 
-    Raises `InputError` if an MX Function cannot be expanded, or the tape has an operation that is not known here.
+    Raises `InputError` if the tape has an operation that is not known here.
     """
-    function = tape.scalar(tape.dense(function))
     inputs, outputs = function.name_in(), function.name_out()
-
-    def load(i: int, row: int, column: int) -> str:
-        return f"{inputs[i]}[{row * function.size2_in(i) + column}]"
-
-    variables, stores = tape.straight_line(function, _OPERATIONS, load, literal)
+    values, stores = _straight_line(function)
     arguments = [f"const real *{name}" for name in inputs] + [f"real *{name}" for name in outputs]
     lines = [f"static void {name}({', '.join(arguments)}) {{"]
-    lines += [f"    (void){inputs[i]};" for i in range(function.n_in()) if not _is_used(inputs[i], variables)]
-    lines += [f"    const real {variable} = {expression};" for expression, variable in variables.items()]
-    for (i, row, column), value in sorted(stores.items()):
-        lines.append(f"    {outputs[i]}[{row * function.size2_out(i) + column}] = {value};")
+    used = {expression.partition("[")[0] for expression in values}
+    lines += [f"    (void){name};" for name in inputs if name not in used]
+    lines += [f"    const real {value.variable} = {expression};" for expression, value in values.items()]
+    for (i, row, column), variable in sorted(stores.items()):
+        lines.append(f"    {outputs[i]}[{row * function.size2_out(i) + column}] = {variable};")
     return "\n".join([*lines, "}", ""])
 
 
 def operations(function: ca.Function) -> Counter[str]:
     """Count the operations of the C function by their names: ADD, MUL, SIN, ..."""
-    function = tape.scalar(tape.dense(function))
-    named = {name: f"{name} {expression}" for name, expression in _OPERATIONS.items()}
-    variables, _ = tape.straight_line(function, named, "x{0}[{1}][{2}]".format, repr)
-    return Counter(expression.split()[0] for expression in variables if expression.split()[0] in _OPERATIONS)
+    values, _ = _straight_line(function)
+    return Counter(value.operation for value in values.values() if value.operation in _OPERATIONS)
 
 
-def _is_used(name: str, variables: dict[str, str]) -> bool:
-    return any(expression.startswith(f"{name}[") for expression in variables)
+def _straight_line(function: ca.Function) -> tuple[dict[str, _Value], dict[tuple[int, int, int], str]]:
+    """Return the distinct values of a tape by their expressions, and the variable of each (output, row, column)."""
+    work: dict[int, str] = {}  # what each slot of the work vector holds now
+    values: dict[str, _Value] = {}
+    stores: dict[tuple[int, int, int], str] = {}
+    for k in range(function.n_instructions()):
+        operation = _NAMES[function.instruction_id(k)]
+        inputs, outputs = function.instruction_input(k), function.instruction_output(k)
+        if operation == "OUTPUT":
+            column, row = divmod(outputs[1], function.size1_out(outputs[0]))
+            stores[outputs[0], row, column] = work[inputs[0]]
+            continue
+        if operation == "INPUT":
+            column, row = divmod(inputs[1], function.size1_in(inputs[0]))
+            expression = f"{function.name_in(inputs[0])}[{row * function.size2_in(inputs[0]) + column}]"
+        elif operation == "CONST":
+            expression = literal(function.instruction_constant(k))
+        elif operation in _OPERATIONS:
+            expression = _OPERATIONS[operation].format(*(work[i] for i in inputs))
+        else:
+            accepted = ", ".join(_OPERATIONS)
+            raise InputError(f"{function.name()} must have only the operations {accepted}, got {operation}")
+        work[outputs[0]] = values.setdefault(expression, _Value(f"v{len(values)}", operation)).variable
+    return values, stores
 
 
 def literal(value: float) -> str:
