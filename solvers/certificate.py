@@ -225,7 +225,7 @@ def certify(problem: TensionProblem) -> Certificate | None:
     certificate = sharpest(problem, projection)
     if certificate is not None or np.linalg.norm(projection.residual) <= accepted_error(problem, projection.closest):
         return certificate
-    return sharpest(problem, Projection(*exact_optimum(problem, projection.closest)))
+    return sharpest(problem, exact_optimum(problem, projection.closest))
 
 
 def sharpest(problem: TensionProblem, projection: Projection) -> Certificate | None:

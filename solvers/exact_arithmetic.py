@@ -16,11 +16,11 @@ the cost by a part in a million, w is known no better than that.
 from collections.abc import Sequence
 from fractions import Fraction
 from math import lcm
-from typing import NamedTuple
 
 import numpy as np
 
 from ..base.tolerances import FEASIBILITY
+from .box_least_squares import Projection
 from .problem import Array, TensionProblem, accepted_error
 
 # Relative error of the wrench at an optimum where the cost is proportional to the wrench: 1e-22, far below rounding.
@@ -28,17 +28,18 @@ from .problem import Array, TensionProblem, accepted_error
 _ERROR = 2.0**-73
 
 
-class ExactOptimum(NamedTuple):
-    """Tensions of least cost inside their limits whose wrench is w or the nearest to it, rounded once."""
+def exact_optimum(problem: TensionProblem, nearest: Array) -> Projection:
+    """Find the tensions of least cost inside their limits whose wrench is w, or the nearest to it.
 
-    tensions: Array  # [N], (m,)
-    missing: Array  # what they miss of the wrench before they are rounded, S (w - A t) [N], (n,)
+    The residual is that of the tensions before they are rounded. Where the wrench is not the nearest, rho is raised
+    until its error falls no more.
 
-
-def exact_optimum(problem: TensionProblem, nearest: Array) -> ExactOptimum:
-    """Find the optimum, from the tensions `nearest`, (m,) [N], of the projection of w.
-
-    Where the projection is not the nearest, rho is raised until the wrench error falls no more.
+    Parameters
+    ----------
+    problem :
+        The problem.
+    nearest :
+        Tensions of the projection of w [N], (m,), to start from.
     """
     size = problem.weights @ (nearest - problem.t_ref) ** 2
     wrench = accepted_error(problem, nearest) / FEASIBILITY
@@ -68,7 +69,7 @@ def exact_optimum(problem: TensionProblem, nearest: Array) -> ExactOptimum:
         missing = np.array([value / (unit * wrench_unit * together) for value in left])
         error = float(np.linalg.norm(missing))
         if error <= accepted_error(problem, t) or error > 0.5 * before:
-            return ExactOptimum(t, missing)
+            return Projection(t, missing)
         rho, before = rho / Fraction(_ERROR) ** 4, error
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.tolerances import AT_LIMIT, RANK
-from .box_least_squares import Projection, project
+from .box_least_squares import project
 from .certificate import Certificate, sharpest
 from .exact_arithmetic import exact_optimum
 from .methods.method import Method, Proposal
@@ -70,14 +70,15 @@ def verify(
         if proposal.final:
             return Verdict(Status.FAILED, None, proposal.detail)
         return Verdict(Status.INACCURATE, exact, f"{_NEAREST}: {proposal.detail}".removesuffix(": "))
-    projection = project(problem)
-    certificate = None if useful else sharpest(problem, projection)
-    if certificate is None and method.exact and not proposal.final:
-        optimum = exact_optimum(problem, projection.closest)
-        if _gives_wrench(problem, optimum.tensions):
-            left = None if method.least_squares else _face(problem, form, optimum.tensions)
-            return Verdict(Status.OPTIMAL, optimum.tensions, _EXACT, left=left)
-        certificate = None if useful else sharpest(problem, Projection(*optimum))
+    nearest, exactly = project(problem), method.exact and not proposal.final
+    while True:
+        certificate = None if useful else sharpest(problem, nearest)
+        if certificate is not None or not exactly:
+            break
+        nearest, exactly = exact_optimum(problem, nearest.closest), False
+        if _gives_wrench(problem, nearest.closest):
+            left = None if method.least_squares else _face(problem, form, nearest.closest)
+            return Verdict(Status.OPTIMAL, nearest.closest, _EXACT, left=left)
     if certificate is not None:
         if method.always_answers and tensions is not None:
             return Verdict(Status.INACCURATE, tensions, proposal.detail, certificate)

@@ -22,17 +22,17 @@ def test_twin_cables_share_on_the_boundary():
     A = [[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
     problem = TensionProblem(A, [1.0, 7.0], 0.0, [5.0, 5.0, 7.0], weights=[1.0, 4.0, 1.0])
     np.testing.assert_allclose(
-        exact_optimum(problem, project(problem).closest).tensions, [1.0, 0.0, 7.0], rtol=0, atol=1e-15
+        exact_optimum(problem, project(problem).closest).closest, [1.0, 0.0, 7.0], rtol=0, atol=1e-15
     )
     negative = TensionProblem(A, [1.0, 7.0], [-5.0, -5.0, 0.0], [5.0, 5.0, 7.0], weights=[1.0, 4.0, 1.0])
     np.testing.assert_allclose(
-        exact_optimum(negative, project(negative).closest).tensions, [0.8, -0.2, 7.0], rtol=0, atol=1e-15
+        exact_optimum(negative, project(negative).closest).closest, [0.8, -0.2, 7.0], rtol=0, atol=1e-15
     )
 
 
 def test_beyond_the_boundary_it_gives_the_nearest_wrench():
     problem = TensionProblem([[1.0, 1.0]], [10.0], 0.0, [4.0, 5.0])
-    np.testing.assert_array_equal(exact_optimum(problem, project(problem).closest).tensions, [4.0, 5.0])
+    np.testing.assert_array_equal(exact_optimum(problem, project(problem).closest).closest, [4.0, 5.0])
 
 
 @given(st.integers(0, 2**32), st.integers(1, 7), st.booleans())
@@ -62,7 +62,7 @@ def test_away_from_the_boundary_it_is_what_solve_finds(seed):
     if solution.feasible and not solution.detail and np.ptp(np.log10(problem.weights)) < 3:
         cost = [
             problem.weights @ (t - problem.t_ref) ** 2
-            for t in (solution.tensions, exact_optimum(problem, project(problem).closest).tensions)
+            for t in (solution.tensions, exact_optimum(problem, project(problem).closest).closest)
         ]
         assert cost[1] == pytest.approx(cost[0], rel=1e-6, abs=1e-12)
 
