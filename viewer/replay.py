@@ -14,11 +14,10 @@ from ..figures.outlines import outlines_from
 from ..models import Robot
 from ..models.parsing import parse_yaml
 from ..ocp import Task
-from ..ocp.audits.by_phase import certified
+from ..ocp.audits.by_phase import worst_certificate
 from ..ocp.tasks.lay_out import lay_out
 from ..ocp.tasks.paths import Motion
 from ..ocp.tasks.scenario import Scenario
-from ..solvers import Certificate
 from .geometry import FARTHEST, Extent, Geometry
 from .snapshot import Snapshot, least_distance
 
@@ -126,7 +125,11 @@ class Replay:
         tensions = self.tensions[index]
         there = bool(np.isfinite(tensions).all())
         margin, nearest = least_distance(tensions, self._t_min[index], self.robot.t_max)
-        certificate = None if there or self._task is None or not prove else self._certificate(index)
+        certificate = None
+        if prove and not there and self._task is not None:
+            time, carriers = float(self.times[index]), self._carriers[index]
+            motion = Motion(*(part[index] for part in (self._pose, self._velocity, self._acceleration)))
+            certificate = worst_certificate(self._scenario, time, motion, carriers)
         status = "feasible" if there else "no tensions" if certificate is None else "infeasible"
         return Snapshot(
             pose=self._pose[index],
@@ -141,18 +144,6 @@ class Replay:
             cut=None if self._cut is None else self._cut[index],
             events=tuple(what for at, what in self._events if at <= self.times[index] + 1e-9),
         )
-
-    def _certificate(self, index: int) -> Certificate | None:
-        """Return the certificate with the largest shortfall of all winds in which tensions must exist."""
-        scenario, time = self._scenario, self.times[index : index + 1]
-        pose, carriers = self._pose[index], self._carriers[index]
-        motion = Motion(*(part[index : index + 1] for part in (self._pose, self._velocity, self._acceleration)))
-        A = scenario.dynamics.wrench_matrix(pose, carriers)
-        proofs = []
-        for wind in scenario.winds_at(pose, self._velocity[index]):
-            w = scenario.required_wrench(time, motion, wind=wind)[0]
-            proofs.append(certified(scenario, float(time[0]), A, w))
-        return max((proof for proof in proofs if proof), key=lambda proof: proof.shortfall, default=None)
 
     @cached_property
     def _t_min(self) -> np.ndarray:

@@ -7,42 +7,38 @@ the lower limit 0.
 from dataclasses import replace
 
 import numpy as np
+from typing_extensions import override
 
 from ...solvers import Certificate, certify
 from ...statics.distribution import wrench_problem
+from ..tasks.paths import Motion
 from ..tasks.phases import LaidPhase
 from ..tasks.resting import end_tensions, largest_support, support_forces
 from ..tasks.scenario import Scenario
-from .tensions import AuditedTensions, Distribute, Distribution
+from .tensions import AuditedTensions, Distribution
 
 
-def distribution(scenario: Scenario, times: np.ndarray, A: np.ndarray) -> Distribute:
+def distribution(scenario: Scenario, times: np.ndarray, A: np.ndarray) -> Distribution:
     """Return the distribution of the tensions at `times` (n,) with wrench matrices A (n, 6, m)."""
     return _ByPhase(scenario, times, A) if scenario.phases.all else Distribution(scenario, A)
 
 
-class _ByPhase:
-    """Distribute the tensions of each phase on its own."""
+class _ByPhase(Distribution):
+    """Distribute the tensions of each phase on its own; those without limits are without ground too."""
 
     def __init__(self, scenario: Scenario, times: np.ndarray, A: np.ndarray):
-        self.scenario, self._parts = scenario, scenario.phases.rows(times)
-        self._A = A
-        self._hanging = Distribution(scenario, A)
-        self.few, self.tolerance = self._hanging.few, self._hanging.tolerance
+        super().__init__(scenario, A)
+        self._parts = scenario.phases.rows(times)
 
-    def unlimited(self, w: np.ndarray) -> np.ndarray:
-        """Return the tensions of least norm for the wrenches w (n, 6), whatever limits and ground, (n, m) [N]."""
-        return self._hanging.unlimited(w)
-
+    @override
     def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
-        """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
         scenario, m, count = self.scenario, self.scenario.robot.m, len(w)
         tensions, violation = np.empty((count, m)), np.empty(count)
         supports = np.zeros((count, scenario.phases.supports))
         worst, row, beyond = None, None, 0.0
         for phase, rows in self._parts:
             near = np.zeros((len(rows), m)) if preferred is None else preferred[rows]
-            A, limits, near = _extended(scenario, phase, self._A[rows], w[rows], near)
+            A, limits, near = _extended(scenario, phase, self.A[rows], w[rows], near)
             result = Distribution(scenario, A, limits)(w[rows], near)
             tensions[rows], violation[rows] = result.tensions[:, :m], result.violation
             supports[rows, : A.shape[2] - m] = result.tensions[:, m:]
@@ -53,14 +49,23 @@ class _ByPhase:
         return AuditedTensions(tensions, violation, worst, row, beyond, supports if scenario.phases.rest else None)
 
 
-def certified(scenario: Scenario, time: float, A: np.ndarray, w: np.ndarray) -> Certificate | None:
-    """Return the proof that no tensions at a time give a wrench w (6,), A being (6, m); None if some do."""
-    phase = scenario.phases.at(time)
-    if phase is None:
-        return certify(wrench_problem(scenario.robot, A, w, *scenario.bounds()))
-    extended, limits, _ = _extended(scenario, phase, A[None], w[None], np.zeros((1, scenario.robot.m)))
-    found = certify(wrench_problem(scenario.robot, extended[0], w, *limits))
-    return None if found is None else _of_cables(found, scenario.robot.m)
+def worst_certificate(scenario: Scenario, time: float, platform: Motion, carriers: np.ndarray) -> Certificate | None:
+    """Return the proof that no tensions at a time give the required wrench, of the worst wind; None if some do.
+
+    `platform` is its motion in {G}, (6,) each, `carriers` are the poses of all, (c, 6). Of a box of winds the proof has
+    its wind.
+    """
+    robot, phase = scenario.robot, scenario.phases.at(time)
+    A = scenario.dynamics.wrench_matrix(platform.pose, carriers)
+    proofs = []
+    for wind in scenario.winds_at(platform.pose, platform.velocity):
+        motion = Motion(*(part[None] for part in platform))
+        w = scenario.required_wrench(np.array([time]), motion, wind=wind)
+        extended, limits, _ = _extended(scenario, phase, A[None], w, np.zeros((1, robot.m)))
+        found = certify(wrench_problem(robot, extended[0], w[0], *limits))
+        if found is not None:
+            proofs.append(replace(_of_cables(found, robot.m), wind=None if scenario.wind_box is None else wind))
+    return max(proofs, key=lambda proof: proof.shortfall, default=None)
 
 
 def taken_up(scenario: Scenario, times: np.ndarray) -> np.ndarray | None:
@@ -81,11 +86,11 @@ def taken_up(scenario: Scenario, times: np.ndarray) -> np.ndarray | None:
 
 
 def _extended(
-    scenario: Scenario, phase: LaidPhase, A: np.ndarray, w: np.ndarray, near: np.ndarray
+    scenario: Scenario, phase: LaidPhase | None, A: np.ndarray, w: np.ndarray, near: np.ndarray
 ) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray], np.ndarray]:
     """Return A, limits and preferred tensions of k instants of a phase, with those of its support forces at the end."""
     low, high = scenario.bounds_in(phase)
-    if not phase.rests:
+    if phase is None or not phase.rests:
         return A, (low, high), near
     S = phase.columns
     forces, _ = support_forces(scenario, S, w - np.einsum("nij,nj->ni", A, near))

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...models.part import Vector3
 from ...solvers import Certificate
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from .audit import Audit
-from .by_phase import certified
+from .by_phase import worst_certificate
 
 MOST_SPANS = 8
 
@@ -26,26 +25,9 @@ def infeasible_spans(scenario: Scenario, audit: Audit) -> tuple[Certificate, ...
     certificates = []
     for first, after in sorted(edges):
         row = first + int(audit.violation[first:after].argmax())
-        certificate = certificate_at(scenario, audit, row)
+        time, platform = float(audit.times[row]), Motion(*(part[row] for part in audit.motion))
+        certificate = worst_certificate(scenario, time, platform, audit.carriers.pose[row])
         if certificate is not None:
             span = (float(audit.times[first]), float(audit.times[after - 1]))
-            certificates.append(replace(certificate, span=span))
+            certificates.append(replace(certificate, time=time, span=span))
     return tuple(certificates)
-
-
-def certificate_at(scenario: Scenario, audit: Audit, row: int) -> Certificate | None:
-    """Return the certificate of one audited instant, of the worst wind of a box; None if tensions exist there."""
-    proofs: list[tuple[Certificate, Vector3 | None]] = []
-    one = slice(row, row + 1)
-    time = audit.times[one]
-    platform, carriers = (Motion(*(part[one] for part in motion)) for motion in (audit.motion, audit.carriers))
-    A = scenario.dynamics.wrench_matrix(platform.pose[0], carriers.pose[0])
-    for wind in scenario.winds_at(platform.pose[0], platform.velocity[0]):
-        w = scenario.required_wrench(time, platform, carriers, wind)[0]
-        certificate = certified(scenario, float(time[0]), A, w)
-        if certificate is not None:
-            proofs.append((certificate, None if scenario.wind_box is None else wind))
-    if not proofs:
-        return None
-    certificate, wind = max(proofs, key=lambda proof: proof[0].shortfall)
-    return replace(certificate, time=float(time[0]), wind=wind)

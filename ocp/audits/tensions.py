@@ -7,7 +7,7 @@ largest such distance of the winds that decide (`wind_set`), and if that is none
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,22 +42,6 @@ def scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
     robot = scenario.robot
     scale = robot.dof_mask * robot.wrench_scale
     return wrenches * scale.reshape(6, *[1] * (wrenches.ndim - 2))
-
-
-class Distribute(Protocol):
-    """Tensions of all instants of a motion, whose wrench matrices it knows, for any required wrenches."""
-
-    scenario: Scenario
-    few: bool
-    tolerance: float
-
-    def unlimited(self, w: np.ndarray) -> np.ndarray:
-        """Return the tensions of least norm for the wrenches w (n, 6), whatever the limits, (n, m) [N]."""
-        ...
-
-    def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
-        """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
-        ...
 
 
 class Distribution:
@@ -155,7 +139,7 @@ def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
 
 
 def in_all_winds(
-    distribute: Distribute, box: WindBox, motion: Motion, w: np.ndarray, middle: AuditedTensions
+    distribute: Distribution, box: WindBox, motion: Motion, w: np.ndarray, middle: AuditedTensions
 ) -> tuple[AuditedTensions, Certificate | None]:
     """Return the result of the worst wind of a box at each instant, and its certificate with its wind.
 

@@ -9,7 +9,6 @@ the load stays, its weight where the load is left on the ground or not yet fixed
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -56,13 +55,6 @@ class LaidPhase(Displayed):
         return bool(self.load[0])
 
 
-class PhaseRows(NamedTuple):
-    """A phase, and which of some instants belong to it."""
-
-    phase: LaidPhase
-    rows: np.ndarray
-
-
 @dataclass(frozen=True, eq=False)
 class Phases(Displayed):
     """All phases of a task in order; none for a task that is not given in phases."""
@@ -107,10 +99,10 @@ class Phases(Displayed):
         """Return the phase to which a time belongs; None for a task without phases."""
         return self.all[int(self.index_at(np.array([time]))[0])] if self.all else None
 
-    def rows(self, times: np.ndarray) -> list[PhaseRows]:
-        """Return the phases to which some of `times` belong, with these."""
+    def rows(self, times: np.ndarray) -> list[tuple[LaidPhase, np.ndarray]]:
+        """Return the phases to which some of `times` belong, each with the indices of these."""
         which = self.index_at(times)
-        return [PhaseRows(self.all[index], np.flatnonzero(which == index)) for index in np.unique(which)]
+        return [(self.all[index], np.flatnonzero(which == index)) for index in np.unique(which)]
 
     def loads_at(self, times: np.ndarray) -> np.ndarray:
         """Return what the platform carries at `times`, (n, 10)."""
