@@ -25,10 +25,10 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, TreeBuilder
 
-import casadi as ca
 import numpy as np
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser, ParseError
+from scipy.spatial.transform import Rotation
 
 from ..base.display import Displayed
 from ..base.errors import InputError
@@ -40,7 +40,6 @@ from .parsing import validate
 from .part import COORDINATES, LARGEST, Coordinate, inertia_matrix
 from .platform import Platform
 from .robot import Robot
-from .rotation import rotation
 
 # What each joint's q moves, in the order of q; both spatial ones turn freely; each writes the angles in its own form.
 JOINTS: dict[str, tuple[Coordinate, ...]] = {
@@ -283,28 +282,20 @@ def _home(link: _Node, joint: _Node, kind: str) -> list[float]:
     q = np.array(joint.numbers(7 if kind == "SPATIAL_QUATERNION" else len(dof), "q_initial"))
     if len(dof) == len(COORDINATES):
         pose[:3] += q[:3]
-        R = _from_quaternion(joint, q[3:]) if kind == "SPATIAL_QUATERNION" else _from_xyz(q[3:])
-        pose[3:] = points.angles(R) + 0.0  # -0 would only puzzle a reader
+        quaternion = kind == "SPATIAL_QUATERNION"
+        turned = _from_quaternion(joint, q[3:]) if quaternion else Rotation.from_euler("XYZ", q[3:])
+        pose[3:] = points.angles(turned.as_matrix()) + 0.0  # -0 would only puzzle a reader
     else:
         pose[[COORDINATES.index(name) for name in dof]] += q
     return pose.tolist()
 
 
-def _from_xyz(angles: np.ndarray) -> np.ndarray:
-    """Return R = Rx Ry Rz of three angles [rad], (3, 3)."""
-    x, y, z = (rotation(ca.DM(np.diag(angles)[i])).full() for i in range(3))
-    return x @ y @ z
-
-
-def _from_quaternion(joint: _Node, quaternion: np.ndarray) -> np.ndarray:
-    """Return R of the quaternion (e0, e1, e2, e3) with the real part e0, (3, 3)."""
+def _from_quaternion(joint: _Node, quaternion: np.ndarray) -> Rotation:
+    """Return the rotation of the quaternion (e0, e1, e2, e3) with the real part e0."""
     norm = np.linalg.norm(quaternion)
     if not 0.999 < norm < 1.001:
         raise joint.wrong("have a quaternion of norm 1", f"a norm of {norm:g}", "q_initial")
-    w, *v = quaternion / norm
-    x, y, z = v
-    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + 2 * w * skew + 2 * skew @ skew
+    return Rotation.from_quat(quaternion, scalar_first=True)
 
 
 def _choose(cables: _Node, requested: str | None) -> tuple[_Node, list[str]]:

@@ -16,18 +16,7 @@ import numpy as np
 from . import rigid_body
 from .cables.pulley import Exit
 from .robot import Robot
-from .rotation import Matrix, rate_matrix, rotation
-
-
-def mass_matrix(robot: Robot, pose: Matrix) -> Matrix:
-    """Return M(q), (6, 6): the wrench about the CoM in {G} for each coordinate's acceleration [kg, kg m, kg m^2]."""
-    R = rotation(pose[3:6])
-    offset = R @ ca.DM(robot.platform.com)
-    turning = R @ rate_matrix(pose[3:6])  # alpha = turning ddTheta + ...
-    inertia = R @ ca.DM(robot.inertia) @ R.T
-    mass = robot.platform.mass
-    top = ca.horzcat(mass * ca.DM.eye(3), -mass * ca.skew(offset) @ turning)
-    return ca.vertcat(top, ca.horzcat(ca.DM.zeros(3, 3), inertia @ turning))
+from .rotation import Matrix, rotation
 
 
 def platform_acceleration(robot: Robot, pose: Matrix, velocity: Matrix, wrench: Matrix) -> Matrix:
@@ -35,9 +24,11 @@ def platform_acceleration(robot: Robot, pose: Matrix, velocity: Matrix, wrench: 
 
     Coordinates that are not in `platform.dof` do not accelerate.
     """
-    resting = rigid_body.inertial_wrench(robot, pose, velocity, ca.DM.zeros(6))
+    acceleration = ca.SX.sym("acceleration", 6)
+    needed = rigid_body.inertial_wrench(robot, pose, velocity, acceleration)  # M ddq + h
+    M, h = ca.jacobian(needed, acceleration), ca.substitute(needed, acceleration, ca.DM.zeros(6))
     rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]
-    moving = ca.solve(mass_matrix(robot, pose)[rows, rows], (wrench - resting)[rows])
+    moving = ca.solve(M[rows, rows], (wrench - h)[rows])
     chosen = ca.DM(6, len(rows))
     for column, row in enumerate(rows):
         chosen[row, column] = 1

@@ -14,30 +14,19 @@ Source: paper F, Eqs. 26 to 38 as corrected.
 import casadi as ca
 
 from .motion import Motion
+from .rigid_body import body_of, body_wrench
 from .robot import Robot
-from .rotation import (
-    Matrix,
-    angles_of,
-    body_acceleration,
-    body_rate,
-    inverse_rate_matrix,
-    rate_matrix_derivative,
-    rotation,
-)
+from .rotation import Matrix, angles_of, body_rate, inverse_rate_matrix, rate_matrix_derivative, rotation, turning
 
 
 def relative_inertial_wrench(robot: Robot, motion: Motion) -> Matrix:
     """Return M_B ddX_b + F_B, (6, 1), in {A} [N, N m]: for the relative motion, without gravity and carrier."""
-    R, Omega, alpha = _turning(motion.pose, motion.velocity, motion.acceleration)
-    com = ca.DM(robot.platform.com)
-    a_com = motion.acceleration[0:3] + R @ (ca.cross(alpha, com) + ca.cross(Omega, ca.cross(Omega, com)))
-    I_b = ca.DM(robot.inertia)
-    return ca.vertcat(robot.platform.mass * a_com, R @ (I_b @ alpha + ca.cross(Omega, I_b @ Omega)))
+    return body_wrench(*body_of(robot), ca.DM.zeros(3), motion.pose, motion.velocity, motion.acceleration)
 
 
 def base_disturbance(robot: Robot, motion: Motion) -> Matrix:
     """Return D_B = (D_F, D_M), (6, 1), in {A} [N, N m]: the coupled quadrotor-disturbance term, weight included."""
-    R_A, omega_A, alpha_A = _turning(motion.carrier_pose, motion.carrier_velocity, motion.carrier_acceleration)
+    R_A, omega_A, alpha_A = turning(motion.carrier_pose, motion.carrier_velocity, motion.carrier_acceleration)
     R, Omega = rotation(motion.pose[3:6]), body_rate(motion.pose[3:6], motion.velocity[3:6])
     com = ca.DM(robot.platform.com)
     x_c = motion.pose[0:3] + R @ com
@@ -63,7 +52,7 @@ def motion_in_world(motion: Motion) -> tuple[Matrix, Matrix, Matrix]:
 
     The Euler angles come out in the ranges of `rotation.angles_of`; their rates do not exist at pitch = +-90 degrees.
     """
-    R_A, omega_A, alpha_A = _turning(motion.carrier_pose, motion.carrier_velocity, motion.carrier_acceleration)
+    R_A, omega_A, alpha_A = turning(motion.carrier_pose, motion.carrier_velocity, motion.carrier_acceleration)
     x, dx, ddx = motion.pose[0:3], motion.velocity[0:3], motion.acceleration[0:3]
     position = motion.carrier_pose[0:3] + R_A @ x
     speed = motion.carrier_velocity[0:3] + R_A @ (ca.cross(omega_A, x) + dx)
@@ -71,16 +60,10 @@ def motion_in_world(motion: Motion) -> tuple[Matrix, Matrix, Matrix]:
         ddx + ca.cross(alpha_A, x) + ca.cross(omega_A, ca.cross(omega_A, x)) + 2 * ca.cross(omega_A, dx)
     )
 
-    R, Omega, alpha = _turning(motion.pose, motion.velocity, motion.acceleration)
+    R, Omega, alpha = turning(motion.pose, motion.velocity, motion.acceleration)
     angles = angles_of(R_A @ R)
     total_rate = R.T @ omega_A + Omega  # in platform axes
     total_alpha = R.T @ (alpha_A + ca.cross(omega_A, R @ Omega)) + alpha
     rates = inverse_rate_matrix(angles) @ total_rate
     rate_rates = inverse_rate_matrix(angles) @ (total_alpha - rate_matrix_derivative(angles, rates) @ rates)
     return ca.vertcat(position, angles), ca.vertcat(speed, rates), ca.vertcat(acceleration_G, rate_rates)
-
-
-def _turning(pose: Matrix, velocity: Matrix, acceleration: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Return rotation, body rate and its derivative of a frame, (3, 3), (3, 1) [rad/s] and (3, 1) [rad/s^2]."""
-    angles, rates = pose[3:6], velocity[3:6]
-    return rotation(angles), body_rate(angles, rates), body_acceleration(angles, rates, acceleration[3:6])

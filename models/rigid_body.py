@@ -12,7 +12,7 @@ A load that the platform carries needs the same about its own CoM, and the momen
 import casadi as ca
 
 from .robot import Robot
-from .rotation import Matrix, body_acceleration, body_rate, rotation
+from .rotation import Matrix, body_rate, rotation, turning
 
 
 def com_velocity(robot: Robot, pose: Matrix, velocity: Matrix) -> Matrix:
@@ -30,8 +30,7 @@ def inertial_wrench(robot: Robot, pose: Matrix, velocity: Matrix, acceleration: 
     pose, velocity, acceleration
         (6, 1) each: (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its first two time derivatives.
     """
-    of_platform = robot.platform.mass, ca.DM(robot.platform.com), ca.DM(robot.inertia)
-    return _wrench(robot, *of_platform, pose, velocity, acceleration)
+    return body_wrench(*body_of(robot), ca.DM(robot.gravity), pose, velocity, acceleration)
 
 
 def carried_wrench(robot: Robot, load: Matrix, pose: Matrix, velocity: Matrix, acceleration: Matrix) -> Matrix:
@@ -47,27 +46,28 @@ def carried_wrench(robot: Robot, load: Matrix, pose: Matrix, velocity: Matrix, a
     mass, com = load[0], load[1:4]
     xx, yy, zz, xy, xz, yz = (load[i] for i in range(4, 10))
     inertia = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
-    own = _wrench(robot, mass, com, inertia, pose, velocity, acceleration)
+    own = body_wrench(mass, com, inertia, ca.DM(robot.gravity), pose, velocity, acceleration)
     arm = rotation(pose[3:6]) @ (com - ca.DM(robot.platform.com))
     return ca.vertcat(own[0:3], own[3:6] + ca.cross(arm, own[0:3]))
 
 
-def _wrench(
-    robot: Robot,
+def body_of(robot: Robot) -> tuple[float, Matrix, Matrix]:
+    """Return mass [kg], CoM in the platform frame (3, 1) [m] and inertia about it (3, 3) [kg m^2] of the platform."""
+    return robot.platform.mass, ca.DM(robot.platform.com), ca.DM(robot.inertia)
+
+
+def body_wrench(
     mass: Matrix | float,
     com: Matrix,
     inertia: Matrix,
+    gravity: Matrix,
     pose: Matrix,
     velocity: Matrix,
     acceleration: Matrix,
 ) -> Matrix:
-    """Return the wrench that a body in the platform's motion needs about its CoM, both in the platform frame."""
-    angles, rates = pose[3:6], velocity[3:6]
-    R = rotation(angles)
-    omega = R @ body_rate(angles, rates)
-    alpha = R @ body_acceleration(angles, rates, acceleration[3:6])
-    offset = R @ com
+    """Return the wrench, (6, 1), that a body needs about its CoM, which like its inertia is given in a moving frame."""
+    R, Omega, alpha_b = turning(pose, velocity, acceleration)
+    omega, alpha, offset = R @ Omega, R @ alpha_b, R @ com
     a_com = acceleration[0:3] + ca.cross(alpha, offset) + ca.cross(omega, ca.cross(omega, offset))
     turned = R @ inertia @ R.T
-    force = mass * (a_com - ca.DM(robot.gravity))
-    return ca.vertcat(force, turned @ alpha + ca.cross(omega, turned @ omega))
+    return ca.vertcat(mass * (a_com - gravity), turned @ alpha + ca.cross(omega, turned @ omega))

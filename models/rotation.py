@@ -64,6 +64,12 @@ def body_acceleration(angles: Matrix, rates: Matrix, accelerations: Matrix) -> M
     return rate_matrix_derivative(angles, rates) @ rates + rate_matrix(angles) @ accelerations
 
 
+def turning(pose: Matrix, velocity: Matrix, acceleration: Matrix) -> tuple[Matrix, Matrix, Matrix]:
+    """Return R, Omega and alpha of a frame from its coordinates and their derivatives: (3, 3), (3, 1) and (3, 1)."""
+    angles, rates = pose[3:6], velocity[3:6]
+    return rotation(angles), body_rate(angles, rates), body_acceleration(angles, rates, acceleration[3:6])
+
+
 def inverse_rate_matrix(angles: Matrix) -> Matrix:
     """Return P^-1, (3, 3): dTheta = P^-1 Omega. Infinite at pitch = +-90 degrees."""
     roll, pitch, _ = ca.vertsplit(angles)
