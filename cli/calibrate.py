@@ -7,7 +7,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of
-from .options import FormatOption, JsonOption, RobotArgument, print_json, print_written
+from .options import FormatOption, JsonOption, RobotArgument, print_result
 from .outputs import check_outputs
 
 SIGMA_KEYS = "lengths, position, rotation"
@@ -93,12 +93,8 @@ def calibrate(
     report = result.report()  # before anything is written
     file = None if result.refused else result.save(target)
     pictures = [] if figures is None else result.plot(figures, form)
-    if as_json:
-        print_json({**result.to_dict(), "file": file, "figures": pictures})
-    else:
-        typer.echo(report)
-        if written := [*([] if file is None else [file]), *pictures]:
-            print_written(written)
+    data = {**result.to_dict(), "file": file, "figures": pictures}
+    print_result(as_json, data, lambda: report, [*([] if file is None else [file]), *pictures])
     if result.refused:
         typer.echo(f"towline: {target} is not written: {result.refused}", err=True)
         raise typer.Exit(1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -101,6 +101,16 @@ def print_json(value: dict[str, Any]) -> None:
 def print_written(files: Iterable[object]) -> None:
     """Print the files that a command has written."""
     typer.echo("\n    ".join(["  Written", *map(str, files)]))
+
+
+def print_result(as_json: bool, data: dict[str, Any], report: Callable[[], str], files: Sequence[object] = ()) -> None:
+    """Print a result: as JSON, or its report and the files that a command has written."""
+    if as_json:
+        print_json(data)
+        return
+    typer.echo(report())
+    if files:
+        print_written(files)
 
 
 def print_table(headings: Sequence[str], rows: Sequence[Sequence[str]], align: str) -> None:

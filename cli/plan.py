@@ -17,11 +17,11 @@ from .options import (
     SpeedOption,
     check_animation,
     print_json,
-    print_written,
+    print_result,
 )
 from .outputs import check_outputs
-from .resuming import check_unused, checkpoint_option, resume_option, scheduler_option
-from .sweep import Sweeping, sweep
+from .resuming import check_unused, checkpoint_of, checkpoint_option, resume_option, scheduler_option
+from .sweep import sweep
 from .watching import watching
 
 
@@ -119,7 +119,9 @@ def plan(
                     "the task's key robust applies to all plans" if name == "--robust" else "--keep saves the plans"
                 )
                 raise InputError(f"{name} must be left out with --vary, got {shown(str(value))}; {instead}")
-        sweep(robot, task, Sweeping(vary, workers, scheduler, checkpoint, resume, keep, form), out, figures, as_json)
+        where = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint_of(checkpoint, resume)}
+        where |= {"resume": resume is not None, "keep": keep}
+        sweep(robot, task, vary, where, out, figures and figures / f"sweep.{form}", as_json)
         return
     many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
     check_unused({**many, "--resume": resume, "--keep": keep}, "--vary", "plans")
@@ -148,10 +150,7 @@ def plan(
             written["report"] = planned.save_report(report)
         if animate is not None:
             written["animation"] = planned.animate(animate, speed, fps)
-    if as_json:
-        print_json({**planned.to_dict(), **written, "figures": pictures})
-    else:
-        typer.echo(planned.report())
-        print_written((*written.values(), *pictures))
+    data = {**planned.to_dict(), **written, "figures": pictures}
+    print_result(as_json, data, planned.report, (*written.values(), *pictures))
     if not planned.feasible:
         raise typer.Exit(1)

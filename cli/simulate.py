@@ -26,8 +26,7 @@ from .options import (
     SpeedOption,
     check_animation,
     numbers,
-    print_json,
-    print_written,
+    print_result,
 )
 from .outputs import check_outputs
 from .resuming import check_unused, checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
@@ -205,11 +204,8 @@ def _once(
         pictures = [] if figures is None else flight.plot(figures, form)
         if film is not None:
             written["animation"] = flight.animate(*film)
-    if as_json:
-        print_json({**flight.to_dict(), **written, "figures": pictures})
-    else:
-        typer.echo(flight.report())
-        print_written((*written.values(), *pictures))
+    data = {**flight.to_dict(), **written, "figures": pictures}
+    print_result(as_json, data, flight.report, (*written.values(), *pictures))
     return flight.passed
 
 
@@ -232,9 +228,6 @@ def _often(
     add_to_message("")
     file = save(flights, target)
     pictures = [] if figures is None else [style.save(figure.errors(flights), figures / f"errors.{form}")]
-    if as_json:
-        print_json({**summary(flights), "file": file, "figures": pictures})
-    else:
-        typer.echo(report(flights).text())
-        print_written((file, *pictures))
+    data = {**summary(flights), "file": file, "figures": pictures}
+    print_result(as_json, data, lambda: report(flights).text(), (file, *pictures))
     return bool(flights["passed"].all())

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, RobotArgument, print_json, print_written
+from .options import JsonOption, RobotArgument, print_result
 from .outputs import check_outputs
 
 
@@ -44,11 +44,6 @@ def time(
     file = None
     if found.feasible:
         file = found.scenario.task.model_copy(update={"name": f"{read.name[:54]}-timed"}).save(target)
-    if as_json:
-        print_json({**found.to_dict(), "file": file})
-    else:
-        typer.echo(found.report())
-        if file is not None:
-            print_written([file])
+    print_result(as_json, {**found.to_dict(), "file": file}, found.report, [] if file is None else [file])
     if not found.feasible:
         raise typer.Exit(1)
