@@ -254,7 +254,7 @@ def test_angular_momentum_by_differences(flying, samples):
     """Eq. 29 holds, and Eq. 33 is off by what stands for omega_A x R I_b Omega in it: Omega x R I_b Omega."""
     change, (omega_A, Omega), R_B, inertia = momenta(samples)
     np.testing.assert_allclose(
-        balance._turn_back(samples.R_A.R, balance.newton_euler(balance.Dynamics("wang-flying"), samples)[:, 3:]),
+        instants.turn_back(samples.R_A.R, balance.newton_euler(balance.Dynamics("wang-flying"), samples)[:, 3:]),
         change,
         atol=1e-4,
     )

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 
 from ...base.text import quantity, quantity_row
@@ -86,7 +87,7 @@ class Statement:
     """A statement of a paper, and the sentences of the verdicts on it, as `claims.yaml` of a study has them.
 
     All texts may have fields such as `{least:.1f}`, whose names begin with a small letter; whoever computes the claim
-    gives their values.
+    gives their values. Computed and printed numbers are kept as a float or a tuple of floats, whatever they come in.
 
     Attributes
     ----------
@@ -103,7 +104,7 @@ class Statement:
     id: str
     place: str
     statement: str
-    printed: Value = None
+    printed: ArrayLike | None = None
     within: float = 0.0
     unit: str = ""
     figure: str | None = None
@@ -114,39 +115,49 @@ class Statement:
     fails: str = ""
 
     def compared(
-        self,
-        computed: float | tuple[float, ...],
-        printed: float | tuple[float, ...] | None = None,
-        within: float | None = None,
-        **fields: Any,
+        self, computed: ArrayLike, printed: ArrayLike | None = None, within: float | None = None, **fields: Any
     ) -> Claim:
         """Compare computed numbers with printed ones: reproduced if they differ by `within` at most."""
-        expected = self.printed if printed is None else printed
-        apart = np.abs(np.asarray(computed, dtype=float) - np.asarray(expected, dtype=float))
-        same = bool((apart <= (self.within if within is None else within)).all())
-        return self.stated(computed, same, expected, **fields)
+        numbers = np.asarray(computed, dtype=float)
+        expected = np.broadcast_to(np.asarray(self.printed if printed is None else printed, dtype=float), numbers.shape)
+        same = (np.abs(numbers - expected) <= (self.within if within is None else within)).all()
+        return self.stated(numbers, bool(same), expected, **fields)
 
     def stated(
-        self, computed: Value, holds: bool, printed: Value = None, otherwise: Verdict = Verdict.DIFFERS, **fields: Any
+        self,
+        computed: ArrayLike,
+        holds: bool | np.bool_,
+        printed: ArrayLike | None = None,
+        otherwise: Verdict = Verdict.DIFFERS,
+        **fields: Any,
     ) -> Claim:
         """Return a claim that is reproduced if the statement holds, else `otherwise`."""
         verdict, why = (Verdict.REPRODUCED, self.agrees) if holds else (otherwise, self.differs)
         return self._claim(computed, printed, verdict, why, fields)
 
-    def undetermined(self, computed: Value, printed: Value = None, **fields: Any) -> Claim:
+    def undetermined(self, computed: ArrayLike, printed: ArrayLike | None = None, **fields: Any) -> Claim:
         """Return a claim that the paper does not decide."""
         return self._claim(computed, printed, Verdict.NOT_DETERMINED, self.missing, fields)
 
-    def repaired(self, computed: Value, holds: bool, **fields: Any) -> Claim:
+    def repaired(self, computed: ArrayLike, holds: bool | np.bool_, **fields: Any) -> Claim:
         """Return something else than the paper has, in the place of what is impossible; not determined if it fails."""
         verdict, why = (Verdict.REPAIRED, self.works) if holds else (Verdict.NOT_DETERMINED, self.fails)
         return self._claim(computed, None, verdict, why, fields)
 
-    def _claim(self, computed: Value, printed: Value, verdict: Verdict, why: str, fields: Mapping[str, Any]) -> Claim:
+    def _claim(
+        self, computed: ArrayLike, printed: ArrayLike | None, verdict: Verdict, why: str, fields: Mapping[str, Any]
+    ) -> Claim:
         texts = (self.id, self.place, self.statement, why, self.unit, self.figure or "")
         id, place, statement, why, unit, figure = (FIELD.sub(lambda at: _filled(at, fields), text) for text in texts)
         expected = self.printed if printed is None else printed
-        return Claim(id, place, statement, expected, computed, verdict, why, unit, figure or None)
+        return Claim(id, place, statement, _value(expected), _value(computed), verdict, why, unit, figure or None)
+
+
+def _value(given: ArrayLike | None) -> Value:
+    if given is None or isinstance(given, str):
+        return given
+    numbers: float | list[float] = np.asarray(given, dtype=float).tolist()
+    return tuple(numbers) if isinstance(numbers, list) else numbers
 
 
 def _filled(field: re.Match[str], fields: Mapping[str, Any]) -> str:
@@ -157,11 +168,7 @@ def _filled(field: re.Match[str], fields: Mapping[str, Any]) -> str:
 def statements(file: Path) -> dict[str, Statement]:
     """Return the statements of a YAML file by their names in it, which are their ids unless these have fields."""
     entries = YAML(typ="safe", pure=True).load(file.read_text(encoding="utf-8"))
-    listed = {name: {"id": name, **entry} for name, entry in entries.items()}
-    for entry in listed.values():
-        if isinstance(entry.get("printed"), list):
-            entry["printed"] = tuple(entry["printed"])
-    return {name: Statement(**entry) for name, entry in listed.items()}
+    return {name: Statement(**{"id": name, **entry}) for name, entry in entries.items()}
 
 
 def value_text(value: Value, unit: str = "") -> str:

@@ -21,14 +21,11 @@ def write(account: Account, folder: Path, form: str = "png") -> list[Path]:
         f"{name}-errata.md": text.errata(account),
         f"{name}.json": json.dumps(account.to_dict(), indent=2, allow_nan=False) + "\n",
     }
-    files = [_write(folder / file, text) for file, text in texts.items()]
+    files = [folder / file for file in texts]
+    for file, content in zip(files, texts.values(), strict=True):
+        with whole_file(file) as temporary:
+            temporary.write_text(content, encoding="utf-8")
     for chapter in account.chapters.values():
         for figure, drawing in chapter.drawings.items():
             files.append(style.save(drawing.figure, folder / text.FIGURES / f"{figure}.{form}"))
     return files
-
-
-def _write(path: Path, text: str) -> Path:
-    with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
-    return path

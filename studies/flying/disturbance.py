@@ -14,7 +14,6 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
-from ..accounts.claim import Claim
 from .claims import claim
 from .helix import flight
 from .motion import FEASIBLE, TIMES, circle, steady_tensions
@@ -31,7 +30,15 @@ def chapter() -> Chapter:
     straight = steady_tensions(dynamics, body, pitching_on_the_line())
     error, worse = (100 * np.abs(without - part) / np.abs(part) for part in (moving, straight))
     spans = np.array([np.ptp(steady_tensions(dynamics, body, flown(float(pitch)))) for pitch in PITCHES])
-    claims = [_motion(), _error(error, worse), _felt(error), _mobility(spans)]
+    claims = [
+        claim("fig-12-13").undetermined(np.degrees(PITCH), not_read=NOT_READ),
+        claim("fig-15").undetermined(error[:, 0].max(), not_read=NOT_READ, worse=worse[:, 0].max()),
+        claim("conclusion-D_B").stated(f"{error.max():.1f} %", error.max() > 1.0),
+        claim("conclusion-mobility").stated(
+            f"{spans[0]:.2f} N at rest, {spans[-1]:.2f} N pitching by {np.degrees(PITCHES[-1]):.0f} degrees",
+            (np.diff(spans) > 0).all(),
+        ),
+    ]
     drawings = {
         "disturbance-flight": Drawing(
             "Figure 12: the quadrotor's flight in {G}, assumed", curve_in_space({"quadrotor": base.pose[:, :3]})
@@ -65,23 +72,3 @@ def pitching_on_the_line() -> Motion:
     """Return the same pitch on VI.A's straight line, which a thrust along the quadrotor's axis cannot give."""
     turned, line = flown(PITCH), flight()
     return Motion(*(np.hstack([ahead[:, :3], tilt[:, 3:]]) for ahead, tilt in zip(line, turned, strict=True)))
-
-
-def _motion() -> Claim:
-    return claim("fig-12-13").undetermined(float(np.degrees(PITCH)), not_read=NOT_READ)
-
-
-def _error(error: np.ndarray, worse: np.ndarray) -> Claim:
-    return claim("fig-15").undetermined(float(error[:, 0].max()), not_read=NOT_READ, worse=worse[:, 0].max())
-
-
-def _felt(error: np.ndarray) -> Claim:
-    most = float(error.max())
-    return claim("conclusion-D_B").stated(f"{most:.1f} %", most > 1.0)
-
-
-def _mobility(spans: np.ndarray) -> Claim:
-    return claim("conclusion-mobility").stated(
-        f"{spans[0]:.2f} N at rest, {spans[-1]:.2f} N pitching by {np.degrees(PITCHES[-1]):.0f} degrees",
-        bool((np.diff(spans) > 0).all()),
-    )

@@ -59,19 +59,16 @@ def product(*shapes: tuple[int, int]) -> str:
 def _nodes() -> Claim:
     """List the nodes j - 1 and j of the elements 1 to n, which Eqs. 12, 13 and 21 use."""
     used = {node for j in range(1, ELEMENTS + 1) for node in (j - 1, j)}
-    return claim("fig-3").compared(
-        (float(min(used)), float(max(used))), printed=(1.0, ELEMENTS + 1.0), elements=ELEMENTS
-    )
+    return claim("fig-3").compared((min(used), max(used)), printed=(1, ELEMENTS + 1), elements=ELEMENTS)
 
 
 def _increment() -> Claim:
     """Compare d tau of Eq. 12 with d tau of Eq. 13 at the same offsets."""
     before, after = OFFSETS
     by_12 = stiffness() * (after - before + WOUND)
-    forces = by_13(OFFSETS, WOUND)
     energy = stiffness() / 2 * (np.array([after - before + WOUND + step for step in (STRETCH, -STRETCH)]) ** 2)
-    pull = float(energy[0] - energy[1]) / (2 * STRETCH)  # the derivative of the strain energy by the elongation
-    return claim("eq-12-13-sign").compared(float(forces[0]), printed=float(by_12), pull=pull)
+    pull = (energy[0] - energy[1]) / (2 * STRETCH)  # the derivative of the strain energy by the elongation
+    return claim("eq-12-13-sign").compared(by_13(OFFSETS, WOUND)[0], printed=by_12, pull=pull)
 
 
 def _winding() -> Claim:
@@ -79,9 +76,7 @@ def _winding() -> Claim:
     printed = stiffness() * np.array([1.0, -1.0]) * WOUND
     by_18 = stiffness() * np.array([-1.0, 1.0]) * WOUND  # k_5 = -S u, k_6 = S u
     forces = by_13(np.zeros(2), WOUND)
-    return claim("eq-15-sign").compared(
-        tuple(forces.tolist()), printed=tuple(printed.tolist()), apart=np.abs(by_18 - forces).max()
-    )
+    return claim("eq-15-sign").compared(forces, printed=printed, apart=np.abs(by_18 - forces).max())
 
 
 def _in_world() -> Claim:
@@ -92,7 +87,7 @@ def _in_world() -> Claim:
     k_l = stiffness() * np.concatenate([-u, u])
     given = k_n @ np.concatenate([OFFSETS[0] * u, OFFSETS[1] * u]) + k_l * WOUND
     along = by_13(OFFSETS, WOUND)
-    return claim("eq-20").compared(float(np.abs(given - np.concatenate([along[0] * u, along[1] * u])).max()))
+    return claim("eq-20").compared(np.abs(given - np.concatenate([along[0] * u, along[1] * u])).max())
 
 
 def _brackets() -> Claim:

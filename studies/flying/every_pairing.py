@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 from ...models import Robot, load
 from ...models.diagnosis import RANK_TOLERANCE
 from ...ocp.tasks.paths import Motion
-from .motion import circle
+from .motion import circle, solved
 from .plans import BELOW, SECONDS
 
 PAIRINGS = np.array(list(permutations(range(6))))
@@ -68,13 +68,13 @@ def at_centre() -> AtCentre:
     J, w = wrench_matrices(still.pose[:, :3])[0], required(still)[0]
     full = _full_rank(J)
     taut = np.zeros(len(PAIRINGS), dtype=bool)
-    taut[full] = (_solved(J[full], w) > BALANCED * w[2]).all(axis=-1)
+    taut[full] = (solved(J[full], w) > BALANCED * w[2]).all(axis=-1)
     return AtCentre(full, taut)
 
 
 def tensions(motion: Motion, pairs: np.ndarray) -> np.ndarray:
     """Return the only tensions of pairings (k, 6) whose J has an inverse, (n, k, 6) [N]: negative if a cable pushes."""
-    return _solved(wrench_matrices(motion.pose[:, :3], pairs), required(motion)[:, None])
+    return solved(wrench_matrices(motion.pose[:, :3], pairs), required(motion)[:, None])
 
 
 def hold(radius: float, pairs: np.ndarray = PAIRINGS) -> np.ndarray:
@@ -87,7 +87,7 @@ def hold(radius: float, pairs: np.ndarray = PAIRINGS) -> np.ndarray:
         J = wrench_matrices(position, left)[0]
         full = _full_rank(J)
         held = np.zeros(len(left), dtype=bool)
-        held[full] = (_solved(J[full], w) >= 0).all(axis=-1)
+        held[full] = (solved(J[full], w) >= 0).all(axis=-1)
         held[~full] = [nnls(one, w)[1] <= BALANCED * w[2] for one in J[~full]]
         left = left[held]
     return left
@@ -111,7 +111,3 @@ def pull_inward(radius: float) -> Inward:
 def _full_rank(J: np.ndarray) -> np.ndarray:
     values = np.linalg.svd(J, compute_uv=False)
     return values[..., -1] > RANK_TOLERANCE * values[..., 0]
-
-
-def _solved(J: np.ndarray, w: np.ndarray) -> np.ndarray:
-    return np.linalg.solve(J, w[..., None])[..., 0]

@@ -24,7 +24,7 @@ from ...simulation import Simulation, simulate
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim
 from .claims import claim
-from .motion import FEASIBLE, TIMES
+from .motion import FEASIBLE, TIMES, solved
 from .plans import BELOW, NOT_READ, RATE, SECONDS, Name, planned
 from .repair import ON_CIRCLE
 from .wind import NOISE, PEAK
@@ -105,8 +105,7 @@ def required(robot: Robot, flown: Flown, wind: np.ndarray | None = None) -> np.n
     """Return the steady tensions of a plan in a wind, T of Eq. 38 without dT, (n, 6) [N]; default: no air."""
     dynamics = Dynamics(robot)
     A = dynamics.wrench_matrix(flown.body.pose, flown.carriers.pose)
-    w = dynamics.required_wrench(*flown.body, *flown.carriers, wind=wind)
-    return np.linalg.solve(A, w[..., None])[..., 0]
+    return solved(A, dynamics.required_wrench(*flown.body, *flown.carriers, wind=wind))
 
 
 def moved(flight: Simulation) -> float:

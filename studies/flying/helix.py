@@ -32,7 +32,7 @@ def chapter() -> Chapter:
         _independent(dynamics),
         _sine_of_lengths(lengths),
         _sine_of_tensions(),
-        _undisturbed(dynamics, body, tensions),
+        claim("VI.A-flight").compared(np.abs(steady_tensions(dynamics, body) - tensions).max()),
         _positive(dynamics, world, base, tensions),
     ]
     drawings = {
@@ -72,8 +72,7 @@ def _turns(world: Motion, base: Motion) -> Claim:
     arm = world.pose[:, :2] - base.pose[:, :2]
     angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
     return claim("fig-6").compared(
-        (float(np.linalg.norm(arm, axis=1).mean()), float(np.ptp(angle) / (2 * np.pi))),
-        printed=(1.0, 0.2 * SECONDS / 2),
+        (np.linalg.norm(arm, axis=1).mean(), np.ptp(angle) / (2 * np.pi)), printed=(1.0, 0.2 * SECONDS / 2)
     )
 
 
@@ -83,7 +82,7 @@ def _independent(dynamics: Dynamics) -> Claim:
     body, zero = np.tile(circle(RADIUS).pose[0], (len(samples.base.pose), 1)), np.zeros_like(samples.base.pose)
     world = dynamics.relative.motion_in_world(body, zero, zero, samples.base.pose, zero, zero)[0]
     lengths = dynamics.cable_lengths(world, samples.base.pose[:, None])
-    change = float(np.ptp(lengths, axis=0).max())
+    change = np.ptp(lengths, axis=0).max()
     return claim("eq-5").stated(f"{change:.0e} m", change > 1e-9)
 
 
@@ -97,7 +96,7 @@ def off_sine(times: np.ndarray, values: np.ndarray) -> np.ndarray:
 def _sine_of_lengths(crossed: np.ndarray) -> Claim:
     """Compare lengths with a sine, of the printed pairing, which has lengths though its J has no inverse."""
     printed = Dynamics(load("wang-flying-printed")).cable_lengths(circle(RADIUS).pose)
-    off, others = (float(off_sine(TIMES, lengths).max()) for lengths in (printed, crossed))
+    off, others = (off_sine(TIMES, lengths).max() for lengths in (printed, crossed))
     return claim("fig-7-lengths").undetermined(off, others=others)
 
 
@@ -106,13 +105,8 @@ def _sine_of_tensions() -> Claim:
     held = tensions_of(circle(RADIUS, TURN), PAIRINGS[at_centre().taut])
     most = off_sine(TURN, held.reshape(len(TURN), -1)).reshape(held.shape[1:]).max(axis=1)
     return claim("fig-7-tensions").stated(
-        float(most.min()), bool(most.min() <= LIKE_A_SINE), like_a_sine=LIKE_A_SINE, count=len(most)
+        most.min(), most.min() <= LIKE_A_SINE, like_a_sine=LIKE_A_SINE, count=len(most)
     )
-
-
-def _undisturbed(dynamics: Dynamics, body: Motion, tensions: np.ndarray) -> Claim:
-    hovering = steady_tensions(dynamics, body)
-    return claim("VI.A-flight").compared(float(np.abs(hovering - tensions).max()))
 
 
 def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndarray) -> Claim:

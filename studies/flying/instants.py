@@ -82,6 +82,21 @@ def turning(motion: Motion) -> Turning:
     return Turning(*(np.asarray(part).T.reshape(-1, 3, 3).transpose(0, 2, 1) for part in columns))
 
 
+def turn(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return R v, (n, 3)."""
+    return np.einsum("nij,nj->ni", R, vectors)
+
+
+def turn_back(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return R^T v, (n, 3)."""
+    return np.einsum("nji,nj->ni", R, vectors)
+
+
+def relative_error(vectors: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Return how far vectors (..., 3) are from the true ones, over the length of these, (...)."""
+    return np.linalg.norm(vectors - true, axis=-1) / np.linalg.norm(true, axis=-1)
+
+
 def _axial(matrices: np.ndarray) -> np.ndarray:
     """Return the vectors of the skew parts of (n, 3, 3); the symmetric part, [omega]x^2, drops out."""
     skew = (matrices - matrices.transpose(0, 2, 1)) / 2

@@ -29,4 +29,9 @@ def steady_tensions(dynamics: Dynamics, motion: Motion, base: Motion | None = No
         Motion of the carrier in {G}; default: hovering, level.
     """
     w = dynamics.relative.required_wrench(*motion, *(base or ()))
-    return np.linalg.solve(dynamics.relative.wrench_matrix(motion.pose), w[..., None])[..., 0]
+    return solved(dynamics.relative.wrench_matrix(motion.pose), w)
+
+
+def solved(A: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return A^-1 w of matrices (..., 6, 6) and wrenches (..., 6), (..., 6)."""
+    return np.linalg.solve(A, w[..., None])[..., 0]

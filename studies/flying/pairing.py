@@ -25,9 +25,9 @@ def chapter() -> Chapter:
     printed, crossed = diagnose(load("wang-flying-printed")), diagnose(robot)
     values = ", ".join(f"{value:.3g}" for value in crossed.singular_values)
     rank = claim("pairing").stated(
-        float(printed.rank_level),
+        printed.rank_level,
         printed.rank_level == ROWS,
-        printed=float(ROWS),
+        printed=ROWS,
         otherwise=Verdict.IMPOSSIBLE,
         affine=off_affine(),
         reason=printed.reason,

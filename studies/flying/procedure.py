@@ -7,9 +7,7 @@ of a vibrating cable is checked by its plant (`shaken`).
 """
 
 from dataclasses import dataclass
-from itertools import accumulate
 
-import casadi as ca
 import numpy as np
 
 from ...figures.curves import Panel, curves
@@ -18,12 +16,14 @@ from ...models import Dynamics, Robot, load
 from ...models.cables import ElementChain
 from ...models.cables.driving_force import DrivingForce, driving_force
 from ...models.diagnosis import diagnose
-from ...models.rotation import rotation
+from ...models.points import rotations
 from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict
+from .cable import constants
 from .claims import claim
-from .motion import FEASIBLE, TIMES, circle
+from .instants import turn
+from .motion import FEASIBLE, TIMES, circle, solved
 from .vibration import ELEMENTS, STEP, vibration
 
 AMPLITUDE = 1e-6  # of the vibration [m], assumed
@@ -49,7 +49,7 @@ def chapter() -> Chapter:
     run = steps(robot, motion, shake[ROWS])
     own = driving_force(robot, *motion, shake[ROWS], STEP, ELEMENTS)
     claims = [
-        _given(),
+        claim("step-1").undetermined(f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um"),
         _same("step-2", "2", "cable lengths l_i(t), Eq. 5", run.lengths, own.lengths, "m"),
         _same("step-3", "3", "element lengths e_i(t) = l_i(t) / n", run.elements, own.lengths / ELEMENTS, "m"),
         _same("step-4", "4", "damping increments dT_C, Eqs. 10 and 11", run.dT_C, own.dT_C, "N"),
@@ -67,44 +67,30 @@ def steps(robot: Robot, motion: Motion, shake: np.ndarray) -> Run:
     rows = [_instant(robot, pose, small) for pose, small in zip(motion.pose, shake, strict=True)]
     lengths, elements, dT_C, dT_K = (np.stack(part) for part in zip(*rows, strict=True))
     dynamics = Dynamics(robot).relative
-    T = np.stack(
-        [
-            np.linalg.solve(J, w - J @ dT)
-            for J, w, dT in zip(
-                dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion), dT_C + dT_K, strict=True
-            )
-        ]
-    )
+    J = dynamics.wrench_matrix(motion.pose)
+    T = solved(J, dynamics.required_wrench(*motion) - turn(J, dT_C + dT_K))
     return Run(TIMES[ROWS], lengths, elements, dT_C, dT_K, T)
 
 
 def _instant(robot: Robot, pose: np.ndarray, shake: np.ndarray) -> tuple[np.ndarray, ...]:
     """Run steps 2 to 5 at one instant; return lengths, element lengths, dT_C and dT_K of each cable, (6,) each."""
-    R = rotation(ca.DM(pose[3:])).full()
-    rows = []
-    for cable in robot.cables:
-        assert cable.stiffness is not None
-        assert cable.damping is not None
-        anchor, arm = np.array(cable.anchor), R @ cable.attachment
+    rows, (stiffness, damping) = [], constants(robot)
+    for anchor, arm in zip(robot.anchors, robot.attachments @ rotations(pose[3:]).T, strict=True):
         end = pose[:3] + arm
-        length = float(np.linalg.norm(anchor - end))
+        length = np.linalg.norm(anchor - end)
         dB = shake[:3] + np.cross(shake[3:], arm)
-        moved = float(np.linalg.norm(anchor - end - dB))
-        chain = ElementChain(anchor, end, cable.stiffness, ELEMENTS)
-        rows.append((length, length / ELEMENTS, cable.damping * (moved - length) / STEP, chain.end_increment(dB)))
+        moved = np.linalg.norm(anchor - end - dB)
+        chain = ElementChain(anchor, end, stiffness, ELEMENTS)
+        rows.append((length, length / ELEMENTS, damping * (moved - length) / STEP, chain.end_increment(dB)))
     return tuple(np.array(column) for column in zip(*rows, strict=True))
-
-
-def _given() -> Claim:
-    return claim("step-1").undetermined(f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um")
 
 
 def _same(name: str, step: str, what: str, run: np.ndarray, own: np.ndarray, unit: str) -> Claim:
     """Report how far one step and `driving_force` are apart, which is no verdict on the paper."""
-    off = float(np.abs(run - own).max())
+    off = np.abs(run - own).max()
     agree = f"agree to {off:.0e} {unit}" if off <= SAME else f"differ by up to {off:.2g} {unit}"
     return claim("one-step").undetermined(
-        float(np.abs(run).max()), name=name, step=step, what=what, feasible=FEASIBLE, unit=unit, agree=agree
+        np.abs(run).max(), name=name, step=step, what=what, feasible=FEASIBLE, unit=unit, agree=agree
     )
 
 
@@ -114,28 +100,26 @@ def _traction(robot: Robot, motion: Motion, run: Run) -> Claim:
     A, w = dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion)
     dT = run.dT_C + run.dT_K
     slope = np.gradient(run.T, run.times, axis=0)
-    meant, literal = (float(np.abs(np.einsum("nij,nj->ni", A, run.T + part) - w).max()) for part in (dT, slope))
+    meant, literal = (np.abs(turn(A, run.T + part) - w).max() for part in (dT, slope))
     return claim("step-7").compared(literal, within=SAME, meant=meant)
 
 
 def _inverse() -> Claim:
     rank = diagnose(load("wang-flying-printed")).rank_level
-    return claim("step-7-inverse").stated(float(rank), rank == 6, otherwise=Verdict.IMPOSSIBLE)
+    return claim("step-7-inverse").stated(rank, rank == 6, otherwise=Verdict.IMPOSSIBLE)
 
 
 def _clock() -> Claim:
     """Compare the times of t = t + k dt for k = 1, 2, 3, ... with those of a constant step."""
-    count = 4
-    printed = tuple(accumulate(k * STEP for k in range(count)))
-    return claim("step-8").compared(tuple(k * STEP for k in range(count)), printed=printed)
+    steps = STEP * np.arange(4)
+    return claim("step-8").compared(steps, printed=np.cumsum(steps))
 
 
 def _figure(run: Run, own: DrivingForce) -> Drawing:
+    labels = {"lengths": "length [m]", "dT_C": "dT_C [N]", "dT_K": "dT_K [N]", "T": "T [N]"}
     panels = [
-        Panel("length [m]", {"in one pass": own.lengths[:, 0]}, dots={"step by step": run.lengths[:, 0]}),
-        Panel("dT_C [N]", {"in one pass": own.dT_C[:, 0]}, dots={"step by step": run.dT_C[:, 0]}),
-        Panel("dT_K [N]", {"in one pass": own.dT_K[:, 0]}, dots={"step by step": run.dT_K[:, 0]}),
-        Panel("T [N]", {"in one pass": own.T[:, 0]}, dots={"step by step": run.T[:, 0]}),
+        Panel(label, {"in one pass": getattr(own, name)[:, 0]}, dots={"step by step": getattr(run, name)[:, 0]})
+        for name, label in labels.items()
     ]
     return Drawing(
         f"Section V for cable 1: circle of radius {FEASIBLE:g} m, vibration of {AMPLITUDE * 1e6:g} um",

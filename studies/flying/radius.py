@@ -5,6 +5,8 @@ tension falls with the radius, so bisection gives the largest feasible one. The 
 anchors and attachments (`every_pairing`), not for crossed pairs alone.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...figures.curves import Panel, curves
@@ -27,14 +29,7 @@ BEYOND = (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # radii [m] at which all pairings
 
 def largest_radius(dynamics: Dynamics, floor: float = 0.0, below: float = BELOW, most: float = 2.0) -> float:
     """Return the largest radius [m], up to `most`, at which tensions of at least `floor` [N] exist all the time."""
-    low, high = 0.0, most
-    while high - low > PRECISION:
-        middle = (low + high) / 2
-        if feasible(dynamics, middle, floor, below):
-            low = middle
-        else:
-            high = middle
-    return low
+    return _bisected(lambda radius: feasible(dynamics, radius, floor, below), 0.0, most)
 
 
 def feasible(dynamics: Dynamics, radius: float, floor: float, below: float = BELOW) -> bool:
@@ -47,10 +42,13 @@ def feasible(dynamics: Dynamics, radius: float, floor: float, below: float = BEL
 def largest_radius_of_any(low: float, high: float = BEYOND[0]) -> float:
     """Return the largest radius [m] from `low` to `high` at which some pairing holds the platform all the time."""
     pairs = hold(low)
+    return _bisected(lambda radius: len(hold(radius, pairs)) > 0, low, high)
+
+
+def _bisected(holds: Callable[[float], bool], low: float, high: float) -> float:
     while high - low > PRECISION:
         middle = (low + high) / 2
-        left = hold(middle, pairs)
-        low, high, pairs = (middle, high, left) if len(left) else (low, middle, pairs)
+        low, high = (middle, high) if holds(middle) else (low, middle)
     return low
 
 
@@ -66,15 +64,13 @@ def chapter() -> Chapter:
 
 def _largest(best: float, crossed: float, kept: str) -> Claim:
     beyond = [radius for radius in (*BEYOND, RADIUS) if radius > best]
-    holding = sum(len(hold(radius)) for radius in beyond)
-    taut = int(at_centre().taut.sum())
     return claim("radius").stated(
         best,
-        best >= RADIUS or holding > 0,
+        best >= RADIUS or any(len(hold(radius)) for radius in beyond),
         printed=RADIUS,
         otherwise=Verdict.IMPOSSIBLE,
         pairings=len(PAIRINGS),
-        taut=taut,
+        taut=at_centre().taut.sum(),
         beyond=", ".join(f"{radius:g}" for radius in beyond),
         crossed=crossed,
         kept=kept,

@@ -31,45 +31,35 @@ TURN = 1e-6  # of alpha_A, for a difference [rad]
 
 def chapter() -> Chapter:
     """Look references up, and form what frames and letters state."""
-    return Chapter([_in_steps(), _outside(), _figures(), _frames(), _angle(), _cables()])
-
-
-def _in_steps() -> Claim:
-    return claim("section-V-references").compared(
-        by_order(IN_STEPS),
-        printed=tuple(float(number) for number in IN_STEPS),
-        tags=len(TAGS),
-        last=TAGS[-1],
-        in_steps=IN_STEPS[-1],
+    captions, shown = zip(*FIGURES.values(), strict=True)
+    last = {"tags": len(TAGS), "last": TAGS[-1], "in_steps": IN_STEPS[-1]}
+    return Chapter(
+        [
+            claim("section-V-references").compared(by_order(IN_STEPS), printed=IN_STEPS, **last),
+            claim("section-II-IV-references").compared(by_order(OUTSIDE), printed=OUTSIDE),
+            claim("section-VI-references").compared(captions, printed=shown),
+            _frames(),
+            _angle(),
+            claim("eq-23-cables").compared(load("wang-flying-printed").m, printed=ELEMENTS + 1, elements=ELEMENTS),
+        ]
     )
 
 
-def _outside() -> Claim:
-    return claim("section-II-IV-references").compared(
-        by_order(OUTSIDE), printed=tuple(float(number) for number in OUTSIDE)
-    )
-
-
-def by_order(references: tuple[int, ...]) -> tuple[float, ...]:
+def by_order(references: tuple[int, ...]) -> list[int]:
     """Return the numbers of the equations at these places among all displayed ones, the second Eq. 2 included."""
-    return tuple(float(TAGS[place - 1]) for place in references)
-
-
-def _figures() -> Claim:
-    captions, shown = (tuple(map(float, numbers)) for numbers in zip(*FIGURES.values(), strict=True))
-    return claim("section-VI-references").compared(captions, printed=shown)
+    return [TAGS[place - 1] for place in references]
 
 
 def _frames() -> Claim:
     """Transform the platform's circle into its own frame."""
     motion = circle(RADIUS)
     in_own = motion.pose[:, :3] - motion.pose[:, :3]  # O_B from O_B; the level platform's axes are those of {A}
-    return claim("frames").compared(float(np.linalg.norm(in_own, axis=1).max()), printed=RADIUS)
+    return claim("frames").compared(np.linalg.norm(in_own, axis=1).max(), printed=RADIUS)
 
 
 def _angle() -> Claim:
     """Compute how far B_2 moves with alpha_A, by the printed b_i and by b_i with alpha_B."""
-    r_B = float(np.hypot(*load("wang-flying-printed").attachments[0, :2]))
+    r_B = np.hypot(*load("wang-flying-printed").attachments[0, :2])
 
     def moved(of_b: float) -> float:
         alpha_B = np.radians(60)
@@ -77,9 +67,3 @@ def _angle() -> Claim:
         return float(np.linalg.norm(after - before) / TURN)
 
     return claim("eq-3-alpha").compared(moved(0.0), printed=moved(TURN))
-
-
-def _cables() -> Claim:
-    return claim("eq-23-cables").compared(
-        float(load("wang-flying-printed").m), printed=float(ELEMENTS + 1), elements=ELEMENTS
-    )

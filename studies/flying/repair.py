@@ -67,20 +67,18 @@ def _hovering(planned: Plan) -> Claim:
 
 def _repaired(name: str, place: str, what: str, planned: Plan, figure: str) -> Claim:
     """Check the audited plan with the base free."""
-    followed = planned.feasible and planned.tracking_error_max <= ON_CIRCLE
     low, high = planned.tension_min, planned.tension_max
     tensions = "" if low is None or high is None else f"tensions from {low:.2f} N to {high:.2f} N"
     apart = planned.trajectory["carrier_pose"].values[:, 0, :2] - planned.trajectory["pose"].values[:, :2]
-    away = float(np.linalg.norm(apart, axis=1).max())
     return claim("free-quadrotor").repaired(
         planned.tracking_error_max,
-        followed,
+        planned.feasible and planned.tracking_error_max <= ON_CIRCLE,
         name=name,
         place=place,
         what=what,
         radius=RADIUS,
         figure=figure,
-        away=100 * away,
+        away=100 * np.linalg.norm(apart, axis=1).max(),
         tensions=tensions,
         rate=planned.audit.rate,
     )

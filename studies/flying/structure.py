@@ -1,6 +1,5 @@
 """Paper F's robot: figures 1 and 2 drawn from its numbers, Eqs. 2 and 3, and a small displacement (Eq. 8)."""
 
-import casadi as ca
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -8,11 +7,11 @@ from ...figures.curve_in_space import curve_in_space
 from ...figures.drawing import Drawing
 from ...figures.robot import RobotSketch, draw
 from ...models import Dynamics, load
-from ...models.rotation import rotation
+from ...models.points import rotations
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim
 from .claims import claim
-from .instants import Instants, instants
+from .instants import Instants, instants, relative_error
 
 ROUNDING = 1e-12  # [m]
 RANK = 1e-9  # of the largest singular value: those below are rounding errors, the printed pairing has rank 3
@@ -38,7 +37,7 @@ def _suspended() -> Claim:
         tensions = np.linalg.pinv(A, rcond=RANK) @ w
         pulls.append(tensions.min())
         left.append(np.abs(A @ tensions - w).max())
-    return claim("fig-1").stated(tuple(float(value) for value in pulls), min(pulls) > 0 and max(left) < ROUNDING)
+    return claim("fig-1").stated(pulls, min(pulls) > 0 and max(left) < ROUNDING)
 
 
 def _points(samples: Instants) -> Claim:
@@ -46,7 +45,7 @@ def _points(samples: Instants) -> Claim:
     dynamics = Dynamics(load("wang-flying"))
     world, _, _ = dynamics.relative.motion_in_world(*samples.body, *samples.base)
     own = np.concatenate(dynamics.points(world, samples.base.pose[:, None]), axis=1)
-    off = float(np.abs(np.concatenate(_anchors_and_ends(samples), axis=1) - own).max())
+    off = np.abs(np.concatenate(_anchors_and_ends(samples), axis=1) - own).max()
     return claim("eq-3").compared(off, within=ROUNDING)
 
 
@@ -64,7 +63,7 @@ def _loop(samples: Instants) -> Claim:
     anchors, ends = _anchors_and_ends(samples)
     R_A, R_B = samples.R_A.R.transpose(0, 2, 1), samples.R_B.R.transpose(0, 2, 1)
     L = (robot.anchors - samples.body.pose[:, None, :3] - robot.attachments @ R_B) @ R_A
-    return claim("fig-2").compared(float(np.linalg.norm(ends + L - anchors, axis=-1).max()), within=ROUNDING)
+    return claim("fig-2").compared(np.linalg.norm(ends + L - anchors, axis=-1).max(), within=ROUNDING)
 
 
 def _displaced(samples: Instants) -> Claim:
@@ -77,40 +76,26 @@ def _displaced(samples: Instants) -> Claim:
     moved = small[:3] + turned - arms
     linear = small[:3] + np.cross(small[3:], arms)  # Eq. 10
     angles = samples.base.pose[:, 3:]
-    change = np.stack([_rotated(row + small[3:]) - _rotated(row) for row in angles])
+    change = rotations(angles + small[3:]) - rotations(angles)
     by_angles = small[:3] + np.einsum("nij,mj->nmi", change, robot.attachments)
     by_vector = small[:3] + np.cross(small[3:], robot.attachments @ samples.R_A.R.transpose(0, 2, 1))
-    share = float((np.linalg.norm(by_angles - by_vector, axis=-1) / np.linalg.norm(by_angles, axis=-1)).max())
+    share = relative_error(by_vector, by_angles).max()
     return claim("eq-8").stated(share, share < SMALL, apart=np.linalg.norm(moved - linear, axis=-1).max(), small=SMALL)
-
-
-def _rotated(angles: np.ndarray) -> np.ndarray:
-    return rotation(ca.DM(angles)).full()
 
 
 def _structure() -> Drawing:
     robot = load("wang-flying-printed")
     tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home), rcond=RANK)[:, 2] * robot.weight
-    sketch = RobotSketch(
-        "the printed pairing at home",
-        robot.anchors,
-        robot.home_attachments,
-        robot.home[:3],
-        robot.carrier_home[:, :3],
-        [carrier.name for carrier in robot.carriers],
-        [],
-        tensions,
-        robot.t_min,
-        robot.t_max,
-        np.empty((0, 3)),
-        np.empty(0, dtype=bool),
-    )
+    places = robot.anchors, robot.home_attachments, robot.home[:3], robot.carrier_home[:, :3]
+    names, nowhere = [carrier.name for carrier in robot.carriers], (np.empty((0, 3)), np.empty(0, dtype=bool))
+    title = "the printed pairing at home"
+    sketch = RobotSketch(title, *places, names, [], tensions, robot.t_min, robot.t_max, *nowhere)
     return Drawing("Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1", draw(sketch))
 
 
 def _frames() -> Drawing:
     robot, (base, body) = load("wang-flying-printed"), SHOWN
-    R_A, R_B = _rotated(base[3:]), _rotated(body[3:])
+    R_A, R_B = rotations(base[3:]), rotations(body[3:])
     x_B = base[:3] + R_A @ body[:3]
     anchor, end = base[:3] + R_A @ robot.anchors[0], x_B + R_A @ R_B @ robot.attachments[0]
     lines = {

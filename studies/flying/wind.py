@@ -26,46 +26,44 @@ def chapter() -> Chapter:
     wind, calm = trapezoid(TIMES, PEAK, noise=NOISE), trapezoid(TIMES, PEAK, noise=0.0)
     still = np.zeros((len(TIMES), 6))
     force = dynamics.aerodynamic_wrench(still, still, wind)[:, :3]
-    claims = [_top(wind), _noise(wind - calm), _shape(), _sign(dynamics), _lift(dynamics)]
+    claims = [_top(wind), _noise(wind - calm), _shape(), *_force(dynamics)]
     return Chapter(claims, {"wind": _figure(wind, force)})
 
 
 def _top(wind: np.ndarray) -> Claim:
     share = TIMES / TIMES[-1]
     top = wind[(share > STEADY[0]) & (share < STEADY[1])].mean(axis=0)
-    return claim("fig-5-peak").undetermined(tuple(float(value) for value in top), printed=PEAK)
+    return claim("fig-5-peak").undetermined(top, printed=PEAK)
 
 
 def _noise(noise: np.ndarray) -> Claim:
     """Report how many samples of a Gaussian sequence with this deviation are outside of the printed amplitudes."""
     deviation = NOISE / DEVIATIONS
     outside = erfc(NOISE / deviation / sqrt(2))
-    return claim("fig-5-noise").undetermined(float(np.abs(noise).max()), printed=NOISE, outside=outside)
+    return claim("fig-5-noise").undetermined(np.abs(noise).max(), printed=NOISE, outside=outside)
 
 
 def _shape() -> Claim:
-    corners = (0.1, 0.3, 0.7, 0.9)
-    return claim("fig-5-shape").undetermined(tuple(corner * TIMES[-1] for corner in corners))
+    return claim("fig-5-shape").undetermined(TIMES[-1] * np.array([0.1, 0.3, 0.7, 0.9]))
 
 
-def _sign(dynamics: Dynamics) -> Claim:
-    """Compare V^2, which has no direction, with V |V| in a wind along -x."""
+def _force(dynamics: Dynamics) -> list[Claim]:
+    """Compare V^2, which has no direction, with V |V| in a wind along -x, and report the lift at the strongest wind.
+
+    The lift is C_l rho (V_x^2 + V_y^2) S / 2, which nothing in the paper checks.
+    """
     aero = dynamics.robot.platform.aero
     assert aero is not None
-    printed = 0.5 * aero.drag * aero.air_density * AGAINST[0] ** 2 * aero.area
-    return claim("eq-25-drag").compared(
-        float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), AGAINST)[0]), printed=printed, against=AGAINST[0]
+    against, strongest = (
+        dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), wind) for wind in (AGAINST, np.array(PEAK))
     )
-
-
-def _lift(dynamics: Dynamics) -> Claim:
-    """Report C_l rho (V_x^2 + V_y^2) S / 2 at the strongest wind, which nothing in the paper checks."""
-    aero = dynamics.robot.platform.aero
-    assert aero is not None
-    printed = 0.5 * aero.lift * aero.air_density * (PEAK[0] ** 2 + PEAK[1] ** 2) * aero.area
-    lift = float(dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[2])
-    used = "as printed" if np.isclose(lift, printed) else "another one"
-    return claim("eq-25-lift").undetermined(lift, printed=printed, used=used)
+    half = 0.5 * aero.air_density * aero.area
+    drag, lift = half * aero.drag * AGAINST[0] ** 2, half * aero.lift * (PEAK[0] ** 2 + PEAK[1] ** 2)
+    used = "as printed" if np.isclose(strongest[2], lift) else "another one"
+    return [
+        claim("eq-25-drag").compared(against[0], printed=drag, against=AGAINST[0]),
+        claim("eq-25-lift").undetermined(strongest[2], printed=lift, used=used),
+    ]
 
 
 def _figure(wind: np.ndarray, force: np.ndarray) -> Drawing:

@@ -8,6 +8,8 @@ from ...models import Dynamics, Robot
 from ...ocp.tasks.paths import Motion
 from ...plant import Plant
 from ...plant.reading import Reading
+from .cable import constants
+from .motion import solved
 
 PERIOD = 1e-3  # of the commanded lengths [s]
 FLIGHT = PERIOD * np.arange(10_001)  # [s]
@@ -66,6 +68,5 @@ def wind_up(
 def unstrained(robot: Robot, body: Motion) -> np.ndarray:
     """Return the lengths that have the steady tensions of a motion under a resting carrier, (n, m) [m]."""
     dynamics = Dynamics(robot)
-    T = np.linalg.solve(dynamics.wrench_matrix(body.pose), dynamics.required_wrench(*body)[..., None])[..., 0]
-    stiffness = np.array([cable.stiffness for cable in robot.cables], dtype=float)
-    return dynamics.cable_lengths(body.pose) / (1 + T / stiffness)
+    T = solved(dynamics.wrench_matrix(body.pose), dynamics.required_wrench(*body))
+    return dynamics.cable_lengths(body.pose) / (1 + T / constants(robot)[0])
