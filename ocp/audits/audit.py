@@ -116,7 +116,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     times = np.linspace(0.0, scenario.duration, intervals + 1)
     regular = instants(scenario, deviation, times)
     seen = regular if to_show else with_peaks(scenario, regular)
-    exceeded = excesses(seen, seen.values) + came_too_near(seen, seen.values)
+    exceeded = excesses(seen) + came_too_near(seen)
     beyond, at = seen.beyond
     if beyond > TOLERANCE:
         why = "wrench error of tensions inside their limits, reduced by the margin"

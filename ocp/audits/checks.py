@@ -6,23 +6,19 @@ the limit's own unit, with no use of the program's points; all else is computed 
 and by differences, and shares nothing with the program.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ...base.display import Displayed
 from ...models.part import COORDINATES
 from ..limits.distance import Distance
-from ..tasks.deviation import Deviation
 from ..tasks.ends import at_rest_without_acceleration, carrier_ends, platform_ends
 from ..tasks.paths import Motion, WaypointPath
-from ..tasks.scenario import ATTITUDE, POSITION, START_BAND, Scenario
+from ..tasks.scenario import ATTITUDE, POSITION, START_BAND
 from ..tasks.task import FreeBase
 from .excess import Excess
+from .instants import Instants
 
 START_TENSIONS = "initial.tensions"
 
-UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 PATH_TOLERANCE = 1e-7  # [m, rad], of ends and waypoints
 END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers and platform start and end
 END_ACCELERATION_TOLERANCE = 1e-4  # [m/s^2, rad/s^2], of second differences
@@ -39,32 +35,18 @@ SECOND = np.array([45.0, -154.0, 214.0, -156.0, 61.0, -10.0]) / 12.0
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
 
-@dataclass(frozen=True)
-class AuditedMotion(Displayed):
-    """A motion on a dense grid with its tensions, and the scenario and deviation that it was made from."""
-
-    scenario: Scenario
-    deviation: Deviation | None
-    times: np.ndarray  # (n,) [s]
-    motion: Motion  # of the platform in {G}, (n, 6) each
-    carriers: Motion  # (n, c, 6) each
-    tensions: np.ndarray  # (n, m) [N], nan where there are none
-    off_path: np.ndarray  # (n, 6) [m, rad], along the path's axes
-
-
-def excesses(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
-    """Return all limits that are exceeded, hard and soft; `limited` is that of the motion."""
+def excesses(audited: Instants) -> list[Excess]:
+    """Return all limits that are exceeded, hard and soft."""
     checks = (_still, _lengths, _initial, _tube_ends, _waypoints, _base_ends, _grounded, _locked, _duration, _jumps)
-    exceeded = _limits(audited, limited)
-    return exceeded + [excess for check in checks for excess in check(audited)]
+    return [excess for check in (_limits, *checks) for excess in check(audited)]
 
 
-def _limits(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
+def _limits(audited: Instants) -> list[Excess]:
     """Check the limits of task, robot and carriers, hard and soft."""
     limits, exceeded = audited.scenario.limits, []
     # A limit of tensions is not checked where there are none; any other value that is nan exceeds its limit.
     there = np.where(np.isfinite(audited.tensions).all(axis=1, keepdims=True), 0.0, np.nan)
-    for limit, values in zip(limits, limited, strict=True):
+    for limit, values in zip(limits, audited.values, strict=True):
         if isinstance(limit, Distance):
             continue  # `clearances` bounds them over all time
         beyond = np.maximum(limit.low - values, values - limit.high)
@@ -73,15 +55,11 @@ def _limits(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
         if beyond.max() <= limit.tolerance:
             continue
         row, which = np.unravel_index(beyond.argmax(), beyond.shape)
-        value = float(values[row, which])
-        side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
-        time, about = float(audited.times[row]), limit.about(int(which))
-        side = "exactly" if limit.is_equation else side
-        exceeded.append(Excess(limit.name, about, time, value, bound, limit.unit, side))
+        exceeded.append(Excess.of(limit, int(which), audited.times[row], values[row, which]))
     return exceeded
 
 
-def _still(audited: AuditedMotion) -> list[Excess]:
+def _still(audited: Instants) -> list[Excess]:
     """Check that carriers keep the coordinates that they cannot change, and their position if only winches move."""
     robot, exceeded = audited.scenario.robot, []
     for index, carrier in enumerate(robot.carriers):
@@ -102,16 +80,21 @@ def _still(audited: AuditedMotion) -> list[Excess]:
 
 
 def _above(
-    audited: AuditedMotion, limit: str, about: str, values: np.ndarray, tolerance: float, unit: str, why: str = ""
+    audited: Instants, limit: str, about: str, values: np.ndarray, tolerance: float, unit: str, why: str = ""
 ) -> list[Excess]:
     """Check that values (n,) that ought to be zero never exceed a tolerance."""
     row = int(values.argmax())
-    if values[row] <= tolerance:
-        return []
-    return [Excess(limit, about, float(audited.times[row]), float(values[row]), 0.0, unit, "exactly", why)]
+    return _missed(limit, about, audited.times[row], values[row], tolerance, unit, why)
 
 
-def _lengths(audited: AuditedMotion) -> list[Excess]:
+def _missed(
+    limit: str, about: str, time: float, value: float, tolerance: float, unit: str, why: str = ""
+) -> list[Excess]:
+    """Check that a value that ought to be zero is a number not above a tolerance."""
+    return [] if value <= tolerance else [Excess(limit, about, float(time), float(value), 0.0, unit, "exactly", why)]
+
+
+def _lengths(audited: Instants) -> list[Excess]:
     """Check that cables keep the lengths that the drive fixes."""
     kept = audited.scenario.robot.fixed_lengths
     if kept is None:
@@ -126,7 +109,7 @@ def _lengths(audited: AuditedMotion) -> list[Excess]:
     return exceeded
 
 
-def _initial(audited: AuditedMotion) -> list[Excess]:
+def _initial(audited: Instants) -> list[Excess]:
     """Check that the motion starts as measured, and ends in the state that the task gives."""
     task, exceeded = audited.scenario.task, list[Excess]()
     bodies: list[tuple[int | None, str, Motion]] = [(None, "platform", audited.motion)]
@@ -138,21 +121,18 @@ def _initial(audited: AuditedMotion) -> list[Excess]:
                 off = motion[order][end] - np.array(value)
                 if order == 0:
                     off[3:] = np.arctan2(np.sin(off[3:]), np.cos(off[3:]))
-                if not (worst := float(np.abs(off).max())) <= END_TOLERANCE:
-                    unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
-                    why = f"away from the {'given end' if end else 'measured start'}"
-                    time = float(audited.times[end])
-                    exceeded.append(Excess(name, about, time, worst, 0.0, unit, "exactly", why))
+                unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
+                why = f"away from the {'given end' if end else 'measured start'}"
+                exceeded += _missed(name, about, audited.times[end], np.abs(off).max(), END_TOLERANCE, unit, why)
     if task.final is not None and task.final.rests_anywhere:
         kept = [at_rest_without_acceleration(audited.scenario.robot, None, i) for i in range(6)]
-        worst = float(np.abs(audited.motion.acceleration[-1, kept]).max())
-        if not worst <= END_ACCELERATION_TOLERANCE:
-            facts = (float(audited.times[-1]), worst, 0.0, "m/s^2, rad/s^2", "exactly", "at the end, at rest")
-            exceeded.append(Excess("final", "platform", *facts))
+        worst = np.abs(audited.motion.acceleration[-1, kept]).max()
+        facts = (worst, END_ACCELERATION_TOLERANCE, "m/s^2, rad/s^2", "at the end, at rest")
+        exceeded += _missed("final", "platform", audited.times[-1], *facts)
     return exceeded + _start_tensions(audited)
 
 
-def _start_tensions(audited: AuditedMotion) -> list[Excess]:
+def _start_tensions(audited: Instants) -> list[Excess]:
     """Check that the tensions start as measured."""
     scenario, first = audited.scenario, audited.tensions[0]
     measured = scenario.start_tensions
@@ -166,7 +146,7 @@ def _start_tensions(audited: AuditedMotion) -> list[Excess]:
     return [Excess(START_TENSIONS, f"cable {worst + 1}", 0.0, *facts)]
 
 
-def _tube_ends(audited: AuditedMotion) -> list[Excess]:
+def _tube_ends(audited: Instants) -> list[Excess]:
     """Check that the platform starts and ends on its path and moves as it does there, by differences of position."""
     scenario, exceeded = audited.scenario, []
     word = platform_ends(scenario.task)
@@ -190,13 +170,13 @@ def _tube_ends(audited: AuditedMotion) -> list[Excess]:
                 off = float(np.linalg.norm(values[place]))
                 counts = word == "exact" or unit == "m" or per == "/s"
                 counts |= per == "/s^2" and at_rest_without_acceleration(scenario.robot, None, place[0])
-                if counts and not off <= tolerance:
+                if counts:
                     why = "off its path at an end" if word == "exact" or not per else "an end at which it should rest"
-                    exceeded.append(Excess("tube.ends", "platform", end, off, 0.0, unit + per, "exactly", why))
+                    exceeded += _missed("tube.ends", "platform", end, off, tolerance, unit + per, why)
     return exceeded
 
 
-def _end_step(audited: AuditedMotion, end: int) -> float:
+def _end_step(audited: Instants, end: int) -> float:
     """Return the step of the differences at the start (0) or the end (-1): all are inside one interval of the nodes."""
     if audited.deviation is None:
         return END_STEP
@@ -204,7 +184,7 @@ def _end_step(audited: AuditedMotion, end: int) -> float:
     return max(min(END_STEP, interval / (len(FIRST) - 1)), END_STEP / 2)
 
 
-def _waypoints(audited: AuditedMotion) -> list[Excess]:
+def _waypoints(audited: Instants) -> list[Excess]:
     """Check that the platform passes through the task's points where it has to."""
     scenario, path = audited.scenario, audited.scenario.task.path
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath):
@@ -217,19 +197,17 @@ def _waypoints(audited: AuditedMotion) -> list[Excess]:
     off, turned = np.linalg.norm(missed[:, :3], axis=1), np.linalg.norm(missed[:, 3:], axis=1)
     exceeded = []
     for k, time in enumerate(knots):
-        about = f"platform at point {k + 2}"
         for value, unit in ((off[k], "m"), (turned[k], "rad")):
-            if not value <= PATH_TOLERANCE:
-                exceeded.append(Excess("tube.waypoints", about, float(time), float(value), 0.0, unit, "exactly"))
+            exceeded += _missed("tube.waypoints", f"platform at point {k + 2}", time, value, PATH_TOLERANCE, unit)
     return exceeded
 
 
-def _off_path(audited: AuditedMotion, times: np.ndarray) -> np.ndarray:
+def _off_path(audited: Instants, times: np.ndarray) -> np.ndarray:
     """Return how far the platform is from its path at times (k,), (k, 6) [m, rad]."""
     return audited.scenario.off_path(times, *audited.scenario.motion(times, audited.deviation))
 
 
-def _base_ends(audited: AuditedMotion) -> list[Excess]:
+def _base_ends(audited: Instants) -> list[Excess]:
     """Check that free carriers start and end as the task requires."""
     scenario, base = audited.scenario, audited.scenario.task.base
     word = carrier_ends(scenario.task)
@@ -260,14 +238,11 @@ def _base_ends(audited: AuditedMotion) -> list[Excess]:
         ]
         about, unit, why = "carriers", "m, m/s", "away from `around`"
     for end, value in zip(ends, off, strict=True):
-        if not value <= END_TOLERANCE:
-            exceeded.append(
-                Excess("base.ends", about, float(audited.times[end]), float(value), 0.0, unit, "exactly", why)
-            )
+        exceeded += _missed("base.ends", about, audited.times[end], value, END_TOLERANCE, unit, why)
     return exceeded
 
 
-def _grounded(audited: AuditedMotion) -> list[Excess]:
+def _grounded(audited: Instants) -> list[Excess]:
     """Check that the platform rests on its path where it is on the ground."""
     resting = audited.scenario.phases.resting(audited.times)
     if not resting.any():
@@ -278,7 +253,7 @@ def _grounded(audited: AuditedMotion) -> list[Excess]:
     return _above(audited, "phases.ground", "platform", off, END_TOLERANCE, "m, m/s, m/s^2", why)
 
 
-def _locked(audited: AuditedMotion) -> list[Excess]:
+def _locked(audited: Instants) -> list[Excess]:
     """Check that coordinates that the platform does not have stay as at home."""
     robot, exceeded = audited.scenario.robot, []
     off = np.abs(audited.motion.pose - robot.home)
@@ -289,7 +264,7 @@ def _locked(audited: AuditedMotion) -> list[Excess]:
     return exceeded
 
 
-def _duration(audited: AuditedMotion) -> list[Excess]:
+def _duration(audited: Instants) -> list[Excess]:
     """Check that the motion lasts as long as the task requires."""
     scenario, span = audited.scenario, audited.scenario.duration_range
     low, high = (scenario.task.seconds,) * 2 if span is None else (span.min, span.max)
@@ -306,7 +281,7 @@ def _duration(audited: AuditedMotion) -> list[Excess]:
     return []
 
 
-def _jumps(audited: AuditedMotion) -> list[Excess]:
+def _jumps(audited: Instants) -> list[Excess]:
     """Check that positions and velocities of platform and carriers are continuous between intervals."""
     deviation = audited.deviation
     if deviation is None:
@@ -324,7 +299,6 @@ def _jumps(audited: AuditedMotion) -> list[Excess]:
                 jump[..., 3:] = np.arctan2(np.sin(jump[..., 3:]), np.cos(jump[..., 3:]))
             jump = np.abs(jump).reshape(len(inner), -1).max(axis=1)
             row = int(jump.argmax())
-            if not jump[row] <= tolerance:
-                facts = (float(inner[row]), float(jump[row]), 0.0, unit, "exactly", "a jump of position or velocity")
-                exceeded.append(Excess("motion", name, *facts))
+            why = "a jump of position or velocity"
+            exceeded += _missed("motion", name, inner[row], jump[row], tolerance, unit, why)
     return exceeded

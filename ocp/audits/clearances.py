@@ -15,9 +15,9 @@ import numpy as np
 from ...models.points import placed
 from ..limits.distance import Distance
 from ..limits.limits import Separating, in_blocks, motions
-from .checks import AuditedMotion
 from .curvature import is_jump, leaves
 from .excess import Excess
+from .instants import Instants
 
 UNDECIDED = 0.05  # of a limit's tolerance: less than that beside it is not looked for
 DEEPEST = 0.99  # of the largest excess is found
@@ -27,13 +27,11 @@ _Least: TypeAlias = tuple[float, int, float]
 """Time, index and value of a distance."""
 
 
-def came_too_near(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Excess]:
-    """Return the limits of distances that are not kept, at the instants of the audit or between them.
-
-    `limited` has the values of all limits at these instants.
-    """
-    limits, exceeded = audited.scenario.limits, list[Excess]()
-    chosen = [(limit, limited[k]) for k, limit in enumerate(limits) if isinstance(limit, Distance)]
+def came_too_near(audited: Instants) -> list[Excess]:
+    """Return the limits of distances that are not kept, at the instants of the audit or between them."""
+    exceeded = list[Excess]()
+    pairs = zip(audited.scenario.limits, audited.values, strict=True)
+    chosen = [(limit, values) for limit, values in pairs if isinstance(limit, Distance)]
     moved = _moved(audited) if chosen else np.zeros(0)
     for limit, values in chosen:
         slack = np.where(np.isnan(values), -np.inf, values - limit.low + limit.tolerance)
@@ -49,7 +47,7 @@ def came_too_near(audited: AuditedMotion, limited: list[np.ndarray]) -> list[Exc
     return exceeded
 
 
-def _moved(audited: AuditedMotion) -> np.ndarray:
+def _moved(audited: Instants) -> np.ndarray:
     """Return how far any point of platform and carriers moves at most from one instant to the next, (n - 1,) [m]."""
     platform, carriers = audited.motion.pose, audited.carriers.pose
     com = placed(platform, np.array([audited.scenario.robot.platform.com]))
@@ -79,7 +77,7 @@ class _Ends(NamedTuple):
         return _Ends(*(part[rows] for part in self))
 
 
-def _least(audited: AuditedMotion, limit: Distance, values: np.ndarray, found: _Least) -> _Least:
+def _least(audited: Instants, limit: Distance, values: np.ndarray, found: _Least) -> _Least:
     """Return the smallest distance over all time if it is too small, else one that is not; `found` is that of `values`.
 
     Wherever the distance may be too small, and less than the smallest so far, the instant in the middle is looked at.
@@ -154,13 +152,13 @@ def _ends(separating: Separating, times: np.ndarray, points: np.ndarray) -> _End
     return _Ends(times, points, planes[:, 0], planes[:, 1:])
 
 
-def _points(separating: Separating, audited: AuditedMotion) -> np.ndarray:
+def _points(separating: Separating, audited: Instants) -> np.ndarray:
     """Return the points of all pairs at the instants of the audit, (n, pairs, s, 3)."""
     values = in_blocks(separating.points, motions(audited.motion, audited.carriers))
     return values.reshape(len(values), separating.pairs, -1, 3)
 
 
-def _at(audited: AuditedMotion, separating: Separating, times: np.ndarray, which: np.ndarray) -> _Ends:
+def _at(audited: Instants, separating: Separating, times: np.ndarray, which: np.ndarray) -> _Ends:
     """Return the pairs `which` (k,) at other `times` (k,)."""
     instants, rows = np.unique(times, return_inverse=True)
     platform, carriers = audited.scenario.motion(instants, audited.deviation)

@@ -1,12 +1,13 @@
 """`Excess`: a limit that a motion exceeds: which, by what, when, and by how much."""
 
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
 from ...base.display import Displayed
 from ...base.text import quantity
+from ..limits import Limit
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,13 @@ class Excess(Displayed):
     unit: str
     accepted: Literal["at most", "at least", "exactly"] = "at most"
     why: str = ""
+
+    @classmethod
+    def of(cls, limit: Limit, which: int, time: float, value: float, why: str = "") -> Self:
+        """Return the excess of one value of a limit, `which`, over the bound that it is beyond."""
+        side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
+        side = "exactly" if limit.is_equation else side
+        return cls(limit.name, limit.about(which), float(time), float(value), bound, limit.unit, side, why)
 
     def __str__(self) -> str:
         """Return "carrier_speed of quad1 must be at most 2 m/s, is 2.5 m/s at t = 1.250 s"."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...base.display import Displayed
 from ...base.errors import InputError
 from ...solvers import Certificate
 from ..limits import Rate
@@ -13,7 +14,6 @@ from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from .by_phase import distribution, taken_up
-from .checks import AuditedMotion
 from .tensions import in_all_winds, scaled
 
 OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "violation")
@@ -21,11 +21,21 @@ MOTIONS = ("motion", "carriers")
 
 
 @dataclass(frozen=True)
-class Instants(AuditedMotion):
+class Instants(Displayed):
     """A motion and its tensions at some instants, with all that an audit computes from them.
 
     Attributes
     ----------
+    scenario, deviation
+        What the motion was made from.
+    times
+        (n,) [s].
+    motion, carriers
+        Motions in {G} of the platform, (n, 6) each, and of the carriers, (n, c, 6) each.
+    tensions
+        (n, m) [N], nan where there are none.
+    off_path
+        Offset of the platform from its path, along the path's axes, (n, 6) [m, rad].
     few, tolerance
         Whether the cables are too few for some wrenches, and the largest violation that passes [N].
     A, w
@@ -44,6 +54,13 @@ class Instants(AuditedMotion):
         Beyond the limits within the range of few cables [N], and when [s].
     """
 
+    scenario: Scenario
+    deviation: Deviation | None
+    times: np.ndarray
+    motion: Motion
+    carriers: Motion
+    tensions: np.ndarray
+    off_path: np.ndarray
     few: bool
     tolerance: float
     A: np.ndarray
@@ -73,14 +90,15 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
     w = scenario.required_wrench(times, motion, carriers, scenario.wind)
     distribute = distribution(scenario, times, A)
-    planned = _planned_tensions(deviation, times, scenario.robot.m)
-    result = distribute(w, taken_up(scenario, times) if planned is None else planned)
+    # Near the plan's own tensions a redundant robot keeps the planned distribution.
+    result = distribute(w, taken_up(scenario, times) if deviation is None else deviation.tensions_at(times))
     tensions, supports, certificate = result.tensions, result.supports, result.certificate
     if (box := scenario.wind_box) is not None:
         result, certificate = in_all_winds(distribute, box, motion, w, result)
     if certificate is not None and result.row is not None:
         certificate = replace(certificate, time=float(times[result.row]))
     off_path = scenario.off_path(times, motion, carriers)
+    limited = zip(scenario.limits, scenario.limits.along(motion, carriers, tensions, off_path), strict=True)
     return Instants(
         scenario=scenario,
         deviation=deviation,
@@ -96,7 +114,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         tensions_unlimited=distribute.unlimited(w),
         violation=result.violation,
         supports=supports,
-        values=_limited(scenario, times, motion, carriers, tensions, off_path),
+        values=[limit.over(times, its) for limit, its in limited],
         certificate=certificate,
         beyond=(result.beyond, float(times[result.row or 0])),
     )
@@ -128,15 +146,6 @@ def joined(some: Instants, others: Instants) -> Instants:
     return replace(some, **changed)
 
 
-def _limited(
-    scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion, tensions: np.ndarray, off_path: np.ndarray
-) -> list[np.ndarray]:
-    """Return the values of the limited quantities over time, (n, k), in their units."""
-    limits = scenario.limits
-    values = limits.along(motion, carriers, tensions, off_path)
-    return [limit.over(times, its) for limit, its in zip(limits, values, strict=True)]
-
-
 def _check_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motion) -> None:
     """Raise InputError if somewhere a cable has no length."""
     lengths = scenario.dynamics.cable_lengths(motion.pose, carriers.pose)
@@ -147,10 +156,3 @@ def _check_lengths(scenario: Scenario, times: np.ndarray, motion: Motion, carrie
         f"task {scenario.task.name!r}: path must be one on which every cable has a length, got one on which anchor and "
         f"attachment of cable {cable + 1} coincide at t = {times[row]:.3f} s"
     )
-
-
-def _planned_tensions(deviation: Deviation | None, times: np.ndarray, m: int) -> np.ndarray | None:
-    """Return the plan's tensions between its nodes, so that a redundant robot keeps the planned distribution."""
-    if deviation is None:
-        return None
-    return np.stack([np.interp(times, deviation.nodes, deviation.tensions[:, i]) for i in range(m)], axis=1)

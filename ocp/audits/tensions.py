@@ -16,9 +16,9 @@ from ...statics.distribution import wrench_problem
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
-from .checks import UNDERACTUATED_TOLERANCE
 
 TOLERANCE = 1e-6  # [N]
+UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
 RANK = 1e-9  # the same, below which nothing is given
 EXACT = 1e-12  # relative, of the wrench: tensions by pseudo-inverse that miss more are solved for again

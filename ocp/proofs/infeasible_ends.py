@@ -238,11 +238,8 @@ def _excess(
     if beyond.max() <= limit.tolerance:
         return None
     row, which = np.unravel_index(beyond.argmax(), beyond.shape)
-    value = float(over[row, which])
-    side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
     why = "" if not near[which] else f"the tube leaves it at most {room[which]:.3g} {limit.unit} more"
-    about = limit.about(int(which))
-    excess = Excess(limit.name, about, float(times[row]), value, bound, limit.unit, side, why)
+    excess = Excess.of(limit, int(which), times[row], over[row, which], why)
     return float(beyond[row, which]) / limit.scale, excess
 
 

@@ -69,7 +69,4 @@ def no_attitude(
         half /= 2
     k, limit = limits[int(middle[0].argmax())]
     which = int(np.maximum(limit.low - values[k][0], values[k][0] - limit.high).argmax())
-    value = float(values[k][0, which])
-    side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
-    why = "no attitude in the tube keeps all distances"
-    return [Excess(limit.name, limit.about(which), time, value, bound, limit.unit, side, why)]
+    return [Excess.of(limit, which, time, values[k][0, which], "no attitude in the tube keeps all distances")]

@@ -32,8 +32,11 @@ class Deviation(Displayed):
     def at(self, nodes: np.ndarray) -> Deviation:
         """Return the same motion at other nodes as an initial guess: tensions are interpolated."""
         q, v, a, jerk = self.evaluate(nodes)
-        tensions = [np.interp(nodes, self.nodes, column) for column in self.tensions.T]
-        return Deviation(nodes, q, v, a, np.stack(tensions, axis=1), jerk=jerk)
+        return Deviation(nodes, q, v, a, self.tensions_at(nodes), jerk=jerk)
+
+    def tensions_at(self, times: np.ndarray) -> np.ndarray:
+        """Return the tensions at `times` (k,), linear between the nodes, (k, m) [N]."""
+        return np.stack([np.interp(times, self.nodes, column) for column in self.tensions.T], axis=1)
 
     def stretched(self, factor: float) -> Deviation:
         """Return the same path in `factor` times the time."""
