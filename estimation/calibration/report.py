@@ -94,8 +94,8 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.alike > 1:
         lines.append(
-            "residuals are autocorrelated, because the model is incomplete: the sigmas below are larger by "
-            "{quantity(result.alike**0.5, digits=2)}"
+            "residuals are autocorrelated, because the model is incomplete: the sigmas below are larger "
+            f"by {quantity(result.alike**0.5, digits=2)}"
         )
     return lines
 
