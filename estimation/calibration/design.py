@@ -13,9 +13,10 @@ from ...models.files import as_robot
 from ...models.robot import Robot
 from .calibration import Calibration
 from .measurements import Measurements
-from .model import Model, State
-from .normal_equations import NormalEquations, metric
-from .parameters import OF_CABLE, Parameters, check_free
+from .model import Model
+from .outliers import project, without_poses
+from .parameters import Parameters, check_free
+from .solving import length_of
 
 DRAWN = 8192  # random poses, of which those at which the robot can rest are candidates
 KEPT = 600
@@ -90,29 +91,14 @@ def _rows(robot: Robot, groups: tuple[str, ...], poses: np.ndarray, measured: bo
     if not np.isfinite(readings).all():
         raise InputError("candidates must be poses at which every cable has a length, got one inside a pulley")
     model = replace(model, measurements=Measurements(readings, poses if measured else None), start=poses)
-    return _projected(model, state)
-
-
-def _projected(model: Model, state: State) -> np.ndarray:
-    residuals, derivatives = model.linearised(state)
-    scale, varies = metric(model), model.parameters.varies
-    m, count, _ = derivatives.cables.shape
-    rows = np.zeros((count, m, model.parameters.count))
-    for i in range(m):
-        rows[:, i, i * OF_CABLE : (i + 1) * OF_CABLE] = derivatives.cables[i]
-    rows = (rows / scale)[..., varies]
-    equations = NormalEquations.at(model, residuals, derivatives, scale)
-    if equations.inverse_root is None or equations.Y is None:
-        return rows
-    G = np.swapaxes(derivatives.poses, 0, 1) * model.poses_vary[:, None]
-    return rows - G @ np.swapaxes(equations.inverse_root, 1, 2) @ equations.Y
+    found = project(model, state)
+    return np.stack([without_poses(model, found, cable) for cable in range(robot.m)], axis=1)
 
 
 def _so_far(calibration: Calibration | None, robot: Robot, groups: tuple[str, ...]) -> np.ndarray:
     """Return the information so far [1/m^2], (p, p), plus a small regularisation that makes it invertible."""
-    reach = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
     size = int(Parameters(robot, groups).varies.sum())
-    start = np.eye(size) / reach**2
+    start = np.eye(size) / length_of(robot) ** 2
     if calibration is None:
         return start
     return start + calibration.information[:size, :size]

@@ -7,22 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...figures import calibration as pictures
+from .parameters import WORDS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from .result import CalibrationData
 
-KINDS = {  # of the parameters of a cable that are lengths, by the end of their names
-    "anchor.x": "anchor x",
-    "anchor.y": "anchor y",
-    "anchor.z": "anchor z",
-    "attachment.x": "attachment x",
-    "attachment.y": "attachment y",
-    "attachment.z": "attachment z",
-    "offset": "offset",
-    "pulley.radius": "pulley radius",
-}
+# The parameters of a cable that are lengths, by the end of their names.
+KINDS = {word: word.replace(".", " ") for word in WORDS if word != "scale"}
 
 
 def drawings(result: CalibrationData) -> dict[str, Figure]:

@@ -201,7 +201,7 @@ class Model(Displayed):
         position, rotation = base_position + state.shift, state.turn @ base_rotation
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
         run = runs(robot, table, position, rotation)
-        slip = self._slips(state.x)
+        slip = self.slips(state.x)
         scale0 = parameters.table(parameters.first)[:, 7:8]
         size_is_open = bool(np.isinf(self.pose_sigmas).any())
         scale = table[:, 7:8]
@@ -235,20 +235,17 @@ class Model(Displayed):
             others[cable, first:, column] = -gain[cable, first:]
         return residuals, Derivatives(cables, others, by_pose, arms, run.lengths)
 
-    def _slips(self, x: np.ndarray) -> np.ndarray:
-        """Return the sum of each cable's slips so far, (m, N) [m]; (m, 1) without slips."""
-        parameters = self.parameters
-        if not parameters.slips:
-            return np.zeros((self.robot.m, 1))
+    def slips(self, x: np.ndarray) -> np.ndarray:
+        """Return the sum of each cable's slips so far, (m, N) [m]."""
         result = np.zeros((self.robot.m, len(self.measurements)))
-        for (cable, first), size in zip(parameters.slips, x[parameters.clock + 1 :], strict=True):
+        for (cable, first), size in zip(self.parameters.slips, x[self.parameters.clock + 1 :], strict=True):
             result[cable, first:] += size
         return result
 
     def lengths(self, state: State) -> np.ndarray:
         """Convert the readings to cable lengths, (N, m) [m]."""
         table = self.parameters.table(state.x)
-        unstrained = table[:, 6:7] + self._slips(state.x) + table[:, 7:8] * self.measurements.lengths.T
+        unstrained = table[:, 6:7] + self.slips(state.x) + table[:, 7:8] * self.measurements.lengths.T
         return (unstrained / self._stretch).T
 
     def moved(self, state: State, dx: np.ndarray, dq: np.ndarray | None) -> State:

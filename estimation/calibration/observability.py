@@ -106,27 +106,21 @@ def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.
     table = parameters.table(state.x)
     turned, placed = parameters.carriers
     anchors = placed + np.einsum("mij,mj->mi", turned, table[:, :3])
-    middle, attachments = anchors.mean(axis=0), table[:, 3:6]
+    middle, attachments, still = anchors.mean(axis=0), table[:, 3:6], np.zeros_like(anchors)
 
-    def change(d_anchors: np.ndarray | None = None, d_attachments: np.ndarray | None = None) -> np.ndarray:
+    def change(d_anchors: np.ndarray, d_attachments: np.ndarray) -> np.ndarray:
         result = np.zeros(parameters.count)
         rows = parameters.table(result)
-        if d_anchors is not None:
-            rows[:, :3] = np.einsum("mji,mj->mi", turned, d_anchors)
-        if d_attachments is not None:
-            rows[:, 3:6] = d_attachments
+        rows[:, :3], rows[:, 3:6] = np.einsum("mji,mj->mi", turned, d_anchors), d_attachments
         return result
 
-    for axis, unit in zip(AXES, np.eye(3), strict=True):
-        yield f"all anchors together along {axis} of {{G}}", change(np.tile(unit, (len(anchors), 1)))
-    for axis, unit in zip(AXES, np.eye(3), strict=True):
-        yield f"all anchors together about {axis} of {{G}}", change(np.cross(unit, anchors - middle))
-    for axis, unit in zip(AXES, np.eye(3), strict=True):
-        along = np.tile(unit, (len(anchors), 1))
-        yield f"all attachments together along {axis} of the platform", change(None, along)
-    for axis, unit in zip(AXES, np.eye(3), strict=True):
-        about = np.cross(unit, attachments - attachments.mean(axis=0))
-        yield f"all attachments together about {axis} of the platform", change(None, about)
+    bodies = (("anchors", "{G}", anchors - middle), ("attachments", "the platform", attachments - attachments.mean(0)))
+    for what, frame, arms in bodies:
+        for word in ("along", "about"):
+            for axis, unit in zip(AXES, np.eye(3), strict=True):
+                moved = np.tile(unit, (len(arms), 1)) if word == "along" else np.cross(unit, arms)
+                both = (moved, still) if what == "anchors" else (still, moved)
+                yield f"all {what} together {word} {axis} of {frame}", change(*both)
     size = state.x.copy()
     size[parameters.clock] = 0.0
     parameters.table(size)[:, :3] = np.einsum("mji,mj->mi", turned, anchors - middle)

@@ -65,7 +65,8 @@ def _threshold(count: int) -> float:
     return max(LEAST_THRESHOLD, float(-ndtri(LEVEL / max(count, 1))))
 
 
-def _project(model: Model, state: State) -> _Projected:
+def project(model: Model, state: State) -> _Projected:
+    """Return residuals and derivatives at a state, with what unknown poses absorb of them."""
     residuals, derivatives = model.linearised(state)
     scale = metric(model)
     equations = NormalEquations.at(model, residuals, derivatives, scale)
@@ -85,14 +86,14 @@ def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess:
     any correlation inside blocks, and excess^2 S^-1 for independent residuals. The result is the ratio of the two as a
     mean over all directions, because single directions would need many more blocks.
     """
-    found = _project(model, state)
+    found = project(model, state)
     count = found.residuals.shape[1]
     if count < BLOCKS * SHORTEST_BLOCK or not rank:
         return 1.0
     edges = np.arange(BLOCKS) * count // BLOCKS
     total = np.zeros((BLOCKS, len(covariance)))
     for i, row in enumerate(found.residuals):
-        scores = _without_poses(model, found, i) * row[:, None]
+        scores = without_poses(model, found, i) * row[:, None]
         total += np.add.reduceat(scores, edges, axis=0)
     # The sums add up to 0 in a minimum, which takes one of them away.
     ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
@@ -101,7 +102,7 @@ def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess:
 
 def find_outliers(model: Model, state: State) -> list[Outlier]:
     """Return outliers, at most one per sample."""
-    found = _project(model, state)
+    found = project(model, state)
     seen = found.redundancy > SMALLEST_REDUNDANCY
     if not seen.any():
         return []
@@ -128,10 +129,8 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
     A large error moves an unknown pose so far that the residuals do not show which reading is wrong.
     """
     m, parameters = model.robot.m, Parameters(model.robot, ())
-    lengths = model.measurements.lengths[sample].copy()
-    table = parameters.table(state.x)
-    for (cable, first), size in zip(model.parameters.slips, state.x[parameters.clock + 1 :], strict=True):
-        lengths[cable] += size / table[cable, 7] * (sample >= first)
+    scales = parameters.table(state.x)[:, 7]
+    lengths = model.measurements.lengths[sample] + model.slips(state.x)[:, sample] / scales
     position, rotation = model.poses(state)
     pose = np.concatenate([position[sample], points.angles(rotation[sample])])
     given = model.measurements.poses
@@ -154,7 +153,7 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
 
 def find_slip(model: Model, state: State, length: float) -> Slip | None:
     """Return the clearest slip of a winch, or None if no cable has one."""
-    found = _project(model, state)
+    found = project(model, state)
     m, count = found.residuals.shape
     if count < 4 * SHORTEST:
         return None
@@ -167,7 +166,7 @@ def find_slip(model: Model, state: State, length: float) -> Slip | None:
     candidates: list[tuple[float, int, int, float, float]] = []
     inverse = np.linalg.inv(held(found.equations.S, length))
     for i in range(m):
-        rows = _without_poses(model, found, i)  # (N, p)
+        rows = without_poses(model, found, i)  # (N, p)
         after = np.cumsum(rows[::-1], axis=0)[::-1]
         absorbed = (onto(after, inverse) * after).sum(axis=1)
         total = np.cumsum(found.redundancy[i, ::-1])[::-1]
@@ -213,7 +212,7 @@ def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
     return bool(step * size > VISIBLE * size**2 and abs(step) * np.sqrt(max(kept, 0.0)) > CLEAR * min(scatter, 1e9))
 
 
-def _without_poses(model: Model, found: _Projected, cable: int) -> np.ndarray:
+def without_poses(model: Model, found: _Projected, cable: int) -> np.ndarray:
     """Return the derivatives of one cable's residuals by the parameters, minus the poses' part, (N, p) [1/m]."""
     parameters, derivatives = model.parameters, found.derivatives
     width = derivatives.cables.shape[2]

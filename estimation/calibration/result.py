@@ -246,15 +246,12 @@ class CalibrationData(Displayed):
 
         Raises `InputError` if the readings have another number of cables.
         """
-        of, x = self._solved.model.parameters, self._solved.fit.state.x
+        model, x = self._solved.model, self._solved.fit.state.x
         values = np.asarray(real_array("readings", readings), dtype=float)
-        table = of.table(x)
+        table = model.parameters.table(x)
         if values.ndim < 1 or values.shape[-1] != len(table):
             raise InputError(f"readings must have the shape (..., {len(table)}), got {values.shape}")
-        offsets = table[:, 6].copy()
-        for (cable, _), size in zip(of.slips, x[of.clock + 1 :], strict=True):
-            offsets[cable] += size
-        return offsets + table[:, 7] * values
+        return table[:, 6] + model.slips(x)[:, -1] + table[:, 7] * values
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data, the output of `towline calibrate --json`."""

@@ -170,10 +170,8 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
     """Return the measurements without their slips, and the weights (m, N): 0 for outliers."""
     model, x = solved.model, solved.fit.state.x
-    parameters, given = model.parameters, model.measurements
-    lengths = given.lengths.copy()
-    for (cable, first), size in zip(parameters.slips, x[parameters.clock + 1 :], strict=True):
-        lengths[first:, cable] += size / parameters.table(x)[cable, 7]
+    given = model.measurements
+    lengths = given.lengths + (model.slips(x) / model.parameters.table(x)[:, 7:8]).T
     return Measurements(lengths, given.poses, None, given.tensions, given.times, given.sigma._asdict()), model.weights
 
 

@@ -54,13 +54,12 @@ class PoseTracker(Displayed):
             If an argument has a wrong shape or value.
         """
         measured, carriers = one_pose(lengths, carrier_pose, self.robot)
+        estimate = None
         if self.pose is not None:
             estimate = pose_from_lengths(self.robot, measured, self.pose, carriers, self.sigma)
-            if estimate.consistent:
-                self.pose = estimate.pose.copy()
-                return estimate
-        self.searches += 1
-        estimate = pose_from_lengths(self.robot, measured, None, carriers, self.sigma)
+        if estimate is None or not estimate.consistent:
+            self.searches += 1
+            estimate = pose_from_lengths(self.robot, measured, None, carriers, self.sigma)
         if estimate.consistent:
             self.pose = estimate.pose.copy()
         return estimate
