@@ -20,12 +20,14 @@ def leg_law(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     s = np.clip(s, 0.0, 1.0)
     early = s <= 0.5
     since = np.where(early, s, 1 - s)
+    # Shares done of the smooth steps at the beginning and in the middle, and the time since the first ended.
     up, after = np.minimum(since / RAMP, 1.0), np.maximum(since - RAMP, 0.0)
     down = np.maximum((since - 0.5) / (2 * RAMP) + 0.5, 0.0)
     up_2, down_2 = up * up, down * down
     rate = PEAK * (RAMP * up_2 * up * (1 - 0.5 * up) + after - 4 * RAMP * down_2 * down * (1 - 0.5 * down))
     rate_rate = PEAK * (up_2 * (3 - 2 * up) - 2 * down_2 * (3 - 2 * down))
-    way = _way(up, after, down)
+    rise = RAMP**2 * up_2 * up_2 * (0.25 - 0.1 * up) + after * (RAMP + after) / 2
+    way = PEAK * (rise - 8 * RAMP**2 * down_2 * down_2 * (0.25 - 0.1 * down))
     return np.where(early, way, 1 - way), rate, np.where(early, rate_rate, -rate_rate)
 
 
@@ -34,18 +36,6 @@ def inverse(done: np.ndarray) -> np.ndarray:
     low, high = np.zeros_like(done), np.full_like(done, 0.5)
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        up, after = np.minimum(middle / RAMP, 1.0), np.maximum(middle - RAMP, 0.0)
-        less = _way(up, after, np.maximum((middle - 0.5) / (2 * RAMP) + 0.5, 0.0)) < done
+        less = leg_law(middle)[0] < done
         low, high = np.where(less, middle, low), np.where(less, high, middle)
     return low
-
-
-def _way(up: np.ndarray, after: np.ndarray, down: np.ndarray) -> np.ndarray:
-    """Return the share of the way in the first half of the time.
-
-    `up` and `down` are the shares done of the smooth steps at the beginning and in the middle, `after` is the share of
-    the time since the first ended.
-    """
-    up_2, down_2 = up * up, down * down
-    rise = RAMP**2 * up_2 * up_2 * (0.25 - 0.1 * up) + after * (RAMP + after) / 2
-    return PEAK * (rise - 8 * RAMP**2 * down_2 * down_2 * (0.25 - 0.1 * down))

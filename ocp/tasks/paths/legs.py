@@ -27,7 +27,7 @@ from ....base.display import Displayed
 from .attitudes import Attitudes, nearest_turn
 from .leg_law import leg_law
 from .motion import Motion
-from .overlap import MOST, even_out, largest_left, shares_of_time, size, zero_between
+from .overlap import MOST, even_out, largest_left, meeting, shares_of_time, size
 
 LOOKS = 48  # at the angles of each leg
 
@@ -244,13 +244,7 @@ def _through(
     `before` and `after` are the weight of a leg in s and how long it lasts.
     """
     (weight_before, last_before), (weight_after, last_after) = before, after
-
-    def ahead(since: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        left, left_rate, _ = _over(overlap - since, np.zeros(1), last_before)
-        done, rate, _ = _over(since, np.zeros(1), last_after)
-        return weight_after * done - weight_before * left - offset, weight_after * rate + weight_before * left_rate
-
-    since = zero_between(ahead, np.zeros_like(overlap), overlap)
+    since = meeting(overlap, before, after, offset)
     left, left_rate, left_rate_rate = _over(overlap - since, np.zeros(1), last_before)
     done, rate, rate_rate = _over(since, np.zeros(1), last_after)
     s_rate = weight_before * left_rate + weight_after * rate

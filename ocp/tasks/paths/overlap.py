@@ -4,8 +4,6 @@
 positions [m/s^2] and of rotations [rad/s^2] are compared each on its own: `size` is the larger of the two.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from .leg_law import PEAK, inverse, leg_law
@@ -15,7 +13,7 @@ PARTS = 12  # of that, which are compared
 LOOKS = 16  # at the acceleration of two legs together
 TOGETHER = 1.1  # of the larger peak of one leg alone: the acceleration of two together
 BACK = 1e-3  # of the sum of the unit vectors of two legs: the path turns back, and rests there
-STEPS = 16  # of `zero_between`: it needs 6
+STEPS = 16  # of `meeting`: it needs 6
 ROUNDS = 8  # of `even_out`: more change the times by less than a hundredth
 
 
@@ -107,31 +105,29 @@ def _together(steps: np.ndarray, last: np.ndarray, overlap: np.ndarray) -> np.nd
 
 def _left_at(overlap: np.ndarray, last: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Return what one leg has left and the next has done where these are equal, of legs that overlap for so long."""
-
-    def ahead(since: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        left, left_rate, _ = leg_law((overlap - since) / last[:-1])
-        done, rate, _ = leg_law(since / last[1:])
-        slope = lengths[1:] * rate / last[1:] + lengths[:-1] * left_rate / last[:-1]
-        return lengths[1:] * done - lengths[:-1] * left, slope
-
-    since = zero_between(ahead, np.zeros_like(overlap), overlap)
+    since = meeting(overlap, (lengths[:-1], last[:-1]), (lengths[1:], last[1:]))
     done, left = leg_law(since / last[1:])[0], leg_law((overlap - since) / last[:-1])[0]
     return np.minimum(lengths[1:] * done, lengths[:-1] * left)
 
 
-def zero_between(
-    function: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], low: np.ndarray, high: np.ndarray
+def meeting(
+    overlap: np.ndarray,
+    before: tuple[np.ndarray, np.ndarray],
+    after: tuple[np.ndarray, np.ndarray],
+    ahead: np.ndarray | float = 0.0,
 ) -> np.ndarray:
-    """Return where an increasing function is zero, (n,), from `low` to `high`: by Newton's method, else by halves.
+    """Return when in an overlap (n,) the next leg has done what the one before has left, and `ahead` more, (n,).
 
-    Parameters
-    ----------
-    function
-        Value and slope at (n,), (n,) each.
+    `before` and `after` are the length of each leg and how long it moves.
     """
+    (length_before, last_before), (length_after, last_after) = before, after
+    low, high = np.zeros_like(overlap), overlap
     at = (low + high) / 2
-    for _ in range(STEPS):
-        value, slope = function(at)
+    for _ in range(STEPS):  # by Newton's method, else by halves
+        left, left_rate, _ = leg_law((overlap - at) / last_before)
+        done, rate, _ = leg_law(at / last_after)
+        value = length_after * done - length_before * left - ahead
+        slope = length_after * rate / last_after + length_before * left_rate / last_before
         low, high = np.where(value < 0, at, low), np.where(value < 0, high, at)
         next_at = at - value / np.maximum(slope, np.finfo(float).tiny)
         at = np.where((next_at >= low) & (next_at <= high), next_at, (low + high) / 2)
