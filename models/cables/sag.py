@@ -30,6 +30,7 @@ TOLERANCE = 1e-14  # how exactly the ends have to meet, in unstrained lengths or
 ITERATIONS = 200
 STEEP = 0.3  # of the slope at the start of a step: what the line search lets the energy rise with at its end
 TAUT = 10.0  # sum of both end tensions in weights of the cable
+BEGIN = 0.3  # of the weight: tension of a slack cable in the first step
 VERTICAL = 1e-13  # horizontal distance in unstrained lengths: below, the cable hangs in a vertical line
 
 
@@ -234,29 +235,12 @@ class _Problem:
         return taken
 
     def _first_guess(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return h and v to start from, (k,): of the catenary that does not stretch, or of a taut cable."""
+        """Return h and v to start from, (k,): along the chord, `BEGIN` and what stretches the cable to it."""
         chord = np.hypot(self.x, self.z)
         spread = self.x > 0
-        safe_x, safe_chord = np.where(spread, self.x, 1.0), np.where(spread, chord, 1.0)
-        slack = spread & (chord < 1)
-        ratio = np.where(slack, np.sqrt(np.abs(1 - self.z**2)) / safe_x, 2.0)  # sinh(lam) / lam
-        lam = np.sqrt(6 * (ratio - 1))
-        for _ in range(8):
-            lam = np.where(ratio > 1.5, np.arcsinh(ratio * lam), lam)
-        lam = np.maximum(lam, 1e-12)
-        h_slack = np.where(slack, self.x / (2 * lam), np.inf)
-        v_slack = self.z / (2 * np.tanh(lam))
-
-        # T of a shallow parabola: chord = 1 + softness T - k / T^2; its two terms' roots in a sum are near enough
-        k = (self.x / safe_chord) ** 2 / 24
-        with np.errstate(divide="ignore", invalid="ignore"):
-            stretched = np.where(chord > 1, (chord - 1) / self.softness, 0.0)
-            taut = stretched + np.cbrt(k / self.softness)
-        use_slack = h_slack * safe_chord / safe_x <= taut
-        taut = np.where(use_slack, 0.0, taut)  # infinite where it does not stretch
-        h = np.where(use_slack, h_slack, taut * self.x / safe_chord)
-        v = np.where(use_slack, v_slack, taut * self.z / safe_chord)
-        return np.where(spread, h, 0.0), np.where(spread, v, self._vertical())
+        stretched = np.divide(chord - 1, self.softness, out=np.zeros_like(chord), where=chord > 1)
+        share = np.divide(BEGIN + stretched, chord, out=np.zeros_like(chord), where=spread)
+        return share * self.x, np.where(spread, share * self.z, self._vertical())
 
     def _vertical(self) -> np.ndarray:
         """Return V of a cable in a vertical line, (k,): taut, or folded where its ends are nearer than its length."""
