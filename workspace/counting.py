@@ -6,11 +6,8 @@ again without evaluating the condition.
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -65,14 +62,14 @@ class Counter(Displayed):
 
 
 def count(
-    shared: Shared, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
+    counter: Counter, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
 ) -> tuple[Counts, list[bytes]]:
     """Count some chunks, one after the other, with one processor.
 
     Parameters
     ----------
-    shared
-        The run's counter.
+    counter
+        That of the run.
     first
         Number of the first chunk.
     known
@@ -86,7 +83,6 @@ def count(
     -------
     The counts, and which samples of each chunk are accepted, one bit per sample.
     """
-    counter = shared.counter
     counts, flags = Counts(counter.domain), []
     with processors.at_most(1):
         for offset, bits in enumerate(known):
@@ -97,23 +93,3 @@ def count(
                 units = counter.sampler.units(first + offset)
             flags.append(counter.chunk(counts, units, bits, keep))
     return counts, flags
-
-
-class Shared:
-    """A counter for all jobs of a run: pickled once for other processes, and not at all for this one."""
-
-    def __init__(self, counter: Counter) -> None:
-        self.counter = counter
-
-    @cached_property
-    def _packed(self) -> bytes:
-        return pickle.dumps(self.counter)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _unpacked, (self._packed,)
-
-
-@lru_cache(maxsize=2)
-def _unpacked(packed: bytes) -> Shared:
-    """Unpack once for all jobs of a run."""
-    return Shared(pickle.loads(packed))

@@ -20,7 +20,7 @@ from ..base.inputs import one_of, required, shown, whole_number, with_fields
 from ..base.version import __version__
 from ..models import Robot
 from .condition import Condition, condition_from, for_robots
-from .counting import Counter, Shared, count
+from .counting import Counter, count
 from .counts import Counts
 from .dataset import dataset
 from .domain import Domain
@@ -174,14 +174,14 @@ class _Run:
         checkpoint: Checkpoint | None,
         progress: Progress | None,
     ):
-        self._shared, self._total = Shared(counter), counter.samples
+        self._counter = counter
         self._counts, self._workers, self._checkpoint, self._progress = counts, workers, checkpoint, progress
         self._chunk = 0
 
     def count(self, refinement: Refinement | None) -> None:
         """Count all samples: the sampler's, or those of a refinement, level by level."""
         if refinement is None:
-            for _ in self.flags(self._total):
+            for _ in self.flags(self._counter.samples):
                 pass
             return
         levels = refinement.levels()
@@ -209,7 +209,7 @@ class _Run:
                 self._chunk += 1
                 yield np.unpackbits(np.frombuffer(flags, np.uint8), count=size).astype(bool)
             if self._progress is not None:
-                self._progress(self._counts.tried, self._total, self._counts.accepted)
+                self._progress(self._counts.tried, self._counter.samples, self._counts.accepted)
 
     def _jobs(self, samples: int, points: np.ndarray | None) -> Iterator[tuple[Any, ...]]:
         """Yield the arguments of `count`, a few chunks each, so that all workers have jobs at low cost."""
@@ -219,7 +219,7 @@ class _Run:
             some = range(start, min(start + together, chunks))
             known = [self._checkpoint and self._checkpoint.get(first + i) for i in some]
             units = None if points is None else [points[i * CHUNK : (i + 1) * CHUNK] for i in some]
-            yield self._shared, first + start, known, units, self._counts.left > 0
+            yield self._counter, first + start, known, units, self._counts.left > 0
 
 
 def _header(robot: Robot, requested: dict[str, Any]) -> dict[str, Any]:
