@@ -83,16 +83,10 @@ def fly(robot: Robot, name: Name) -> Flown:
     """Fly one of the three plans in each manner."""
     plan = planned(name)
     body, carriers = (Motion(*parts) for parts in read_trajectory(robot, plan, None).at(FLIGHT))
-    windy = wind_up(robot, body, carriers, wind=gust(FLIGHT[:-1], 0))
-    pilot = ComputedTorque(robot, reach=(AWAY, 0.0))
-    return Flown(
-        simulate(robot, plan, wind=gust),
-        simulate(robot, plan, pilot, wind=gust),
-        wind_up(robot, body, carriers),
-        windy,
-        body,
-        carriers,
-    )
+    calm, windy = (wind_up(robot, body, carriers, wind=wind) for wind in (None, gust(FLIGHT[:-1], 0)))
+    pilots = None, ComputedTorque(robot, reach=(AWAY, 0.0))
+    stays, gives = (simulate(robot, plan, pilot, wind=gust) for pilot in pilots)
+    return Flown(stays, gives, calm, windy, body, carriers)
 
 
 def small_circle(robot: Robot, away: float) -> Simulation:
@@ -110,8 +104,8 @@ def required(robot: Robot, flown: Flown, wind: np.ndarray | None = None) -> np.n
 
 def moved(flight: Simulation) -> float:
     """Return how far the quadrotor was from its plan at most [m]."""
-    motion, plan = flight.trajectory["carrier_pose"].values, flight.trajectory["carrier_reference"].values
-    return float(np.linalg.norm((motion - plan)[..., :3], axis=-1).max())
+    off = flight.trajectory["carrier_pose"].values - flight.trajectory["carrier_reference"].values
+    return float(np.linalg.norm(off[..., :3], axis=-1).max())
 
 
 def accelerated(flight: Simulation) -> float:
@@ -121,73 +115,63 @@ def accelerated(flight: Simulation) -> float:
     return float(np.linalg.norm(np.diff(velocity, axis=0), axis=1).max() / (times[1] - times[0]))
 
 
-def _off(flown: Flown, run: Wound) -> float:
-    return float(np.linalg.norm((run.states.pose - flown.body.pose)[:, :3], axis=1).max())
-
-
 def _lengths(flown: dict[Name, Flown]) -> Claim:
-    off = tuple(_off(part, part.calm) for part in flown.values())
-    return claim("eq-6-flown").compared(off, printed=(0.0,) * len(off), within=ON_CIRCLE, near=1000.0 * ON_CIRCLE)
+    errors = [(part.calm.states.pose - part.body.pose)[:, :3] for part in flown.values()]
+    off = np.linalg.norm(errors, axis=-1).max(axis=-1)
+    return claim("eq-6-flown").compared(off, printed=0.0, within=ON_CIRCLE, near=1000.0 * ON_CIRCLE)
 
 
 def _followed(id: str, name: Name, flown: dict[Name, Flown]) -> Claim:
-    part = flown[name]
-    most = float(part.gives.error.max())
-    low, high = (float(edge) for edge in (part.gives.record.tensions.min(), part.gives.record.tensions.max()))
-    floor = float(part.gives.robot.t_min.max())
-    below = float((part.gives.record.tensions.min(axis=1) < floor).mean())
+    stays, gives = flown[name].stays, flown[name].gives
+    most, tensions, floor = gives.error.max(), gives.record.tensions, gives.robot.t_min.max()
     return claim("flown-free").repaired(
         most,
-        part.gives.lasted == len(part.gives.references) and most <= ON_CIRCLE,
+        gives.lasted == len(gives.references) and most <= ON_CIRCLE,
         id=id,
         place=PLACES[name],
         what=WHAT[name],
         name=name,
-        acceleration=accelerated(part.gives),
-        moved=100 * moved(part.gives),
-        low=low,
-        high=high,
-        below=below,
+        acceleration=accelerated(gives),
+        moved=100 * moved(gives),
+        low=tensions.min(),
+        high=tensions.max(),
+        below=(tensions.min(axis=1) < floor).mean(),
         floor=floor,
-        stays=100 * float(part.stays.error.max()),
+        stays=100 * stays.error.max(),
         near=1000.0 * ON_CIRCLE,
     )
 
 
 def _pitching(part: Flown) -> Claim:
-    worst = int(part.gives.error.argmax())
-    short = float(np.nanmax(part.gives.record.shortfall, initial=0.0))
+    gives = part.gives
     return claim("VI.C-flown").undetermined(
-        float(part.gives.error.max()),
+        gives.error.max(),
         place=PLACES["pitching"],
         what=WHAT["pitching"],
         not_read=NOT_READ,
-        time=part.gives.times[worst],
-        short=short,
-        stays=100 * float(part.stays.error.max()),
+        time=gives.times[gives.error.argmax()],
+        short=np.nanmax(gives.record.shortfall, initial=0.0),
+        stays=100 * part.stays.error.max(),
     )
 
 
 def _positive(flown: dict[Name, Flown]) -> Claim:
-    least = tuple(float(part.gives.record.tensions.min()) for part in flown.values())
-    slack = max(float((part.windy.tensions <= 0).any(axis=1).mean()) for part in flown.values())
-    most = max(float(part.windy.tensions.max()) for part in flown.values())
-    return claim("flown-positive").repaired(
-        f"{', '.join(f'{value:.2f}' for value in least)} N", min(least) > 0, slack=slack, most=most
-    )
+    least = [part.gives.record.tensions.min() for part in flown.values()]
+    windy = np.stack([part.windy.tensions for part in flown.values()])
+    slack = (windy <= 0).any(axis=-1).mean(axis=-1).max()
+    text = ", ".join(f"{value:.2f}" for value in least)
+    return claim("flown-positive").repaired(f"{text} N", min(least) > 0, slack=slack, most=windy.max())
 
 
 def _wind(robot: Robot, part: Flown) -> Claim:
     without, windy = required(robot, part), required(robot, part, gust(FLIGHT, 0))
-    change = float(100 * np.abs((windy - without) / without).max())
-    return claim("conclusion-wind").stated(
-        f"{change:.0f} %",
-        change > 1.0,
-        pushing=f" Along the circle the wind would make cables push, with {windy.min():.1f} N, if the quadrotor stayed "
-        "on its plan."
-        if windy.min() < 0
-        else "",
-    )
+    change, pushing = 100 * np.abs((windy - without) / without).max(), ""
+    if windy.min() < 0:
+        pushing = (
+            f" Along the circle the wind would make cables push, with {windy.min():.1f} N, if the quadrotor stayed on "
+            "its plan."
+        )
+    return claim("conclusion-wind").stated(f"{change:.0f} %", change > 1.0, pushing=pushing)
 
 
 def _own_drag(robot: Robot, part: Flown) -> Claim:
@@ -197,7 +181,7 @@ def _own_drag(robot: Robot, part: Flown) -> Claim:
     strongest = dynamics.aerodynamic_wrench(np.zeros(6), np.zeros(6), np.array(PEAK))[:2]
     along = (part.carriers.pose[-1, 0, :3] - part.carriers.pose[0, 0, :3]) / SECONDS
     return claim("eq-25-flight").compared(
-        float(np.linalg.norm(drag, axis=1).max()),
+        np.linalg.norm(drag, axis=1).max(),
         speed=np.linalg.norm(along),
         horizontal=np.linalg.norm(along[:2]),
         strongest=np.linalg.norm(strongest),
@@ -206,9 +190,8 @@ def _own_drag(robot: Robot, part: Flown) -> Claim:
 
 def _stability(stays: Simulation, gives: Simulation) -> Claim:
     unanswered = 1 - stays.answered["as planned"] / len(stays.references)
-    off = tuple(float(flight.error.max()) for flight in (stays, gives))
     return claim("conclusion-stability").undetermined(
-        f"{1e3 * off[0]:.0f} mm hovering, {1e3 * off[1]:.1f} mm giving way",
+        f"{1e3 * stays.error.max():.0f} mm hovering, {1e3 * gives.error.max():.1f} mm giving way",
         feasible=FEASIBLE,
         unanswered=unanswered,
         moved=100 * moved(gives),

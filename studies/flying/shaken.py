@@ -21,6 +21,7 @@ from ...models.cables.driving_force import DrivingForce, driving_force
 from ...plant import Plant
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim
+from .cable import constants
 from .claims import claim
 from .motion import FEASIBLE, circle
 from .vibration import ELEMENTS, HERTZ, PHASES, RATIO
@@ -70,12 +71,13 @@ def chapter() -> Chapter:
     displaced = {step: procedure(robot, seen.vibration, step) for step in STEPS}
     stepped = {step: procedure(robot, _of_one_step(seen.vibration, step), step) for step in STEPS}
     free, (strongest, ratios) = release(robot), blow(robot)
+    off = np.abs(seen.dT - seen.elastic - seen.damping)[BEGUN].max()
+    elastic = _rms(displaced[USED].dT_K[:, 0]) / _rms(seen.dT - seen.damping)
     claims = [
-        _superposed(seen),
-        _elastic(seen, displaced[USED]),
+        claim("eq-7-plant").compared(off / np.abs(seen.dT)[BEGUN].max()),
+        claim("eq-21-plant").compared(elastic),
         _switch(robot, seen),
-        _damping(seen, displaced),
-        _stepped(seen, stepped),
+        *_by_step(seen, displaced, stepped),
         _slow(free),
         _noise(strongest),
     ]
@@ -94,20 +96,13 @@ def shake(robot: Robot) -> Shaken:
     """Run the plant still and shaken, and take the difference."""
     force = FORCE * np.sin(2 * np.pi * np.outer(SHAKEN[:-1], HERTZ) + PHASES)
     wrench = np.stack([np.zeros((len(force), 6)), np.hstack([force, np.zeros_like(force)])])
-    body, dynamics, cable = circle(FEASIBLE, SHAKEN), Dynamics(robot), robot.cables[0]
+    body, dynamics, (stiffness, damping) = circle(FEASIBLE, SHAKEN), Dynamics(robot), constants(robot)
     run = wind_up(robot, body, wrench=wrench, lengths=unstrained(robot, body))
     still, shaken = run.states.pose
     lengths = dynamics.cable_lengths(still)[:, 0]
     added = dynamics.cable_lengths(shaken)[:, 0] - lengths
-    assert cable.stiffness is not None
-    assert cable.damping is not None
-    return Shaken(
-        shaken - still,
-        added,
-        (run.tensions[1] - run.tensions[0])[:, 0],
-        cable.stiffness / lengths * added,
-        cable.damping * np.gradient(added, PERIOD),
-    )
+    dT = (run.tensions[1] - run.tensions[0])[:, 0]
+    return Shaken(shaken - still, added, dT, stiffness / lengths * added, damping * np.gradient(added, PERIOD))
 
 
 def procedure(robot: Robot, vibration: np.ndarray, step: int) -> DrivingForce:
@@ -155,35 +150,27 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values[BEGUN] ** 2)))
 
 
-def _superposed(seen: Shaken) -> Claim:
-    off = np.abs(seen.dT - seen.elastic - seen.damping)[BEGUN].max() / np.abs(seen.dT)[BEGUN].max()
-    return claim("eq-7-plant").compared(float(off))
-
-
-def _elastic(seen: Shaken, given: DrivingForce) -> Claim:
-    return claim("eq-21-plant").compared(_rms(given.dT_K[:, 0]) / _rms(seen.dT - seen.damping))
-
-
 def _switch(robot: Robot, seen: Shaken) -> Claim:
     paper = driving_force(robot, *circle(FEASIBLE, SHAKEN), seen.vibration, USED * PERIOD, ELEMENTS)
     return claim("eq-16-plant").compared(
-        float((seen.dT - seen.damping)[BEGUN].min()),
-        printed=float(paper.dT_K[BEGUN, 0].min()),
-        within=SAME * float(np.abs(seen.elastic[BEGUN]).max()),
+        (seen.dT - seen.damping)[BEGUN].min(),
+        printed=paper.dT_K[BEGUN, 0].min(),
+        within=SAME * np.abs(seen.elastic[BEGUN]).max(),
     )
 
 
-def _damping(seen: Shaken, displaced: dict[int, DrivingForce]) -> Claim:
-    ratios = tuple(_rms(given.dT_C[:, 0]) / _rms(seen.damping) for given in displaced.values())
-    return claim("eq-11-plant").compared(ratios, printed=(1.0,) * len(ratios), milliseconds=_milliseconds())
-
-
-def _stepped(seen: Shaken, stepped: dict[int, DrivingForce]) -> Claim:
-    elastic = tuple(_rms(given.dT_K[:, 0]) / _rms(seen.elastic) for given in stepped.values())
-    damping = ", ".join(f"{_rms(given.dT_C[:, 0]) / _rms(seen.damping):.2f}" for given in stepped.values())
-    return claim("eq-10-plant").compared(
-        elastic, printed=(1.0,) * len(elastic), milliseconds=_milliseconds(), damping=damping
+def _by_step(seen: Shaken, displaced: dict[int, DrivingForce], stepped: dict[int, DrivingForce]) -> list[Claim]:
+    """Compare increments with those of the plant for each time step of the procedure."""
+    by_displacement, by_step = (
+        [_rms(given.dT_C[:, 0]) / _rms(seen.damping) for given in each.values()] for each in (displaced, stepped)
     )
+    elastic = [_rms(given.dT_K[:, 0]) / _rms(seen.elastic) for given in stepped.values()]
+    milliseconds = ", ".join(f"{step * PERIOD * 1e3:g}" for step in STEPS)
+    damping = ", ".join(f"{ratio:.2f}" for ratio in by_step)
+    return [
+        claim("eq-11-plant").compared(by_displacement, printed=1.0, milliseconds=milliseconds),
+        claim("eq-10-plant").compared(elastic, printed=1.0, milliseconds=milliseconds, damping=damping),
+    ]
 
 
 def _slow(free: np.ndarray) -> Claim:
@@ -204,12 +191,8 @@ def _slow(free: np.ndarray) -> Claim:
 
 def _noise(strongest: dict[str, np.ndarray]) -> Claim:
     given = ", ".join(f"{values[0]:.1%} with {name}" for name, values in strongest.items())
-    others = max(float(values.max()) for values in strongest.values())
+    others = max(values.max() for values in strongest.values())
     return claim("fig-11-wind").undetermined(given, printed=f"{RATIO:.2%}", others=others)
-
-
-def _milliseconds() -> str:
-    return ", ".join(f"{step * PERIOD * 1e3:g}" for step in STEPS)
 
 
 def _shaken(seen: Shaken, given: DrivingForce) -> Drawing:

@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.optimize import root_scalar
+from scipy.stats import pearsonr
 
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
@@ -19,6 +20,7 @@ from ...models.cables.driving_force import DrivingForce, driving_force
 from ...ocp.tasks.paths import Motion
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim
+from .cable import constants
 from .claims import claim
 from .every_pairing import PAIRINGS, at_centre, hold, printed
 from .every_pairing import tensions as tensions_of
@@ -48,7 +50,7 @@ def chapter() -> Chapter:
         _length(lengths),
         _tension(),
         _winding(robot, float(np.ptp(tensions))),
-        _superimposed(),
+        claim("fig-8").undetermined(HERTZ),
         _no_ratio(tensions),
         _ratio(robot, amplitudes),
     ]
@@ -96,9 +98,8 @@ def _length(lengths: np.ndarray) -> Claim:
     turn = lengths[:-1]
     opposite = np.roll(turn, -(len(turn) // 2))
     start = int(turn.argmin())
-    share = float((opposite > turn).mean())
     return claim("fig-9-length").undetermined(
-        f"{turn[start]:.3f} m, {opposite[start]:.3f} m, {turn[start]:.3f} m", share=share
+        f"{turn[start]:.3f} m, {opposite[start]:.3f} m, {turn[start]:.3f} m", share=(opposite > turn).mean()
     )
 
 
@@ -107,30 +108,24 @@ def together(pairs: np.ndarray, radius: float) -> np.ndarray:
     robot, motion = printed(), circle(radius, COARSE)
     ends = robot.attachments[pairs[:, 0]] + motion.pose[:, None, :3]
     lengths = np.linalg.norm(robot.anchors[0] - ends, axis=-1)
-    pulls = tensions_of(motion, pairs)[..., 0]
-    centred = [values - values.mean(axis=0) for values in (lengths, pulls)]
-    size = np.prod([np.linalg.norm(values, axis=0) for values in centred], axis=0)
-    return (centred[0] * centred[1]).sum(axis=0) / size
+    return np.asarray(pearsonr(lengths, tensions_of(motion, pairs)[..., 0], axis=0)[0])
 
 
 def _tension() -> Claim:
     taut = PAIRINGS[at_centre().taut]
     flying = hold(FEASIBLE, taut)
-    low, high = (float(edge(together(flying, FEASIBLE))) for edge in (np.min, np.max))
-    return claim("fig-10-tension").stated((low, high), low > 0, feasible=FEASIBLE, flying=len(flying))
+    correlations = together(flying, FEASIBLE)
+    ends = correlations.min(), correlations.max()
+    return claim("fig-10-tension").stated(ends, ends[0] > 0, feasible=FEASIBLE, flying=len(flying))
 
 
 def _winding(robot: Robot, span: float) -> Claim:
     """Compare Eq. 13, taken literally, on the printed circle without vibration."""
     still, motion = np.zeros(6), circle(RADIUS)
     literal, paid_out = (
-        float(driving_force(robot, *motion, still, STEP, ELEMENTS, winding=how).dT_K[:, 0].max()) for how in WINDINGS
+        driving_force(robot, *motion, still, STEP, ELEMENTS, winding=how).dT_K[:, 0].max() for how in WINDINGS
     )
     return claim("eq-13").compared(paid_out, printed=literal, within=0.01 * span, step=STEP * 1000.0, span=span)
-
-
-def _superimposed() -> Claim:
-    return claim("fig-8").undetermined(tuple(float(value) for value in HERTZ))
 
 
 def _no_ratio(tensions: np.ndarray) -> Claim:
@@ -157,9 +152,7 @@ def _curves(robot: Robot, amplitude: float) -> Drawing:
     """Draw figures 9 to 11 for the second about the largest ratio, where single waves are visible."""
     shaken, still = forces(robot, amplitude), forces(robot, 0.0)
     rows = np.abs(TIMES - TIMES[np.abs(shaken.ratio[:, 0]).argmax()]) <= HALF_WINDOW
-    damping = robot.cables[0].damping
-    assert damping is not None
-    longer = shaken.dT_C[:, 0] * STEP / damping  # Eq. 11 backwards
+    longer = shaken.dT_C[:, 0] * STEP / constants(robot)[1]  # Eq. 11 backwards
     panels = [
         Panel("length [m]", {"expected": still.lengths[rows, 0]}),
         Panel("added [um]", {"by vibration": 1e6 * longer[rows]}),

@@ -3,12 +3,13 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ...models import Dynamics, load
+from ...models import Dynamics, Robot, load
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict
 from .claims import claim
 
 ANGLES = np.array([0.3, -0.4, 0.5])  # roll, pitch, yaw [rad], inside the paper's (-1, 1)
+TURN = Rotation.from_euler("ZYX", ANGLES[::-1])
 RATES = np.array([1.0, 1.0, 1.0])  # their time derivatives [rad/s]
 FEWER = (3, 4, 5)  # cables, than J has rows
 SECOND = np.array([0.5, -0.5, 0.5])  # and second ones [rad/s^2]
@@ -19,7 +20,9 @@ SIZES = {3: "wang-ctmrts", 4: "wang-ctmrts-4", 5: "wang-ctmrts-5", 6: "wang-ctmr
 def chapter() -> Chapter:
     """Check each equation of section 3 that can be tested."""
     claims = [_rotation(), _rigid(), _inertia(), _weight(), _gyroscopic(), _direction(), _second_form(), _shape()]
-    return Chapter([*claims, _summed(), _angular_acceleration(), _inverse(), _symbols(), _references()])
+    dynamic = MEANT["the dynamic equations"]
+    references = claim("equation-references").compared((dynamic, dynamic))
+    return Chapter([*claims, _summed(), _angular_acceleration(), _inverse(), _symbols(), references])
 
 
 def turned_home() -> np.ndarray:
@@ -27,22 +30,27 @@ def turned_home() -> np.ndarray:
     return np.concatenate([load("wang-ctmrts").home[:3], ANGLES])
 
 
+def lines(robot: Robot, pose: np.ndarray, ends: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vectors from attachments to robot-ends, and the arms of the attachments, (..., m, 3) each [m].
+
+    By scipy's rotations; `pose` is (..., 6), and `ends` (..., m, 3), default: the robot-ends at home.
+    """
+    turns = Rotation.from_euler("ZYX", pose[..., :2:-1]).as_matrix()
+    arms = robot.attachments @ np.swapaxes(turns, -1, -2)
+    return (robot.carrier_home[:, :3] if ends is None else ends) - pose[..., None, :3] - arms, arms
+
+
 def _rotation() -> Claim:
     """Compare the cable lengths of Eq. 1 with distances of the attachments by scipy's rotation."""
-    robot = load("wang-ctmrts")
-    turn = Rotation.from_euler("ZYX", ANGLES[::-1]).as_matrix()
-    ends = turned_home()[:3] + robot.attachments @ turn.T
-    return claim("eq-3-rotation").compared(
-        tuple(Dynamics(robot).cable_lengths(turned_home()).tolist()),
-        printed=tuple(np.linalg.norm(robot.carrier_home[:, :3] - ends, axis=1).tolist()),
-    )
+    robot, pose = load("wang-ctmrts"), turned_home()
+    printed = np.linalg.norm(lines(robot, pose)[0], axis=1)
+    return claim("eq-3-rotation").compared(Dynamics(robot).cable_lengths(pose), printed=printed)
 
 
 def _rigid() -> Claim:
     moments = np.sort(np.diag(load("wang-ctmrts").inertia))
-    return claim("section-5-rigid").stated(
-        float(moments[:2].sum()), bool(moments[2] <= moments[:2].sum() + 1e-12), printed=float(moments[2])
-    )
+    others = moments[:2].sum()
+    return claim("section-5-rigid").stated(others, moments[2] <= others + 1e-12, printed=moments[2])
 
 
 def masses() -> np.ndarray:
@@ -56,36 +64,35 @@ def masses() -> np.ndarray:
 
 def _inertia() -> Claim:
     """Compare R I R^T with the inertia of rotated point masses."""
-    robot, turn = load("wang-ctmrts"), Rotation.from_euler("ZYX", ANGLES[::-1]).as_matrix()
+    robot, turn = load("wang-ctmrts"), TURN.as_matrix()
     points = masses() @ turn.T
     summed = (points**2).sum() * np.eye(3) - points.T @ points
     off = np.abs(turn @ robot.inertia @ turn.T - robot.platform.mass / len(points) * summed).max()
-    return claim("eq-10").compared(float(off))
+    return claim("eq-10").compared(off)
 
 
 def _weight() -> Claim:
     """Compare G with minus the slope of the potential energy of point masses, by position and by rotation."""
-    robot, turn = load("wang-ctmrts"), Rotation.from_euler("ZYX", ANGLES[::-1])
+    robot = load("wang-ctmrts")
     share, step = robot.platform.mass / 6, 1e-4
 
     def energy(move: np.ndarray) -> float:
-        places = move[:3] + (Rotation.from_rotvec(move[3:]) * turn).apply(masses())
+        places = move[:3] + (Rotation.from_rotvec(move[3:]) * TURN).apply(masses())
         return float(-share * (places @ np.array(robot.gravity)).sum())
 
-    slope = [(energy(row) - energy(-row)) / (2 * step) for row in step * np.eye(6)]
-    return claim("eq-8").compared(tuple(-part for part in slope), printed=(0.0, 0.0, -robot.weight, 0.0, 0.0, 0.0))
+    slope = [(energy(-row) - energy(row)) / (2 * step) for row in step * np.eye(6)]
+    return claim("eq-8").compared(slope, printed=(0.0, 0.0, -robot.weight, 0.0, 0.0, 0.0))
 
 
 def _turning() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return angular velocity and acceleration in {O} by differences of the rotation, and the required moment."""
     step = 1e-4
 
-    def rotation(t: float) -> np.ndarray:
-        return Rotation.from_euler("ZYX", (ANGLES + RATES * t + SECOND * t**2 / 2)[::-1]).as_matrix()
+    def rotation(t: float) -> Rotation:
+        return Rotation.from_euler("ZYX", (ANGLES + RATES * t + SECOND * t**2 / 2)[::-1])
 
     def velocity(t: float) -> np.ndarray:
-        skew = (rotation(t + step) - rotation(t - step)) / (2 * step) @ rotation(t).T
-        return np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        return (rotation(t + step) * rotation(t - step).inv()).as_rotvec() / (2 * step)
 
     acceleration = (velocity(step) - velocity(-step)) / (2 * step)
     still = np.zeros(3)
@@ -95,12 +102,11 @@ def _turning() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _gyroscopic() -> Claim:
     omega, alpha, moment = _turning()
-    turn = Rotation.from_euler("ZYX", ANGLES[::-1]).as_matrix()
+    turn = TURN.as_matrix()
     inertia = turn @ load("wang-ctmrts").inertia @ turn.T
     left_out = moment - inertia @ alpha
-    gyroscopic = np.cross(omega, inertia @ omega)
-    apart = float(np.abs(left_out - gyroscopic).max())
-    return claim("eq-4-gyroscopic").compared(float(np.linalg.norm(left_out)), apart=apart)
+    apart = np.abs(left_out - np.cross(omega, inertia @ omega)).max()
+    return claim("eq-4-gyroscopic").compared(np.linalg.norm(left_out), apart=apart)
 
 
 def _direction() -> Claim:
@@ -108,30 +114,21 @@ def _direction() -> Claim:
     robot = load("wang-ctmrts")
     A = Dynamics(robot).wrench_matrix(robot.home)[:3]
     tensions = np.linalg.solve(-A, [0.0, 0.0, robot.weight])
-    return claim("eq-6-direction").stated(tuple(tensions.tolist()), bool((tensions > 0).all()))
+    return claim("eq-6-direction").stated(tensions, (tensions > 0).all())
 
 
 def _second_form() -> Claim:
     """Compare R_p (P_i - b_i) / |L_i|, the second form without P_i in {P}, with the moment of the first form."""
-    robot, pose = load("wang-ctmrts"), turned_home()
-    turn = Rotation.from_euler("ZYX", ANGLES[::-1])
-    arms = turn.apply(robot.attachments)
-    lines = pose[:3] + arms - robot.carrier_home[:, :3]  # P_i - b_i
-    e = lines / np.linalg.norm(lines, axis=1)[:, None]
-    first, second = np.cross(arms, e), turn.apply(e)
-    return claim("eq-6-second").compared(
-        float(np.linalg.norm(first, axis=1).max()), printed=float(np.linalg.norm(second, axis=1).max())
-    )
+    vectors, arms = lines(load("wang-ctmrts"), turned_home())
+    e = -vectors / np.linalg.norm(vectors, axis=1)[:, None]  # along P_i - b_i
+    first, second = (np.linalg.norm(moments, axis=1).max() for moments in (np.cross(arms, e), TURN.apply(e)))
+    return claim("eq-6-second").compared(first, printed=second)
 
 
 def _shape() -> Claim:
-    A = Dynamics(load("wang-ctmrts")).wrench_matrix(load("wang-ctmrts").home)
-    printed = A.T.shape
-    return claim("eq-5-shape").stated(
-        f"{A.shape[0]} x {A.shape[1]}",
-        printed[1] == A.shape[1] and printed[0] == 6,
-        printed=f"{printed[0]} x {printed[1]}",
-    )
+    A = Dynamics(load("wang-ctmrts")).wrench_matrix(turned_home())
+    size, printed = ("{} x {}".format(*matrix.shape) for matrix in (A, A.T))
+    return claim("eq-5-shape").stated(size, size == printed, printed=printed)
 
 
 def _summed() -> Claim:
@@ -139,12 +136,11 @@ def _summed() -> Claim:
     off = []
     for m, name in SIZES.items():
         robot, pose = load(name), turned_home()
-        arms = Rotation.from_euler("ZYX", ANGLES[::-1]).apply(robot.attachments)
-        lines = robot.carrier_home[:, :3] - pose[:3] - arms
-        pulls = np.arange(1.0, m + 1)[:, None] * lines / np.linalg.norm(lines, axis=1)[:, None]
+        vectors, arms = lines(robot, pose)
+        pulls = np.arange(1.0, m + 1)[:, None] * vectors / np.linalg.norm(vectors, axis=1)[:, None]
         summed = np.concatenate([pulls.sum(axis=0), np.cross(arms, pulls).sum(axis=0)])
         off.append(np.abs(Dynamics(robot).wrench_matrix(pose) @ np.arange(1.0, m + 1) - summed).max())
-    return claim("eq-7").compared(float(max(off)))
+    return claim("eq-7").compared(max(off))
 
 
 def _symbols() -> Claim:
@@ -154,42 +150,36 @@ def _symbols() -> Claim:
     before = np.linalg.norm(end - (place + arm))
     change = np.linalg.norm(end - (place + shift + arm)) - before
     inside = np.linalg.norm((end - place + place + shift) - (place + shift + arm)) - before  # b_1 moves too
-    return claim("table-1").compared(float(change), printed=float(inside))
+    return claim("table-1").compared(change, printed=inside)
 
 
 def _angular_acceleration() -> Claim:
     _, alpha, _ = _turning()
-    return claim("eq-12-angular-acceleration").compared(tuple(alpha.tolist()), printed=tuple(SECOND.tolist()))
+    return claim("eq-12-angular-acceleration").compared(alpha, printed=SECOND)
 
 
 def _inverse() -> Claim:
-    ranks = {m: rank(Dynamics(load(SIZES[m])).wrench_matrix(turned_home())) for m in FEWER}
-    return claim("eq-13-inverse").stated(
-        tuple(float(size) for size in ranks.values()),
-        all(size == 6 for size in ranks.values()),
-        printed=(6.0,) * len(ranks),
-        otherwise=Verdict.IMPOSSIBLE,
-        six=six_cables(),
-    )
+    ranks = [rank(Dynamics(load(SIZES[m])).wrench_matrix(turned_home())) for m in FEWER]
+    return has_rank_6("eq-13-inverse", ranks)
+
+
+def has_rank_6(name: str, ranks: list[int]) -> Claim:
+    """Return a claim that needs rank 6 for each number of cables in `FEWER`."""
+    printed, otherwise = [6] * len(ranks), Verdict.IMPOSSIBLE
+    return claim(name).stated(ranks, ranks == printed, printed, otherwise, six=six_cables())
 
 
 def six_cables() -> str:
     """State the ranks of two robots with six cables: the library's two hexagons, and crossed pairs of their points."""
     robot, pose = load(SIZES[6]), turned_home()
-    crossed = robot.attachments[[1, 0, 3, 2, 5, 4]]
-    arms = Rotation.from_euler("ZYX", ANGLES[::-1]).apply(crossed)
-    lines = robot.carrier_home[:, :3] - pose[:3] - arms
-    J = np.hstack([lines, np.cross(arms, lines)]).T / np.linalg.norm(lines, axis=1)
+    arms = lines(robot, pose)[1][[1, 0, 3, 2, 5, 4]]
+    vectors = robot.carrier_home[:, :3] - pose[:3] - arms
+    J = np.hstack([vectors, np.cross(arms, vectors)]).T / np.linalg.norm(vectors, axis=1)
     ranks = rank(Dynamics(robot).wrench_matrix(pose)), rank(J)
     return (
         f"between two similar hexagons, this toolkit's choice, the rank is {ranks[0]}, with crossed pairs of the same "
         f"points {ranks[1]}"
     )
-
-
-def _references() -> Claim:
-    dynamic = MEANT["the dynamic equations"]
-    return claim("equation-references").compared((dynamic, dynamic))
 
 
 def rank(A: np.ndarray) -> int:

@@ -26,8 +26,10 @@ def chapter() -> Chapter:
     """Fly every drive and every m."""
     flights: dict[Drive, dict[int, Simulation]] = {drive: {m: fly(drive, m) for m in SIZES} for drive in DRIVES}
     claims = [_towed(drive, by_m) for drive, by_m in flights.items()]
-    claims.append(_positive(flights))
-    return Chapter(claims, {f"towed-{drive}": _drawing(drive, by_m[PAPERS]) for drive, by_m in flights.items()})
+    return Chapter(
+        [*claims, _positive(flights)],
+        {f"towed-{drive}": _drawing(drive, by_m[PAPERS]) for drive, by_m in flights.items()},
+    )
 
 
 def fly(drive: Drive, m: int) -> Simulation:
@@ -44,30 +46,25 @@ def in_boxes(flight: Simulation) -> bool:
 
 
 def _towed(drive: Drive, flights: dict[int, Simulation]) -> Claim:
-    most, left = (max(float(flight.error[rows].max()) for flight in flights.values()) for rows in (slice(None), [-1]))
     return claim("towed-{drive}").stated(
-        most,
+        max(flight.error.max() for flight in flights.values()),
         all(flight.passed and in_boxes(flight) for flight in flights.values()),
         drive=drive,
         section=SECTIONS[drive],
         changes=CHANGES[drive],
         flights=len(flights),
-        left=1000.0 * left,
+        left=1000.0 * max(flight.error[-1] for flight in flights.values()),
         arrived=1000.0 * ARRIVED,
     )
 
 
 def _positive(flights: dict[Drive, dict[int, Simulation]]) -> Claim:
-    ranges = {
-        drive: (by_m[PAPERS].record.tensions.min(), by_m[PAPERS].record.tensions.max())
-        for drive, by_m in flights.items()
-    }
-    low, high = min(low for low, _ in ranges.values()), max(high for _, high in ranges.values())
-    others = min(float(f.record.tensions.min()) for by_m in flights.values() for m, f in by_m.items() if m != PAPERS)
-    limit = float(flights["both"][PAPERS].robot.t_max.max())
+    tensions = {drive: by_m[PAPERS].record.tensions for drive, by_m in flights.items()}
+    others = min(f.record.tensions.min() for by_m in flights.values() for m, f in by_m.items() if m != PAPERS)
+    limit = flights["both"][PAPERS].robot.t_max.max()
     return claim("towed-tensions").stated(
-        "; ".join(f"{least:.1f} N to {most:.1f} N, {drive}" for drive, (least, most) in ranges.items()),
-        bool(low > 0 and high < limit),
+        "; ".join(f"{T.min():.1f} N to {T.max():.1f} N, {drive}" for drive, T in tensions.items()),
+        all(T.min() > 0 and T.max() < limit for T in tensions.values()),
         printed=f"0 N to {limit:g} N",
         limit=limit,
         others="they do too" if others > 0 else "some cables pull nothing at times, for the others can carry the load",

@@ -7,17 +7,16 @@ lengths are computed here from points and scipy's rotations, apart from the cond
 from functools import cache
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ...figures.drawing import Drawing
 from ...figures.robot import RobotSketch, draw
-from ...models import Dynamics, Robot, load
+from ...models import Dynamics, load
 from ...statics.equilibria import Equilibrium, equilibria
 from ...workspace import ForceBalance, Places
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict
 from .claims import claim
-from .equations import MEANT, SIZES, rank
+from .equations import MEANT, SIZES, lines, rank
 from .plans import DRIVES, FIXED, robot
 from .workspace import POSTURE, PRINTED, loops, reach
 
@@ -32,12 +31,13 @@ def chapter() -> Chapter:
     """Check the configuration, the constraints and the steps."""
     rests = {m: rest(m) for m in SIZES}
     poses, forces = around_the_ends()
+    low, high = reach(robot("wang-ctmrts", "both"))
     claims = [
         _suspended(rests),
         _dimension(rests[3]),
         _beside(poses, forces),
         _heights(),
-        _scope(),
+        claim("step-a").undetermined((high - low).max(axis=0) / 2),
         _drawn(),
         _placed(),
         _solved(),
@@ -53,13 +53,6 @@ def rest(m: int) -> Equilibrium:
     return equilibria(mover, np.full(m, FIXED), mover.carrier_home)[0]
 
 
-def lines(mover: Robot, poses: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vectors from attachments to robot-ends, and the arms of the attachments, (n, m, 3) each [m]."""
-    turns = Rotation.from_euler("ZYX", poses[:, :2:-1]).as_matrix()
-    arms = mover.attachments @ turns.transpose(0, 2, 1)
-    return ends - poses[:, None, :3] - arms, arms
-
-
 def around_the_ends() -> tuple[np.ndarray, np.ndarray]:
     """Draw poses of W2 in and around the box of Eq. 15, and return them with the tensions that balance the forces.
 
@@ -70,7 +63,7 @@ def around_the_ends() -> tuple[np.ndarray, np.ndarray]:
     low, high = ends.min(axis=0) - BESIDE, ends.max(axis=0) + BESIDE
     low[2] = 0.0
     poses = np.hstack([rng.uniform(low, high, (SAMPLES, 3)), rng.uniform(-POSTURE, POSTURE, (SAMPLES, 3))])
-    vectors, _ = lines(mover, poses, ends)
+    vectors, _ = lines(mover, poses)
     units = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     weight = np.array([0.0, 0.0, mover.weight])
     return poses, np.linalg.solve(units.transpose(0, 2, 1), weight[:, None])[..., 0]
@@ -78,21 +71,17 @@ def around_the_ends() -> tuple[np.ndarray, np.ndarray]:
 
 def _suspended(rests: dict[int, Equilibrium]) -> Claim:
     """Check the balance of force and moment at rest, and that the load is below the robot-ends."""
-    left, pulling = [], []
+    left, pulling, below = [], [], []
     for m, found in rests.items():
         mover = robot(SIZES[m], "fixed-length")
-        vectors, arms = lines(mover, found.pose[None], mover.carrier_home[:, :3])
-        forces = (found.tensions / np.linalg.norm(vectors[0], axis=1))[:, None] * vectors[0]
-        force, moment = forces.sum(axis=0) - [0, 0, mover.weight], np.cross(arms[0], forces).sum(axis=0)
+        vectors, arms = lines(mover, found.pose)
+        forces = (found.tensions / np.linalg.norm(vectors, axis=1))[:, None] * vectors
+        force, moment = forces.sum(axis=0) - [0, 0, mover.weight], np.cross(arms, forces).sum(axis=0)
         left.append(np.abs(np.concatenate([force, moment])).max() / mover.weight)
-        pulling.append(float((found.tensions > AT_REST * mover.weight).sum()))
-    below = all(found.pose[2] < robot(SIZES[m], "fixed-length").carrier_home[:, 2].min() for m, found in rests.items())
-    return claim("figure-1").stated(
-        tuple(pulling),
-        below and max(left) < AT_REST and tuple(pulling) == tuple(float(m) for m in rests),
-        printed=tuple(float(m) for m in rests),
-        left=max(left),
-    )
+        pulling.append((found.tensions > AT_REST * mover.weight).sum())
+        below.append(found.pose[2] < mover.carrier_home[:, 2].min())
+    holds = all(below) and max(left) < AT_REST and pulling == list(rests)
+    return claim("figure-1").stated(pulling, holds, printed=list(rests), left=max(left))
 
 
 def _dimension(found: Equilibrium) -> Claim:
@@ -105,7 +94,7 @@ def _dimension(found: Equilibrium) -> Claim:
     ahead, behind = (dynamics.wrench_matrix(found.pose + sign * steps) @ found.tensions for sign in (1, -1))
     slopes = np.hstack([(ahead - behind).T / (2 * STEP), dynamics.wrench_matrix(found.pose)])
     size = slopes.shape[1] - int(np.linalg.matrix_rank(slopes, rtol=1e-6))
-    return claim("eq-14").stated(float(size), 0 < size <= 6)
+    return claim("eq-14").stated(size, 0 < size <= 6)
 
 
 def _beside(poses: np.ndarray, forces: np.ndarray) -> Claim:
@@ -113,27 +102,22 @@ def _beside(poses: np.ndarray, forces: np.ndarray) -> Claim:
     ends = robot("wang-ctmrts", "both").carrier_home[:, :2]
     held = poses[(forces > 0).all(axis=1), :2]
     outside = np.maximum(ends.min(axis=0) - held, held - ends.max(axis=0)).max(axis=1)
-    share = float((outside < 0).mean())
-    return claim("eq-15-xy").stated(
-        share, share == 1.0, arm=np.linalg.norm(load("wang-ctmrts").attachments, axis=1).max(), outside=outside.max()
-    )
+    share, arm = (outside < 0).mean(), np.linalg.norm(load("wang-ctmrts").attachments, axis=1).max()
+    return claim("eq-15-xy").stated(share, share == 1.0, arm=arm, outside=outside.max())
 
 
 def _heights() -> Claim:
     """Compute the shares of the printed ranges of z that the third row of Eq. 15 leaves."""
     mover = robot("wang-ctmrts", "both")
     (low, high), home = reach(mover), mover.carrier_home[:, 2]
-    allowed = {
-        "fixed-length": (low[:, 2].min(), high[:, 2].max()),
-        "variable-length": (home.min(), home.max()),
-        "both": (low[:, 2].min(), high[:, 2].max()),
-    }
     shares = []
-    for drive, (least, most) in allowed.items():
+    for drive in DRIVES:
+        fixed = drive == "variable-length"  # then the robot-ends are at home
+        least, most = (home.min(), home.max()) if fixed else (low[:, 2].min(), high[:, 2].max())
         start, end = PRINTED[drive][2]
         shares.append(max(min(most, end) - max(least, start), 0.0) / (end - start))
     return claim("eq-15-z").stated(
-        tuple(shares),
+        shares,
         min(shares) == 1.0,
         otherwise=Verdict.IMPOSSIBLE,
         home=home[0],
@@ -143,24 +127,14 @@ def _heights() -> Claim:
     )
 
 
-def _scope() -> Claim:
-    low, high = reach(robot("wang-ctmrts", "both"))
-    half = (high - low).max(axis=0) / 2
-    return claim("step-a").undetermined(tuple(float(width) for width in half))
-
-
 def _drawn() -> Claim:
     """Count, by drive, the coordinates of robot-ends and load that neither step (b) nor the lengths determine."""
     mover = robot("wang-ctmrts", "both")
-    ends, pose = mover.carrier_home[:, :3], rest(3).pose
-    steps = STEP * np.eye(6)
-    slopes = [
-        np.linalg.norm(lines(mover, pose + sign * steps, ends)[0], axis=-1) / (2 * sign * STEP) for sign in (1, -1)
-    ]
-    fixed_by_lengths = rank((slopes[0] + slopes[1]).T[:, :3])  # of the position, where lengths are given
+    pose, steps = rest(3).pose, STEP * np.eye(6)
+    ahead, behind = (np.linalg.norm(lines(mover, pose + sign * steps)[0], axis=-1) for sign in (1, -1))
+    fixed_by_lengths = rank((ahead - behind).T[:, :3] / (2 * STEP))  # of the position, where lengths are given
     given = [robot("wang-ctmrts", drive).fixed_lengths is not None for drive in DRIVES]
-    missing = tuple(float(3 - fixed_by_lengths if known else 3) for known in given)
-    return claim("step-b").compared(missing)
+    return claim("step-b").compared([3 - fixed_by_lengths if known else 3 for known in given])
 
 
 def _placed() -> Claim:
@@ -169,48 +143,32 @@ def _placed() -> Claim:
     met = np.isfinite(samples.places.pose[:, 0])
     vectors, _ = lines(samples.robot, samples.places.pose[met], samples.places.carriers[met, :, :3])
     off = np.abs(np.linalg.norm(vectors, axis=-1) - FIXED).max()
-    return claim("step-c").compared(float(off), fixed=FIXED, met=met.mean())
+    return claim("step-c").compared(off, fixed=FIXED, met=met.mean())
 
 
 def _solved() -> Claim:
     J = Dynamics(robot("wang-ctmrts", "both")).wrench_matrix(rest(3).pose)
-    columns = J.shape[1]
-    return claim("step-e").stated(
-        f"{J.shape[0]} x {columns}",
-        J.shape[0] == columns,
-        otherwise=Verdict.IMPOSSIBLE,
-        rank=rank(J),
-        equations=EQUATIONS,
-    )
+    rows, columns = J.shape
+    fields = {"rank": rank(J), "equations": EQUATIONS}
+    return claim("step-e").stated(f"{rows} x {columns}", rows == columns, otherwise=Verdict.IMPOSSIBLE, **fields)
 
 
 def _bounded(poses: np.ndarray, forces: np.ndarray) -> list[Claim]:
     """Compare the poses that the loops record with those whose tensions meet Eq. 11."""
     mover = robot("wang-ctmrts", "variable-length")
-    meets = ((forces > 0) & (forces < mover.t_max)).all(axis=1)
+    pulling, meets = (np.all(inside, axis=1) for inside in (forces > 0, (forces > 0) & (forces < mover.t_max)))
     recorded = ForceBalance().holds(mover, Places.at_home(mover, poses))
-    too_much = float(((forces > 0).all(axis=1) & ~meets).sum() / (forces > 0).all(axis=1).sum())
-    reference = claim("step-f").compared(MEANT["the bounds of the tensions"])
-    bounds = claim("step-f-bounds").compared(float((meets == recorded).mean()), too_much=too_much)
-    return [reference, bounds]
+    return [
+        claim("step-f").compared(MEANT["the bounds of the tensions"]),
+        claim("step-f-bounds").compared((meets == recorded).mean(), too_much=1 - meets[pulling].mean()),
+    ]
 
 
 def _figure(found: Equilibrium) -> Drawing:
     mover = robot("wang-ctmrts", "both")
-    low, high = reach(mover)
-    vectors, _ = lines(mover, found.pose[None], mover.carrier_home[:, :3])
-    sketch = RobotSketch(
-        "three robots, cables of 1.2 m, at rest",
-        mover.home_anchors,
-        mover.home_anchors - vectors[0],
-        found.pose[:3],
-        mover.carrier_home[:, :3],
-        [carrier.name for carrier in mover.carriers],
-        list(zip(low, high, strict=True)),
-        found.tensions,
-        mover.t_min,
-        mover.t_max,
-        np.empty((0, 3)),
-        np.empty(0, dtype=bool),
-    )
+    ends, names = mover.home_anchors, [carrier.name for carrier in mover.carriers]
+    places = ends, ends - lines(mover, found.pose)[0], found.pose[:3], mover.carrier_home[:, :3]
+    boxes, nowhere = list(zip(*reach(mover), strict=True)), (np.empty((0, 3)), np.empty(0, dtype=bool))
+    title = "three robots, cables of 1.2 m, at rest"
+    sketch = RobotSketch(title, *places, names, boxes, found.tensions, mover.t_min, mover.t_max, *nowhere)
     return Drawing("Figure 1: robot-ends in their boxes (widths inferred), cables and load", draw(sketch))

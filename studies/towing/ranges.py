@@ -1,7 +1,6 @@
 """Paper C's figures 2 to 6: the workspaces of the three system types, their ranges, shapes, volumes and inclusion."""
 
 from collections.abc import Mapping
-from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -27,15 +26,19 @@ TRIANGLE, RECTANGLE = 0.5, 1.0  # share of the smallest rectangle about it that 
 def chapter() -> Chapter:
     """Check ranges, sections and inclusion with 60 000 loops of each type, and volumes."""
     samples = {drive: loops(drive) for drive in DRIVES}
-    claims = [_boxes(samples["both"])]
-    claims += [claim for drive in DRIVES for claim in _ranges(drive, samples[drive])]
-    claims += [
+    low, high = reach(samples["both"].robot)
+    claims = [
+        claim("figure-2").undetermined((high - low).max(axis=0)[:2] / 2),
+        *(claim for drive in DRIVES for claim in _ranges(drive, samples[drive])),
         _least_height(),
         _greatest_height(),
         *_sections(samples["fixed-length"]),
         _prism(samples["variable-length"]),
+        _volumes(),
+        _inside_both(samples),
+        _fixed_inside_variable(),
+        _repeated(samples),
     ]
-    claims += [_volumes(), _inside_both(samples), _fixed_inside_variable(), _repeated(samples)]
     drawings = {
         FIGURES[drive]: Drawing(
             f"{NAMES[drive]}, {drive}: poses of 60 000 loops where forces balance, from above and from the sides",
@@ -48,12 +51,6 @@ def chapter() -> Chapter:
     )
     drawings["figure-2"] = _drawn_boxes(samples["both"])
     return Chapter(claims, drawings)
-
-
-def _boxes(both: Loops) -> Claim:
-    low, high = reach(both.robot)
-    half = (high - low).max(axis=0) / 2
-    return claim("figure-2").undetermined((float(half[0]), float(half[1])))
 
 
 def _drawn_boxes(both: Loops) -> Drawing:
@@ -78,7 +75,7 @@ def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
         if own:
             why = f"{not_printed}this very range."
         elif differs:
-            inferred = value_text(_pair(computed), "m")
+            inferred = value_text(tuple(computed.tolist()), "m")
             why = (
                 "With robot-ends at the printed x and y and heights, which are inside any boxes, the range is already "
             )
@@ -87,8 +84,8 @@ def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
             why = f"{not_printed}section 5.3. With these the range is {_beside(computed, printed)}."
         claims.append(
             claim("range").stated(
-                _pair(least if differs else computed),
-                not own and bool((np.abs(computed - printed) <= READ).all()),
+                least if differs else computed,
+                not own and (np.abs(computed - printed) <= READ).all(),
                 printed=printed,
                 otherwise=Verdict.DIFFERS if differs else Verdict.NOT_DETERMINED,
                 motion=NAMES[drive],
@@ -100,11 +97,6 @@ def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
             )
         )
     return claims
-
-
-def _pair(values: np.ndarray) -> tuple[float, float]:
-    low, high = (float(value) for value in values)
-    return low, high
 
 
 def _beside(computed: np.ndarray, printed: tuple[float, float]) -> str:
@@ -122,9 +114,7 @@ def _least_height() -> Claim:
     lowest[:, 2] = least
     rest = equilibria(system, np.full(3, FIXED), lowest)[0].pose[2]
     printed = PRINTED["fixed-length"][2][0]
-    return claim("range-W1-least-height").stated(
-        float(rest), bool(rest >= printed - 0.01), printed=printed, least=least.min()
-    )
+    return claim("range-W1-least-height").stated(rest, rest >= printed - DIGIT, printed=printed, least=least.min())
 
 
 def _greatest_height() -> Claim:
@@ -134,7 +124,7 @@ def _greatest_height() -> Claim:
     attachments is that of the load.
     """
     system = robot("wang-ctmrts", "fixed-length")
-    highest, pull = float(reach(system)[1][:, 2].max()), float(system.t_max.sum())
+    highest, pull = reach(system)[1][:, 2].max(), system.t_max.sum()
     bound = highest - FIXED * system.weight / pull
     printed = PRINTED["fixed-length"][2][1]
     return claim("range-W1-greatest-height").stated(
@@ -152,36 +142,17 @@ def _greatest_height() -> Claim:
 def _sections(fixed: Loops) -> list[Claim]:
     cuts = [fixed.points[np.abs(fixed.points[:, 2] - height) <= THICKNESS / 2][:, :2] for height in SECTIONS]
     shares = [share_of_rectangle(points) for points in cuts]
-    areas = [float(ConvexHull(points).volume) for points in cuts]
-    not_printed = "The widths of the boxes are not printed. With those of this run"
+    areas = [ConvexHull(points).volume for points in cuts]
+    not_printed, unknown = "The widths of the boxes are not printed. With those of this run", Verdict.NOT_DETERMINED
+    fields = {"heights": ", ".join(map(str, SECTIONS)), "not_printed": not_printed}
     claims = []
-    for height, filled, shape, ideal in (
-        (SECTIONS[0], shares[0], "a triangle", TRIANGLE),
-        (SECTIONS[-1], shares[-1], "a rectangle", RECTANGLE),
-    ):
-        claims.append(
-            claim("figure-4-{height:g}").stated(
-                filled,
-                abs(filled - ideal) < abs(filled - (TRIANGLE + RECTANGLE - ideal)),
-                printed=ideal,
-                otherwise=Verdict.NOT_DETERMINED,
-                height=height,
-                shape=shape,
-                not_printed=not_printed,
-            )
-        )
-    rising = all(lower < upper for lower, upper in pairwise(shares))
-    order = claim("figure-4-order").stated(
-        tuple(shares),
-        rising,
-        otherwise=Verdict.NOT_DETERMINED,
-        heights=", ".join(map(str, SECTIONS)),
-        not_printed=not_printed,
-    )
-    shape_of_all = claim("figure-3-shape").undetermined(
-        tuple(areas), heights=", ".join(map(str, SECTIONS)), not_printed=not_printed
-    )
-    return [*claims, order, shape_of_all]
+    for row, shape, ideal, other in ((0, "a triangle", TRIANGLE, RECTANGLE), (-1, "a rectangle", RECTANGLE, TRIANGLE)):
+        share, height = shares[row], SECTIONS[row]
+        nearer = abs(share - ideal) < abs(share - other)
+        one = claim("figure-4-{height:g}").stated(share, nearer, ideal, unknown, height=height, shape=shape, **fields)
+        claims.append(one)
+    order = claim("figure-4-order").stated(shares, (np.diff(shares) > 0).all(), otherwise=unknown, **fields)
+    return [*claims, order, claim("figure-3-shape").undetermined(areas, **fields)]
 
 
 def share_of_rectangle(points: np.ndarray) -> float:
@@ -201,27 +172,24 @@ def share_of_rectangle(points: np.ndarray) -> float:
 
 
 def _prism(variable: Loops) -> Claim:
-    inside = float(in_prism(variable.robot, variable.points).mean())
-    arm = float(np.linalg.norm(variable.robot.attachments, axis=1).max())
+    inside = in_prism(variable.robot, variable.points).mean()
+    arm = np.linalg.norm(variable.robot.attachments, axis=1).max()
     return claim("section-5-prism").stated(inside, inside == 1.0, arm=arm)
 
 
 def _volumes() -> Claim:
     sizes = [volume_of(drive, samples=8000) for drive in DRIVES]
     volumes = "; ".join(f"{NAMES[drive]} {size} m^3" for drive, size in zip(DRIVES, sizes, strict=True))
-    return claim("volumes").stated(
-        tuple(size.value for size in sizes),
-        sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low,
-        volumes=volumes,
-    )
+    rising = sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low
+    return claim("volumes").stated([size.value for size in sizes], rising, volumes=volumes)
 
 
 def _inside_both(samples: Mapping[str, Loops]) -> Claim:
     shares = []
     for drive in ("fixed-length", "variable-length"):
         places = samples[drive].places.only(samples[drive].held)
-        shares.append(float(placed_as_both(places).mean()))
-    return claim("inclusion-W3").stated(tuple(shares), min(shares) == 1.0)
+        shares.append(placed_as_both(places).mean())
+    return claim("inclusion-W3").stated(shares, min(shares) == 1.0)
 
 
 def _fixed_inside_variable() -> Claim:
@@ -236,8 +204,8 @@ def _fixed_inside_variable() -> Claim:
     there = ExistsPlacement(condition=ForceBalance(), tries=64, turn=1.0)
     also = there.holds(variable, Places.at_home(variable, poses[held]))
     return claim("inclusion-W1-W2").stated(
-        float(also.mean()) if held.any() else 1.0,
-        bool(also.all()),
+        also.mean() if held.any() else 1.0,
+        also.all(),
         otherwise=Verdict.IMPOSSIBLE,
         held=held.sum(),
         highest=highest,
@@ -252,6 +220,6 @@ def _repeated(samples: Mapping[str, Loops]) -> Claim:
     for system in samples.values():
         half = len(system.held) // 2
         parts = [system.places.pose[rows, :3][system.held[rows]] for rows in (slice(None, half), slice(half, None))]
-        low, high = (np.abs(np.subtract(*(edge(part, axis=0) for part in parts))).max() for edge in (np.min, np.max))
-        apart.append(float(max(low, high)))
-    return claim("step-g").stated(tuple(apart), max(apart) <= DIGIT, printed=(DIGIT,) * len(apart))
+        first, second = (np.stack([part.min(axis=0), part.max(axis=0)]) for part in parts)
+        apart.append(np.abs(first - second).max())
+    return claim("step-g").stated(apart, max(apart) <= DIGIT, printed=[DIGIT] * len(apart))
