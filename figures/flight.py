@@ -21,10 +21,9 @@ GAP = 0.065  # of a panel's height, between the names of curves at its edge
 HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
 DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
 DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
-SCALES = ((1.0, "m"), (1e-4, "mm"), (1e-7, "µm"))  # the least lengths for which units are used
+SCALES = ((1.0, 1.0, "m"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))  # from which lengths units are used, and their size
 EVENT_DASHES = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5))]
 THRUST = "thrust"  # an actuator of carriers that fly
-UNITS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6}
 
 
 def flight(trajectory: xr.Dataset) -> Figure:
@@ -213,8 +212,7 @@ def _end(time: np.ndarray) -> float:
 
 def _scale(largest: float) -> tuple[float, str]:
     """Return the unit in which the largest of some lengths reads best, with its size [m]."""
-    unit = next((name for least, name in SCALES if largest >= least), SCALES[-1][1])
-    return UNITS[unit], unit
+    return next(((size, unit) for least, size, unit in SCALES if largest >= least), SCALES[-1][1:])
 
 
 def _legend_beside(ax: Axes) -> None:

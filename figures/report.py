@@ -105,15 +105,11 @@ class Report(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the report as data, ready for JSON."""
-        parts: list[Any] = []
-        for part in self.parts:
-            if isinstance(part, Section):
-                parts.append({"title": part.title, "facts": [list(fact) for fact in part.facts]})
-            elif isinstance(part, Table):
-                rows = [list(row) for row in part.rows]
-                parts.append({"title": part.title, "columns": list(part.columns), "rows": rows})
-            else:
-                parts.append(part)
+        names = ("title", "facts", "columns", "rows")
+        parts = [
+            part if isinstance(part, str) else {name: getattr(part, name) for name in names if hasattr(part, name)}
+            for part in self.parts
+        ]
         return {"about": self.about, "status": self.status, "summary": self.summary, "parts": parts}
 
 

@@ -19,6 +19,7 @@ from .feasible_ranges import Strips
 from .geometry import Geometry
 from .sliders import Slider, sliders
 from .snapshot import Snapshot, at_rest
+from .stage import move
 
 if TYPE_CHECKING:
     import viser
@@ -182,9 +183,7 @@ class Posing:
                         slider.value = self._value(setting)
                 for owner, handle in self._handles.items():
                     if handle is not held:
-                        place = pose if owner is None else carriers[owner]
-                        handle.position = place[:3]
-                        handle.wxyz = Rotation.from_euler("ZYX", place[:2:-1]).as_quat(scalar_first=True)
+                        move(handle, pose if owner is None else carriers[owner])
                 if instant is None:
                     self._refuse(refused)
                 else:

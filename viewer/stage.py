@@ -106,10 +106,10 @@ class Stage:
                 self._sheaves.points = rings.astype(np.float32)
         for dots, ends in zip(self._ends, (points.anchors, points.attachments), strict=True):
             dots.points = ends.astype(np.float32)
-        _place(self._platform, instant.pose)
+        move(self._platform, instant.pose)
         for handle, pose in zip(self._carriers, instant.carriers, strict=True):
             if handle is not None:
-                _place(handle, pose)
+                move(handle, pose)
         # Not all at one height, for cables that run close to each other.
         along = (np.arange(self._robot.m) % 2 * 0.2 + 0.3)[:, None]
         middles = (1 - along) * exits + along * ends
@@ -149,7 +149,7 @@ class Stage:
 
     def _shadow(self, other: Snapshot) -> None:
         """Draw platform and cables of another plan or simulation."""
-        _place(self._other_platform, other.pose)
+        move(self._other_platform, other.pose)
         exits = np.where(np.isfinite(other.points.exits), other.points.exits, other.points.anchors)
         self._other_cables.points = np.stack([exits, other.points.attachments], axis=1).astype(np.float32)
 
@@ -352,8 +352,8 @@ def _strokes(start: np.ndarray, tip: np.ndarray) -> np.ndarray:
     return np.concatenate([[[start, tip]], np.stack([np.tile(tip, (BARBS, 1)), ends], axis=1)])
 
 
-def _place(handle: viser.FrameHandle, pose: np.ndarray) -> None:
-    """Move a frame to a pose (6,) in {G}."""
+def move(handle: viser.FrameHandle | viser.TransformControlsHandle, pose: np.ndarray) -> None:
+    """Move a frame or a handle to a pose (6,) in {G}."""
     handle.position = pose[:3]
     handle.wxyz = Rotation.from_euler("ZYX", pose[:2:-1]).as_quat(scalar_first=True)
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..base.display import Displayed
 from ..base.errors import InputError
 from ..base.inputs import shown
+from ..base.text import quantity_row
 from ..models import Robot
 from ..models.part import COORDINATES, Box
 from .places import Places
@@ -60,7 +61,7 @@ class Domain(Displayed):
         if region.lengths is None and not (position[1] - position[0] > THINNEST).any():
             raise InputError(
                 "region.position must have min below max along at least one axis, got a box from "
-                f"{_text(position[0])} to {_text(position[1])}"
+                f"({quantity_row(position[0])}) to ({quantity_row(position[1])})"
             )
         lengths = ([], []) if region.lengths is None else ([region.lengths.min] * 3, [region.lengths.max] * 3)
         parts = [
@@ -215,7 +216,3 @@ def _box_of_lengths(robot: Robot, region: Region, carriers: list[Box]) -> tuple[
             f"region.lengths must be long enough for the three cables to meet, got at most {region.lengths.max:g} m"
         )
     return low, high
-
-
-def _text(vector: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:g}" for value in vector) + ")"
