@@ -20,10 +20,11 @@ from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
-from .warnings.inside_bodies import into_places
+from .warnings.inside_bodies import into_each_other, into_places
 from .warnings.instants import Instants
 from .warnings.leaves_its_points import leaves_its_points
-from .warnings.warnings import warnings
+from .warnings.outside_frame import outside_frame
+from .warnings.short_cables import short_cables
 
 if TYPE_CHECKING:
     from .audits.robust_margin import RobustMargin
@@ -187,7 +188,8 @@ class PlanData(Displayed):
         some = slice(None, None, max(len(audit.times) // MOST_WARNED, 1))
         seen = Instants(scenario.dynamics, audit.times[some], audit.motion.pose[some], audit.carriers.pose[some])
         inside = into_places(seen, scenario.limits.all, [values[some] for values in audit.limited])
-        return (*leaves_its_points(scenario.task.path), *inside, *warnings(seen))
+        others = (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))
+        return (*leaves_its_points(scenario.task.path), *inside, *others)
 
     @cached_property
     def infeasible_spans(self) -> tuple[Certificate, ...]:
@@ -274,10 +276,4 @@ class Relaxed(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return {"name", "unit", "requested", "possible", "detail"} for JSON."""
-        return {
-            "name": self.name,
-            "unit": self.unit,
-            "requested": self.requested,
-            "possible": self.possible,
-            "detail": self.detail,
-        }
+        return {name: getattr(self, name) for name in ("name", "unit", "requested", "possible", "detail")}

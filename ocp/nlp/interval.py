@@ -74,7 +74,8 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     parameters_end, given_end = reference_symbols("p_end", references)
     columns = [*ca.vertsplit(x, layout.width), x_end]
     referred = [*ca.vertsplit(given_references, wide), given_end]
-    numbers, (step, take_up) = _numbers(grid)
+    numbers, varying = reference_symbols("grid", grid)
+    step, take_up = ca.vertsplit(varying)
     given = scenario.duration / mesh.steps
     h = step * stretch(layout, x)
     own = points(scenario, layout, h, given, columns)
@@ -101,7 +102,9 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         """Return the points of a carrier's whole motion, or of the platform's offset from its path."""
         of_body = spread(scenario, carrier)
         if carrier is None:
-            own_points = Points(_within(layout, h, columns, own.position), own.speed, own.acceleration)
+            first, last = columns[0], columns[-1]
+            position = bernstein.joined(h, own.position, first[layout.v], last[layout.q], last[layout.v])
+            own_points = Points(position, own.speed, own.acceleration)
             return Points(*([of_body @ point for point in part] for part in own_points))
         motion = [point[1 + carrier] for point in moving]
         jerk = [of_body @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
@@ -114,12 +117,6 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     function = ca.Function("interval", inputs, [ca.vertcat(*values)], names, ["values"], differentiated(5, 2))
     ends, given_at = {"x": x, "x_end": x_end}, {"p": parameters, "p_end": parameters_end}
     return Interval(cost_function("interval_cost", cost, ends, given_at, {"grid": numbers}), function, rows, local)
-
-
-def _numbers(grid: np.ndarray) -> tuple[ca.SX, list[ca.SX]]:
-    """Return symbols for one column of a grid, and the same with what is constant as numbers."""
-    symbols, values = reference_symbols("grid", grid)
-    return symbols, ca.vertsplit(values)
 
 
 def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX]) -> tuple[ca.SX, ca.SX]:
@@ -216,11 +213,6 @@ def _way_rows(
         pieces = [bounded(limit, on_the_way(*first, *second), mesh, slack, held) for first, second in pairwise(whole)]
         values, rows = ([*chain(*parts)] for parts in zip(*pieces, strict=True))
         yield scenario.limits.all.index(limit), values, rows
-
-
-def _within(layout: Layout, h: ca.SX | float, columns: list[ca.SX], position: list[ca.SX]) -> list[ca.SX]:
-    first, last = columns[0], columns[-1]
-    return bernstein.joined(h, position, first[layout.v], last[layout.q], last[layout.v])
 
 
 def _hull_rows(

@@ -111,25 +111,15 @@ def reference_symbols(name: str, references: np.ndarray) -> tuple[ca.SX, ca.SX]:
 
 def spread(scenario: Scenario, owner: int | None) -> ca.DM:
     """Return the matrix (6, n) from free coordinates to the six of the platform (None) or of a carrier."""
-    chosen = ca.DM(6, scenario.count)
-    for column, (whose, coordinate) in enumerate(scenario.owners()):
-        if whose == owner:
-            chosen[coordinate, column] = 1
-    return chosen
+    return ca.sparsify(ca.DM(scenario.spread(owner)))
 
 
 def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> list[list[ca.SX]]:
     """Return platform and carriers as symbols, [pose, velocity, acceleration] each: reference plus deviation."""
-    owners: list[int | None] = [None, *range(len(scenario.robot.carriers))]
-    scale = stretch(layout, x)
-    each = []
-    for position, owner in enumerate(owners):
-        chosen = spread(scenario, owner)
-        reference = ca.vertsplit(parameters[18 * position : 18 * (position + 1)], 6)
-        deviation = (x[layout.q], x[layout.v], x[layout.a])
-        each.append(
-            [at / scale**k + chosen @ off for k, (at, off) in enumerate(zip(reference, deviation, strict=True))]
-        )
+    scale, each = stretch(layout, x), []
+    for reference, offset in zip(ca.vertsplit(parameters, 18), offsets(scenario, layout, x), strict=True):
+        parts = zip(ca.vertsplit(reference, 6), ca.vertsplit(offset, 6), strict=True)
+        each.append([at / scale**k + off for k, (at, off) in enumerate(parts)])
     return each
 
 

@@ -44,17 +44,6 @@ class Outcome(Displayed):
     objective: float  # of the task; nan in the elastic program, which has another one
 
 
-# A guess or a motion from another mesh or task is near: IPOPT's default 0.1 throws it away, "adaptive" took 8 times as
-# long. From 1e-2 the README's circle took 20 iterations, of which 7 were backtracking, from 1e-3 it takes 9; a minimum
-# time of three robots from a coarser mesh took more than 150, and takes 96.
-_FROM_A_MOTION = {"mu_init": 1e-3}
-
-
-# The same task's optimum on a coarser mesh is nearer still: paper F's circle then takes 5 to 8 iterations from N = 100
-# to 1600, and 6 to 40 from the barrier above.
-_FROM_COARSER = {"mu_init": 1e-5}
-
-
 # A solution with its multipliers is the nearest.
 FROM_A_SOLUTION = {
     "mu_init": 1e-6,
@@ -67,16 +56,18 @@ FROM_A_SOLUTION = {
 }
 
 
-# Of a program whose parameters have changed a little: with the accuracy of others each would take two iterations more,
-# and the motions differ by less than the audit can tell. What constraints may miss is the same.
-_FROM_A_NEAR_SOLUTION = FROM_A_SOLUTION | {"mu_init": 1e-7, "tol": 1e-6}
-
-
 _STARTS: dict[str, dict[str, Any]] = {
-    "near": _FROM_A_NEAR_SOLUTION,
-    "motion": _FROM_A_MOTION,
-    "coarser": _FROM_COARSER,
+    # A guess or a motion from another mesh or task is near: IPOPT's default 0.1 throws it away, "adaptive" took 8 times
+    # as long. From 1e-2 the README's circle took 20 iterations, of which 7 were backtracking, from 1e-3 it takes 9; a
+    # minimum time of three robots from a coarser mesh took more than 150, and takes 96.
+    "motion": {"mu_init": 1e-3},
+    # The same task's optimum on a coarser mesh is nearer still: paper F's circle then takes 5 to 8 iterations from
+    # N = 100 to 1600, and 6 to 40 from the barrier above.
+    "coarser": {"mu_init": 1e-5},
     "solution": FROM_A_SOLUTION,
+    # Of a program whose parameters have changed a little: with the accuracy of others each would take two iterations
+    # more, and the motions differ by less than the audit can tell. What constraints may miss is the same.
+    "near": FROM_A_SOLUTION | {"mu_init": 1e-7, "tol": 1e-6},
 }
 
 

@@ -207,14 +207,9 @@ class Scenario(Displayed):
         platform, carriers = self.references(times)
         if deviation is not None:
             values = deviation.evaluate(times)[:3]
-            platform = platform.plus(self._spread(value, None) for value in values)
-            carriers = [c.plus(self._spread(value, i) for value in values) for i, c in enumerate(carriers)]
-        if self.relative:
-            pose, velocity, acceleration = self.dynamics.relative.motion_in_world(*platform, *carriers[0])
-            pose[:, 3:] = np.unwrap(pose[:, 3:], axis=0)
-            platform = Motion(pose, velocity, acceleration)
-        stacked = Motion(*(np.stack(parts, axis=1) for parts in zip(*carriers, strict=True)))
-        return platform, stacked
+            platform = platform.plus(value @ self.spread(None).T for value in values)
+            carriers = [c.plus(value @ self.spread(i).T for value in values) for i, c in enumerate(carriers)]
+        return in_world(self.dynamics, self.relative, platform, carriers)
 
     def pose_on_path(self, motion: Motion, carriers: Motion) -> np.ndarray:
         """Return the poses of the platform at `motion` in {G} in the frame of its path, (n, 6) [m, rad]."""
@@ -226,13 +221,13 @@ class Scenario(Displayed):
         off[:, 3:] -= 2 * np.pi * np.round(off[:, 3:] / (2 * np.pi))
         return off
 
-    def _spread(self, value: np.ndarray, carrier: int | None) -> np.ndarray:
-        """Return the free coordinates (n, count) as the six of the platform (None) or of a carrier."""
-        spread = np.zeros((len(value), 6))
-        for column, owner in enumerate(self.owners()):
-            if owner[0] == carrier:
-                spread[:, owner[1]] = value[:, column]
-        return spread
+    def spread(self, body: int | None) -> np.ndarray:
+        """Return the matrix (6, count) from free coordinates to the six of the platform (None) or of a carrier."""
+        matrix = np.zeros((6, self.count))
+        for column, (owner, coordinate) in enumerate(self.owners()):
+            if owner == body:
+                matrix[coordinate, column] = 1.0
+        return matrix
 
     def moves(self, hull: Hull) -> bool:
         """Return whether the planner chooses a coordinate that a convex limit is about."""
@@ -241,6 +236,18 @@ class Scenario(Displayed):
     def owners(self) -> list[tuple[int | None, int]]:
         """Return the owner of each free coordinate: (None for the platform or the carrier's index, coordinate)."""
         return [*((None, coordinate) for coordinate in self.platform_free), *self.carrier_free]
+
+
+def in_world(dynamics: Dynamics, relative: bool, platform: Motion, carriers: list[Motion]) -> tuple[Motion, Motion]:
+    """Return motions in {G} of a platform, given in the frame of the only carrier if `relative`, and of all carriers.
+
+    The carriers' is (n, c, 6). Derivatives by another parameter than the time are turned alike, by the chain rule.
+    """
+    if relative:
+        pose, velocity, acceleration = dynamics.relative.motion_in_world(*platform, *carriers[0])
+        pose[:, 3:] = np.unwrap(pose[:, 3:], axis=0)
+        platform = Motion(pose, velocity, acceleration)
+    return platform, Motion(*(np.stack(parts, axis=1) for parts in zip(*carriers, strict=True)))
 
 
 def _pose_in(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES
 from ..limits.limits import Limits
 from ..tasks.paths import CirclePath, Curve, Motion, RestPath
+from ..tasks.scenario import in_world
 
 STILL = 1e-6  # of the largest speed along s: slower than this the path rests
 SAME = 1e-7  # [m, rad]
@@ -130,12 +131,7 @@ class ParametrisedPath:
         for index, home in enumerate(self.robot.carrier_home):
             path = self.carriers.get(index, RestPath(kind="rest", pose=tuple(home)))
             each.append(path.by_fraction(s, self.until(path)))
-        if self.relative:
-            # By the chain rule, derivatives by s turn into each other as those by time do.
-            pose, first, second = self.dynamics.relative.motion_in_world(*platform, *each[0])
-            pose[:, 3:] = np.unwrap(pose[:, 3:], axis=0)
-            platform = Motion(pose, first, second)
-        return platform, Motion(*(np.stack(parts, axis=1) for parts in zip(*each, strict=True)))
+        return in_world(self.dynamics, self.relative, platform, each)
 
     def wrench(self, platform: Motion) -> Wrench:
         """Return the wrench that the motion needs, from derivatives by s."""

@@ -6,7 +6,6 @@ from pydantic import Field
 
 from .base import PathBase, PoseOrPosition
 from .circle import CirclePath
-from .curve import Curve
 from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
@@ -14,7 +13,7 @@ from .returning import ReturnPath
 from .samples import SamplePath
 from .sequence import SequencePath, SinglePath
 from .stations import Stations
-from .timed import TimedPath
+from .timed import Curve, TimedPath
 from .waypoints import WaypointPath
 
 __all__ = [

@@ -2,7 +2,7 @@
 
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal, Self
+from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -10,10 +10,16 @@ from typing_extensions import override
 
 from ....models.part import Finite, NonNegative, Positive
 from .base import PathBase
-from .curve import Curve
+from .circle import CirclePath
+from .line import LinePath
 from .motion import Motion
+from .rest import RestPath
+from .samples import SamplePath
 from .stations import Stations
 from .waypoints import WaypointPath
+
+Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
+"""A path of any kind but `timed`."""
 
 
 class TimedPath(PathBase):
