@@ -1,9 +1,12 @@
 """The papers that `towline reproduce` recomputes, by name."""
 
 from collections.abc import Callable
+from functools import partial
 
-from .accounts.account import Account, Progress
+from .accounts.account import Account, Progress, gather
 from .flying import study as flying
 from .towing import study as towing
 
-PAPERS: dict[str, Callable[[Progress | None], Account]] = {"flying": flying.account, "ctmrts": towing.account}
+PAPERS: dict[str, Callable[[Progress | None], Account]] = {
+    study.PAPER.name: partial(gather, study.PAPER, study.CHAPTERS) for study in (flying, towing)
+}

@@ -6,7 +6,7 @@ from ...figures.curve_in_space import curve_in_space
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, load
-from ...ocp.tasks.paths import LinePath, Motion
+from ...ocp.tasks.paths import Motion
 from ...solvers import TensionProblem, solve
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict
@@ -15,7 +15,7 @@ from .every_pairing import PAIRINGS, TURN, at_centre, pull_inward
 from .every_pairing import tensions as tensions_of
 from .instants import instants
 from .motion import RADIUS, TIMES, circle, steady_tensions
-from .plans import END, RATE, SECONDS, START
+from .plans import LINE, RATE, SECONDS
 
 LIKE_A_SINE = 0.05  # of the amplitude, assumed: a smaller deviation is not visible in figure 7
 
@@ -54,8 +54,7 @@ def chapter() -> Chapter:
 
 def flight() -> Motion:
     """Return the quadrotor's flight, level and at constant speed, (n, 6) each."""
-    line = LinePath(kind="line", start=(*START, 0, 0, 0), end=(*END, 0, 0, 0), timing="uniform")
-    return line.at(TIMES, SECONDS)
+    return LINE.at(TIMES, SECONDS)
 
 
 def _arm(world: Motion, base: Motion) -> Panel:

@@ -20,10 +20,11 @@ import numpy as np
 from ...models import load
 from ...ocp import Plan, Task, plan
 from ...ocp.tasks.paths import CirclePath, LinePath, SamplePath
-from ...ocp.tasks.task import FreeBase, GivenBase
+from ...ocp.tasks.task import GivenBase
 from .circle import tasks
 
 START, END, SECONDS = np.array([-20.0, -30.0, 40.0]), np.array([40.0, 20.0, 102.45]), 10.0  # VI.A [m], [s]
+LINE = LinePath(kind="line", start=(*START, 0, 0, 0), end=(*END, 0, 0, 0), timing="uniform")  # of the quadrotor in VI.A
 RATE = 0.2 * np.pi  # [rad/s]
 BELOW = 1.0  # of the circle's centre under the quadrotor [m]
 PITCH = 0.1  # [rad], assumed
@@ -32,27 +33,15 @@ NOT_READ = (
     "not known here."
 )
 GRAVITY = 9.81
-Vector = tuple[float, float, float]
 Name = Literal["circle", "helix", "pitching"]
-
-
-def circle() -> Task:
-    """Return VI.B: the circle about a hovering point, with the quadrotor free."""
-    return tasks()[1]
 
 
 def helix() -> Task:
     """Return VI.A: the helix about a straight flight, with the quadrotor free."""
-    path = CirclePath(
-        kind="circle",
-        centre=_vector(START - [0, 0, BELOW]),
-        radius=1.0,
-        rate=RATE,
-        drift=_vector((END - START) / SECONDS),
-    )
-    flight = LinePath(kind="line", start=(*START, 0, 0, 0), end=(*END, 0, 0, 0), timing="uniform")
-    base = FreeBase(kind="free", around={"quad": flight}, acceleration_max=3.0)
-    return Task(name="helix-free", path=path, base=base, duration=SECONDS)
+    centre, drift = (START - [0, 0, BELOW]).tolist(), ((END - START) / SECONDS).tolist()
+    path = {"kind": "circle", "centre": centre, "radius": 1.0, "rate": RATE, "drift": drift}
+    base = {"kind": "free", "around": {"quad": LINE}, "acceleration_max": 3.0}
+    return Task.model_validate({"name": "helix-free", "path": path, "base": base, "duration": SECONDS})
 
 
 def pitching() -> Task:
@@ -64,7 +53,7 @@ def pitching() -> Task:
 @cache
 def planned(name: Name) -> Plan:
     """Return the plan of one of the three motions, computed once in a process."""
-    return plan(load("wang-flying"), {"circle": circle, "helix": helix, "pitching": pitching}[name]())
+    return plan(load("wang-flying"), {"circle": lambda: tasks()[1], "helix": helix, "pitching": pitching}[name]())
 
 
 def pitching_flight(largest: float = PITCH) -> SamplePath:
@@ -85,8 +74,3 @@ def surge(times: np.ndarray, largest: float = PITCH) -> np.ndarray:
     """
     first, third = largest + largest**3 / 4, -(largest**3) / 12
     return -GRAVITY / RATE**2 * (first * np.sin(RATE * times) + third / 9 * np.sin(3 * RATE * times))
-
-
-def _vector(values: np.ndarray) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

@@ -1,6 +1,6 @@
 """Paper F recomputed, claim by claim: `towline reproduce flying`."""
 
-from ..accounts.account import Account, Paper, Progress, gather
+from ..accounts.account import Paper
 from . import (
     balance,
     cable,
@@ -43,8 +43,3 @@ CHAPTERS = {
     "A moving quadrotor (figures 12 to 15)": disturbance.chapter,
     "Motions flown in the wind (section VI)": flights.chapter,
 }
-
-
-def account(progress: Progress | None = None) -> Account:
-    """Recompute the paper."""
-    return gather(PAPER, CHAPTERS, progress)

@@ -7,15 +7,12 @@ between, including the attitude of the load.
 """
 
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ...models import Robot, load
-from ...models.ranges import PositiveRange
 from ...ocp import Plan, Task, plan
-from ...ocp.tasks.paths import AnyPath, LinePath
-from ...ocp.tasks.task import AnyBase, FreeBase, HoldBase, Objective, Tube
 from ...statics.equilibria import equilibria
 
 Drive = Literal["fixed-length", "variable-length", "both"]
@@ -25,11 +22,8 @@ FIXED, LONG, SHORT = 1.2, 1.25, 1.1  # lengths [m]
 SHIFT = np.array([0.08, 0.1, 0.1])  # of all robot-ends [m], inside their boxes
 TAUT = 0.1  # [N]: paper C requires tensions above zero
 SECONDS = 2.0  # of a motion with least effort
-SPAN = PositiveRange(min=0.1, max=4.0)  # [s], of a motion in least time
-OBJECTIVES = {
-    "effort": Objective(),
-    "time": Objective(time=0.01, jerk=30.0, carrier_acceleration=2.0, carrier_offset=0.5),
-}
+SPAN = {"min": 0.1, "max": 4.0}  # [s], of a motion in least time
+OBJECTIVES = {"effort": {}, "time": {"time": 0.01, "jerk": 30.0, "carrier_acceleration": 2.0, "carrier_offset": 0.5}}
 
 
 @cache
@@ -50,22 +44,19 @@ def task(mover: Robot, aim: Aim, steps: int = 50) -> Task:
         equilibria(mover, np.full(mover.m, length), places)[0].pose
         for length, places in zip(lengths, (home, there), strict=True)
     )
-    base: AnyBase = HoldBase(kind="hold")
-    if not stays:
-        around: dict[str, AnyPath] = {
-            carrier.name: LinePath(kind="line", start=_pose(home[i]), end=_pose(there[i]))
-            for i, carrier in enumerate(mover.carriers)
+    names = [carrier.name for carrier in mover.carriers]
+    around = {name: _line(*ends) for name, *ends in zip(names, home, there, strict=True)}
+    return Task.model_validate(
+        {
+            "name": f"{mover.drive}-{aim}",
+            "path": _line(start, end),
+            "tube": {"position": "free", "attitude": "free", "ends": "exact"},
+            "base": {"kind": "hold"} if stays else {"kind": "free", "ends": "exact", "around": around},
+            "duration": SECONDS if aim == "effort" else SPAN,
+            "margin": TAUT,
+            "steps": steps,
+            "objective": OBJECTIVES[aim],
         }
-        base = FreeBase(kind="free", ends="exact", around=around)
-    return Task(
-        name=f"{mover.drive}-{aim}",
-        path=LinePath(kind="line", start=_pose(start), end=_pose(end)),
-        tube=Tube(position="free", attitude="free", ends="exact"),
-        base=base,
-        duration=SECONDS if aim == "effort" else SPAN,
-        margin=TAUT,
-        steps=steps,
-        objective=OBJECTIVES[aim],
     )
 
 
@@ -76,6 +67,5 @@ def planned(name: str, drive: Drive) -> Plan:
     return plan(mover, task(mover, "effort"))
 
 
-def _pose(values: np.ndarray) -> tuple[float, float, float, float, float, float]:
-    x, y, z, roll, pitch, yaw = (float(value) for value in values)
-    return x, y, z, roll, pitch, yaw
+def _line(start: np.ndarray, end: np.ndarray) -> dict[str, Any]:
+    return {"kind": "line", "start": start.tolist(), "end": end.tolist()}

@@ -1,6 +1,6 @@
 """Paper C recomputed, claim by claim: `towline reproduce ctmrts`."""
 
-from ..accounts.account import Account, Paper, Progress, gather
+from ..accounts.account import Paper
 from . import equations, flights, loop, modes, ranges, tensions
 
 PAPER = Paper(
@@ -16,8 +16,3 @@ CHAPTERS = {
     "Three drives, three to six robots": modes.chapter,
     "The load towed": flights.chapter,
 }
-
-
-def account(progress: Progress | None = None) -> Account:
-    """Recompute the paper."""
-    return gather(PAPER, CHAPTERS, progress)
