@@ -114,45 +114,34 @@ class Workers:
 
         Raises `SolverError` if workers end before their work is done.
         """
-        return self._results(function, jobs, self._next)
+        return self._results(function, jobs, in_order=True)
 
     def as_completed(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
         """Yield `function(*job)` of each job as soon as it is there, so that no worker waits for a slow one.
 
         Raises `SolverError` if workers end before their work is done.
         """
-        return self._results(function, jobs, self._done)
+        return self._results(function, jobs, in_order=False)
 
     def _results(
-        self,
-        function: Callable[..., Result],
-        jobs: Iterable[tuple[Any, ...]],
-        take: Callable[[list[Future[Result]]], Iterator[Result]],
+        self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]], in_order: bool
     ) -> Iterator[Result]:
-        """Yield the results of all jobs, as `take` takes them from those under way."""
+        """Yield the results of all jobs."""
         under_way: list[Future[Result]] = []
         with self._ending(under_way):
             for job in jobs:
                 under_way.append(self.executor.submit(function, *job))
                 while len(under_way) >= self.limit():
-                    yield from take(under_way)
+                    yield from self._done(under_way, in_order)
             while under_way:
-                yield from take(under_way)
+                yield from self._done(under_way, in_order)
 
-    def _next(self, under_way: list[Future[Result]]) -> Iterator[Result]:
-        """Wait until the first job is done; remove it and yield its result."""
-        self._wait(under_way[0])
-        yield under_way.pop(0).result()
-
-    def _wait(self, *futures: Future[Result]) -> set[Future[Result]]:
-        """Wait until at least one of some jobs is done; return those that are."""
-        while not (done := wait(futures, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED).done):
+    def _done(self, under_way: list[Future[Result]], in_order: bool) -> Iterator[Result]:
+        """Wait until the first job is done, or any; remove those that are and yield their results."""
+        awaited = under_way[:1] if in_order else under_way
+        while not (done := wait(awaited, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED).done):
             self.look()
-        return done
-
-    def _done(self, under_way: list[Future[Result]]) -> Iterator[Result]:
-        """Wait until jobs are done; remove them and yield their results."""
-        for future in self._wait(*under_way):
+        for future in done:
             under_way.remove(future)
             yield future.result()
 

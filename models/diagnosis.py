@@ -53,12 +53,14 @@ def diagnose(robot: Robot | str | os.PathLike[str]) -> Diagnosis:
     A = dynamics.wrench_matrix(robot.home) * scale * rows
     lengths = dynamics.cable_lengths(robot.home)
     singular_values = np.linalg.svd(A, compute_uv=False)[: len(robot.platform.dof)]
-    level, tilted = _poses_about_home(robot, lengths)
-    rank = int(_ranks(A))
+    rank, level, tilted = (
+        int(np.linalg.matrix_rank(dynamics.wrench_matrix(poses) * scale * rows, rtol=RANK_TOLERANCE).max())
+        for poses in (robot.home, *_poses_about_home(robot, lengths))
+    )
     return Diagnosis(
         rank=rank,
-        rank_level=int(_ranks(dynamics.wrench_matrix(level) * scale * rows).max()),
-        rank_tilted=int(_ranks(dynamics.wrench_matrix(tilted) * scale * rows).max()),
+        rank_level=level,
+        rank_tilted=tilted,
         singular_values=singular_values,
         lengths=lengths,
         reason=_why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else "",
@@ -74,11 +76,6 @@ def _poses_about_home(robot: Robot, lengths: np.ndarray) -> tuple[np.ndarray, np
     tilted = level.copy()
     tilted[:, 3:] = robot.dof_mask[3:] * rng.uniform(-0.3, 0.3, size=(LEVEL_POSES, 3))
     return level, tilted
-
-
-def _ranks(A: np.ndarray) -> np.ndarray:
-    values = np.linalg.svd(A, compute_uv=False)
-    return (values > RANK_TOLERANCE * values[..., :1]).sum(axis=-1)
 
 
 def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:

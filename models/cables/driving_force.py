@@ -202,6 +202,4 @@ def _traction(robot: Robot, A: np.ndarray, w: np.ndarray, dT: np.ndarray) -> tup
     left = w - np.einsum("nij,nj->ni", A, dT)
     T = np.einsum("nij,nj->ni", np.linalg.pinv(A, rcond=SINGULAR), left)
     residual = np.linalg.norm(np.einsum("nij,nj->ni", A, T) - left, axis=1)
-    singular = np.linalg.svd(A, compute_uv=False)
-    rank = (singular > SINGULAR * singular[:, :1]).sum(axis=1)
-    return T, residual, rank
+    return T, residual, np.linalg.matrix_rank(A, rtol=SINGULAR)
