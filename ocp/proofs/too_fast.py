@@ -67,11 +67,8 @@ def _acceleration(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarra
     """Yield the limit of an acceleration if that of a motion within off (n,) of x (n, 3) must exceed it."""
     whole = times[-1] - times[0]
     moved = np.linalg.norm(x[-1] - x[0]) - off[-1] - off[0]
-    worst, at, why = (
-        4 * moved / whole**2 if rests else -np.inf,
-        0.0,
-        "the smallest possible from rest to rest in this time",
-    )
+    worst, at = 4 * moved / whole**2 if rests else -np.inf, 0.0
+    why = "the smallest possible from rest to rest in this time"
     for steps in range(1, (len(times) - 1) // 2 + 1):
         before, here, after = slice(None, -2 * steps), slice(steps, -steps), slice(2 * steps, None)
         bent = np.linalg.norm(x[before] - 2 * x[here] + x[after], axis=1) - off[before] - 2 * off[here] - off[after]

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,6 +24,9 @@ INSTANTS = 120  # at which tensions are asked for before a motion is audited
 HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of what has tensions at these instants, one after the other until the audit passes
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
+
+Variation: TypeAlias = tuple[Scenario, float, str]
+"""A varied task laid out, the value that it differs by, and what is said of it behind that."""
 
 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -57,47 +60,41 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
     if not isinstance(path, LinePath):
         return []
     start, way = np.array(path.start), np.array(path.end) - np.array(path.start)
+    whole = float(np.linalg.norm(way[:3]))
 
-    def to(share: float) -> Scenario:
-        nearer = path.model_copy(update={"end": tuple((start + share * way).tolist())})
-        return lay_out(scenario.robot, scenario.task.model_copy(update={"path": nearer}))
+    def to(share: float) -> Variation:
+        end = start + share * way
+        nearer = path.model_copy(update={"end": tuple(end.tolist())})
+        place = ", ".join(f"{value:.4g}" for value in end[:3])
+        varied = lay_out(scenario.robot, scenario.task.model_copy(update={"path": nearer}))
+        return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place})"
 
-    def offer(share: float) -> tuple[float, str]:
-        end = ", ".join(f"{value:.4g}" for value in (start + share * way)[:3])
-        return share * float(np.linalg.norm(way[:3])), f"of {quantity(float(np.linalg.norm(way[:3])), 'm')}, to ({end})"
-
-    return _largest(search, to, "length of the line", "m", offer)
+    return _largest(search, to, "length of the line", "m")
 
 
 def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the heaviest platform that is feasible, with the moments of inertia that go with its mass."""
     platform = scenario.robot.platform
 
-    def with_mass(share: float) -> Scenario:
+    def with_mass(share: float) -> Variation:
         inertia = None if platform.inertia is None else [share * value for value in platform.inertia]
-        return _with_robot(scenario, {"platform": {"mass": share * platform.mass, "inertia": inertia}})
+        lighter = _with_robot(scenario, {"platform": {"mass": share * platform.mass, "inertia": inertia}})
+        return lighter, share * platform.mass, f"instead of {quantity(platform.mass, 'kg')}"
 
-    def offer(share: float) -> tuple[float, str]:
-        return share * platform.mass, f"instead of {quantity(platform.mass, 'kg')}"
-
-    return _largest(search, with_mass, "platform.mass", "kg", offer)
+    return _largest(search, with_mass, "platform.mass", "kg")
 
 
 def _stronger_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the smallest factor of all t_max that is feasible, as the largest t_max."""
-    robot, largest = scenario.robot, float(scenario.robot.t_max.max())
+    t_max = scenario.robot.t_max
+    largest, others = float(t_max.max()), "" if np.ptp(t_max) == 0 else ", and others alike"
 
-    def with_limits(share: float) -> Scenario:
+    def with_limits(share: float) -> Variation:
         factor = 1 + (STRONGEST - 1) * (1 - share) ** 4  # fine steps near one
-        return _with_robot(scenario, {"cables": [{"t_max": factor * high} for high in robot.t_max]})
+        stronger = _with_robot(scenario, {"cables": [{"t_max": factor * high} for high in t_max]})
+        return stronger, factor * largest, f"instead of {quantity(largest, 'N')}{others}"
 
-    def offer(share: float) -> tuple[float, str]:
-        factor = 1 + (STRONGEST - 1) * (1 - share) ** 4
-        return factor * largest, f"instead of {quantity(largest, 'N')}" + (
-            "" if np.ptp(robot.t_max) == 0 else ", and others alike"
-        )
-
-    return _largest(search, with_limits, "cables.t_max", "N", offer, up=True)
+    return _largest(search, with_limits, "cables.t_max", "N", up=True)
 
 
 def _with_robot(scenario: Scenario, changes: dict[str, Any]) -> Scenario:
@@ -110,28 +107,21 @@ def _with_robot(scenario: Scenario, changes: dict[str, Any]) -> Scenario:
 
 
 def _largest(
-    search: Search,
-    make: Callable[[float], Scenario],
-    name: str,
-    unit: str,
-    offer: Callable[[float], tuple[float, str]],
-    up: bool = False,
+    search: Search, make: Callable[[float], Variation], name: str, unit: str, up: bool = False
 ) -> list[Relaxed]:
     """Return the variation with the largest share, from 0 to 1, that passes its audit; nothing if none is found."""
     low, high = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if _has_tensions(make(middle)) else (low, middle)
+        low, high = (middle, high) if _has_tensions(make(middle)[0]) else (low, middle)
     if low == 0.0:
         return []
     for reserve in RESERVES:
-        share = reserve * low
-        varied = make(share)
+        varied, value, detail = make(reserve * low)
         audit = search.audit_motion(varied, None, f"audit, other {name}")
         if audit.passed:
-            value, detail = offer(share)
             plan = Plan(varied, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0)
-            return [Relaxed(name, unit, offer(1.0)[0], rounded(value, up), plan, detail)]
+            return [Relaxed(name, unit, make(1.0)[1], rounded(value, up), plan, detail)]
     return []
 
 

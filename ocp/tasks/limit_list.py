@@ -56,14 +56,9 @@ def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
 
 
 def _of_platform(given: TaskLimits) -> Iterator[Limit]:
-    if given.platform_speed is not None:
-        yield PlatformSpeed(given.platform_speed)
-    if given.platform_acceleration is not None:
-        yield PlatformAcceleration(given.platform_acceleration)
-    if given.platform_turn is not None:
-        yield PlatformTurn(given.platform_turn)
-    if given.platform_tilt is not None:
-        yield PlatformTilt(given.platform_tilt)
+    for kind in (PlatformSpeed, PlatformAcceleration, PlatformTurn, PlatformTilt):
+        if (most := getattr(given, kind.name)) is not None:
+            yield kind(most)
     if given.platform_box is not None:
         for axis, low, high in zip(range(3), given.platform_box.min, given.platform_box.max, strict=True):
             yield PlatformBox(axis, low, high)

@@ -27,9 +27,8 @@ from ...models.part import Part, Vector3
 from ...models.platform import Aero
 from ...models.rigid_body import com_velocity
 
-LOW, HIGH, ALONG = range(
-    3
-)  # which value of a coordinate: the box's smallest, its largest, or that of the CoM's velocity
+# Which value of a coordinate: the box's smallest, its largest, or that of the CoM's velocity.
+LOW, HIGH, ALONG = range(3)
 
 # Additive recurrence of the plastic number's three-dimensional kin: the fractions of k times these fill a box evenly
 # (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences").

@@ -6,13 +6,11 @@ import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import override
 
-from ....models.part import NonNegative, Pose, Positive
+from ....models.part import AT_ORIGIN, NonNegative, Pose, Positive
 from .base import PathBase
 from .motion import Motion
 from .sequence import SequencePath, SinglePath
 from .stations import Stations
-
-STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class ReturnPath(PathBase):
@@ -26,9 +24,9 @@ class ReturnPath(PathBase):
     duration: Positive = Field(description="of the whole path [s]")
     start: NonNegative = Field(description="time on the whole path at which this one starts [s]")
     settle: Positive = Field(description="time after which the offset is zero [s]")
-    offset: Pose = Field(default=STILL, description="from the path at the start [m, rad]")
-    offset_velocity: Pose = Field(default=STILL, description="its time derivative at the start [m/s, rad/s]")
-    offset_acceleration: Pose = Field(default=STILL, description="the second one [m/s^2, rad/s^2]")
+    offset: Pose = Field(default=AT_ORIGIN, description="from the path at the start [m, rad]")
+    offset_velocity: Pose = Field(default=AT_ORIGIN, description="its time derivative at the start [m/s, rad/s]")
+    offset_acceleration: Pose = Field(default=AT_ORIGIN, description="the second one [m/s^2, rad/s^2]")
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
