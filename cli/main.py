@@ -30,7 +30,7 @@ COMMANDS = {
     "pose": "Estimate the pose of the platform from its cable lengths.",
     "plan": "Plan a motion that keeps every tension inside its limits.",
     "time": "Compute the fastest motion along a path.",
-    "simulate": "Simulate a plan in closed loop, with wind, noise and faults.",
+    "simulate": "Simulate a plan in closed loop, with wind, noise and events.",
     "workspace": "Sample the poses at which a condition holds.",
     "calibrate": "Calibrate a robot from measured cable lengths.",
     "view": "Show robots, plans, simulations and workspaces in the browser.",

@@ -1,4 +1,4 @@
-"""`towline simulate`: simulate a plan in closed loop, with wind, sensor noise and faults."""
+"""`towline simulate`: simulate a plan in closed loop, with wind, sensor noise and events."""
 
 from __future__ import annotations
 
@@ -75,7 +75,9 @@ EventOption = Annotated[
         metavar="EVENT",
         help="Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
         "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'stop at 3' "
-        "(the reference stops on its path). Repeat the option for more.",
+        "(the reference stops on its path), 'follow next.nc at 3' (it becomes another plan), "
+        "'push 20 0 0 at 1 for 0.5' (a force on the platform [N]), or the YAML file of a list of events. Repeat the "
+        "option for more.",
     ),
 ]
 DurationOption = Annotated[
@@ -130,7 +132,7 @@ def simulate(
     fps: FpsOption = FPS,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate a plan in closed loop, with wind, sensor noise and faults.
+    """Simulate a plan in closed loop, with wind, sensor noise and events.
 
     A run passes if it does not diverge, its position error stays within --tolerance, no tension exceeds t_max by more
     than 0.1 % of the cable's range, and no cable with t_min above zero goes slack. The exit code is 0 if all runs pass,

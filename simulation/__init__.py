@@ -5,11 +5,27 @@ from typing import TYPE_CHECKING, Any
 from ..base.execution import Execution
 from ..base.former_names import moved_name
 from .conditions import Conditions
+from .events import Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
 from .sensors import Noise
 from .simulate import simulate
 from .simulation import Simulation
 
-__all__ = ["Conditions", "Execution", "Noise", "Simulation", "simulate"]
+__all__ = [
+    "Conditions",
+    "Cut",
+    "Event",
+    "Execution",
+    "Follow",
+    "Lose",
+    "Miss",
+    "Noise",
+    "Push",
+    "Simulation",
+    "Stick",
+    "StopReference",
+    "Wall",
+    "simulate",
+]
 
 
 if not TYPE_CHECKING:  # a type checker would accept any name

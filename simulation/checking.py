@@ -1,4 +1,4 @@
-"""`check_command`: refuse invalid commands of a user's controller with a one-line error."""
+"""Refuse invalid commands of a user's controller, and wrenches of a user's event, with a one-line error."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from ..control import ANSWERS, Command
 from ..models.robot import Robot
+from .events import Event
 
 
 def check_command(command: Any, robot: Robot, flights: int, time: float) -> None:
@@ -36,3 +37,20 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
         raise InputError(
             f"controller must return answered from 0 to {len(ANSWERS) - 1}, got {answered.max()} at t = {time:g} s"
         )
+
+
+def check_wrench(event: Event, wrench: Any, shape: tuple[int, int], time: float) -> np.ndarray:
+    """Return the wrench of an event as an array for all runs, of `shape` (N, 6).
+
+    Raises `InputError` if it has another shape, or numbers that are not finite.
+    """
+    try:
+        values = np.broadcast_to(np.asarray(wrench, dtype=float), shape)
+    except (TypeError, ValueError):
+        values = np.full(shape, np.nan)
+    if not np.isfinite(values).all():
+        raise InputError(
+            f"events must exert wrenches of six finite numbers, got {shown(wrench)} of {type(event).__name__} "
+            f"at t = {time:g} s"
+        )
+    return values

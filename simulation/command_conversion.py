@@ -44,6 +44,7 @@ class Orders:
         blocks = self._rows[:, :, layout.COMMANDS + m :].reshape(len(seeds), -1, count, layout.CARRIER)
         rows, carriers = self._rows[:, 0], blocks[:, 0]
         # Views of the parts of all rows.
+        self._wrenches, self._constant = rows[:, layout.WRENCH : layout.COMMANDS], conditions.disturbance
         self._cables = rows[:, layout.COMMANDS : layout.COMMANDS + m]
         self._poses, self._velocities = carriers[..., first : first + 6], carriers[..., first + 6 : first + 12]
         self._accelerations = carriers[..., first + 12 : first + 18]
@@ -59,6 +60,10 @@ class Orders:
         """Return pose, velocity and acceleration at the end of a period in which the acceleration is constant."""
         h = self._period
         return pose + h * (velocity + 0.5 * h * acceleration), velocity + h * acceleration, acceleration
+
+    def push(self, wrench: np.ndarray) -> None:
+        """Add a wrench, (N, 6) [N, N m], to the constant one on the platform, until the next call."""
+        np.add(self._constant, wrench, out=self._wrenches)
 
     def rows(self, k: int, command: Command, lengths: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Return the rows of period `k`, (N, 1 or 2, k); lengths and rates are (N, 2, m), states (N, n), as it begins.

@@ -27,13 +27,15 @@ class Conditions(Displayed):
     noise
         Sensor noise, a `Noise` or a mapping (default: none).
     events
-        Events, a string each: "cut 3 at 2.5", cable 3 breaks (counted from 1; times in [s]); "stick 2 at 1", its winch
-        stops; "lose quad-1 at 2", the actuators of a carrier stop; "miss 0.05 at 1.2", the controller does not respond;
-        "stop at 3", the reference stops on its path as `control.stop` does.
+        Events, each a line, a mapping, the YAML file of a list, or an `Event` (times in [s], cables count from 1): "cut
+        3 at 2.5", a cable breaks; "stick 2 at 1", its winch stops; "lose quad-1 at 2", the actuators of a carrier stop;
+        "miss 0.05 at 1.2", the controller does not respond; "stop at 3", the reference stops on its path as
+        `control.stop` does; "follow next.nc at 3", it becomes another plan; "push 20 0 0 at 1 for 0.5", a force on the
+        platform in {G} [N]; a `Wall` that it meets.
     disturbance
         Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
     duration
-        Simulated time [s] (default: the reference's). After the end of the reference the robot holds its final pose.
+        Simulated time [s] (default: until every reference has ended). After that the robot holds its final pose.
     period
         Period of the controller [s].
     substeps
@@ -54,7 +56,7 @@ class Conditions(Displayed):
     wind: Any = None
     gusts: float = 0.0
     noise: Noise | dict[str, Any] | None = None
-    events: Sequence[str] = ()
+    events: Sequence[Any] = ()
     disturbance: Any = None
     duration: float | None = None
     period: float = 1e-3

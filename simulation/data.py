@@ -26,7 +26,7 @@ class SimulationData(Displayed):
     robot
         The robot.
     conditions
-        References, faults and noise, see `Experiment`.
+        References, events and noise, see `Experiment`.
     seed
         Seed of wind and noise.
     record

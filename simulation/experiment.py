@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.display import record
 from ..control import Reference
-from .faults import Fault
+from .events import Cut, Event
 from .sensors import Noise
 
 
@@ -20,7 +20,7 @@ class Wind(Protocol):
 
 
 class Experiment(NamedTuple):
-    """Settings shared by all runs: controller period, references, wind, noise and faults, see `Conditions`.
+    """Settings shared by all runs: controller period, references, wind, noise and events, see `Conditions`.
 
     Attributes
     ----------
@@ -37,8 +37,8 @@ class Experiment(NamedTuple):
         Force [N] and moment about the CoM [N m] on the platform in {G}, (6,).
     noise
         Sensor noise.
-    faults
-        Faults in order of time.
+    events
+        Events in order of time.
     keep_out
         Outlines of the keep-out regions of the reference, see `Trajectory`.
     doubt
@@ -51,14 +51,14 @@ class Experiment(NamedTuple):
     wind: Wind | None
     disturbance: np.ndarray
     noise: Noise
-    faults: tuple[Fault, ...]
+    events: tuple[Event, ...]
     keep_out: Sequence[Sequence[np.ndarray]]
     doubt: str = ""
 
     __repr__ = record
 
     def should_pull(self, t_min: np.ndarray, periods: np.ndarray) -> np.ndarray:
-        """Return where a slack cable is a failure, (n, m): t_min (m,) [N] is above zero and no fault has cut it.
+        """Return where a slack cable is a failure, (n, m): t_min (m,) [N] is above zero and no event has cut it.
 
         `periods`, (n,), are their numbers.
         """
@@ -67,9 +67,9 @@ class Experiment(NamedTuple):
     def cut(self, cables: int, periods: np.ndarray) -> np.ndarray:
         """Return which cables are cut when periods begin, (n, cables); `periods`, (n,), are their numbers."""
         result = np.zeros((len(periods), cables), dtype=bool)
-        for fault in self.faults:
-            if fault.kind == "cut":
-                result[periods * self.period >= fault.at - 1e-9 * self.period, fault.part] = True
+        for event in self.events:
+            if isinstance(event, Cut):
+                result[periods * self.period >= event.at - 1e-9 * self.period, event.cable - 1] = True
         return result
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,5 +79,5 @@ class Experiment(NamedTuple):
             "substeps": self.substeps,
             "disturbance": self.disturbance.tolist(),
             "noise": self.noise.model_dump(exclude_defaults=True),
-            "faults": [fault._asdict() for fault in self.faults],
+            "events": [event.model_dump() for event in self.events],
         }

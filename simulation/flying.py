@@ -12,8 +12,9 @@ from ..control.command import HOLD
 from ..core import sense
 from ..plant import Plant
 from ..plant.periods import Periods
-from .checking import check_command
+from .checking import check_command, check_wrench
 from .command_conversion import Orders
+from .events import Event, Running
 from .experiment import Experiment
 from .recorder import Period, Recorder
 from .sensors import Sensors
@@ -83,29 +84,28 @@ def fly(
     first = conditions.references[0]
     motion = (first.pose, first.velocity, first.carrier_pose, first.carrier_velocity)
     start = np.zeros(m) if first.tensions is None else np.maximum(first.tensions, 0.0)
-    states = np.tile(plant.start(*motion, tensions=start), (flights, 1))
+    periods = Periods(plant, period, conditions.substeps)
+    running = Running(plant, periods, np.tile(plant.start(*motion, tensions=start), (flights, 1)))
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
-    history, tensions = np.zeros((flights, 2, states.shape[1])), np.zeros((flights, 2, m))
+    history, tensions = np.zeros((flights, 2, plant.size)), np.zeros((flights, 2, m))
     end, numbers = history[:, 1], history.reshape(-1)
     pulls = np.tile(start, (flights, 1))  # means of the last period
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
     orders = Orders(plant, conditions, seeds)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
-    periods = Periods(plant, period, conditions.substeps)
-    faults, silent_until, command, expected = list(conditions.faults), -1.0, None, None
+    coming, pushing, command, expected = list(conditions.events), list[Event](), None, None
     for k, reference in enumerate(conditions.references):
         time = k * period
-        while faults and faults[0].at <= time + 1e-9 * period:
-            fault = faults.pop(0)
-            if fault.kind == "miss":
-                silent_until = max(silent_until, fault.at + fault.lasting)
-            elif fault.kind == "lose":
-                periods.lose(fault.part)
-            elif fault.kind != "stop":  # which the references have
-                states = (plant.cut if fault.kind == "cut" else plant.stick)(states, fault.part)
+        while coming and coming[0].at <= time + 1e-9 * period:
+            event = coming.pop(0)
+            event.begin(running)
+            pushing += [event] if type(event).wrench is not Event.wrench else []
+        states = running.states
         sense(plant.record, states, motions, lengths)
+        if pushing:
+            orders.push(_wrench(pushing, time + 1e-9 * period, motions))
         reported = sensors.report(k, motions, pulls)
-        if command is None or time >= silent_until:
+        if command is None or time >= running.silent_until:
             command = pilot.step(time, *reported, reference)
         else:
             command = _held(command, period)
@@ -139,6 +139,15 @@ def fly(
         lasted += alive
         states[:] = end
     return np.maximum(lasted, 1), pilot.seconds
+
+
+def _wrench(events: Sequence[Event], time: float, motions: np.ndarray) -> np.ndarray:
+    """Return the sum of what events exert on the platform in the period that begins at `time`, (N, 6)."""
+    total = np.zeros((len(motions), 6))
+    for event in events:
+        if event.until > time and (exerted := event.wrench(time, motions)) is not None:
+            total += check_wrench(event, exerted, total.shape, time)
+    return total
 
 
 def _held(command: Command, period: float) -> Command:

@@ -16,7 +16,6 @@ from ..base.execution import Execution, ExecutionOptions
 from ..base.inputs import required, shown, whole_number, with_fields
 from ..control import ComputedTorque, Controller, Reference
 from ..control.planned_references import references_at
-from ..control.stops import Stop, stop_along
 from ..control.trajectory import Trajectory, read_trajectory
 from ..models.files import as_robot
 from ..models.parsing import validate
@@ -24,8 +23,8 @@ from ..models.robot import Robot
 from ..plant import Plant
 from .command_conversion import Orders
 from .conditions import Conditions
+from .events import Event, read_events
 from .experiment import Experiment
-from .faults import Fault, read_faults
 from .flights import flights
 from .flying import fly
 from .record import Record
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LONGEST = 1e6  # periods of one flight
-BEYOND = "a stop that needs tensions beyond their limits"
 MOST_RUNS = 10_000_000
 
 
@@ -56,7 +54,7 @@ class Options(ExecutionOptions, total=False):
     substeps: int | None
     drive: str | None
     tolerance: float
-    faults: Sequence[str]
+    faults: Sequence[Any]
 
 
 @overload
@@ -66,7 +64,7 @@ def simulate(
     controller: Controller | None = None,
     wind: Any = None,
     noise: AnyNoise = None,
-    events: Sequence[str] = (),
+    events: Sequence[Any] = (),
     duration: float | None = None,
     seed: int = 0,
     *,
@@ -82,7 +80,7 @@ def simulate(
     controller: Controller | None = None,
     wind: Any = None,
     noise: AnyNoise = None,
-    events: Sequence[str] = (),
+    events: Sequence[Any] = (),
     duration: float | None = None,
     seed: int = 0,
     *,
@@ -97,7 +95,7 @@ def simulate(
     controller: Controller | None = None,
     wind: Any = None,
     noise: AnyNoise = None,
-    events: Sequence[str] = (),
+    events: Sequence[Any] = (),
     duration: float | None = None,
     seed: int = 0,
     *,
@@ -178,43 +176,52 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
         from ..ocp import Task
 
         reference = validate({"path": reference}, Task, "reference").path
-    trajectory = read_trajectory(robot, reference, meets.duration)
-    if meets.duration is None and trajectory.duration is None:
+    trajectory, period = read_trajectory(robot, reference, meets.duration), meets.period
+    named = read_events(robot, meets.events, events)
+    happening = tuple(event for _, event in named)
+    parts = _in_turn(robot, trajectory, happening)
+    ends = [begins + part.duration for begins, part in parts if part.duration is not None]
+    if meets.duration is None and not ends:
         raise InputError("duration must be the simulated time [s] if the reference is a pose, got None")
-    period, lasting = meets.period, trajectory.duration if meets.duration is None else meets.duration
-    assert lasting is not None
+    lasting = max(ends) if meets.duration is None else meets.duration
     periods = max(1, round(lasting / period))
     if periods > LONGEST:
         raise InputError(f"duration must be at most {LONGEST:g} periods of {period:g} s, got {lasting:g} s")
+    for where, event in named:
+        if event.at >= periods * period:
+            raise InputError(f"{where} must begin before the end at {periods * period:g} s, got {event.at:g} s")
     plant = Plant(robot, drive=_drive(robot) if meets.drive is None else meets.drive)
-    faults = read_faults(robot, meets.events, periods * period, events)
-    halt = _stop(robot, trajectory, faults)
     return plant, Experiment(
         period=period,
         substeps=meets.substeps or steps_in(period, plant),
-        references=_references(robot, trajectory, period * np.arange(periods), halt),
+        references=_references(robot, parts, period * np.arange(periods)),
         wind=read_wind(robot, meets.wind, meets.gusts),
         disturbance=meets.disturbance,
         noise=required("noise", meets.noise, Noise),
-        faults=faults,
-        keep_out=trajectory.keep_out,
-        doubt=trajectory.doubt or ("" if halt is None or halt.feasible else BEYOND),
+        events=happening,
+        keep_out=next((part.keep_out for _, part in parts if part.keep_out), ()),
+        doubt="; ".join(dict.fromkeys(part.doubt for _, part in parts if part.doubt)),
     )
 
 
-def _stop(robot: Robot, trajectory: Trajectory, faults: Sequence[Fault]) -> Stop | None:
-    """Return the stop of the first event of that kind; None if there is none, or if the reference is a pose."""
-    begins = next((fault.at for fault in faults if fault.kind == "stop"), None)
-    return None if begins is None or trajectory.duration is None else stop_along(robot, trajectory, begins)
+def _in_turn(robot: Robot, first: Trajectory, events: Sequence[Event]) -> list[tuple[float, Trajectory]]:
+    """Return the references that follow each other, each with the time from which it is followed [s]."""
+    parts = [(0.0, first)]
+    for event in events:
+        begins, current = parts[-1]
+        new = event.follow(robot, current, event.at - begins)
+        parts += [] if new is None else [(event.at, new)]
+    return parts
 
 
-def _references(robot: Robot, trajectory: Trajectory, times: np.ndarray, halt: Stop | None) -> list[Reference]:
+def _references(robot: Robot, parts: Sequence[tuple[float, Trajectory]], times: np.ndarray) -> list[Reference]:
     """Return the reference at each of the times (n,) [s]."""
-    if halt is None:
-        return references_at(robot, trajectory, times)
-    after = times > halt.begins
-    stopping = read_trajectory(robot, halt, None)
-    return references_at(robot, trajectory, times[~after]) + references_at(robot, stopping, times[after] - halt.begins)
+    which = np.maximum(np.searchsorted([begins for begins, _ in parts], times) - 1, 0)
+    return [
+        reference
+        for number, (begins, part) in enumerate(parts)
+        for reference in references_at(robot, part, times[which == number] - begins)
+    ]
 
 
 def _drive(robot: Robot) -> str:

@@ -22,7 +22,7 @@ from ..figures.report import Report, Reported, Section
 from ..models.dimensions import dimensions
 from ..models.parsing import to_yaml
 from .data import SimulationData
-from .events import events, sentence
+from .occurrences import occurrences, sentence
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,7 @@ class Simulation(SimulationData, Filmed, Reported):
         return {
             "passed": self.passed,
             "failures": list(self.failures),
-            "events": [event.to_dict() for event in events(self)],
+            "events": [event.to_dict() for event in occurrences(self)],
             "error_rms": float(np.sqrt(np.mean(self.error**2))),
             "error_max": float(self.error.max()),
             "tension_min": float(pulling.min()) if pulling.size else 0.0,
@@ -184,7 +184,7 @@ class Simulation(SimulationData, Filmed, Reported):
         return self._report().headline
 
     def _facts(self) -> list[Fact]:
-        merit, happened = self.figures_of_merit(), events(self)
+        merit, happened = self.figures_of_merit(), occurrences(self)
         rows = {"reference": self.conditions.doubt} if self.conditions.doubt else {}
         rows |= {"events": sentence(happened)} if happened else {}
         rows |= {

@@ -119,9 +119,9 @@ def test_many_flights_have_one_table(folder):
         ("cogiro", "step.nc", [], "must be a plan of robot 'cogiro', got one of 'wang-flying'"),
         ("wang-flying", "none.nc", [], "none.nc: no such file"),
         ("wang-flying", "late.yaml", [], "must be a plan, the NetCDF file of one"),
-        ("wang-flying", "step.nc", ["--fault", "cut 9 at 1"], "must name a cable of 'wang-flying', 1 to 6, got '9'"),
+        ("wang-flying", "step.nc", ["--fault", "cut 9 at 1"], "must name a cable of 'wang-flying', 1 to 6, got 9"),
         ("wang-flying", "step.nc", ["--fault", "snap 1"], "must be 'cut CABLE at SECONDS', 'stick CABLE at SECONDS'"),
-        ("wang-flying", "step.nc", ["--fault", "cut 1 at nan"], "must have times from 0 to 1e6 s, got 'nan'"),
+        ("wang-flying", "step.nc", ["--fault", "cut 1 at nan"], "at must be a finite number, got nan"),
         ("wang-flying", "step.nc", ["--noise", "late.yaml"], "delay must be greater than or equal to 0, got -1"),
         ("wang-flying", "step.nc", ["--wind", "nan 0 0"], "--wind must be 3 finite numbers, got 'nan 0 0'"),
         ("wang-flying", "step.nc", ["--gusts", "1"], "gusts must be 0 without a wind"),
@@ -163,7 +163,7 @@ def test_an_interrupt_before_the_first_result_explains_how_to_resume(monkeypatch
 def test_the_line_is_printed_and_the_exit_code_is_2(folder):
     done = simulate(folder, "--event", "cut 9 at 1", "--json")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "towline: --event 'cut 9 at 1' must name a cable of 'wang-flying', 1 to 6, got '9'\n"
+    assert done.stderr == "towline: --event 'cut 9 at 1' must name a cable of 'wang-flying', 1 to 6, got 9\n"
 
 
 def test_the_viewer_plays_a_flight(folder):

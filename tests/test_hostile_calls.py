@@ -388,6 +388,16 @@ ALSO = {
     "nonsense": ("options",),
 }
 
+EVENTS: dict[str, dict[str, Any]] = {
+    "Cut": {"at": 0.005, "cable": 1},
+    "Stick": {"at": 0.005, "cable": 1},
+    "Lose": {"at": 0.005, "carrier": "quad1"},
+    "Miss": {"at": 0.005, "duration": 0.01},
+    "Push": {"at": 0.005, "force": [1, 0, 0]},
+    "Wall": {"at": 0.005, "point": [0, 0, 0], "normal": [0, 0, 1], "stiffness": 1e3},
+    "StopReference": {"at": 0.005},
+    "Follow": {"at": 0.005, "plan": "plan.nc"},
+}
 # Models: their fields are their parameters, and these the valid values.
 REST = {"kind": "static-equilibrium"}
 MODELS: dict[str, dict[str, Any]] = {
@@ -405,6 +415,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "Lengths": {"min": 0.1, "max": 10.0},
     "Margin": {},
     "Noise": {},
+    **EVENTS,
     "StaticEquilibrium": {},
     "WrenchClosure": {},
     "WrenchFeasible": {"box": [[0] * 6, [1] * 6]},
@@ -495,7 +506,7 @@ def subjects() -> dict[str, Subject]:
     objects |= {
         name: getattr(workspace, name)(**MODELS[name])
         for name in MODELS
-        if name not in objects and name not in {"Noise", "Uncertainty"}
+        if name not in objects and name not in {"Noise", "Uncertainty", *EVENTS}
     }
     for name, value in objects.items():
         for method, bound in public_methods(value):

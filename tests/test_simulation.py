@@ -313,7 +313,7 @@ def test_a_plan_whose_loads_the_plant_would_not_carry_is_refused(crane):
         ({"duration": np.nan}, "duration"),
         ({"noise": {"delay": -1}}, "delay"),
         ({"noise": {"positon": 1}}, "positon"),
-        ({"events": ["cut 9 at 1"]}, "1 to 8, got '9'"),
+        ({"events": ["cut 9 at 1"]}, "1 to 8, got 9"),
         ({"events": ["cut 1"]}, "events"),
         ({"events": "cut 1 at 2"}, "events"),
         ({"events": ["miss x at 2"]}, "events"),

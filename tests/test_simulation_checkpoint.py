@@ -85,7 +85,7 @@ def stored(file):
         ({"duration": 0.04}, "reference"),
         ({"disturbance": np.ones(6)}, "disturbance"),
         ({"noise": {"position": 1e-3}}, "noise"),
-        ({"events": ["cut 1 at 0.01"]}, "faults"),
+        ({"events": ["cut 1 at 0.01"]}, "events"),
         ({"controller": ComputedTorque("wang-flying", bandwidth=9.0)}, "controller"),
         ({"drive": "tensions"}, "robot"),
     ],

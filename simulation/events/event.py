@@ -1,0 +1,129 @@
+"""`Event`: what happens to a robot at a time of a simulation."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from math import inf
+from typing import Annotated, Any, ClassVar, get_args
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from ...control.trajectory import Trajectory
+from ...models.part import Part
+from ...models.robot import Robot
+from ...plant import Plant
+from ...plant.periods import Periods
+
+
+def number_in(text: Any) -> Any:
+    """Return the number that a word is, or the word."""
+    try:
+        return float(text) if isinstance(text, str) else text
+    except ValueError:
+        return text
+
+
+LONGEST = 1e6  # [s]
+Seconds = Annotated[float, BeforeValidator(number_in), Field(ge=0, le=LONGEST, allow_inf_nan=False)]
+
+
+@dataclass
+class Running:
+    """A simulation that runs, as events change it.
+
+    Attributes
+    ----------
+    plant, periods
+        The plant, and how it is stepped.
+    states
+        States of all runs, (N, n), see `Plant`.
+    silent_until
+        Time until which the controller does not respond [s].
+    """
+
+    plant: Plant
+    periods: Periods
+    states: np.ndarray
+    silent_until: float = -1.0
+
+
+class Event(Part, ABC):
+    """An event. One of your own defines `kind`, `describe`, and one or more of `begin`, `wrench` and `follow`.
+
+    Attributes
+    ----------
+    at
+        Time at which it begins [s]. It acts from the next period of the controller on.
+    kinds
+        The registry: every defined event by its kind.
+    short
+        How it is written in one line, but for "at SECONDS" and "for SECONDS"; empty if it cannot be.
+    said
+        The field that the words between its kind and "at" give.
+    """
+
+    kinds: ClassVar[dict[str, type[Event]]] = {}
+    short: ClassVar[str] = ""
+    said: ClassVar[str] = "what"
+
+    at: Seconds = Field(description="time at which it begins [s]")
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        super().__pydantic_init_subclass__(**options)
+        if "kind" in cls.__annotations__:
+            Event.kinds[get_args(cls.model_fields["kind"].annotation)[0]] = cls
+
+    @property
+    def until(self) -> float:
+        """Return the time at which it ends [s]; infinity if it does not."""
+        return inf
+
+    @classmethod
+    def in_words(cls, words: list[str]) -> dict[str, Any]:
+        """Return its fields but the time from the words between its kind and "at"."""
+        return {cls.said: " ".join(words)} if words else {}
+
+    def check(self, robot: Robot) -> None:
+        """Check that it can happen to the robot.
+
+        Raises
+        ------
+        InputError
+            If it cannot: "must ..., got ...".
+        """
+
+    @abstractmethod
+    def describe(self, robot: Robot) -> str:
+        """Return what happened, such as "cable 3 was cut"."""
+
+    def begin(self, running: Running) -> None:
+        """Change the running simulation once, as the event begins."""
+
+    def wrench(self, time: float, motions: np.ndarray) -> np.ndarray | None:
+        """Return force [N] and moment about the CoM [N m] on the platform in {G}, (6,) or (N, 6), for one period.
+
+        Parameters
+        ----------
+        time
+            Time at which the period begins [s].
+        motions
+            Poses of platform and carriers then, and their derivatives, in N runs: (N, 1 + c, 12).
+        """
+        return None
+
+    def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory | None:
+        """Return the reference from its beginning on, by a time of its own; None if it remains.
+
+        Parameters
+        ----------
+        robot
+            The robot.
+        trajectory
+            The reference until then.
+        time
+            The time in it [s].
+        """
+        return None

@@ -1,0 +1,94 @@
+"""Wrenches on the platform: a push for some time, and a wall that it meets."""
+
+from math import inf
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from typing_extensions import override
+
+from ...base.text import quantity
+from ...models.part import NonNegative, Positive, Vector3
+from ...models.robot import Robot
+from .event import Event, Seconds, number_in
+
+
+class Push(Event):
+    """A force and a moment on the platform, from one time to another."""
+
+    kind: Literal["push"] = "push"
+    short = "push FX FY FZ [MX MY MZ]"
+    force: Vector3 = Field(default=(0.0, 0.0, 0.0), description="force in {G} [N]")
+    moment: Vector3 = Field(default=(0.0, 0.0, 0.0), description="moment about the CoM in {G} [N m]")
+    duration: Seconds | None = Field(default=None, description="how long it acts [s]; default: until the end")
+
+    @override
+    @classmethod
+    def in_words(cls, words: list[str]) -> dict[str, Any]:
+        """Return force and moment from their numbers."""
+        numbers = [number_in(word) for word in words]
+        return {"force": numbers[:3]} | ({"moment": numbers[3:]} if len(numbers) > 3 else {})
+
+    @property
+    @override
+    def until(self) -> float:
+        """Return the time at which it ends [s]; infinity if it does not."""
+        return inf if self.duration is None else self.at + self.duration
+
+    @override
+    def describe(self, robot: Robot) -> str:
+        """Return what happened."""
+        sizes = quantity(float(np.linalg.norm(self.force)), "N"), quantity(float(np.linalg.norm(self.moment)), "N m")
+        parts = [size for size, part in zip(sizes, (self.force, self.moment), strict=True) if any(part)]
+        lasting = "" if self.duration is None else f" for {quantity(self.duration, 's')}"
+        return f"a push of {' and '.join(parts) or '0 N'}{lasting}"
+
+    @override
+    def wrench(self, time: float, motions: np.ndarray) -> np.ndarray:
+        """Return force [N] and moment [N m], (6,), the same at each time [s]."""
+        return np.array([*self.force, *self.moment])
+
+
+class Wall(Event):
+    """A plane that pushes the platform away, with a spring and a damper and without friction.
+
+    It touches the ball of the given radius about the origin of the platform frame. The force acts along the normal and
+    through the CoM; it never pulls. It is computed once in each period of the controller, which limits the stiffness
+    for which a contact is stable: sqrt(stiffness / mass) times the period should be at most 0.3.
+    """
+
+    kind: Literal["wall"] = "wall"
+    point: Vector3 = Field(description="a point of the plane in {G} [m]")
+    normal: Vector3 = Field(description="direction in {G} to the side on which the robot is, of any length")
+    stiffness: Positive = Field(description="force per depth [N/m]")
+    damping: NonNegative = Field(default=0.0, description="force per speed into the wall [N s/m]")
+    radius: NonNegative = Field(default=0.0, description="of the ball that it touches [m]")
+    duration: Seconds | None = Field(default=None, description="how long it stands [s]; default: until the end")
+
+    @model_validator(mode="after")
+    def _has_normal(self) -> Self:
+        if not any(self.normal):
+            raise ValueError("normal must have a length, got zeros")
+        return self
+
+    @property
+    @override
+    def until(self) -> float:
+        """Return the time at which it ends [s]; infinity if it does not."""
+        return inf if self.duration is None else self.at + self.duration
+
+    @override
+    def describe(self, robot: Robot) -> str:
+        """Return what happened."""
+        return f"a wall of {quantity(self.stiffness, 'N/m')} appeared"
+
+    @override
+    def wrench(self, time: float, motions: np.ndarray) -> np.ndarray:
+        """Return the force [N] on the platforms of N runs, with no moment, (N, 6), the same at each time [s]."""
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        position, velocity = motions[:, 0, :3], motions[:, 0, 6:9]
+        depth = self.radius - (position - np.array(self.point)) @ normal
+        force = np.where(depth > 0, self.stiffness * depth - self.damping * (velocity @ normal), 0.0)
+        result = np.zeros((len(motions), 6))
+        result[:, :3] = np.maximum(force, 0.0)[:, None] * normal
+        return result

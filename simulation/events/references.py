@@ -1,0 +1,93 @@
+"""Changes of the reference: a stop on its path, and another plan."""
+
+import os
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_serializer, field_validator
+from typing_extensions import override
+
+from ...base.errors import InputError
+from ...base.text import quantity
+from ...control.stops import stop_along
+from ...control.trajectory import Trajectory, read_trajectory
+from ...models.robot import Robot
+from .event import Event
+
+BEYOND = "a stop that needs tensions beyond their limits"
+JUMP = 1e-3  # [m, rad, m/s, rad/s], between two references: less is no jump
+
+
+class StopReference(Event):
+    """The reference stops on its path, as `control.stop` does."""
+
+    kind: Literal["stop"] = "stop"
+    short = "stop"
+
+    @override
+    def describe(self, robot: Robot) -> str:
+        """Return what happened."""
+        return "the reference began to stop"
+
+    @override
+    def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory | None:
+        """Return the stop from the time [s] on, as a reference by a time of its own; None for a pose to hold."""
+        if trajectory.duration is None:
+            return None  # a pose
+        halt = stop_along(robot, trajectory, time)
+        return read_trajectory(robot, halt, None)._replace(doubt="" if halt.feasible else BEYOND)
+
+
+class Follow(Event):
+    """The reference becomes another plan, which begins then."""
+
+    kind: Literal["follow"] = "follow"
+    short, said = "follow PLAN.nc", "plan"
+    plan: Any = Field(description="a plan, or the NetCDF file of one")
+
+    @field_validator("plan")
+    @classmethod
+    def _placed(cls, plan: Any, info: ValidationInfo) -> Any:
+        """Take a file's name as relative to the folder of the file that names it."""
+        folder = (info.context or {}).get("folder")
+        return Path(folder, plan) if folder is not None and isinstance(plan, str | os.PathLike) else plan
+
+    @field_serializer("plan")
+    def _named(self, plan: Any) -> str:
+        return str(plan) if isinstance(plan, str | os.PathLike) else type(plan).__name__
+
+    def _trajectory(self, robot: Robot) -> Trajectory:
+        return read_trajectory(robot, self.plan, None)
+
+    @override
+    def check(self, robot: Robot) -> None:
+        """Check that the robot can follow the plan.
+
+        Raises
+        ------
+        InputError
+            If it cannot.
+        """
+        try:
+            self._trajectory(robot)
+        except InputError as error:
+            raise InputError(str(error).removeprefix("reference ")) from None
+
+    @override
+    def describe(self, robot: Robot) -> str:
+        """Return what happened."""
+        return "the reference became another plan"
+
+    @override
+    def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory:
+        """Return the plan, and whether it begins elsewhere than the reference is at the time [s]."""
+        new = self._trajectory(robot)
+        (before, _), (after, _) = trajectory.at(np.array([time])), new.at(np.zeros(1))
+        pose, velocity = (after[i][0] - before[i][0] for i in (0, 1))
+        pose[3:] = (pose[3:] + np.pi) % (2 * np.pi) - np.pi
+        if max(np.abs(pose).max(), np.abs(velocity).max()) <= JUMP:
+            return new
+        moved, faster = (float(np.linalg.norm(part[:3])) for part in (pose, velocity))
+        jump = f"jumps by {quantity(1e3 * moved, 'mm')} and {quantity(faster, 'm/s')} at the hand-over"
+        return new._replace(doubt="; ".join(filter(None, [new.doubt, f"another plan, which {jump}"])))

@@ -1,0 +1,214 @@
+"""Pushes, walls, hand-overs and events of one's own: what they do to a robot, by computations of their own."""
+
+import json
+import re
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from towline import InputError, load, plan, simulate
+from towline.control import OpenLoop, references
+from towline.models import Dynamics
+from towline.simulation import Cut, Event, Follow, Push, Wall
+
+PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-event.md").read_text()
+(CODE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.2, 1.2]}
+ON = {"kind": "line", "start": [0.6, 0.2, 1.2], "end": [0, 0.4, 1]}
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load("cogiro")
+
+
+def stiffness_at_home(robot):
+    """Force per displacement, (3, 3) [N/m], of cables with constant tensions, by differences of the wrench matrix."""
+    dynamics = Dynamics(robot)
+    held = simulate(robot, robot.home, OpenLoop(robot), duration=1e-3).record.commanded[0]
+
+    def force(step):
+        pose = robot.home + np.r_[step, 0, 0, 0]
+        return (dynamics.wrench_matrix(pose, robot.carrier_home) @ held)[:3]
+
+    steps = 1e-5 * np.eye(3)
+    return -np.stack([(force(step) - force(-step)) / 2e-5 for step in steps], axis=1)
+
+
+def test_a_push_gives_the_platform_its_momentum(robot):
+    lasting, force = 0.02, np.array([30.0, -20.0, 40.0])
+    run = simulate(
+        robot, robot.home, OpenLoop(robot), duration=0.2, events=[Push(force=tuple(force), at=0.1, duration=lasting)]
+    )
+    speed = run.record.motions[:, 0, 6:9]
+    assert np.abs(speed[:101]).max() < 1e-7
+    np.testing.assert_allclose(speed[120], force * lasting / robot.platform.mass, rtol=0.02)
+
+
+def test_a_push_without_an_end_is_a_constant_disturbance(robot):
+    wrench = [10.0, 0.0, -5.0, 1.0, 2.0, 0.0]
+    pushed = simulate(robot, robot.home, duration=0.2, events=["push 10 0 -5 1 2 0 at 0"])
+    disturbed = simulate(robot, robot.home, duration=0.2, disturbance=wrench)
+    np.testing.assert_array_equal(pushed.record.motions, disturbed.record.motions)
+    both = simulate(robot, robot.home, duration=0.2, disturbance=[10, 0, -5, 0, 0, 0], events=["push 0 0 0 1 2 0 at 0"])
+    np.testing.assert_array_equal(both.record.motions, disturbed.record.motions)
+
+
+def test_it_ends(robot):
+    ended = simulate(robot, robot.home, duration=0.2, events=["push 10 0 0 at 0.05 for 0.05"])
+    endless = simulate(robot, robot.home, duration=0.2, events=["push 10 0 0 at 0.05"])
+    first = np.argmax((ended.record.motions != endless.record.motions).any(axis=(1, 2)))
+    assert first == 101  # what is sensed one period after the first without it
+
+
+def test_a_wall_carries_what_the_cables_do_not():
+    """With constant tensions: push = wall + geometric stiffness times displacement, once the platform rests."""
+    robot = load("cogiro")
+    push, gap, stiffness = 100.0, 0.002, 2e4
+    wall = Wall(at=0.0, point=(gap, 0, robot.home[2]), normal=(-2, 0, 0), stiffness=stiffness, damping=3e3)
+    constant = stiffness_at_home(robot)
+    run = simulate(robot, robot.home, OpenLoop(robot), duration=1.5, events=[wall, Push(force=(push, 0, 0), at=0.0)])
+    x = run.record.motions[-1, 0, 0] - robot.home[0]
+    assert x > gap
+    assert stiffness * (x - gap) + constant[0, 0] * x == pytest.approx(push, rel=0.02)
+
+
+def test_a_wall_never_pulls(robot):
+    wall = Wall(at=0.0, point=(0, 0, 0), normal=(0, 0, 3), stiffness=100.0, damping=1e4, radius=0.1)
+    motions = np.zeros((3, 2, 12))
+    motions[:, 0, 2] = [0.2, 0.05, 0.05]  # apart, inside, inside and quickly out
+    motions[:, 0, 8] = [-1.0, -0.1, 1.0]
+    wrench = wall.wrench(0.0, motions)
+    np.testing.assert_allclose(wrench[:, 2], [0.0, 100 * 0.05 + 1e4 * 0.1, 0.0])
+    assert not np.delete(wrench, 2, axis=1).any()
+
+
+@pytest.fixture(scope="module")
+def two_plans(robot, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plans")
+    first, second = (plan(robot, {"path": path, "duration": 1.5}) for path in (LINE, ON))
+    return first, second, second.save(folder / "second.nc")
+
+
+def test_the_reference_becomes_another_plan(robot, two_plans):
+    first, second, file = two_plans
+    run = simulate(robot, first, events=[f"follow {file} at 1.5"])
+    assert run.passed
+    assert run.lasted == 3000
+    assert "the reference became another plan at 1.5 s" in run.report()
+    assert "hand-over" not in run.report()
+    wanted = references(second, 1e-3)
+    for k in (1, 700, 1499):
+        np.testing.assert_allclose(run.references[1500 + k].pose, wanted[k].pose, atol=1e-12)
+    by_plan = simulate(robot, first, events=[Follow(plan=second, at=1.5)])
+    np.testing.assert_array_equal(run.record.motions, by_plan.record.motions)
+
+
+def test_a_jump_at_the_hand_over_is_said(robot, two_plans):
+    first, second, _ = two_plans
+    run = simulate(robot, first, events=[Follow(plan=second, at=1.0)])
+    where = np.linalg.norm(references(first, 1e-3)[1000].pose[:3] - references(second, 1e-3)[0].pose[:3])
+    assert f"jumps by {1e3 * where:.4g} mm" in run.report()
+
+
+def test_a_stop_of_the_second_plan(robot, two_plans):
+    first, second, _ = two_plans
+    run = simulate(robot, first, events=["stop at 2", Follow(plan=second, at=1.5)], duration=3.0)
+    assert run.passed
+    end = run.references[-1].pose[:3]
+    assert 0.01 < np.linalg.norm(end - np.array(ON["end"])) < np.linalg.norm(np.subtract(ON["end"], ON["start"])) - 0.01
+    assert np.abs(run.references[-1].velocity).max() < 1e-9
+
+
+def test_events_from_a_file_are_relative_to_it(robot, two_plans, tmp_path):
+    first, _, file = two_plans
+    (file.parent / "events.yaml").write_text(
+        "events: [{kind: follow, plan: second.nc, at: 1.5}, push 5 0 0 at 1 for 0.1, {kind: cut, cable: 2, at: 2.9}]"
+    )
+    run = simulate(robot, first, events=[str(file.parent / "events.yaml")])
+    assert [type(event) for event in run.conditions.events] == [Push, Follow, Cut]
+    assert run.to_dict()["events"][0]["what"] == "a push of 5 N for 0.1 s"
+
+
+def test_events_in_json_and_as_objects_are_the_same(robot):
+    events = ['{"kind": "cut", "cable": 3, "at": 0.01}', {"kind": "cut", "cable": 3, "at": 0.01}, Cut(cable=3, at=0.01)]
+    for event in [*events, "cut 3 at 0.01"]:
+        assert simulate(robot, robot.home, duration=0.02, events=[event]).conditions.events == (Cut(cable=3, at=0.01),)
+
+
+def test_many_runs_are_pushed_as_one_is(robot):
+    events = ["push 20 0 0 at 0.01 for 0.05", {"kind": "wall", "at": 0, "point": [0.0001, 0, 0], "normal": [-1, 0, 0]}]
+    events[1]["stiffness"] = 1e4
+    run = simulate(robot, robot.home, duration=0.2, events=events)
+    runs = simulate(robot, robot.home, duration=0.2, events=events, runs=3)
+    np.testing.assert_allclose(runs["error_max"].values, run.error.max(), rtol=1e-9)
+
+
+def test_the_example_of_the_page_is_short_and_runs(capsys):
+    assert len([line for line in CODE.splitlines() if line.strip()]) <= 30
+    names = {}
+    exec(CODE, names)
+    assert "a rubber band of 20 N/m was tied to the platform at 0.5 s" in capsys.readouterr().out
+    run, band = names["run"], names["RubberBand"]
+    assert run.conditions.events == (band(at=0.5, end=(3, 0, 1)),)
+    assert json.loads(json.dumps(run.conditions.to_dict()))["events"][0]["kind"] == "rubber-band"
+    # The observer finds the force that the band exerts.
+    controller = names["simulate"].__globals__["ComputedTorque"](names["robot"])
+    simulate(names["robot"], names["robot"].home, controller, duration=3.0, events=run.conditions.events)
+    expected = 20.0 * (np.array([3, 0, 1]) - names["robot"].home[:3])
+    np.testing.assert_allclose(controller.disturbance[0, :3], expected, rtol=0.02, atol=0.5)
+
+
+@pytest.mark.parametrize(
+    ("wrench", "message"),
+    [(None, None), (np.zeros(5), "six finite"), (np.full(6, np.nan), "six finite"), ("no", "six finite")],
+)
+def test_what_an_own_event_returns_is_checked(robot, wrench, message):
+    class Odd(Event):
+        kind: Literal["odd"] = "odd"
+
+        def describe(self, robot):
+            return "something odd"
+
+        def wrench(self, time, motions):
+            return wrench
+
+    try:
+        if message is None:
+            assert simulate(robot, robot.home, duration=0.01, events=[Odd(at=0)]).passed
+        else:
+            with pytest.raises(InputError, match=message):
+                simulate(robot, robot.home, duration=0.01, events=[Odd(at=0)])
+    finally:
+        del Event.kinds["odd"]
+
+
+@pytest.mark.parametrize(
+    ("event", "message"),
+    [
+        ("push 1 at 0", "events[0]: force must be 3 numbers, got [1.0]"),
+        ("push 1 2 x at 0", "events[0]: force[2] must be a number, got 'x'"),
+        ("push 1 2 nan at 0", "events[0]: force[2] must be a finite number, got nan"),
+        ("wall at 0", "got 'wall at 0'"),
+        ({"kind": "wall", "at": 0}, "events[0]: point is missing"),
+        (
+            {"kind": "wall", "at": 0, "point": [0, 0, 0], "normal": [0, 0, 0], "stiffness": 1},
+            "normal must have a length, got zeros",
+        ),
+        ({"kind": "brush", "at": 0}, "events[0]: kind must be one of cut, follow, lose, miss, push,"),
+        ({"at": 0}, "events[0]: kind must be one of"),
+        ("follow none.nc at 0", "no such file"),
+        ("none.yaml", "none.yaml: no such file"),
+        ("{", "JSON"),
+        (3, "got 3"),
+        ("cut 1 at 1", "events[0] must begin before the end at 0.01 s, got 1 s"),
+        ("cut 1 at 1e300", "events[0]: at must be"),
+    ],
+)
+def test_wrong_events_are_one_clear_line(robot, event, message):
+    with pytest.raises(InputError) as caught:
+        simulate(robot, robot.home, duration=0.01, events=[event])
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
