@@ -60,12 +60,12 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
         height_ratios=[heights[row] for row in sorted(heights)],
     )
     panels: list[Axes] = []
+    in_column: dict[int, Axes] = {}
+    in_row: dict[int, Axes] = {}
     for view, (column, row) in zip(views, places, strict=True):
-        same = {
-            name: panels[i] for i, place in enumerate(places[: len(panels)]) for name in _shared(place, (column, row))
-        }
         lowest = row == max(heights)
-        ax = canvas.add_subplot(grid[row, column], **same)
+        ax = canvas.add_subplot(grid[row, column], sharex=in_column.get(column), sharey=in_row.get(row))
+        in_column[column] = in_row[row] = ax
         style.dressed(ax, f"{'xyz'[view.across]} [m]" if lowest else "", f"{'xyz'[view.up]} [m]" if not column else "")
         style.heading(ax, view.name, extent[view.across] / extent[[v.across for v in views]].max() / len(widths))
         ax.set_aspect("equal", adjustable="box")
@@ -83,8 +83,3 @@ def _places(views: Sequence[View]) -> list[tuple[int, int]]:
     columns = list(dict.fromkeys(view.across for view in views))
     rows = list(dict.fromkeys(view.up for view in views))
     return [(columns.index(view.across), rows.index(view.up)) for view in views]
-
-
-def _shared(one: tuple[int, int], other: tuple[int, int]) -> list[str]:
-    """Return which axes two places share."""
-    return [name for k, name in enumerate(("sharex", "sharey")) if one[k] == other[k]]

@@ -76,10 +76,11 @@ class Report(Displayed):
         for part in self.parts:
             if isinstance(part, str):
                 lines.append(f"  {part}")
-            elif isinstance(part, Table):
-                lines += _in_columns(part)
+                continue
+            lines += [f"  {part.title}"] if part.title else []
+            if isinstance(part, Table):
+                lines += [f"    {line}" for line in in_columns([part.columns, *part.rows], part.numeric)]
             else:
-                lines += [f"  {part.title}"] if part.title else []
                 wide = width + 2 if any(name for name, _ in part.facts) else 0
                 lines += [f"    {name:<{wide}}{fact}" for name, fact in part.facts]
         return "\n".join(lines)
@@ -141,9 +142,3 @@ class Reported:
                 content = report.html()
             temporary.write_text(content, encoding="utf-8")
         return path
-
-
-def _in_columns(table: Table) -> list[str]:
-    """Return a table's lines, below its title."""
-    lines = in_columns([table.columns, *table.rows], table.numeric)
-    return [*([f"  {table.title}"] if table.title else []), *(f"    {line}" for line in lines)]

@@ -87,7 +87,9 @@ def reached(result: xr.Dataset) -> Figure:
     if not views:
         canvas = style.figure()
         canvas.suptitle(title, fontsize=style.TEXT)
-        _reached_along(canvas, result, thick[0] if thick else "x")
+        along = thick[0] if thick else "x"
+        share = _share(result, tuple(name for name in ("x", "y", "z") if name != along))
+        style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(result[along], share, color=style.colour(0))
         return canvas
     canvas, panels = views_of(
         np.array(np.meshgrid(*(_ends(result[name].values) for name in "xyz"))).reshape(3, -1).T, views, 0.8
@@ -117,12 +119,6 @@ def _ends(centres: np.ndarray) -> list[float]:
     """Return the outer edges of equal cells, from their centres."""
     half = 0.5 * float(centres[1] - centres[0]) if len(centres) > 1 else 0.0
     return [float(centres[0]) - half, float(centres[-1]) + half]
-
-
-def _reached_along(canvas: Figure, result: xr.Dataset, along: str) -> None:
-    """Draw the accepted share over the axis of a region of one dimension."""
-    share = _share(result, tuple(name for name in ("x", "y", "z") if name != along))
-    style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(result[along], share, color=style.colour(0))
 
 
 def _share(result: xr.Dataset, over: tuple[str, ...]) -> xr.DataArray:

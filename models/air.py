@@ -4,7 +4,6 @@ Each is a function of times and returns (n, 3) in [m/s]. Random parts are seeded
 """
 
 from collections.abc import Sequence
-from functools import cache
 
 import numpy as np
 
@@ -110,7 +109,7 @@ def _across(step: float, noise: np.ndarray) -> np.ndarray:
     step is the integral of that with itself, by quadrature: rounding would ruin a difference of large numbers.
     """
     h = min(step, 40.0)
-    nodes, weights = _quadrature()
+    nodes, weights = np.polynomial.legendre.leggauss(40)
     s = h * (nodes + 1) / 2
     impulse = np.exp(-s) * np.stack([s, 1 - s])
     root = np.linalg.cholesky(h / 2 * (impulse * weights) @ impulse.T)
@@ -122,12 +121,6 @@ def _across(step: float, noise: np.ndarray) -> np.ndarray:
     kicks[1:, 0] += decay * h * both[:-1]
     x = _decaying(decay, kicks[:, 0])
     return x + np.sqrt(3) * (both - x)
-
-
-@cache
-def _quadrature() -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes and weights of Gauss and Legendre."""
-    return np.polynomial.legendre.leggauss(40)
 
 
 def _decaying(keep: float, kicks: np.ndarray) -> np.ndarray:

@@ -27,7 +27,8 @@ def begin_with_clock(model: Model, length: float) -> State:
     `length` is the length of the cables [m].
     """
     few = _thinned(model)
-    without = _without_clock(few)
+    fixed = tuple(group for group in few.parameters.groups if group != "clock")
+    without = replace(few, parameters=replace(few.parameters, groups=fixed))
     times = model.measurements.times
     assert times is not None
     most = min(CLOCK_RANGE, SHARE * float(times[-1] - times[0]))
@@ -59,12 +60,6 @@ def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:
     left = rows[1::2][track.inside(0.0)[rows[1::2]]]
     apart, spread = track.at(0.0)[0][left] - position[left], position[left] - position[left].mean(axis=0)
     return bool(left.size) and float(np.vdot(apart, apart)) < SMOOTH**2 * float(np.vdot(spread, spread))
-
-
-def _without_clock(model: Model) -> Model:
-    """Return the model with a fixed clock offset."""
-    groups = tuple(group for group in model.parameters.groups if group != "clock")
-    return replace(model, parameters=replace(model.parameters, groups=groups))
 
 
 def _by_cable_speeds(model: Model) -> float:

@@ -147,18 +147,14 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
 
 
 def _of_open(result: CalibrationData) -> list[Part]:
-    texts = result.not_identifiable
+    texts, lines = result.not_identifiable, list[Part]()
     loose = [one.name for one in result.parameters if one.unit == "m" and LOOSE < one.sigma < np.inf]
     if loose:
         names = ", ".join(loose[:MOST_NAMED]) + (
             f" and {len(loose) - MOST_NAMED} more" if len(loose) > MOST_NAMED else ""
         )
-        return [f"hardly determined: {names}; measure other poses, or give a prior", *_directions(texts)]
-    return _directions(texts)
-
-
-def _directions(texts: tuple[str, ...]) -> list[Part]:
+        lines.append(f"hardly determined: {names}; measure other poses, or give a prior")
     if not texts:
-        return ["all directions of the parameters are observable"]
+        return [*lines, "all directions of the parameters are observable"]
     title = f"{len(texts)} unobservable directions, along which the file's values are kept:"
-    return [Section(title, [("", text) for text in texts])]
+    return [*lines, Section(title, [("", text) for text in texts])]

@@ -26,28 +26,13 @@ RARE = 1e-4  # share of sound measurements that fit no better than the least lik
 MISFIT = 1e12  # beyond the score of any pose that fits
 
 
-def search(problem: Problem, lengths: np.ndarray, sigma: np.ndarray) -> _Best:
-    """Return poses (N, 6), errors (N, m) in standard deviations, and whether they are minima or ambiguous, (N,).
-
-    Lengths (N, m) [m] have the standard deviations `sigma` (m,) [m].
-    """
-    best = _Best(problem, len(lengths))
-    level = level_platform(problem, lengths, 1.0 / sigma)
-    for start in _starts(problem, level):
-        left = best.left
-        best.offer(left, *problem.of(left).descend_from_afar(lengths[left], 1.0 / sigma, start[left]))
-        if not best.left.size:
-            break
-    return best
-
-
 class _Best:
     """The best poses so far.
 
     Attributes
     ----------
     poses, errors, ended
-        As `search` returns them.
+        (N, 6), (N, m) in standard deviations, and whether they are minima, (N,).
     ambiguous
         True if another pose fits too, held by the cables or not, (N,).
     left
@@ -120,7 +105,12 @@ def estimates(problem: Problem, lengths: np.ndarray, starts: np.ndarray | None, 
     """Return the poses that fit lengths (N, m) best, nearest to `starts` (N, 6) or, without any, of all."""
     robot, carriers, ambiguous = problem.robot, problem.carriers, None
     if starts is None:
-        best = search(problem, lengths, sigma)
+        best, level = _Best(problem, len(lengths)), level_platform(problem, lengths, 1.0 / sigma)
+        for start in _starts(problem, level):
+            left = best.left
+            best.offer(left, *problem.of(left).descend_from_afar(lengths[left], 1.0 / sigma, start[left]))
+            if not best.left.size:
+                break
         poses, errors, ended, ambiguous = best.poses, best.errors, best.ended, best.ambiguous
     else:
         poses, errors, ended = problem.descend(lengths, 1.0 / sigma, starts, 0.0)
