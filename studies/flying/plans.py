@@ -36,6 +36,11 @@ GRAVITY = 9.81
 Name = Literal["circle", "helix", "pitching"]
 
 
+def circle() -> Task:
+    """Return VI.B: the circle about a hovering point, with the quadrotor free."""
+    return tasks()[1]
+
+
 def helix() -> Task:
     """Return VI.A: the helix about a straight flight, with the quadrotor free."""
     centre, drift = (START - [0, 0, BELOW]).tolist(), ((END - START) / SECONDS).tolist()
@@ -53,7 +58,7 @@ def pitching() -> Task:
 @cache
 def planned(name: Name) -> Plan:
     """Return the plan of one of the three motions, computed once in a process."""
-    return plan(load("wang-flying"), {"circle": lambda: tasks()[1], "helix": helix, "pitching": pitching}[name]())
+    return plan(load("wang-flying"), {"circle": circle, "helix": helix, "pitching": pitching}[name]())
 
 
 def pitching_flight(largest: float = PITCH) -> SamplePath:
