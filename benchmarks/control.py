@@ -79,8 +79,7 @@ class Report:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists and numbers, ready for JSON."""
-        lists = {name: [asdict(row) for row in getattr(self, name)] for name in ("rows", "steps", "errors")}
-        return {**lists, "machine": self.machine, "count": self.count, "seeds": self.seeds}
+        return asdict(self)
 
 
 def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progress: Progress | None = None) -> Report:

@@ -95,9 +95,14 @@ def horizon_of(program: Program, tolerance: float, iterations: int) -> Horizon:
     N, n, m = program.B.shape
     horizon = Horizon(N, n, m)
     horizon.tolerance, horizon.iterations_max = tolerance, iterations
+    fill(horizon, program)
+    return horizon
+
+
+def fill(horizon: Horizon, program: Program | Horizon) -> None:
+    """Write the arrays of a program, or of another horizon, into a horizon."""
     for name in FIELDS:
         getattr(horizon, name)[...] = getattr(program, name)
-    return horizon
 
 
 def _towline(warm: bool) -> Callable[[Program], Solver]:
@@ -105,8 +110,7 @@ def _towline(warm: bool) -> Callable[[Program], Solver]:
         horizon = horizon_of(first, 1e-6, 20)
 
         def arrange(program: Program) -> bool:
-            for name in FIELDS:
-                getattr(horizon, name)[...] = getattr(program, name)
+            fill(horizon, program)
             horizon.states[:], horizon.controls[:] = program.states, program.controls
             return warm and program.warm
 
@@ -144,40 +148,39 @@ def _daqp(alone: bool) -> Callable[[Program], Solver]:
 
 
 class Sparse:
-    """Sparse matrices of programs of one size, for z = (u_0, x_1, u_1, ..., x_N); behind x_0 if that is a variable."""
+    """Matrices of programs of one size, for z = (u_0, x_1, u_1, ..., x_N); behind x_0 if that is a variable.
+
+    Attributes
+    ----------
+    controls, states :
+        Where they are in z, (N, m) and (N, n).
+    H :
+        Of the cost, with ones for x_0, whose bounds determine it.
+    mask :
+        Where the rows of `dynamics` have entries, (N n, size) of bool.
+    """
 
     def __init__(self, first: Program, fixed_start: bool):
         N, n, m = first.B.shape
         self.offset = 0 if fixed_start else n
-        self.size, self.rows = N * (m + n) + self.offset, N * n
-        self.controls = (np.arange(N)[:, None] * (m + n) + np.arange(m)).ravel() + self.offset
-        self.states = (np.arange(N)[:, None] * (m + n) + m + np.arange(n)) + self.offset
-        before = np.vstack([np.arange(n), self.states[:-1]])  # where a stage's state is, if x_0 is a variable
-        H = np.zeros((self.size, self.size))
-        inputs = self.controls.reshape(N, m)
-        for k in range(N):
-            H[np.ix_(inputs[k], inputs[k])] = first.R[k]
-            H[np.ix_(self.states[k], self.states[k])] = first.Q[k + 1]
-        self.H = sp.csc_matrix(H)
-        row = np.arange(self.rows).reshape(N, n)
-        begin = 1 if fixed_start else 0  # the first stage whose state is a variable
-        places = [
-            (np.broadcast_to(row[:, :, None], first.B.shape), np.broadcast_to(inputs[:, None, :], first.B.shape)),
-            (
-                np.broadcast_to(row[begin:, :, None], first.A[begin:].shape),
-                np.broadcast_to(before[begin:, None, :], first.A[begin:].shape),
-            ),
-            (row, self.states),
-        ]
-        at = [np.concatenate([part[i].ravel() for part in places]) for i in range(2)]
-        self._first, self._order = begin, np.lexsort((at[0], at[1]))
-        ordered = (np.ones(self._order.size), (at[0][self._order], at[1][self._order]))
-        self.pattern = sp.csc_matrix(ordered, shape=(self.rows, self.size))
+        stages = np.arange(N)[:, None] * (m + n) + self.offset
+        self.controls, self.states = stages + np.arange(m), stages + m + np.arange(n)
+        blocks = [block for k in range(N) for block in (first.R[k], first.Q[k + 1])]
+        self.H = sp.block_diag([np.eye(self.offset), *blocks]).toarray()
+        full = first._replace(A=np.ones_like(first.A), B=np.ones_like(first.B))
+        self.mask = self.dynamics(full) != 0
 
-    def values(self, program: Program) -> Array:
-        """Return the entries of the dynamics' rows, B u + A x - x of the next stage, in the order of `pattern`."""
-        entries = (program.B.ravel(), program.A[self._first :].ravel(), np.full(self.rows, -1.0))
-        return np.concatenate(entries)[self._order]
+    def dynamics(self, program: Program) -> Array:
+        """Return the rows B u + A x - x of the next stage, (N n, size)."""
+        N, n, _ = program.B.shape
+        rows = np.zeros((N, n, len(self.H)))
+        for k in range(N):
+            rows[k][:, self.controls[k]], rows[k][:, self.states[k]] = program.B[k], -np.eye(n)
+            if k > 0:
+                rows[k][:, self.states[k - 1]] = program.A[k]
+        if self.offset:
+            rows[0, :, :n] = program.A[0]
+        return rows.reshape(N * n, -1)
 
     def right(self, program: Program) -> Array:
         """Return the right-hand side of the dynamics equations, (N n,)."""
@@ -188,46 +191,41 @@ class Sparse:
 
     def linear(self, program: Program) -> Array:
         """Return the linear cost."""
-        slope = np.zeros(self.size)
-        slope[self.controls], slope[self.states] = program.r.ravel(), program.q[1:]
+        slope = np.zeros(len(self.H))
+        slope[self.controls], slope[self.states] = program.r, program.q[1:]
         return slope
 
 
 def _osqp(first: Program) -> Solver:
     import osqp
 
-    sparse, shape = Sparse(first, fixed_start=True), first.r.shape
-    unit = sp.csc_matrix(np.eye(sparse.size)[sparse.controls])
-    # Rows of controls have no entries that change, so that those of the dynamics can be exchanged by their places.
-    dynamics = sp.csc_matrix((np.arange(1.0, 1 + sparse.pattern.nnz), sparse.pattern.indices, sparse.pattern.indptr))
-    both = sp.vstack([dynamics, -unit], format="csc")
-    places, which = np.flatnonzero(both.data > 0), both.data[both.data > 0].astype(int) - 1
-    both.data[both.data < 0] = 1.0
+    sparse = Sparse(first, fixed_start=True)
+    unit = np.eye(len(sparse.H))[sparse.controls.ravel()]
+    mask = np.vstack([sparse.mask, unit != 0])
 
     def arrange(program: Program) -> dict[str, Array]:
-        entries, right = np.ones(both.nnz), sparse.right(program)
-        entries[places] = sparse.values(program)[which]
+        entries = np.vstack([sparse.dynamics(program), unit]).T[mask.T]  # column by column
+        right = sparse.right(program)
         low, high = np.r_[right, program.u_min.ravel()], np.r_[right, program.u_max.ravel()]
         return {"q": sparse.linear(program), "Ax": entries, "l": low, "u": high}
 
-    begun, solver = arrange(first), osqp.OSQP()
-    both.data[:] = begun["Ax"]
+    begun, solver, rows = arrange(first), osqp.OSQP(), sp.csc_matrix(mask, dtype=float)
+    rows.data[:] = begun["Ax"]
     options = {"eps_abs": 1e-6, "eps_rel": 1e-6, "max_iter": 20_000, "verbose": False}
-    solver.setup(sp.triu(sparse.H, format="csc"), begun["q"], both, begun["l"], begun["u"], **options)
+    solver.setup(sp.csc_matrix(np.triu(sparse.H)), begun["q"], rows, begun["l"], begun["u"], **options)
 
     def solve(given: dict[str, Array]) -> Array | None:
         solver.update(**given)
         found = solver.solve(raise_error=False)
-        return found.x[sparse.controls].reshape(shape) if found.info.status == "solved" else None
+        return found.x[sparse.controls] if found.info.status == "solved" else None
 
     return Solver(arrange, solve)
 
 
 def _hpipm(first: Program) -> Solver:
     N, n, m = first.B.shape
-    sparse, shape = Sparse(first, fixed_start=False), first.r.shape
-    H = ca.DM(sparse.H + sp.csc_matrix(([1.0] * n, (range(n), range(n))), shape=sparse.H.shape))
-    pattern = ca.DM(sparse.pattern).sparsity()
+    sparse = Sparse(first, fixed_start=False)
+    H, pattern = ca.DM(sp.csc_matrix(sparse.H)), ca.DM(sp.csc_matrix(sparse.mask, dtype=float)).sparsity()
     sizes = {"N": N, "nx": [n] * (N + 1), "nu": [m] * N + [0], "ng": [0] * (N + 1)}
     # Bounds that are infinite are numbers to this interface: with its own, 1e8, the iterations do not converge.
     settings = {"error_on_fail": False, "inf": FAR, "hpipm": {"mode": "speed_abs", "iter_max": 100}}
@@ -235,18 +233,16 @@ def _hpipm(first: Program) -> Solver:
     solver = ca.conic("stages", "hpipm", {"h": H.sparsity(), "a": pattern}, options)
 
     def arrange(program: Program) -> dict[str, ca.DM]:
-        low, high = np.full(sparse.size, -np.inf), np.full(sparse.size, np.inf)
+        low, high = np.full(len(sparse.H), -np.inf), np.full(len(sparse.H), np.inf)
         low[:n] = high[:n] = program.start
-        low[sparse.controls], high[sparse.controls] = program.u_min.ravel(), program.u_max.ravel()
-        right = ca.DM(sparse.right(program))
-        given = {"g": sparse.linear(program), "lbx": low, "ubx": high}
-        rows = ca.DM(pattern, sparse.values(program))
-        return {name: ca.DM(value) for name, value in given.items()} | {"h": H, "a": rows, "lba": right, "uba": right}
+        low[sparse.controls], high[sparse.controls] = program.u_min, program.u_max
+        right, rows = sparse.right(program), ca.DM(pattern, sparse.dynamics(program).T[sparse.mask.T])
+        given = {"g": sparse.linear(program), "lbx": low, "ubx": high, "lba": right, "uba": right}
+        return {name: ca.DM(value) for name, value in given.items()} | {"h": H, "a": rows}
 
     def solve(given: dict[str, ca.DM]) -> Array | None:
         found = solver(**given)
-        well = solver.stats()["success"]
-        return np.array(found["x"]).ravel()[sparse.controls].reshape(shape) if well else None
+        return np.array(found["x"]).ravel()[sparse.controls] if solver.stats()["success"] else None
 
     return Solver(arrange, solve)
 

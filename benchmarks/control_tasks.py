@@ -11,7 +11,7 @@ from ..control import ComputedTorque, Controller, OpenLoop, Predictive
 from ..models import Robot, load
 from ..simulation import simulate
 from ..solvers import Horizon
-from .control_contenders import FIELDS, Program
+from .control_contenders import FIELDS, Program, fill
 
 STANDARD = "computed torque"
 
@@ -92,8 +92,7 @@ class Keeping(Horizon):
         super().__init__(N, n, m)
         self.kept: list[Program] = []
         self.tolerance, self.iterations_max = other.tolerance, other.iterations_max
-        for name in FIELDS:
-            getattr(self, name)[...] = getattr(other, name)
+        fill(self, other)
 
     @override
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:

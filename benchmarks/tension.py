@@ -80,8 +80,7 @@ class Report:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists and numbers, ready for JSON."""
-        rows = [asdict(row) for row in self.rows]
-        return {"rows": rows, "machine": self.machine, "count": self.count, "repeats": self.repeats}
+        return asdict(self)
 
 
 def run(
@@ -147,9 +146,8 @@ class _Runner:
         try:
             call = self.contender.prepare(self.task)
             if number == 0:
-                # Imports and compilation belong to no problem, and are no reason to be out.
-                call() if self.contender.batch else call(0)
-            times, answers = self._batch(call) if self.contender.batch else self._singles(call)
+                call(0)  # imports and compilation belong to no problem, and are no reason to be out
+            times, answers = self._solve(call)
         except Exception as error:  # a contender that breaks is a result, whatever it raises
             self.detail = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
             return
@@ -158,32 +156,23 @@ class _Runner:
         if times:
             self.blocks[number] = times
 
-    def _batch(self, call: Callable[[], tuple[Array, NDArray[np.bool_]]]) -> tuple[list[float], list[Array | None]]:
-        start = time.perf_counter_ns()
-        tensions, solved = call()
-        elapsed = time.perf_counter_ns() - start
-        self._account(elapsed)
-        count = len(self.task.problems)
-        answers = [x if ok else None for x, ok in zip(tensions[:count], solved[:count], strict=True)]
-        return [elapsed / 1e3 / len(tensions)], answers
-
-    def _singles(self, call: Callable[[int], Array | None]) -> tuple[list[float], list[Array | None]]:
-        times, answers = [], []
-        for i in range(len(self.task.problems)):
+    def _solve(self, call: Callable[[int], Any]) -> tuple[list[float], list[Array | None]]:
+        count, times, answers = len(self.task.problems), list[float](), list[Array | None]()
+        for i in range(1 if self.contender.batch else count):
             start = time.perf_counter_ns()
             answer = call(i)
-            elapsed = time.perf_counter_ns() - start
-            times.append(elapsed / 1e3)
-            answers.append(answer)
-            self._account(elapsed)
-            if not self.running:
+            microseconds = (time.perf_counter_ns() - start) / 1e3
+            if self.contender.batch:
+                times.append(microseconds / len(answer[0]))
+                answers = [x if ok else None for x, ok in zip(*answer, strict=True)][:count]
+            else:
+                times.append(microseconds)
+                answers.append(answer)
+            self.spent += microseconds / 1e6
+            if self.spent > self.limit:
+                self.detail = f"out after {self.spent:.1f} s"
                 break
         return times, answers
-
-    def _account(self, nanoseconds: int) -> None:
-        self.spent += nanoseconds / 1e9
-        if self.spent > self.limit:
-            self.detail = f"out after {self.spent:.1f} s"
 
     def counted(self) -> dict[int, list[float]]:
         """Return the times [us] of the turns that count, by turn; of turn 0 if there is no other."""

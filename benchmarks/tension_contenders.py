@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_matrix
 
 from ..core import solve_packed
 from ..solvers import TensionProblem, methods, solve, solve_batch
@@ -21,7 +22,7 @@ from .tension_tasks import KINDS, STIFFNESS, Task
 
 Array = NDArray[np.float64]
 Single = Callable[[int], Array | None]
-Batch = Callable[[], tuple[Array, NDArray[np.bool_]]]
+Batch = Callable[[int], tuple[Array, NDArray[np.bool_]]]
 
 REFERENCE = "daqp.solve"
 EPS = 1e-9
@@ -54,8 +55,8 @@ class Contender(NamedTuple):
     tolerance :
         The accuracy that it was set to.
     prepare :
-        From a task to a function of the problem's index that returns x, shape (variables,), or None; for a batch, to a
-        function without arguments that returns x of all, shape (batch, variables), and which of them are results.
+        From a task to a function of the problem's index that returns x, shape (variables,), or None; for a batch, of 0
+        alone: it returns x of all, shape (batch, variables), and which of them are results.
     batch :
         True if it takes all problems at once.
     same_aim :
@@ -79,10 +80,9 @@ def contenders() -> list[Contender]:
     for name in methods():
         entries.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
     entries.append(Contender("towline core alone", "its own, 1e-9", _towline_core))
-    entries.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
-    entries.append(
-        Contender("towline solve_batch, rho", "its own, 3e-14", _towline_soft_batch, batch=True, kinds=("soft",))
-    )
+    entries.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch(None), batch=True))
+    soft = _towline_batch(STIFFNESS)
+    entries.append(Contender("towline solve_batch, rho", "its own, 3e-14", soft, batch=True, kinds=("soft",)))
     native = {
         "daqp": ("daqp Model, reuse", _daqp_model),
         "osqp": ("osqp, reuse", _osqp),
@@ -117,6 +117,21 @@ def _one_sided(qp: dict[str, Any]) -> tuple[Array, Array]:
     return np.vstack([qp["A"], np.eye(n)[up], -np.eye(n)[low]]), np.r_[qp["b"], qp["ub"][up], -qp["lb"][low]]
 
 
+def _pattern(C: Array, equations: int) -> NDArray[np.bool_]:
+    """Return where C may have entries: anywhere in the rows of the equations, and below where it has."""
+    pattern = C != 0.0
+    pattern[:equations] = True
+    return pattern
+
+
+def _columns(matrices: list[Array], equations: int) -> tuple[csc_matrix, list[Array]]:
+    """Return the first of the matrices, compressed by columns, and the entries of each in that order."""
+    pattern = _pattern(matrices[0], equations)
+    first, entries = csc_matrix(pattern, dtype=float), [C.T[pattern.T] for C in matrices]
+    first.data[:] = entries[0]
+    return first, entries
+
+
 def _towline(method: str) -> Callable[[Task], Single]:
     def prepare(task: Task) -> Single:
         # Problems remember what was computed from them: each run gets new ones, as in a control loop.
@@ -131,31 +146,24 @@ def _towline(method: str) -> Callable[[Task], Single]:
     return prepare
 
 
-def _towline_batch(task: Task) -> Batch:
-    A, w, t_min, t_max, weights = (
-        _over_and_over(np.array([getattr(problem, name) for problem in task.problems]))
-        for name in ("A", "w", "t_min", "t_max", "weights")
-    )
+def _towline_batch(rho: float | None) -> Callable[[Task], Batch]:
+    """Return how to start `solve_batch`; with `rho` the tensions are the only variables."""
 
-    def run() -> tuple[Array, NDArray[np.bool_]]:
-        answer = solve_batch(A, w, t_min, t_max, weights=weights, threads=1)
-        return answer.tensions, answer.feasible
+    def prepare(task: Task) -> Batch:
+        m = task.problems[0].m if rho is None else task.m
+        A, t_min, t_max, weights = (
+            _over_and_over(np.array([getattr(problem, name)[..., :m] for problem in task.problems]))
+            for name in ("A", "t_min", "t_max", "weights")
+        )
+        w = _over_and_over(np.array([problem.w for problem in task.problems]))
 
-    return run
+        def run(_: int) -> tuple[Array, NDArray[np.bool_]]:
+            answer = solve_batch(A, w, t_min, t_max, weights=weights, rho=rho, threads=1)
+            return answer.tensions, answer.feasible if rho is None else np.isfinite(answer.residual)
 
+        return run
 
-def _towline_soft_batch(task: Task) -> Batch:
-    m = task.m
-    A, w, t_min, t_max = (
-        _over_and_over(np.array([values(problem) for problem in task.problems]))
-        for values in (lambda p: p.A[:, :m], lambda p: p.w, lambda p: p.t_min[:m], lambda p: p.t_max[:m])
-    )
-
-    def run() -> tuple[Array, NDArray[np.bool_]]:
-        answer = solve_batch(A, w, t_min, t_max, rho=STIFFNESS, threads=1)
-        return answer.tensions, np.isfinite(answer.residual)
-
-    return run
+    return prepare
 
 
 def _towline_core(task: Task) -> Single:
@@ -215,16 +223,10 @@ def _daqp_model(task: Task) -> Single:
 
 def _osqp(task: Task) -> Single:
     import osqp
-    from scipy.sparse import csc_matrix
 
     rows = [_stacked(qp) for qp in task.qps]
-    full = csc_matrix(np.vstack([np.ones_like(task.qps[0]["A"]), np.eye(rows[0][0].shape[1])]))  # pattern of all
-    places = full.nonzero()
-    order = np.lexsort((places[0], places[1]))
-    values = [C[places[0][order], places[1][order]] for C, _, _ in rows]
-    solver = osqp.OSQP()
-    first = csc_matrix((values[0], full.indices, full.indptr), shape=full.shape)
-    P = csc_matrix(task.qps[0]["P"])
+    first, values = _columns([C for C, _, _ in rows], task.qps[0]["b"].size)
+    solver, P = osqp.OSQP(), csc_matrix(task.qps[0]["P"])
     settings = {"eps_abs": EPS, "eps_rel": 0.0, "max_iter": 4000, "verbose": False}
     solver.setup(P, task.qps[0]["q"], first, rows[0][1], rows[0][2], **settings)
 
@@ -237,22 +239,15 @@ def _osqp(task: Task) -> Single:
 
 
 def _clarabel(task: Task) -> Single:
-    from scipy.sparse import csc_matrix
-
     clarabel: Any = import_module("clarabel")  # a compiled module without types
 
-    stacked = [_one_sided(qp) for qp in task.qps]
-    equations, n = task.qps[0]["b"].size, task.qps[0]["q"].size
-    pattern = csc_matrix(np.vstack([np.ones((equations, n)), stacked[0][0][equations:]]))
-    places = pattern.nonzero()
-    order = np.lexsort((places[0], places[1]))
-    values = [C[places[0][order], places[1][order]] for C, _ in stacked]
+    stacked, equations = [_one_sided(qp) for qp in task.qps], task.qps[0]["b"].size
+    first, values = _columns([C for C, _ in stacked], equations)
     cones = [clarabel.ZeroConeT(equations), clarabel.NonnegativeConeT(stacked[0][1].size - equations)]
     settings = clarabel.DefaultSettings()
     settings.verbose = settings.presolve_enable = False  # without presolve the data can be changed
     settings.tol_gap_abs = settings.tol_feas = EPS
     settings.tol_gap_rel = 0.0
-    first = csc_matrix((values[0], pattern.indices, pattern.indptr), shape=pattern.shape)
     P = csc_matrix(task.qps[0]["P"])
     solver = clarabel.DefaultSolver(P, task.qps[0]["q"], first, stacked[0][1], cones, settings)
 
@@ -331,11 +326,9 @@ def _moreau_batch(task: Task) -> Batch:
 
     stacked = [_one_sided(qp) for qp in task.qps]
     equations, n = task.qps[0]["b"].size, task.qps[0]["q"].size
-    pattern = stacked[0][0] != 0.0
-    pattern[:equations] = True
-    places = np.nonzero(pattern)
+    pattern = _pattern(stacked[0][0], equations)
     P = _over_and_over(np.array([np.diagonal(qp["P"]) for qp in task.qps]))
-    A = _over_and_over(np.array([C[places] for C, _ in stacked]))
+    A = _over_and_over(np.array([C[pattern] for C, _ in stacked]))
     q, b = _over_and_over(np.array([qp["q"] for qp in task.qps])), _over_and_over(np.array([d for _, d in stacked]))
     settings = moreau.Settings(
         device="cpu",
@@ -349,12 +342,12 @@ def _moreau_batch(task: Task) -> Batch:
         P_row_offsets=np.arange(n + 1),
         P_col_indices=np.arange(n),
         A_row_offsets=np.r_[0, np.cumsum(pattern.sum(axis=1))],
-        A_col_indices=places[1],
+        A_col_indices=np.nonzero(pattern)[1],
         cones=moreau.Cones(num_zero_cones=equations, num_nonneg_cones=pattern.shape[0] - equations),
         settings=settings,
     )
 
-    def run() -> tuple[Array, NDArray[np.bool_]]:
+    def run(_: int) -> tuple[Array, NDArray[np.bool_]]:
         solver.setup(P, A)
         answer = solver.solve(q, b)
         return answer.x, np.array([status == moreau.SolverStatus.Solved for status in solver.info.status])
@@ -365,7 +358,6 @@ def _moreau_batch(task: Task) -> Batch:
 def _through_qpsolvers(name: str) -> Callable[[Task], Single]:
     def prepare(task: Task) -> Single:
         import qpsolvers
-        from scipy.sparse import csc_matrix
 
         dense = name in qpsolvers.dense_solvers
         problems = []
