@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, RobotArgument, print_json
+from .options import JsonOption, RobotArgument, print_result
 from .outputs import check_outputs
 
 
@@ -49,10 +49,8 @@ def export(
         from ..export.step import export_step
 
         folder = export_step(loaded, step, "float" if single else "double")
-        if as_json:
-            print_json({"robot": loaded.name, "folder": folder, "files": sorted(folder.iterdir())})
-        else:
-            typer.echo(str(folder))
+        files = {"folder": folder, "files": sorted(folder.iterdir())}
+        print_result(as_json, {"robot": loaded.name, **files}, lambda: str(folder))
         return
     ending = ".xml" if mjcf else ".c"
     path = out if out is not None else Path(f"{loaded.name}{ending}")
@@ -67,7 +65,4 @@ def export(
         text = to_c(loaded)
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    if as_json:
-        print_json({"robot": loaded.name, "file": path})
-    else:
-        typer.echo(str(path))
+    print_result(as_json, {"robot": loaded.name, "file": path}, lambda: str(path))

@@ -7,7 +7,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending
-from .options import JsonOption, print_json, robot_names
+from .options import JsonOption, print_result, robot_names
 from .outputs import check_outputs
 from .stopping import end_at_once, requested, unlisten
 
@@ -54,18 +54,12 @@ def view(
     summary = {"kind": subject.kind, "robot": subject.robot.name} | ({} if other is None else {"other": other})
     if html is not None:
         written = save_page(subject, html)
-        if as_json:
-            print_json({**summary, "file": written})
-        else:
-            typer.echo(str(written))
+        print_result(as_json, {**summary, "file": written}, lambda: str(written))
         return
     with serve(subject, host, port) as url:
         unlisten()
         try:
-            if as_json:
-                print_json({**summary, "url": url})
-            else:
-                typer.echo(f"{subject.title}\n{url}   (Ctrl-C ends it)")
+            print_result(as_json, {**summary, "url": url}, lambda: f"{subject.title}\n{url}   (Ctrl-C ends it)")
             if host not in LOOPBACK:
                 typer.echo("towline: anyone who can connect to this address can watch and move the sliders", err=True)
             threading.Event().wait()

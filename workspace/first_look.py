@@ -4,8 +4,8 @@ import numpy as np
 
 from ..base.inputs import required, whole_number
 from ..models import Dynamics
-from ..solvers import solve
-from ..statics.distribution import pose_problem
+from .feasibility import feasible, rest_wrench
+from .places import Places
 from .region import surrounding_box
 
 MOST = 1_000_000  # positions
@@ -41,5 +41,4 @@ def hints(dynamics: Dynamics, count: int = 400, seed: int = 0) -> tuple[np.ndarr
     low, high = surrounding_box(robot, {})
     poses = np.tile(robot.home, (count, 1))
     poses[:, :3] = low + np.random.default_rng(seed).uniform(size=(count, 3)) * (high - low)
-    feasible = np.array([solve(pose_problem(dynamics, pose)).feasible for pose in poses])
-    return poses[:, :3], feasible
+    return poses[:, :3], feasible(robot, Places.at_home(robot, poses), rest_wrench(robot)[None])

@@ -130,15 +130,9 @@ class ElementChain(Displayed):
         winding
             De [m]: by how much each element is lengthened beside that, its share of what the winch did not pay out.
         """
-        from scipy.sparse import kron
-
-        nodes = as_array("displacements", displacements, (self.elements + 1, 3))
-        taut = self.taut(nodes, winding)
-        forces = self.K_n(taut) @ nodes.ravel() + self.K_l(taut) @ np.full(self.elements, winding)
-        if self.pretension > 0 and not taut.all():
-            lost = self.pretension * (1 - taut)
-            forces -= kron(self._steps().T, self.direction[:, None]) @ lost
-        return forces.reshape(-1, 3)
+        # An element that would have to push loses what it had.
+        carried = np.maximum(self._element_stiffness * self.elongations(displacements, winding), -self.pretension)
+        return -np.diff(carried, prepend=0.0, append=0.0)[:, None] * self.direction
 
     def end_increment(self, end: Any, winding: float = 0.0) -> float:
         """Return dT_K [N], the increment at the attachment if it moves by `end` (3,) [m]; positive pulls more."""

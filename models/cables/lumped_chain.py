@@ -104,7 +104,7 @@ class LumpedChain(Displayed):
         [N], in {G}; `tensions` (n,) [N].
         """
         inputs = self._symbols()
-        _, velocities, tensions, directions = self._segments(inputs)
+        _, velocities, tensions, directions, *_ = self._segments(inputs)
         pulls = directions * ca.repmat(tensions.T, 3, 1)  # (3, n), each on its segment's first node
         weight = ca.repmat(ca.DM(self.gravity), 1, self.segments - 1)
         acceleration = (pulls[:, 1:] - pulls[:, :-1]) / self.node_mass + weight
@@ -121,8 +121,7 @@ class LumpedChain(Displayed):
         the spring gives.
         """
         inputs = self._symbols()
-        positions, velocities, tensions, directions = self._segments(inputs)
-        stretch, rates = self._stretch(positions, velocities, directions)
+        positions, velocities, tensions, _, stretch, rates = self._segments(inputs)
         kinetic = self.node_mass / 2 * ca.sumsqr(velocities[:, 1:-1])
         spring = self.stiffness / self.segment_length * ca.fmax(stretch, 0)
         elastic_energy = ca.dot(spring, ca.fmax(stretch, 0)) / 2
@@ -140,8 +139,11 @@ class LumpedChain(Displayed):
         ends = ("start", "start_velocity", "end", "end_velocity")
         return {"state": ca.SX.sym("state", self.state_size)} | {name: ca.SX.sym(name, 3) for name in ends}
 
-    def _segments(self, inputs: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """Return positions and velocities of all nodes, (3, n + 1), tensions, (n, 1), and u_j, (3, n)."""
+    def _segments(self, inputs: dict[str, ca.SX]) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX, ca.SX]:
+        """Return positions and velocities of all nodes, (3, n + 1), and what each segment has.
+
+        Its tension [N], (n, 1), u_j, (3, n), the elongation l_j - e [m] and dl_j/dt [m/s], (n, 1) each.
+        """
         half = self.state_size // 2
         inner = ca.reshape(inputs["state"][:half], 3, -1)
         inner_velocity = ca.reshape(inputs["state"][half:], 3, -1)
@@ -151,13 +153,7 @@ class LumpedChain(Displayed):
         # A segment whose nodes coincide has no direction, but it is slack: any finite one will do.
         lengths = ca.fmax(ca.sqrt(ca.sum1(vectors**2)), 1e-12 * self.segment_length)
         directions = vectors / ca.repmat(lengths, 3, 1)
-        stretch, rates = self._stretch(positions, velocities, directions)
-        length = stretch + self.segment_length
-        tensions = elastic.tension(length, rates, self.segment_length, self.stiffness, self.segments * self.damping)
-        return positions, velocities, tensions, directions
-
-    def _stretch(self, positions: ca.SX, velocities: ca.SX, directions: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Return the elongation l_j - e [m] and dl_j/dt [m/s] of each segment, (n, 1) each."""
-        along = ca.sum1(directions * (positions[:, 1:] - positions[:, :-1])).T
+        along = ca.sum1(directions * vectors).T
         rates = ca.sum1(directions * (velocities[:, 1:] - velocities[:, :-1])).T
-        return along - self.segment_length, rates
+        tensions = elastic.tension(along, rates, self.segment_length, self.stiffness, self.segments * self.damping)
+        return positions, velocities, tensions, directions, along - self.segment_length, rates
