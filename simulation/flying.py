@@ -17,7 +17,7 @@ from .command_conversion import Orders
 from .events import Event, Running
 from .experiment import Experiment
 from .recorder import Period, Recorder
-from .sensors import Sensors
+from .sensors import Reading, Sensors
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
 FEW = 1000  # numbers that BLAS adds with one thread
@@ -36,26 +36,26 @@ class Pilot:
             each.follow(conditions.references, conditions.period)
         self.seconds: list[float] = []
 
-    def step(self, time: float, motions: np.ndarray, tensions: np.ndarray, reference: Reference) -> Command:
+    def step(self, time: float, reading: Reading, reference: Reference) -> Command:
         """Return the command of the only run, or of all, and record the computing time per run."""
-        start = perf_counter()
+        start, (motions, tensions, seen) = perf_counter(), reading
         if self._alone:
-            command = self._controllers[0].step(time, _state(motions[0], tensions[0]), reference)
+            command = self._controllers[0].step(time, _state(motions[0], tensions[0], seen), reference)
         elif self._together:
-            command = self._controllers[0].step(time, _state(motions, tensions), reference)
+            command = self._controllers[0].step(time, _state(motions, tensions, seen), reference)
         else:
             rows = zip(self._controllers, motions, tensions, strict=True)
-            single = [each.step(time, _state(*row), reference) for each, *row in rows]
+            single = [each.step(time, _state(row, pulls, seen), reference) for each, row, pulls in rows]
             command = _stacked(single)
         self.seconds.append((perf_counter() - start) / len(motions))
         return command
 
 
-def _state(motions: np.ndarray, tensions: np.ndarray) -> State:
+def _state(motions: np.ndarray, tensions: np.ndarray, seen: float | None) -> State:
     """Return a state with arrays of its own, which a controller may keep."""
     motions = motions.copy()
     pose, velocity, carrier_pose, carrier_velocity = (motions[part] for part in _PARTS)
-    return State(pose, velocity, carrier_pose, carrier_velocity, tensions)
+    return State(pose, velocity, carrier_pose, carrier_velocity, tensions, seen)
 
 
 def _stacked(commands: list[Command]) -> Command:
@@ -106,7 +106,7 @@ def fly(
             orders.push(_wrench(pushing, time + 1e-9 * period, motions))
         reported = sensors.report(k, motions, pulls)
         if command is None or time >= running.silent_until:
-            command = pilot.step(time, *reported, reference)
+            command = pilot.step(time, reported, reference)
         else:
             command = _held(command, period)
         # Only shapes are compared in each period, since all checks take longer than a step: NumPy broadcasts silently.

@@ -1,6 +1,7 @@
-"""`Sensors` and their `Noise`: errors and delay."""
+"""`Sensors` and their `Noise`: errors, resolution, rate and delay."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -8,12 +9,15 @@ from pydantic import Field
 from ..models.part import Part
 
 DRAWN_AT_ONCE = 64  # periods whose noise is drawn together
+EARLY = 1e-6  # of a sample
+_WHEN = {"delay", "rate", "stamped"}  # what does not change the readings
 
 
 class Noise(Part):
-    """Errors of the sensors, as in a YAML file; each number is a standard deviation of white noise (default: 0).
+    """Errors of the sensors, as in a YAML file; the default is perfect sensors.
 
-    The bias of a run is drawn once, at its beginning.
+    A number without another description is the standard deviation of white noise. The bias of a run is drawn once, at
+    its beginning.
     """
 
     position: float = Field(default=0.0, ge=0, le=1e3, description="of the platform's position [m]")
@@ -24,7 +28,20 @@ class Noise(Part):
     position_bias: float = Field(default=0.0, ge=0, le=1e3, description="of the bias of the position [m]")
     attitude_bias: float = Field(default=0.0, ge=0, le=10, description="of the bias of roll, pitch and yaw [rad]")
     tension_bias: float = Field(default=0.0, ge=0, le=1e9, description="of the bias of the tensions [N]")
+    resolution: float = Field(default=0.0, ge=0, le=1e3, description="steps of the measured position [m]")
+    attitude_resolution: float = Field(default=0.0, ge=0, le=10, description="steps of roll, pitch and yaw [rad]")
+    tension_resolution: float = Field(default=0.0, ge=0, le=1e9, description="steps of the measured tensions [N]")
+    differenced: bool = Field(default=False, description="whether velocities are differences of the measured poses")
+    rate: float | None = Field(
+        default=None,
+        ge=0.1,
+        le=1e6,
+        description="of all sensors [1/s]; the last readings are held; default: each period",
+    )
     delay: float = Field(default=0.0, ge=0, le=10, description="of all sensors [s]; rounded to whole control periods")
+    stamped: bool = Field(
+        default=False, description="whether states have the time of their measurement, from which controllers predict"
+    )
 
     @property
     def of_motion(self) -> np.ndarray:
@@ -37,31 +54,75 @@ class Noise(Part):
         return np.repeat([self.position_bias, self.attitude_bias, 0.0, 0.0], 3)
 
 
+class Reading(NamedTuple):
+    """The readings of all sensors in one period."""
+
+    motions: np.ndarray  # (N, 1 + c, 12)
+    tensions: np.ndarray  # (N, m) [N]
+    time: float | None  # of the measurement [s], if it is known
+
+
 class Sensors:
-    """Sensors with noise, bias and delay, with separate random numbers for each run."""
+    """Sensors with noise, bias, resolution, rate and delay, with separate random numbers for each run."""
 
     def __init__(self, noise: Noise, seeds: Sequence[int], period: float, m: int):
-        self._noise, self._delay = noise, round(noise.delay / period)
+        self._noise, self._period, self._m = noise, period, m
+        self._delay, self._exact = (
+            round(noise.delay / period),
+            not noise.model_dump(exclude=_WHEN, exclude_defaults=True),
+        )
         self._random = [np.random.default_rng([seed, 1]) for seed in seeds]
-        self._of_motion, self._m = noise.of_motion, m
-        self._exact = not (self._of_motion.any() or noise.bias_of_motion.any())
-        self._exact_tensions = not (noise.tension or noise.tension_bias)
         draws = [random.normal(size=12 + m) for random in self._random]
-        self._bias = np.array(draws)[:, None, :12] * noise.bias_of_motion
+        self._bias = np.array(draws)[:, :12] * noise.bias_of_motion
         self._tension_bias = np.array(draws)[:, 12:] * noise.tension_bias
-        self._late: list[tuple[np.ndarray, np.ndarray]] = []
+        self._of_motion, self._drawn, self._block = noise.of_motion, np.empty(0), -1
+        self._steps = np.repeat([noise.resolution, noise.attitude_resolution], 3)
+        self._last: Reading | None = None
+        self._sampled = -1
+        self._late: list[Reading] = []
 
-    def report(self, k: int, motions: np.ndarray, tensions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sensor readings in period `k` for motions (N, 1 + c, 12) and tensions (N, m)."""
-        if not (self._exact and self._exact_tensions):
-            if k % DRAWN_AT_ONCE == 0:
-                size = (DRAWN_AT_ONCE, 12 + self._m)
-                self._drawn = np.stack([random.normal(size=size) for random in self._random], axis=1)
-            drawn = self._drawn[k % DRAWN_AT_ONCE]
-            motions = motions.copy()
-            motions[:, :1] += self._bias + drawn[:, None, :12] * self._of_motion
-            tensions = np.maximum(tensions + self._tension_bias + drawn[:, 12:] * self._noise.tension, 0.0)
+    def report(self, k: int, motions: np.ndarray, tensions: np.ndarray) -> Reading:
+        """Return the readings in period `k` for motions (N, 1 + c, 12) and tensions (N, m)."""
+        reading = self._last
+        if reading is None or self._samples(k):
+            reading = Reading(motions, tensions, k * self._period if self._noise.stamped else None)
+            if not self._exact:
+                reading = self._measured(k, reading)
+            if self._delay or self._noise.rate or self._noise.differenced:
+                reading = reading._replace(motions=reading.motions.copy(), tensions=reading.tensions.copy())
+                self._last, self._sampled = reading, k
         if self._delay:
-            self._late.append((motions.copy(), tensions.copy()))
-            motions, tensions = self._late[0] if len(self._late) <= self._delay else self._late.pop(0)
-        return motions, tensions
+            self._late.append(reading)
+            return self._late[0] if len(self._late) <= self._delay else self._late.pop(0)
+        return reading
+
+    def _samples(self, k: int) -> bool:
+        """Return whether the sensors measure in period `k`."""
+        if self._noise.rate is None:
+            return True
+        per = self._noise.rate * self._period  # samples
+        return int(k * per + EARLY) > int((k - 1) * per + EARLY)
+
+    def _measured(self, k: int, true: Reading) -> Reading:
+        """Return what is measured in period `k`."""
+        noise, block = self._noise, k // DRAWN_AT_ONCE
+        if block != self._block:
+            size = (DRAWN_AT_ONCE, 12 + self._m)
+            self._drawn = np.stack([random.normal(size=size) for random in self._random], axis=1)
+            self._block = block
+        drawn = self._drawn[k % DRAWN_AT_ONCE]
+        motions = true.motions.copy()
+        platform = motions[:, 0]
+        platform += self._bias + drawn[:, :12] * self._of_motion
+        platform[:, :6] = _rounded(platform[:, :6], self._steps)
+        if noise.differenced and self._last is not None:
+            moved = platform[:, :6] - self._last.motions[:, 0, :6]
+            moved[:, 3:] -= 2 * np.pi * np.round(moved[:, 3:] / (2 * np.pi))
+            platform[:, 6:] = moved / ((k - self._sampled) * self._period)
+        tensions = np.maximum(true.tensions + self._tension_bias + drawn[:, 12:] * noise.tension, 0.0)
+        return true._replace(motions=motions, tensions=_rounded(tensions, np.array(noise.tension_resolution)))
+
+
+def _rounded(values: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return values as whole numbers of steps; steps of zero change nothing."""
+    return np.where(steps > 0, np.round(values / np.where(steps > 0, steps, 1.0)) * steps, values)
