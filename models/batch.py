@@ -76,19 +76,6 @@ def as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     return array
 
 
-def arrays(values: dict[str, tuple[Any, tuple[int, ...]]]) -> list[np.ndarray]:
-    """Check arguments, each a value and its shape without leading dimensions, and return them as arrays of floats.
-
-    Raises
-    ------
-    InputError
-        Naming the argument whose shape or value does not fit; also if the leading dimensions do not broadcast.
-    """
-    checked = {name: as_array(name, value, core) for name, (value, core) in values.items()}
-    leading({name: array.shape[: array.ndim - len(values[name][1])] for name, array in checked.items()})
-    return list(checked.values())
-
-
 def _evaluated(function: ca.Function, arguments: dict[str, Any]) -> dict[str, np.ndarray]:
     """Evaluate a Function on arrays, all rows of a batch in one call."""
     sizes = {name: function.size_in(name) for name in function.name_in()}

@@ -16,7 +16,7 @@ from ..base.errors import InputError
 from ..base.inputs import flag, required
 from . import elasticity
 from .arrays import Array, one_array, several_arrays
-from .batch import SYMBOLIC, arrays, call, is_symbolic
+from .batch import SYMBOLIC, as_array, call, is_symbolic
 from .files import as_robot
 from .mechanics import Mechanics
 from .motion import Motion
@@ -328,7 +328,7 @@ class Dynamics(Displayed):
         if carrier_pose is not None:
             places = carrier_pose
         given = {"pose": (pose, (6,)), "tensions": (tensions, (self.robot.m,)), "carrier_pose": (places, home.shape)}
-        pose, tensions, carrier_pose = checked = arrays(given)
+        pose, tensions, carrier_pose = checked = [as_array(name, value, core) for name, (value, core) in given.items()]
         for (name, (_, core)), array in zip(given.items(), checked, strict=True):
             if array.shape != core:
                 raise InputError(f"{name} must have the shape {core}, got {array.shape}")

@@ -23,7 +23,8 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...base.errors import InputError, SolverError
-from ..batch import arrays, as_array
+from ...base.inputs import leading
+from ..batch import as_array
 from . import checks
 
 TOLERANCE = 1e-14  # how exactly the ends have to meet, in unstrained lengths or spans, the longer ones
@@ -132,8 +133,8 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
     weight = checks.positive("weight", weight)
     upward = as_array("up", up, (3,)).reshape(3)
     upward = upward / checks.positive("the length of up", np.linalg.norm(upward))
-    start, end, length = arrays({"start": (start, (3,)), "end": (end, (3,)), "length": (length, ())})
-    batch = np.broadcast_shapes(start.shape[:-1], end.shape[:-1], length.shape)
+    start, end, length = as_array("start", start, (3,)), as_array("end", end, (3,)), as_array("length", length, ())
+    batch = leading({"start": start.shape[:-1], "end": end.shape[:-1], "length": length.shape})
     start, length = np.broadcast_to(start, (*batch, 3)), np.broadcast_to(length, batch)
     if not (length > 0).all():
         raise InputError(f"length must have numbers > 0, got {length.min():g}")
