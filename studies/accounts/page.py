@@ -45,11 +45,11 @@ def _errata(account: Account) -> list[str]:
 
 def _chapter(chapter: Chapter) -> list[str]:
     """Return the claims, folded, then the figures side by side, with the claims that each belongs to."""
-    captions = {name: [claim.place for claim in chapter.claims if claim.figure == name] for name in chapter.drawings}
-    drawings = [
-        drawing._replace(caption=f"{drawing.caption} ({', '.join(places)})" if places else drawing.caption)
-        for drawing, places in zip(chapter.drawings.values(), map(_once, captions.values()), strict=True)
-    ]
+    drawings = []
+    for name, drawing in chapter.drawings.items():
+        places = dict.fromkeys(claim.place for claim in chapter.claims if claim.figure == name)
+        caption = f"{drawing.caption} ({', '.join(places)})" if places else drawing.caption
+        drawings.append(drawing._replace(caption=caption))
     parts = [_claim(claim) for claim in chapter.claims]
     return [*parts, *([html.side_by_side(map(html.picture, drawings))] if drawings else [])]
 
@@ -66,7 +66,3 @@ def _claim(claim: Claim) -> str:
 
 def _anchor(claim: Claim) -> str:
     return f"claim-{claim.id}"
-
-
-def _once(places: list[str]) -> list[str]:
-    return list(dict.fromkeys(places))

@@ -19,18 +19,7 @@ def report(account: Account, form: str = "png") -> str:
     lines = [f"# {account.paper.source}", "", f"{account.summary()}. Computed in {account.seconds:.0f} s."]
     for title, chapter in account.chapters.items():
         heads = ("claim", "where", "the paper states", BY_THE_PAPER, "computed", "verdict", "why")
-        rows = [
-            (
-                claim.id,
-                claim.place,
-                claim.statement,
-                value_text(claim.printed, claim.unit),
-                value_text(claim.computed, claim.unit),
-                f"**{claim.verdict}**",
-                claim.why,
-            )
-            for claim in chapter.claims
-        ]
+        rows = [(*_row(claim)[:-1], f"**{claim.verdict}**", claim.why) for claim in chapter.claims]
         lines += ["", f"## {title}", "", *_table(heads, rows)]
         for name, drawing in chapter.drawings.items():
             shows = [claim.id for claim in chapter.claims if claim.figure == name]
@@ -57,12 +46,8 @@ def errata(account: Account) -> str:
         rows = [_row(claim) for claim in account.errata if claim.verdict is verdict]
         statement = "instead" if verdict is Verdict.REPAIRED else "the paper states"
         if rows:
-            lines += [
-                "",
-                f"## {title}",
-                "",
-                *_table(("claim", "where", statement, BY_THE_PAPER, "computed", "why"), rows),
-            ]
+            heads = ("claim", "where", statement, BY_THE_PAPER, "computed", "why")
+            lines += ["", f"## {title}", "", *_table(heads, rows)]
     return "\n".join([*lines, ""])
 
 

@@ -48,6 +48,7 @@ def chapter() -> Chapter:
     robot, motion, shake = load("wang-flying"), Motion(*(part[ROWS] for part in circle(FEASIBLE))), vibration(AMPLITUDE)
     run = steps(robot, motion, shake[ROWS])
     own = driving_force(robot, *motion, shake[ROWS], STEP, ELEMENTS)
+    rank = diagnose(load("wang-flying-printed")).rank_level
     claims = [
         claim("step-1").undetermined(f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um"),
         _same("step-2", "2", "cable lengths l_i(t), Eq. 5", run.lengths, own.lengths, "m"),
@@ -56,8 +57,9 @@ def chapter() -> Chapter:
         _same("step-5", "5", "elastic increments dT_K, Eq. 21 as corrected", run.dT_K, own.dT_K, "N"),
         _same("step-6", "6", "increments dT = dT_C + dT_K, Eq. 23", run.dT_C + run.dT_K, own.dT, "N"),
         _traction(robot, motion, run),
-        _inverse(),
-        _clock(),
+        claim("step-7-inverse").stated(rank, rank == 6, otherwise=Verdict.IMPOSSIBLE),
+        # Times of t = t + k dt for k = 1, 2, 3, ..., and those of a constant step.
+        claim("step-8").compared(STEP * np.arange(4), printed=np.cumsum(STEP * np.arange(4))),
     ]
     return Chapter(claims, {"procedure": _figure(run, own)})
 
@@ -102,17 +104,6 @@ def _traction(robot: Robot, motion: Motion, run: Run) -> Claim:
     slope = np.gradient(run.T, run.times, axis=0)
     meant, literal = (np.abs(turn(A, run.T + part) - w).max() for part in (dT, slope))
     return claim("step-7").compared(literal, within=SAME, meant=meant)
-
-
-def _inverse() -> Claim:
-    rank = diagnose(load("wang-flying-printed")).rank_level
-    return claim("step-7-inverse").stated(rank, rank == 6, otherwise=Verdict.IMPOSSIBLE)
-
-
-def _clock() -> Claim:
-    """Compare the times of t = t + k dt for k = 1, 2, 3, ... with those of a constant step."""
-    steps = STEP * np.arange(4)
-    return claim("step-8").compared(steps, printed=np.cumsum(steps))
 
 
 def _figure(run: Run, own: DrivingForce) -> Drawing:

@@ -50,11 +50,8 @@ def _small_angle() -> Claim:
     angles = SMALL * np.array([0.6, -0.8, 1.0])
     sizes = []
     for sines in (np.zeros(3), angles):  # as printed, and as Eq. 9 has them
-        (sr, sp, sy), identity = sines, np.eye(3)
-        Rx = identity + sr * np.array([[0, 0, 0], [0, 0, -1], [0, 1, 0]])
-        Ry = identity + sp * np.array([[0, 0, 1], [0, 0, 0], [-1, 0, 0]])
-        Rz = identity + sy * np.array([[0, -1, 0], [1, 0, 0], [0, 0, 0]])
-        sizes.append(np.abs(Rz @ Ry @ Rx - identity).max())
+        Rx, Ry, Rz = (np.eye(3) + ca.skew(ca.DM(about_axis)).full() for about_axis in np.diag(sines))
+        sizes.append(np.abs(Rz @ Ry @ Rx - np.eye(3)).max())
     printed, meant = sizes
     return claim("eq-9-small").compared(meant, printed=printed, within=SMALL**2, small=SMALL)
 

@@ -42,23 +42,20 @@ def chapter() -> Chapter:
     """Check lengths, tensions and the ratio of cable 1."""
     robot = load("wang-flying")
     dynamics = Dynamics(robot)
-    small, large = circle(FEASIBLE), circle(RADIUS)
-    lengths, tensions = dynamics.cable_lengths(large.pose)[:, 0], steady_tensions(dynamics, large)[:, 0]
-    short, slight = dynamics.cable_lengths(small.pose)[:, 0], steady_tensions(dynamics, small)[:, 0]
+    motions = {f"r = {radius:g} m": circle(radius) for radius in (RADIUS, FEASIBLE)}
+    lengths = {name: dynamics.cable_lengths(motion.pose)[:, 0] for name, motion in motions.items()}
+    tensions = {name: steady_tensions(dynamics, motion)[:, 0] for name, motion in motions.items()}
+    large = next(iter(motions))
     amplitudes = {step: amplitude_of(robot, RATIO, step) for step in STEPS}
     claims = [
-        _length(lengths),
+        _length(lengths[large]),
         _tension(),
-        _winding(robot, float(np.ptp(tensions))),
+        _winding(robot, float(np.ptp(tensions[large]))),
         claim("fig-8").undetermined(HERTZ),
-        _no_ratio(tensions),
+        _no_ratio(tensions[large]),
         _ratio(robot, amplitudes),
     ]
-    names = (f"r = {RADIUS:g} m", f"r = {FEASIBLE:g} m")
-    panels = [
-        Panel("length [m]", dict(zip(names, (lengths, short), strict=True))),
-        Panel("tension [N]", dict(zip(names, (tensions, slight), strict=True)), {"0 N": 0.0}),
-    ]
+    panels = [Panel("length [m]", lengths), Panel("tension [N]", tensions, {"0 N": 0.0})]
     turn = Drawing("Figures 9 and 10: cable 1 over a turn, without vibration", curves(TIMES, "time [s]", panels))
     drawings = {"turn": turn, "vibration": _curves(robot, amplitudes[STEP]), "ratio": _against_amplitude(robot)}
     return Chapter(claims, drawings)

@@ -26,7 +26,8 @@ def chapter() -> Chapter:
     wind, calm = trapezoid(TIMES, PEAK, noise=NOISE), trapezoid(TIMES, PEAK, noise=0.0)
     still = np.zeros((len(TIMES), 6))
     force = dynamics.aerodynamic_wrench(still, still, wind)[:, :3]
-    claims = [_top(wind), _noise(wind - calm), _shape(), *_force(dynamics)]
+    shape = claim("fig-5-shape").undetermined(TIMES[-1] * np.array([0.1, 0.3, 0.7, 0.9]))
+    claims = [_top(wind), _noise(wind - calm), shape, *_force(dynamics)]
     return Chapter(claims, {"wind": _figure(wind, force)})
 
 
@@ -41,10 +42,6 @@ def _noise(noise: np.ndarray) -> Claim:
     deviation = NOISE / DEVIATIONS
     outside = erfc(NOISE / deviation / sqrt(2))
     return claim("fig-5-noise").undetermined(np.abs(noise).max(), printed=NOISE, outside=outside)
-
-
-def _shape() -> Claim:
-    return claim("fig-5-shape").undetermined(TIMES[-1] * np.array([0.1, 0.3, 0.7, 0.9]))
 
 
 def _force(dynamics: Dynamics) -> list[Claim]:

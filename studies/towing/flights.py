@@ -4,8 +4,6 @@ The plant moves the load forward in time, on cables that only pull and do not st
 the plant keeps them and the robot-ends alone move the load; otherwise the winches give the commanded tensions.
 """
 
-import numpy as np
-
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...simulation import Simulation, simulate
@@ -15,6 +13,7 @@ from .claims import claim
 from .equations import SIZES
 from .modes import CHANGES, SECTIONS
 from .plans import DRIVES, SECONDS, Drive, planned, robot
+from .workspace import reach
 
 ARRIVED = 0.005  # [m], allowed distance of the load from its plan
 EDGE = 1e-3  # [m], of the boxes of the robot-ends
@@ -39,8 +38,7 @@ def fly(drive: Drive, m: int) -> Simulation:
 
 def in_boxes(flight: Simulation) -> bool:
     """Return whether the robot-ends were in the boxes of their reach all the time."""
-    boxes = [carrier.motion_limits.reach for carrier in flight.robot.carriers]
-    low, high = (np.array([getattr(box, edge) for box in boxes]) for edge in ("min", "max"))
+    low, high = reach(flight.robot)
     places = flight.record.motions[:, 1:, :3]
     return bool(((places >= low - EDGE) & (places <= high + EDGE)).all())
 

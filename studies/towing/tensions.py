@@ -65,10 +65,9 @@ def _freedom() -> Claim:
 
 
 def _scalar() -> Claim:
-    low, high, at = _choices()
-    return claim("eq-17-lambda").stated(
-        (low, high), low <= 0.0 and high >= 1.0, at=", ".join(f"{tension:.1f}" for tension in at)
-    )
+    low, high = _choices()
+    at, _ = _null_space(forces(load(SIZES[4])))
+    return claim("eq-17-lambda").stated((low, high), low <= 0 and high >= 1, at=", ".join(f"{T:.1f}" for T in at))
 
 
 def _scalar_elsewhere() -> Claim:
@@ -98,13 +97,13 @@ def _general() -> Claim:
     return claim("eq-17-general").compared(free, printed=1.0)
 
 
-def _choices() -> tuple[float, float, np.ndarray]:
-    """Return the range of lambda inside the limits, m = 4, for a null vector of length one, and T' (4,) [N]."""
+def _choices() -> tuple[float, float]:
+    """Return the range of lambda inside the limits, m = 4, for a null vector of length one."""
     problem = forces(load(SIZES[4]))
     special, null = _null_space(problem)
     with np.errstate(divide="ignore"):
         ends = np.sort(np.stack([(problem.t_min - special) / null, (problem.t_max - special) / null]), axis=0)
-    return float(ends[0].max()), float(ends[1].min()), special
+    return float(ends[0].max()), float(ends[1].min())
 
 
 def _null_space(problem: TensionProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -116,24 +115,21 @@ def _null_space(problem: TensionProblem) -> tuple[np.ndarray, np.ndarray]:
 def _along_null_space() -> Drawing:
     problem = forces(load(SIZES[4]))
     special, null = _null_space(problem)
-    low, high, _ = _choices()
+    low, high = _choices()
     choices = np.linspace(1.3 * low - 0.3 * high, 1.3 * high - 0.3 * low, 101)
     lines = {f"cable {i + 1}": special[i] + choices * null[i] for i in range(4)}
+    panel, marks = Panel("tension [N]", lines, {"0 N": 0.0}), {"smallest": low, "largest": high}
     return Drawing(
         "Tensions T' + lambda Null(J) of four cables at home, forces alone; inside the limits between the dotted lines",
-        curves(
-            choices, "lambda [N]", [Panel("tension [N]", lines, {"0 N": 0.0})], marks={"smallest": low, "largest": high}
-        ),
+        curves(choices, "lambda [N]", [panel], marks=marks),
     )
 
 
 def _rank_test() -> Claim:
     """Check the relative residual of the six rows at random postures of W2, with tensions nearest to balance."""
     samples = loops("variable-length", count=SAMPLES)
-    places = samples.places.only(samples.held)
-    robot = samples.robot
-    A = Dynamics(robot).wrench_matrix(places.pose, places.carriers)
-    A *= robot.wrench_scale[:, None]
+    places, robot = samples.places.only(samples.held), samples.robot
+    A = Dynamics(robot).wrench_matrix(places.pose, places.carriers) * robot.wrench_scale[:, None]
     w = np.array([0.0, 0.0, robot.weight, 0.0, 0.0, 0.0])
     left = w - (A @ (np.linalg.pinv(A) @ w)[..., None])[..., 0]
     relative = np.linalg.norm(left, axis=1) / robot.weight
