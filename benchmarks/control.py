@@ -149,15 +149,12 @@ def _steps(task: Task, robot: Robot, steps: int) -> list[Step]:
 
 def _errors(task: Task, robot: Robot, steps: int, seeds: int) -> list[Error]:
     """Fly all seeds with each controller."""
-    flown = {}
-    for name, make in _accepted(task, robot)[0].items():
-        given = {**task.conditions(), "duration": steps * 1e-3, "runs": seeds}
-        flown[name] = simulate(robot, robot.home, make(robot), **given)
-    rows = []
+    given = {**task.conditions(), "duration": steps * 1e-3, "runs": seeds}
+    accepted, _ = _accepted(task, robot)
+    flown = {name: simulate(robot, robot.home, make(robot), **given) for name, make in accepted.items()}
+    known, rows = flown[STANDARD]["error_max"].values, []
     for name, flights in flown.items():
-        largest, rms = flights["error_max"].values, flights["error_rms"].values
-        known = flown[STANDARD]["error_max"].values
-        answers = flights["answered"].values
+        largest, rms, answers = (flights[part].values for part in ("error_max", "error_rms", "answered"))
         rows.append(
             Error(
                 task=task.name,

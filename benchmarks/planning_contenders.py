@@ -194,11 +194,7 @@ def _step(robot: Robot, h: float) -> ca.Function:
     turning = ca.inv(inertia) @ (R.T @ moment - ca.cross(rates, inertia @ rates))
     moving = [x[6:9], inverse_rate_matrix(x[3:6]) @ rates, force / robot.platform.mass, turning]
     f = ca.Function("f", [x, u], [ca.vertcat(*moving, x[15:], u[6:])])
-    k1 = f(x, u)
-    k2 = f(x + h / 2 * k1, u)
-    k3 = f(x + h / 2 * k2, u)
-    k4 = f(x + h * k3, u)
-    return ca.Function("step", [x, u], [x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)], {"cse": True})
+    return ca.Function("step", [x, u], [ca.simpleRK(f, 1)(x, u, h)], {"cse": True})
 
 
 def rockit(steps: int) -> Run:

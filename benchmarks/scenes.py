@@ -82,7 +82,6 @@ def row(name: str, planned: Plan, seconds: float) -> str:
 
 def team(cables: list[tuple[float, float]]) -> Robot:
     """Return quadrotors with one cable each to a point load, at azimuths and elevations [rad] about it."""
-    count = len(cables)
     quadrotors, lines = [], []
     for i, offset in enumerate(_offsets(cables), start=1):
         quadrotors.append(
@@ -99,11 +98,11 @@ def team(cables: list[tuple[float, float]]) -> Robot:
                 "acceleration_max": 3.0,
             }
         )
-        lines.append({"carrier": f"quad{i}", "anchor": [0, 0, 0], "attachment": [0, 0, 0], "length": LENGTH})
-        lines[-1] |= {"t_min": 0.002, "t_max": 0.5}
+        ends = {"carrier": f"quad{i}", "anchor": [0, 0, 0], "attachment": [0, 0, 0]}
+        lines.append({**ends, "length": LENGTH, "t_min": 0.002, "t_max": 0.5})
     return Robot.model_validate(
         {
-            "name": f"point-load-{count}",
+            "name": f"point-load-{len(cables)}",
             "source": "cables and ends: coltrans-planning; masses, thrusts and tensions are assumed",
             "platform": {"mass": 0.01, "dof": ["x", "y", "z"], "home": [0, 0, 0, 0, 0, 0]},
             "carriers": quadrotors,
@@ -138,16 +137,10 @@ def carried(
         for carrier, first, last in zip(robot.carriers, *ends, strict=True)
     }
     keep = {"platform": LOAD, "carriers": QUADROTOR, "cables": 0.001}
-    places = [
-        {
-            "kind": "box",
-            "name": f"post {i}",
-            "min": [x - width / 2, y - width / 2, -1.5],
-            "max": [x + width / 2, y + width / 2, 1.5],
-            **keep,
-        }
-        for i, (x, y, width) in enumerate(posts, start=1)
-    ]
+    places = []
+    for i, (x, y, width) in enumerate(posts, start=1):
+        low_corner, high_corner = [x - width / 2, y - width / 2, -1.5], [x + width / 2, y + width / 2, 1.5]
+        places.append({"kind": "box", "name": f"post {i}", "min": low_corner, "max": high_corner, **keep})
     limits: dict[str, Any] = {"platform_box": {"min": low, "max": high}, "keep_out": places}
     if count > 1:
         limits["carrier_separation"] = APART
