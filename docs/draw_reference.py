@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from towline import available
 from towline.figures import style
@@ -24,10 +25,8 @@ TURNS = (("yaw", 2, 0.6), ("pitch", 1, 0.5), ("roll", 0, 0.7))  # axis of the tu
 
 def main() -> None:
     """Draw all."""
-    style.save(frames(), PICTURES / "frames.png")
-    style.save(angles(), PICTURES / "angles.png")
-    for name in ("frames", "angles"):
-        shrink(PICTURES / f"{name}.png", 1040)
+    for name, canvas in (("frames", frames()), ("angles", angles())):
+        shrink(style.save(canvas, PICTURES / f"{name}.png"), 1040)
     for name in available():
         small(name, PICTURES / "robots" / f"{name}.png")
 
@@ -75,18 +74,17 @@ def angles() -> Figure:
     canvas = style.figure(height=1.4)
     R = np.eye(3)
     for index, (name, axis, angle) in enumerate(TURNS):
-        before = R
-        R = R @ _turn(axis, angle)
-        from mpl_toolkits.mplot3d import Axes3D
-
-        ax: Any = canvas.add_subplot(1, 3, index + 1, projection=Axes3D.name)
+        before, unit = R, np.eye(3)[axis]
+        R = R @ Rotation.from_rotvec(angle * unit).as_matrix()
+        ax: Any = canvas.add_subplot(1, 3, index + 1, projection="3d")
         _box(ax, R)
         for column, letter in enumerate("xyz"):
             about = column == axis
             tip = R[:, column] * 1.25
             ax.plot(*np.transpose([np.zeros(3), tip]), color=style.COLOURS[1] if about else DARK, linewidth=1.4)
             ax.text(*(1.15 * tip), letter, fontsize=style.NOTE, color=style.COLOURS[1] if about else DARK)
-        arc = np.array([before @ _turn(axis, part) @ _start(axis) for part in np.linspace(0, angle, 30)])
+        parts = np.linspace(0, angle, 30)[:, None] * unit
+        arc = Rotation.from_rotvec(parts).apply(np.roll(unit, 1)) @ before.T  # from the axis after that of the turn
         ax.plot(*(1.05 * arc).T, color=style.COLOURS[1], linewidth=1.0)
         ax.set_title(f"{index + 1}. {name} about {'xyz'[axis]}", fontsize=style.NOTE, y=0.02)
         ax.set_box_aspect((1, 1, 1), zoom=1.15)
@@ -136,20 +134,6 @@ def _arrow(ax: Axes, start: np.ndarray, end: np.ndarray, colour: str) -> None:
 
 def _note(ax: Axes, at: np.ndarray, text: str, by: tuple[float, float], colour: str = DARK, ha: str = "left") -> None:
     ax.annotate(text, at, by, textcoords="offset points", fontsize=style.NOTE, color=colour, ha=ha)
-
-
-def _turn(axis: int, angle: float) -> np.ndarray:
-    """Return the rotation about a coordinate axis, (3, 3)."""
-    R = np.eye(3)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R[i, i] = R[j, j] = np.cos(angle)
-    R[j, i], R[i, j] = np.sin(angle), -np.sin(angle)
-    return R
-
-
-def _start(axis: int) -> np.ndarray:
-    """Return the unit vector at which the arc of a turn begins."""
-    return np.eye(3)[(axis + 1) % 3]
 
 
 def _box(ax: Any, R: np.ndarray) -> None:
