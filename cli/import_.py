@@ -53,13 +53,10 @@ def caspr(
             }
         )
         return
-    if out is None:
-        typer.echo(text, nl=False)
+    typer.echo(text if out is None else f"  {out}", nl=out is not None)
     # Standard output may be the robot file itself: notes go to standard error.
     for note in result.notes:
         typer.echo(f"note: {note}", err=True)
     others = [name for name in result.cable_sets if name != result.cable_set]
     if others:
         typer.echo(f"note: other cable sets: {', '.join(others)}", err=True)
-    if out is not None:
-        typer.echo(f"  {out}")

@@ -144,15 +144,13 @@ class _Stage:
         self._cables.set_color(colours if gone is None else np.where(gone[:, None], TORN, colours))
         self._cables.set_linestyle("-" if there else "--")
         self._clock.set_text(f"t = {self._when.times[k]:.2f} s" + ("" if there else "\nno tensions\ninside the limits"))
-        for artist in (self._trail, *self._shapes(), self._rotors, self._cables, *self._labels):
+        shapes = [artist for body in (*self._bodies, self._platform) for artist in body.artists]
+        for artist in (self._trail, *shapes, self._rotors, self._cables, *self._labels):
             if hasattr(artist, "do_3d_projection"):
                 artist.do_3d_projection()
             self._axes.draw_artist(artist)
         self._figure.draw_artist(self._clock)
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
-
-    def _shapes(self) -> list[Any]:
-        return [artist for body in (*self._bodies, self._platform) for artist in body.artists]
 
     def _draw_surroundings(self) -> None:
         """Draw axes, paths of platform and carriers, boxes, and the colour bar with the limits."""

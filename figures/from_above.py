@@ -22,15 +22,13 @@ def from_above(pairings: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
         ax.tick_params(labelleft=place == 1)
         for anchor, attachment in zip(anchors, attachments, strict=True):
             ax.plot(*np.stack([anchor, attachment])[:, :2].T, color="#999999", linewidth=1.0)
-        ax.plot(*anchors[:, :2].T, "s", color=style.colour(1), markersize=3, label="anchors A")
-        ax.plot(*attachments[:, :2].T, "o", color=style.colour(0), markersize=3, label="attachments B")
-        for index, (anchor, attachment) in enumerate(zip(anchors, attachments, strict=True), 1):
-            ax.annotate(
-                f"{index}", 1.12 * anchor[:2], fontsize=style.NOTE, ha="center", va="center", color=style.colour(1)
-            )
-            ax.annotate(
-                f"{index}", 0.75 * attachment[:2], fontsize=style.NOTE, ha="center", va="center", color=style.colour(0)
-            )
+        ends = ((anchors, "s", 1, "anchors A", 1.12), (attachments, "o", 0, "attachments B", 0.75))
+        for points, mark, index, label, away in ends:
+            shade = style.colour(index)
+            ax.plot(*points[:, :2].T, mark, color=shade, markersize=3, label=label)
+            for number, point in enumerate(points, 1):
+                look = {"fontsize": style.NOTE, "ha": "center", "va": "center", "color": shade}
+                ax.annotate(f"{number}", away * point[:2], **look)
         ax.set_aspect("equal")
         ax.margins(0.12)
         style.heading(ax, title, 1 / len(pairings))

@@ -39,22 +39,15 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
-def line_style(index: int) -> tuple[float, tuple[float, ...]] | str:
-    """Return the dashes of the index-th series: of sixteen, those with the same dashes differ in brightness."""
-    dashes = DASHES[(index + len(DASHES) // 2 * (index // len(COLOURS))) % len(DASHES)]
-    return (0.0, dashes) if dashes else "-"
-
-
 def look(index: int) -> dict[str, Any]:
     """Return colour, dashes and width of the index-th series.
 
-    The solid line is wider: it stays visible on either side of a dashed one that lies on it.
+    Of sixteen, those with the same dashes differ in brightness. The solid line is wider: it stays visible on either
+    side of a dashed one that lies on it.
     """
-    return {
-        "color": colour(index),
-        "linestyle": line_style(index),
-        "linewidth": 1.2 if line_style(index) != "-" else 1.8,
-    }
+    dashes = DASHES[(index + len(DASHES) // 2 * (index // len(COLOURS))) % len(DASHES)]
+    style, width = ((0.0, dashes), 1.2) if dashes else ("-", 1.8)
+    return {"color": colour(index), "linestyle": style, "linewidth": width}
 
 
 def marker(index: int) -> str:
@@ -217,14 +210,6 @@ def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes]
     return bar
 
 
-def check_format(name: str) -> str:
-    """Return the format of a figure, one of `FORMATS`.
-
-    Raises `InputError` if it is none of them.
-    """
-    return one_of("format", name, FORMATS)
-
-
 def check_picture(path: Path) -> Path:
     """Return the path of a figure, whose suffix is one of `FORMATS`.
 
@@ -267,7 +252,7 @@ def save_all(
 
     Raises `InputError` if the format is none of `FORMATS`, before anything is drawn, or a file cannot be written.
     """
-    into, suffix = file_path("folder", folder), check_format(format)
+    into, suffix = file_path("folder", folder), one_of("format", format, FORMATS)
     return [save(drawn, into / f"{name}.{suffix}") for name, drawn in draw().items()]
 
 

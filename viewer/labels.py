@@ -120,11 +120,7 @@ def shortfall(instant: Snapshot) -> str:
 def legend(subject: Subject, cell: float) -> str:
     """Return the meaning of colours and marks as HTML; `cell` is the edge of the grid's cells [m]."""
     robot = subject.robot
-    bar = _gradient()
-    ends = (
-        f'<div style="display:flex;justify-content:space-between"><span>{_limit("t_min", robot.t_min)}</span>'
-        f"<span>{_limit('t_max', robot.t_max)}</span></div>"
-    )
+    bar = _gradient(_limit("t_min", robot.t_min), _limit("t_max", robot.t_max))
     marks = [("no tensions", NO_TENSION), ("platform", style.colour(4))]
     marks += [("post below an anchor", PART)] if not all(carrier.moves for carrier in robot.carriers) else []
     marks += [("pulley (its sheave)", BLACK)] if robot.pulley_radii.any() else []
@@ -140,7 +136,7 @@ def legend(subject: Subject, cell: float) -> str:
     summary = f'<div style="color:{MUTED}">{escape(subject.cloud.summary)}</div>' if subject.cloud else ""
     return (
         f'<div class="towline-legend" style="{BODY}">'
-        f"<div>cable tension between its limits, logarithmic</div>{bar}{ends}"
+        f"<div>cable tension between its limits, logarithmic</div>{bar}"
         f'{"".join(rows)}{summary}<div style="color:{MUTED}">cells of the grid: {cell:g} m</div></div>'
     )
 
@@ -159,16 +155,18 @@ def note(message: str) -> str:
 def margin_scale(largest: float) -> str:
     """Return the colours of capacity margins from zero to the largest [N] of a workspace, as HTML."""
     return (
-        f'<div style="{BODY}"><div>surface by capacity margin, attitude and carriers at home</div>{_gradient()}'
-        f'<div style="display:flex;justify-content:space-between"><span>0</span><span>{quantity(largest, "N", 3)}'
-        "</span></div></div>"
+        f'<div style="{BODY}"><div>surface by capacity margin, attitude and carriers at home</div>'
+        f"{_gradient('0', quantity(largest, 'N', 3))}</div>"
     )
 
 
-def _gradient() -> str:
-    """Return a bar with the colours of all places."""
+def _gradient(low: str, high: str) -> str:
+    """Return a bar with the colours of all places, and what its ends stand for."""
     stops = ", ".join(f"rgb({r},{g},{b})" for r, g, b in shades(np.linspace(0.0, 1.0, STOPS)))
-    return f'<div style="height:10px;background:linear-gradient(to right, {stops})"></div>'
+    return (
+        f'<div style="height:10px;background:linear-gradient(to right, {stops})"></div>'
+        f'<div style="display:flex;justify-content:space-between"><span>{low}</span><span>{high}</span></div>'
+    )
 
 
 def refusal(message: str) -> str:

@@ -156,7 +156,7 @@ def _compare(
     whole = replace(model_of(robot, measurements, (), {}), weights=weights)
     parts = halves(measurements)
     compared = []
-    before = float(np.sqrt(_mean_square(*poses_fitted(whole, robot))))
+    before = float(np.sqrt(_mean_square(*poses_fitted(whole))))
     for free in sets:
         if not free:
             compared.append(Compared((), before, before))
@@ -212,7 +212,7 @@ def _mean_square(model: Model, state: State) -> float:
     return squares / max(int(used.sum()) - unknown, 1)
 
 
-def poses_fitted(model: Model, robot: Robot) -> tuple[Model, State]:
-    """Return the model without free parameters, and the poses that fit the lengths best with a robot's file."""
-    nothing = replace(model, parameters=Parameters(robot, ()), prior={})
-    return nothing, fit_from(nothing, nothing.begin(), length_of(robot))[0].state
+def poses_fitted(model: Model) -> tuple[Model, State]:
+    """Return the model without free parameters, and the poses that fit the lengths best with the robot's file."""
+    nothing = replace(model, parameters=Parameters(model.robot, ()), prior={})
+    return nothing, fit_from(nothing, nothing.begin(), length_of(model.robot))[0].state

@@ -187,8 +187,7 @@ class CalibrationData(Displayed):
     @cached_property
     def residuals_before(self) -> np.ndarray:
         """Return the residuals of the lengths with the file's parameters, (N, m) [m], at poses that fit them best."""
-        model = self._solved.model
-        return lengths_of(*poses_fitted(model, model.parameters.robot))
+        return lengths_of(*poses_fitted(self._solved.model))
 
     @property
     def residual_before(self) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...models import points
+from ...models.dynamics import dynamics_of
 from ...models.robot import Robot
 from ..pose.estimate import largest_cost
 from ..pose.from_lengths import pose_from_lengths
@@ -76,20 +77,14 @@ def level_poses(robot: Robot, lengths: np.ndarray, offsets: bool) -> np.ndarray:
 
     def level(of: np.ndarray) -> tuple[np.ndarray, float]:
         poses = level_platform(problem, np.maximum(of, SHORTEST), weights)
-        return poses, float(np.median(np.abs(_lengths(robot, poses) - of)))
+        return poses, float(np.median(np.abs(dynamics_of(robot).cable_lengths(poses) - of)))
 
     poses, misfit = level(lengths)
     if offsets and misfit > FAR * float(lengths.mean()):
-        other, smaller = level(lengths - lengths[0] + _lengths(robot, robot.home[None]))
+        other, smaller = level(lengths - lengths[0] + dynamics_of(robot).cable_lengths(robot.home))
         if smaller < misfit:
             return other
     return poses
-
-
-def _lengths(robot: Robot, poses: np.ndarray) -> np.ndarray:
-    from ...models.dynamics import dynamics_of
-
-    return dynamics_of(robot).cable_lengths(poses)
 
 
 def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:
