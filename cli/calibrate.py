@@ -10,9 +10,6 @@ from ..base.inputs import check_ending, one_of
 from .options import FormatOption, JsonOption, RobotArgument, print_result
 from .outputs import check_outputs
 
-SIGMA_KEYS = "lengths, position, rotation"
-
-
 LogArgument = Annotated[
     Path,
     typer.Argument(
@@ -106,7 +103,9 @@ def _sigma(text: str) -> Any:
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"--sigma must be a number [m], or NAME=NUMBER of {SIGMA_KEYS}, got {text!r}") from None
+        raise InputError(
+            f"--sigma must be a number [m], or NAME=NUMBER of lengths, position, rotation, got {text!r}"
+        ) from None
 
 
 def _by_name(option: str, text: str) -> dict[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -144,9 +145,7 @@ def _draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) ->
 
 
 def _draw_wind(ax: Axes, trajectory: xr.Dataset) -> None:
-    for index, (axis, values) in enumerate(zip("xyz", trajectory["wind"].values.T, strict=True)):
-        ax.plot(trajectory["time"].values, values, **style.look(index), label=axis)
-    _legend_beside(ax)
+    _draw_named(ax, trajectory, "xyz", trajectory["wind"].values)
 
 
 def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
@@ -154,18 +153,13 @@ def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
     scale, unit = _scale(float(offsets.max()))
     ax.set_ylabel(f"offset of\ncarriers [{unit}]")
     names = trajectory["carrier"].values[trajectory["carrier_moves"].values]
-    for index, name in enumerate(names):
-        ax.plot(trajectory["time"].values, offsets[:, index] / scale, **style.look(index), label=str(name))
+    _draw_named(ax, trajectory, names, offsets / scale)
     ax.set_ylim(bottom=0.0)
-    _legend_beside(ax)
 
 
 def _draw_thrusts(ax: Axes, trajectory: xr.Dataset) -> None:
     thrusts = trajectory["actuation"].sel(actuator=THRUST).values
-    for index, name in enumerate(trajectory["carrier"].values):
-        if np.isfinite(thrusts[:, index]).any():
-            ax.plot(trajectory["time"].values, thrusts[:, index], **style.look(index), label=str(name))
-    _legend_beside(ax)
+    _draw_named(ax, trajectory, trajectory["carrier"].values, thrusts)
 
 
 def _draw_answers(ax: Axes, trajectory: xr.Dataset) -> None:
@@ -215,7 +209,11 @@ def _scale(largest: float) -> tuple[float, str]:
     return next(((size, unit) for least, size, unit in SCALES if largest >= least), SCALES[-1][1:])
 
 
-def _legend_beside(ax: Axes) -> None:
+def _draw_named(ax: Axes, trajectory: xr.Dataset, names: Iterable[Any], values: np.ndarray) -> None:
+    """Draw the columns of values (n, k) that have any, with their names beside the panel."""
+    for index, name in enumerate(names):
+        if np.isfinite(values[:, index]).any():
+            ax.plot(trajectory["time"].values, values[:, index], **style.look(index), label=str(name))
     ax.legend(fontsize=style.NOTE, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, handlelength=2.6)
 
 

@@ -12,12 +12,10 @@ import casadi as ca
 import numpy as np
 
 from ..base.errors import InputError, SolverError
-from ..base.inputs import check_dimensions, float64, leading, shown
+from ..base.inputs import FLOAT, check_dimensions, float64, leading, shown
 from ..core import finite
 
 SYMBOLIC = (ca.SX, ca.MX)
-
-_FLOAT = np.dtype(np.float64)
 
 
 def is_symbolic(value: Any) -> bool:
@@ -57,7 +55,7 @@ def call(function: ca.Function, arguments: dict[str, Any], matrices: tuple[str, 
 
 def as_array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     """Return `value` as floats whose last dimensions are `core`, or raise InputError unless all are finite."""
-    if type(value) is np.ndarray and value.dtype is _FLOAT:
+    if type(value) is np.ndarray and value.dtype is FLOAT:
         array = value
     else:
         try:

@@ -54,7 +54,8 @@ class TimeLine:
         gui: Any = server.gui
         first, last = float(replay.times[0]), float(replay.times[-1])
         with gui.add_folder("Time"):
-            self._now = gui.add_slider("time [s]", first, _whole(last - first, TICK) + first, TICK, first)
+            ticks = max(math.ceil((last - first) / TICK - 1e-6), 1)  # whole ones, so that the end is a round number
+            self._now = gui.add_slider("time [s]", first, first + round(ticks * TICK, 6), TICK, first)
             self._play = gui.add_button("Play", hint="K")
             self._step = gui.add_button_group("step", ("first", "back", "next", "last"))
             self._loop = gui.add_checkbox("loop", True)
@@ -130,8 +131,3 @@ class TimeLine:
             self._go(self._replay.index_at(onward), at=onward, playing=True)
             if onward == last and not self._loop.value:
                 self._turn(False)
-
-
-def _whole(length: float, step: float) -> float:
-    """Return the number of whole steps that cover a length, at least one, so that the end is a round number."""
-    return round(max(math.ceil(length / step - 1e-6), 1) * step, 6)

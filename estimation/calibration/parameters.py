@@ -21,8 +21,7 @@ from ...models.robot import Robot
 OF_CABLE = 9  # parameters of a cable
 GROUPS = ("anchors", "attachments", "offsets", "scales", "radii", "clock")
 COLUMNS = {"anchors": (0, 1, 2), "attachments": (3, 4, 5), "offsets": (6,), "scales": (7,), "radii": (8,)}
-_WORDS = ("anchor.x", "anchor.y", "anchor.z", "attachment.x", "attachment.y", "attachment.z")
-WORDS = (*_WORDS, "offset", "scale", "pulley.radius")
+WORDS = (*(f"{end}.{axis}" for end in ("anchor", "attachment") for axis in "xyz"), "offset", "scale", "pulley.radius")
 LARGEST_PRIOR = 1e3
 SMALLEST_PRIOR = 1e-9
 

@@ -108,17 +108,15 @@ class ElementChain(Displayed):
         """
         from scipy.sparse import csr_array, diags_array, kron
 
-        switch = self._element_stiffness * self._switch(taut)
         steps = self._steps()
-        axial = steps.T @ diags_array(switch) @ steps
+        axial = steps.T @ diags_array(self._stiffnesses(taut)) @ steps
         return csr_array(kron(axial, np.outer(self.direction, self.direction)))
 
     def K_l(self, taut: Any = None) -> csr_array:
         """Return the stiffness to the elements' own lengthening de [N/m], sparse, (3(n + 1), n); `taut` as in `K_n`."""
         from scipy.sparse import csr_array, diags_array, kron
 
-        switch = self._element_stiffness * self._switch(taut)
-        return csr_array(kron(self._steps().T @ diags_array(switch), self.direction[:, None]))
+        return csr_array(kron(self._steps().T @ diags_array(self._stiffnesses(taut)), self.direction[:, None]))
 
     def node_forces(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
         """Return the increments of the forces that hold each node [N], (n + 1, 3): K_n dX + K_l dE.
@@ -142,8 +140,9 @@ class ElementChain(Displayed):
     def _element_stiffness(self) -> float:
         return self.stiffness * self.elements / self.length
 
-    def _switch(self, taut: Any) -> np.ndarray:
-        return np.ones(self.elements) if taut is None else as_array("taut", taut, (self.elements,))
+    def _stiffnesses(self, taut: Any) -> np.ndarray:
+        switch = np.ones(self.elements) if taut is None else as_array("taut", taut, (self.elements,))
+        return self._element_stiffness * switch
 
     def _steps(self) -> csr_array:
         """Return the matrix (n, n + 1) from values at the nodes to their differences over the elements."""
