@@ -40,8 +40,7 @@ class Costs(Displayed):
         gives (18 each: pose, velocity, acceleration), tensions [N] (m), duration [s] and margin [N].
         """
         count = 1 + len(self.robot.carriers)
-        # Pieces of one symbol are no symbols: derivatives are taken with respect to these.
-        bodies = [Body(*(ca.SX.sym(name, 6) for name in "xva")) for _ in range(2 * count)]
+        bodies = [Body.symbols() for _ in range(2 * count)]
         tensions, duration, margin = (ca.SX.sym(name, size) for name, size in (("t", self.robot.m), ("T", 1), ("e", 1)))
         state = CostState(
             robot=self.robot,

@@ -91,10 +91,7 @@ class Limits(Displayed):
 
     @cached_property
     def _state(self) -> State:
-        # Pieces of one symbol are no symbols: derivatives are taken with respect to these.
-        platform, *carriers = (
-            Body(ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("a", 6)) for _ in range(1 + len(self.robot.carriers))
-        )
+        platform, *carriers = (Body.symbols() for _ in range(1 + len(self.robot.carriers)))
         return State(self.robot, platform, tuple(carriers), ca.SX.sym("t", self.robot.m), ca.SX.sym("off_path", 6))
 
     @property
@@ -211,6 +208,11 @@ class Limits(Displayed):
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
         values = in_blocks(self._of_block, arguments)
         return [values[:, place] for place in self.places]
+
+    def at_rest(self, platform: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
+        """Return the values of each limit at poses of platform (n, 6) and carriers (n, c, 6) at rest, (n, k)."""
+        moving, bases = ((pose, np.zeros_like(pose), np.zeros_like(pose)) for pose in (platform, carriers))
+        return self.along(moving, bases)
 
     @cached_property
     def _of_block(self) -> ca.Function:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -21,6 +21,11 @@ class Body(NamedTuple):
     pose: ca.SX  # [m, rad]
     velocity: ca.SX  # [m/s, rad/s]
     acceleration: ca.SX  # [m/s^2, rad/s^2]
+
+    @classmethod
+    def symbols(cls) -> Self:
+        """Return symbols: pieces of one symbol are no symbols, and derivatives are taken with respect to these."""
+        return cls(ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("a", 6))
 
     @property
     def position(self) -> ca.SX:

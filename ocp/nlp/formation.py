@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 
-import casadi as ca
 import numpy as np
 
 from ...base.display import Displayed
@@ -64,18 +63,17 @@ def clear_formation(scenario: Scenario) -> Formation | None:
     span = _span(scenario)
     if scenario.relative or not any(limit.name in DISTANCES for limit in scenario.limits) or not span.any():
         return None
-    beyond = _Distances(scenario)
     shares = np.linspace(0.0, 1.0, PLACES // 2 + 1)
     references = _References.at(scenario, shares * scenario.duration)
     shape = np.zeros((len(shares), 4))
-    if beyond(*_placed(scenario, references, shape)).max() <= 0.0:
+    if _beyond(scenario, *_placed(scenario, references, shape)).max() <= 0.0:
         return None
-    shape = _best(scenario, references, beyond, _tried(shape, span, 0), span)
+    shape = _best(scenario, references, _tried(shape, span, 0), span)
     finer = np.linspace(0.0, 1.0, PLACES + 1)
     references = _References.at(scenario, finer * scenario.duration)
     shape = np.stack([np.interp(finer, shares, column) for column in shape.T], axis=1)
     for attempt in range(1, 1 + REFINEMENTS):
-        shape = _best(scenario, references, beyond, _tried(shape, span, attempt), span)
+        shape = _best(scenario, references, _tried(shape, span, attempt), span)
     from scipy.ndimage import gaussian_filter1d  # loads for longer than a plan takes that does not need it
 
     return Formation(scenario, finer, gaussian_filter1d(shape, PLACES / 60, axis=0, mode="nearest"))
@@ -162,36 +160,21 @@ def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> t
     return platform, carriers
 
 
-class _Distances:
-    """The violation of the task's distances by poses, in metres."""
-
-    def __init__(self, scenario: Scenario):
-        bodies = 1 + len(scenario.robot.carriers)
-        pose = ca.SX.sym("pose", 6, bodies)
-        at_rest = [ca.vertcat(pose[:, i], ca.SX.zeros(12)) for i in range(bodies)]
-        limits = scenario.limits
-        values = limits.function(*at_rest, ca.SX.zeros(scenario.robot.m), ca.SX.zeros(6))
-        beyond = [ca.SX(0.0)]
-        for limit, place in zip(limits, limits.places, strict=True):
-            mine = values[place]
-            if limit.name in DISTANCES:
-                beyond += [limit.low + CLEARANCE - mine] * bool(np.isfinite(limit.low))
-                beyond += [mine - limit.high + CLEARANCE] * bool(np.isfinite(limit.high))
-        self._function = ca.Function("beyond", [ca.vec(pose)], [ca.sum1(ca.fmax(ca.vertcat(*beyond), 0.0))])
-
-    def __call__(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
-        """Return the sum of the violations by platform (n, 6) and carriers (n, c, 6), (n,) [m]."""
-        poses = np.concatenate([platform[:, None], carriers], axis=1).reshape(len(platform), -1)
-        return self._function.map(len(poses))(poses.T).full().ravel()
+def _beyond(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
+    """Return the sum of the violations of the task's distances by platform (n, 6) and carriers (n, c, 6), (n,) [m]."""
+    beyond = np.zeros(len(platform))
+    for limit, values in zip(scenario.limits, scenario.limits.at_rest(platform, carriers), strict=True):
+        if limit.name in DISTANCES:
+            both = (limit.low + CLEARANCE - values, values - limit.high + CLEARANCE)
+            beyond += sum(np.maximum(side, 0.0).sum(axis=1) for side in both)
+    return beyond
 
 
-def _best(
-    scenario: Scenario, places: _References, beyond: _Distances, tried: np.ndarray, span: np.ndarray
-) -> np.ndarray:
+def _best(scenario: Scenario, places: _References, tried: np.ndarray, span: np.ndarray) -> np.ndarray:
     """Return the cheapest sequence of formations (k, 4) among those tried at each point, (k, tries, 4)."""
     count, tries, _ = tried.shape
     every = _References(*(np.repeat(part, tries, axis=0) for part in (places.platform, places.carriers, places.across)))
-    passed = beyond(*_placed(scenario, every, tried.reshape(-1, 4))).reshape(count, tries)
+    passed = _beyond(scenario, *_placed(scenario, every, tried.reshape(-1, 4))).reshape(count, tries)
     size = tried / np.where(span > 0, span, 1.0)
     squares = (size**2).sum(axis=2)
     cost = VIOLATION * passed + UNUSUAL * squares

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from ..limits import Body
 from ..limits.limits import motions as whole_motions
 from ..tasks.ends import fixed_values
 from ..tasks.scenario import Scenario
@@ -57,7 +58,7 @@ def _slopes_outwards(scenario: Scenario, end: int) -> Iterator[tuple[str, ca.Fun
     limits, share = scenario.limits, 0.0 if end == 0 else 1.0
     held = held_spans(scenario, lambda _: ON_IT)
     there = [motion[end] for motion in whole_motions(*at_ends(scenario))]
-    bodies = [[ca.SX.sym(part, 6) for part in "xva"] for _ in there]
+    bodies = [Body.symbols() for _ in there]
     others = [ca.SX.sym("t", scenario.robot.m), ca.SX.sym("off_path", 6)]
     whole = [ca.vertcat(*body) for body in bodies]
     evaluated = limits.function(*whole, *others) if limits.all else ca.SX(0, 1)

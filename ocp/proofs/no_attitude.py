@@ -8,7 +8,6 @@ that it does not prove are halved along each angle, until all are proven or an a
 import numpy as np
 
 from ..audits.excess import Excess
-from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 
 MOST = 30_000  # boxes
@@ -46,10 +45,7 @@ def no_attitude(
         """Return by how many metres of movement limits are exceeded (n, limits), and all values."""
         pose = np.repeat(platform[None], len(offsets), axis=0)
         pose[:, angles] += offsets
-        still, places = np.zeros_like(pose), np.repeat(carriers[None], len(offsets), axis=0)
-        values = scenario.limits.along(
-            Motion(pose, still, still), Motion(places, np.zeros_like(places), np.zeros_like(places))
-        )
+        values = scenario.limits.at_rest(pose, np.repeat(carriers[None], len(offsets), axis=0))
         over = [np.maximum(limit.low - values[k], values[k] - limit.high).max(axis=1) for k, limit in limits]
         rates = [limit.per_metre for _, limit in limits]
         return np.stack(over, axis=1) / rates, values
