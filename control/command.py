@@ -34,6 +34,9 @@ class Command(NamedTuple):
     unexplained
         Mean acceleration of the platform that was not predicted, (...) [m/s^2], angles times the robot's length; nan
         from controllers that do not predict.
+    lengths
+        Unstrained lengths for winches that take them, (..., m) [m], instead of the tensions, which are then those that
+        are expected; default: None.
     """
 
     tensions: np.ndarray
@@ -45,5 +48,6 @@ class Command(NamedTuple):
     shortfall: np.ndarray = NOTHING
     actuation: np.ndarray | None = None
     unexplained: np.ndarray = NOTHING
+    lengths: np.ndarray | None = None
 
     __repr__ = record

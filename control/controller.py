@@ -19,9 +19,12 @@ class Controller(ABC):
     batches
         True if `step` accepts states with a leading dimension, a robot in each row, and treats every row independently.
         Otherwise each of many runs uses a copy.
+    drive
+        Type of command of the plant that `simulate` uses, see `Plant`; default: chosen by the robot.
     """
 
     batches = False
+    drive: str | None = None
 
     @abstractmethod
     def step(self, time: float, state: State, reference: Reference) -> Command:

@@ -24,6 +24,8 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
     shapes |= {f"carrier_{part}": (count, 6) for part in ("pose", "velocity", "acceleration")}
     if command.actuation is not None:
         shapes["actuation"] = (count, max(len(carrier.actuators) for carrier in robot.carriers))
+    if command.lengths is not None:
+        shapes["lengths"] = (robot.m,)
     for name, core in shapes.items():
         values = np.asarray(getattr(command, name))
         if values.shape != (*lead, *core):

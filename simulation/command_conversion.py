@@ -73,7 +73,11 @@ class Orders:
         rows = self._rows[:, 0]
         if self.wind is not None:
             rows[:, layout.WIND : layout.WRENCH] = self.wind[k]
-        if self._drive != "lengths":
+        if command.lengths is not None:
+            if self._drive != "lengths":
+                raise InputError(f"drive must be 'lengths' for a controller that commands lengths, got {self._drive!r}")
+            self._cables[:] = command.lengths
+        elif self._drive != "lengths":
             self._cables[:] = command.tensions
         elif self._fixed is not None:
             self._cables[:] = self._fixed

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, overload
 from warnings import warn
@@ -160,8 +161,9 @@ def simulate(
     the_robot = as_robot(robot)
     if controller is not None and not isinstance(controller, Controller):
         raise InputError(f"controller must be a Controller, got {shown(controller)}")
-    plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     pilot = ComputedTorque(the_robot) if controller is None else controller
+    meets = replace(meets, drive=meets.drive or pilot.drive or _drive(the_robot))
+    plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
     if runs is None:
         where.check_alone()
@@ -190,7 +192,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
     for where, event in named:
         if event.at >= periods * period:
             raise InputError(f"{where} must begin before the end at {periods * period:g} s, got {event.at:g} s")
-    plant = Plant(robot, drive=_drive(robot) if meets.drive is None else meets.drive)
+    plant = Plant(robot, drive=meets.drive or _drive(robot))
     return plant, Experiment(
         period=period,
         substeps=meets.substeps or steps_in(period, plant),

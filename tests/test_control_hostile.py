@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from towline import InputError, load
-from towline.control import ComputedTorque, OpenLoop, Predictive, Reference, State
+from towline.control import ComputedTorque, LengthControl, OpenLoop, Predictive, Reference, State
 
 
 class Raising:
@@ -46,7 +46,7 @@ def at_home(robot):
     return state, Reference(robot.home, *np.zeros((2, 6)), robot.carrier_home, still, still)
 
 
-@pytest.mark.parametrize("kind", [ComputedTorque, Predictive, OpenLoop])
+@pytest.mark.parametrize("kind", [ComputedTorque, Predictive, OpenLoop, LengthControl])
 @pytest.mark.parametrize("case", WRONG)
 def test_a_wrong_array_is_refused_in_one_line_that_names_it(case, kind):
     robot = load("wang-flying")

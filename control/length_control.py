@@ -1,0 +1,179 @@
+"""`LengthControl`: for winches that take lengths, as most industrial ones do."""
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+from typing_extensions import override
+
+from ..base.errors import InputError
+from ..base.inputs import number, repeated, required, shown
+from ..models.dynamics import dynamics_of
+from ..models.files import as_robot
+from ..models.robot import Robot
+from .as_floats import as_floats, is_time, rows_of
+from .command import HOLD, PLANNED, Command
+from .controller import Controller
+from .reference import Reference
+from .state import State
+
+SHARE = 0.05  # of the robot's length: the default of `most`
+CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]
+
+
+class LengthControl(Controller):
+    r"""Command unstrained lengths: those of the plan, ahead of the winches, and a correction by the measured pose.
+
+        L0 = l(x) / (1 + t / EA) + J (P e + I \int e dt)
+
+    with the planned pose x and tensions t when winches will have followed, the Jacobian J of the lengths, and the
+    error e of the measured pose. The tensions of a robot with more cables than degrees of freedom follow from the
+    lengths; they are not controlled.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
+    stiffness
+        E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does not
+        stretch (also the default of a cable without a value in the file).
+    lag
+        Time by which the winches follow their commands late [s]: lengths are commanded so much earlier.
+    proportional, integral
+        P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 2 and 10 if
+        it is current, 0.3 and 2 up to 20 ms, less beyond. A pose that is late without a time of its measurement needs
+        gains for that age: with others the oscillations of the platform on its cables grow.
+    most
+        Largest correction of a length [m]; default: 5 % of the robot's length. At it the integral stops, and the
+        status is "hold".
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong value, the robot has flying carriers, or its cables have fixed lengths.
+    """
+
+    batches = True
+    drive = "lengths"
+
+    def __init__(
+        self,
+        robot: Robot | str | os.PathLike[str],
+        stiffness: float | Sequence[float] | np.ndarray | None = None,
+        lag: float = 0.0,
+        proportional: float | None = None,
+        integral: float | None = None,
+        most: float | None = None,
+    ):
+        self.robot = as_robot(robot)
+        flying = [carrier.name for carrier in self.robot.carriers if carrier.actuators]
+        if flying or self.robot.fixed_lengths is not None:
+            reason = f"the flying carrier {flying[0]!r}" if flying else "cables of fixed length"
+            raise InputError(f"robot must be one with winches and without flying carriers, got {reason}")
+        given = [cable.stiffness or np.inf for cable in self.robot.cables] if stiffness is None else stiffness
+        self._EA = repeated("stiffness", given, self.robot.m)
+        if not (self._EA > 0).all():
+            raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
+        self._lag = number("lag", lag, 0.0, 1.0)
+        self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
+        self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
+        self._most = number("most", SHARE * self.robot.length if most is None else most, 0.0, 1e3)
+        self._dynamics = dynamics_of(self.robot)
+        self.reset()
+
+    @override
+    def reset(self) -> None:
+        self._time: float | None = None
+        self._sum: np.ndarray | None = None  # integral of the error, (..., 6)
+        self._tensions: np.ndarray | None = None  # planned at the last step, (..., m)
+
+    @override
+    def step(self, time: float, state: State, reference: Reference) -> Command:
+        """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
+
+        Parameters
+        ----------
+        time
+            Time of the step [s], later than that of the last one.
+        state
+            Measured state, of which the pose is used. With a time of its measurement it is compared with the plan then.
+        reference
+            The plan at this time.
+
+        Raises
+        ------
+        InputError
+            If the time is not later than that of the last step, an array has a wrong shape, or no tensions are planned
+            for cables that stretch.
+        """
+        rows = rows_of(required("state", state, State))
+        state = as_floats(state, self.robot, rows)
+        reference = as_floats(required("reference", reference, Reference), self.robot, rows)
+        if not is_time(time) or (self._time is not None and not float(time) > self._time):
+            raise InputError(f"time must be a finite number that increases from step to step, got {shown(time)}")
+        dt = 0.0 if self._time is None else float(time) - self._time
+        seen = time if state.time is None else state.time
+        if not is_time(seen) or float(seen) > float(time):
+            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
+        corrected, held = self._correction(dt, float(time) - float(seen), state, reference)
+        lead, (pose, carriers, tensions) = () if rows is None else (rows,), self._ahead(dt, reference)
+        lengths = self._dynamics.cable_lengths(pose, carriers) / (1.0 + tensions / self._EA) + corrected
+        self._time, self._tensions = float(time), reference.tensions
+        planned = self.robot.t_min if reference.tensions is None else reference.tensions
+        motions = (reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration)
+        pose, velocity, acceleration = (np.broadcast_to(part, (*lead, *part.shape[-2:])) for part in motions)
+        return Command(
+            tensions=np.broadcast_to(np.clip(planned, self.robot.t_min, self.robot.t_max), (*lead, self.robot.m)),
+            carrier_pose=pose,
+            carrier_velocity=velocity,
+            carrier_acceleration=acceleration,
+            answered=np.where(held, HOLD, PLANNED).astype(np.int8),
+            lengths=np.broadcast_to(lengths, (*lead, self.robot.m)),
+        )
+
+    def _ahead(self, dt: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the planned pose, poses of carriers and tensions when winches will have followed."""
+        lag, tensions = self._lag, reference.tensions
+        pose = reference.pose + lag * (reference.velocity + 0.5 * lag * reference.acceleration)
+        carriers = reference.carrier_pose + lag * (
+            reference.carrier_velocity + 0.5 * lag * reference.carrier_acceleration
+        )
+        if tensions is None or not np.isfinite(tensions).all():
+            if np.isfinite(self._EA).any():
+                raise InputError(
+                    f"reference.tensions must be planned for cables that stretch, got {shown(reference.tensions)}"
+                )
+            return pose, carriers, np.zeros(self.robot.m)
+        if dt > 0 and self._tensions is not None and self._tensions.shape == tensions.shape:
+            tensions = tensions + lag / dt * (tensions - self._tensions)
+        return pose, carriers, tensions
+
+    def _correction(self, dt: float, age: float, state: State, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
+        """Return the corrections of the lengths [m], (..., m), and where they are held at their bound, (...)."""
+        planned = reference.pose - age * (reference.velocity - 0.5 * age * reference.acceleration)
+        error = planned - state.pose
+        error[..., 3:] = (error[..., 3:] + np.pi) % (2 * np.pi) - np.pi
+        known = np.asarray(np.isfinite(error).all(axis=-1))
+        error = np.where(known[..., None], error, 0.0) * self.robot.dof_mask
+        before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
+        J = self._dynamics.length_jacobian(reference.pose, reference.carrier_pose)  # (..., m, 6)
+        proportional, integral = _gains(age)
+        proportional = proportional if self._proportional is None else self._proportional
+        integral = integral if self._integral is None else self._integral
+        total = before + dt * error
+        wanted = (J @ (proportional * error + integral * total)[..., None])[..., 0]
+        beyond = np.asarray((np.abs(wanted) > self._most).any(axis=-1))
+        self._sum = np.where(beyond[..., None], before, total)
+        return np.clip(wanted, -self._most, self._most), beyond | ~known
+
+
+def _gains(age: float) -> tuple[float, float]:
+    """Return the default gains, P and I [1/s], for a pose of an age [s].
+
+    An oscillation of the platform with the frequency w and the damping d is stable for I < 2 d w (1 + P) without
+    delay, which wants a large P; with one, P and the growth of the delayed phase limit both.
+    """
+    if age <= CURRENT:
+        return 2.0, 10.0
+    share = min(1.0, LATE / age)
+    return 0.3 * share, 2.0 * share

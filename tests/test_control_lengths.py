@@ -1,0 +1,184 @@
+"""Winches that take lengths: a robot keeps its plan although stiffness and lag of its cables are not as in its file."""
+
+import numpy as np
+import pytest
+
+from towline import InputError, load, plan, simulate
+from towline.control import ComputedTorque, Controller, LengthControl, Reference, State, references
+from towline.control.command import HOLD, PLANNED
+from towline.models import Robot
+
+EA = 2e5
+PERIOD = 1e-3
+
+
+def elastic(name, stiffness):
+    data = load(name).model_dump(mode="json", exclude_none=True)
+    for cable in data["cables"]:
+        cable |= {"stiffness": stiffness, "damping": 0.002 * stiffness}
+    return Robot(**data)
+
+
+def wound(command):
+    assert command.lengths is not None
+    return command.lengths
+
+
+class Late(Controller):
+    """Winches that follow the lengths of a controller with a lag."""
+
+    batches, drive = True, "lengths"
+
+    def __init__(self, inner, lag):
+        self.inner, self.lag = inner, lag
+
+    def reset(self):
+        self.inner.reset()
+        self.wound = None
+
+    def step(self, time, state, reference):
+        command = self.inner.step(time, state, reference)
+        lengths = wound(command)
+        share = 1.0 - np.exp(-PERIOD / self.lag)
+        self.wound = lengths if self.wound is None else self.wound + share * (lengths - self.wound)
+        return command._replace(lengths=self.wound)
+
+
+@pytest.fixture(scope="module")
+def model():
+    return elastic("cogiro", EA)
+
+
+@pytest.fixture(scope="module")
+def motion(model):
+    found = plan(model, {"path": {"kind": "line", "start": [-2, -1, 1], "end": [2.5, 1.5, 2]}, "duration": 3.4})
+    assert np.linalg.norm(found.trajectory.velocity.values[:, :3], axis=1).max() > 2.3
+    return found
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.0, 1.2])
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+def test_it_keeps_the_plan_with_other_cables_and_winches(model, motion, factor, lag):
+    controller = LengthControl(model, lag=lag)
+    run = simulate(elastic("cogiro", factor * EA), motion, Late(controller, lag) if lag else controller, duration=3.6)
+    assert np.sqrt(np.mean(run.error**2)) < 2e-3
+    assert run.error.max() < 5e-3
+    assert run.answered["as planned"] == len(run.references)
+
+
+def test_without_lead_the_lag_is_a_delay(model, motion):
+    """Feed-forward alone: the error is the lag times the speed."""
+    controller = LengthControl(model, proportional=0, integral=0)
+    run = simulate(model, motion, Late(controller, 0.02))
+    speed = max(np.linalg.norm(reference.velocity[:3]) for reference in run.references)
+    assert run.error.max() == pytest.approx(0.02 * speed, rel=0.1)
+    led = simulate(model, motion, Late(LengthControl(model, lag=0.02, proportional=0, integral=0), 0.02))
+    assert led.error.max() < 0.05 * run.error.max()
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-1", "planar-4"])
+def test_at_rest_the_lengths_give_the_planned_tensions(name):
+    """Hooke's law at the pose: t = EA (l - L0) / L0, with distances of the points alone."""
+    robot = elastic(name, EA)
+    run = simulate(robot, robot.home, LengthControl(robot), duration=0.5)
+    planned = run.references[0].tensions
+    assert planned is not None
+    controller = LengthControl(robot)
+    state = State(robot.home, np.zeros(6), robot.carrier_home, np.zeros_like(robot.carrier_home))
+    commanded = wound(controller.step(0.0, state, run.references[0]))
+    distances = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
+    np.testing.assert_allclose(EA * (distances - commanded) / commanded, planned, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(run.record.tensions[-1], planned, rtol=1e-3, atol=0.1)
+    assert run.error.max() < 1e-4
+
+
+def test_a_constant_error_of_the_model_is_integrated_away(model):
+    true = elastic("cogiro", 0.8 * EA)
+    run = simulate(true, true.home, LengthControl(model), duration=4.0)
+    assert run.error.max() > 1e-3
+    assert run.error[-1] < 2e-5
+
+
+def test_an_old_state_is_compared_with_the_plan_of_its_time(model, motion):
+    late = {"delay": 0.02}
+    known = simulate(model, motion, LengthControl(model), noise={**late, "stamped": True}, duration=6.0)
+    unknown = simulate(model, motion, LengthControl(model, proportional=0.3, integral=2), noise=late)
+    assert known.error.max() < 5e-3 < 0.2 * unknown.error.max()
+    assert known.error[-100:].max() < 1e-3
+    for factor in (0.8, 1.2):
+        other = simulate(elastic("cogiro", factor * EA), motion, LengthControl(model), noise={**late, "stamped": True})
+        assert other.error.max() < 0.012
+
+
+def test_gains_for_another_age_are_not_kept_quiet(model, motion):
+    run = simulate(elastic("cogiro", 0.8 * EA), motion, LengthControl(model), noise={"delay": 0.02}, duration=5.0)
+    assert not run.passed
+    assert run.answered["hold"] > 0
+
+
+def test_beyond_its_bound_it_says_hold(model):
+    controller = LengthControl(model, most=1e-3)
+    true = elastic("cogiro", 0.5 * EA)
+    run = simulate(true, true.home, controller, duration=1.0)
+    assert run.record.answered[-1] == HOLD
+    state = State(model.home, np.zeros(6), model.carrier_home, np.zeros_like(model.carrier_home))
+    controller.reset()
+    first = controller.step(0.0, state, run.references[0])
+    assert first.answered == PLANNED
+    lost = controller.step(1e-3, state._replace(pose=np.full(6, np.nan)), run.references[0])
+    assert lost.answered == HOLD
+    np.testing.assert_allclose(wound(lost), wound(first))
+
+
+def test_rows_are_as_alone(model, motion):
+    wanted = references(motion, 0.1)[:5]
+    rng = np.random.default_rng(0)
+    off = 1e-3 * rng.normal(size=(3, 6))
+    together, alone = LengthControl(model, lag=0.01), [LengthControl(model, lag=0.01) for _ in off]
+    for k, reference in enumerate(wanted):
+        still = np.zeros((3, 6)), np.tile(model.carrier_home, (3, 1, 1)), np.zeros((3, 1, 6))
+        both = together.step(0.1 * k, State(reference.pose + off, *still), reference)
+        for row, controller in enumerate(alone):
+            state = State(reference.pose + off[row], *(part[row] for part in still))
+            one = controller.step(0.1 * k, state, reference)
+            np.testing.assert_allclose(wound(both)[row], wound(one), rtol=1e-13)
+            assert one.answered == both.answered[row]
+
+
+def test_angles_are_compared_round_the_circle(model):
+    pose = np.r_[model.home[:5], np.pi - 1e-3]
+    state = State(np.r_[model.home[:5], -np.pi + 1e-3], np.zeros(6), model.carrier_home, np.zeros((1, 6)))
+    reference = references_at_rest(model, pose)
+    near = wound(LengthControl(model).step(0.0, state, reference))
+    exact = wound(LengthControl(model).step(0.0, state._replace(pose=pose), reference))
+    assert 0 < np.abs(near - exact).max() < 0.02
+
+
+def references_at_rest(robot, pose):
+    still = np.zeros(6), np.zeros(6)
+    carriers = robot.carrier_home, np.zeros_like(robot.carrier_home), np.zeros_like(robot.carrier_home)
+    return Reference(pose, *still, *carriers, np.full(robot.m, 100.0))
+
+
+def test_wrong_calls_are_one_line(model):
+    with pytest.raises(InputError, match=r"drive must be 'lengths' for a controller that commands lengths, got 'tensi"):
+        simulate(model, model.home, LengthControl(model), duration=0.01, drive="tensions")
+    with pytest.raises(InputError, match="flying carrier 'quad1'"):
+        LengthControl("multi-quadrotor-3")
+    with pytest.raises(InputError, match="stiffness"):
+        LengthControl(model, stiffness=-1)
+    with pytest.raises(InputError, match="lag"):
+        LengthControl(model, lag=-1)
+    state = State(model.home, np.zeros(6), model.carrier_home, np.zeros((1, 6)))
+    reference = references_at_rest(model, model.home)
+    controller = LengthControl(model)
+    with pytest.raises(InputError, match=r"reference\.tensions must be planned"):
+        controller.step(0.0, state, reference._replace(tensions=None))
+    controller.step(0.0, state, reference)
+    with pytest.raises(InputError, match="time must be"):
+        controller.step(0.0, state, reference)
+
+
+def test_other_controllers_keep_their_drive(model):
+    run = simulate(model, model.home, ComputedTorque(model), duration=0.01)
+    assert run.passed
