@@ -22,13 +22,10 @@ def relative_violation(scenario: Scenario, audit: Audit) -> float:
 
 
 def _share(scenario: Scenario, excess: Excess) -> float:
+    """Return an excess relative to its bound, or to the robot's scale of its unit; times are in seconds."""
     if not np.isfinite(excess.value):
         return np.inf
-    return abs(excess.value - excess.bound) / (abs(excess.bound) or _scale(scenario, excess.unit))
-
-
-def _scale(scenario: Scenario, unit: str) -> float:
-    """Return the robot's scale of a unit, in that unit; times are in seconds."""
-    robot = scenario.robot
-    quantity = unit.partition("/")[0].partition(",")[0].strip()
-    return {"m": robot.length, "N": robot.force_scale, "N m": robot.force_scale * robot.length}.get(quantity, 1.0)
+    length, force = scenario.robot.length, scenario.robot.force_scale
+    quantity = excess.unit.partition("/")[0].partition(",")[0].strip()
+    scale = {"m": length, "N": force, "N m": force * length}.get(quantity, 1.0)
+    return abs(excess.value - excess.bound) / (abs(excess.bound) or scale)

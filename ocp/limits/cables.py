@@ -1,4 +1,4 @@
-"""Limits of the cables: speeds, lengths, and distances between cables."""
+"""Limits of the cables: speeds, accelerations, powers, lengths, and distances between cables."""
 
 from itertools import combinations
 
@@ -32,6 +32,34 @@ class CableSpeed(Limit):
     @override
     def values(self, state: State) -> ca.SX:
         return state.rate(state.run.lengths)
+
+
+class CableAcceleration(Limit):
+    """Limit the second derivative of each cable's length, that is, the acceleration of its winch."""
+
+    name, unit = "cable_acceleration", "m/s^2"
+
+    def __init__(self, robot: Robot, most: float):
+        self.low, self.high, self.scale = -most, most, most
+        self.labels = names(robot)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.rate(state.rate(state.run.lengths))
+
+
+class WinchPower(Limit):
+    """Limit the mechanical power of each winch, the tension times the rate of the length, in both directions."""
+
+    name, unit = "winch_power", "W"
+
+    def __init__(self, robot: Robot, most: float):
+        self.low, self.high, self.scale = -most, most, most
+        self.labels = names(robot)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.tensions * state.rate(state.run.lengths)
 
 
 class CableLength(Limit):

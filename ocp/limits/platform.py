@@ -3,7 +3,7 @@
 import casadi as ca
 from typing_extensions import override
 
-from ...models.rotation import body_rate
+from ...models.rotation import body_rate, rotation
 from .limit import Angle, Limit, Magnitude
 from .state import State
 
@@ -26,6 +26,17 @@ class PlatformAcceleration(Magnitude):
     @override
     def values(self, state: State) -> ca.SX:
         return state.platform.acceleration[:3]
+
+
+class PlatformLateralAcceleration(Magnitude):
+    """Limit what an open cup on the platform feels sideways: acceleration less gravity in the platform's x and y."""
+
+    name, unit = "platform_lateral_acceleration", "m/s^2"
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        felt = state.platform.acceleration[:3] - ca.DM(state.robot.gravity)
+        return (rotation(state.platform.pose[3:6]).T @ felt)[:2]
 
 
 class PlatformTurn(Magnitude):

@@ -97,9 +97,11 @@ class State(Displayed):
         ]
 
     def rate(self, values: ca.SX) -> ca.SX:
-        """Return the time derivative of an expression of the poses."""
-        bodies = (self.platform, *self.carriers)
-        return sum((ca.jtimes(values, body.pose, body.velocity) for body in bodies), ca.SX.zeros(*values.shape))
+        """Return the time derivative of an expression of the poses and velocities."""
+        parts = [
+            pair for pose, velocity, a in (self.platform, *self.carriers) for pair in ((pose, velocity), (velocity, a))
+        ]
+        return sum((ca.jtimes(values, *pair) for pair in parts), ca.SX.zeros(*values.shape))
 
     def on_platform(self, points: ca.SX) -> ca.SX:
         """Return points (3, k) of {G} in the platform's frame, (3, k) [m]."""

@@ -18,13 +18,9 @@ def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     """
     if scenario.count > MANY:
         return {}
-    thin = [limit for limit in scenario.limits if limit.thickness < STEPS * _step(scenario, mesh)]
-    functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
-    return {limit: function for limit, function in functions.items() if function is not None}
-
-
-def _step(scenario: Scenario, mesh: Mesh) -> float:
-    """Return the longest distance of platform or carriers from node to node of the reference motion [m]."""
     platform, carriers = scenario.references(scenario.scheme.shares(mesh.steps) * scenario.duration)
     ways = [np.diff(motion.pose[:, POSITION], axis=0) for motion in (platform, *carriers)]
-    return max(float(np.linalg.norm(way, axis=1).max()) for way in ways)
+    longest = max(float(np.linalg.norm(way, axis=1).max()) for way in ways)  # from node to node
+    thin = [limit for limit in scenario.limits if limit.thickness < STEPS * longest]
+    functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
+    return {limit: function for limit, function in functions.items() if function is not None}

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from queue import Empty, SimpleQueue
 from typing import Any, TypeAlias, TypeVar
 
@@ -34,14 +35,13 @@ def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Resu
     """
     raise_if_swallowed()
     queue: Errands = SimpleQueue() if errands is None else errands
-    results: list[Result] = []
-    failures: list[BaseException] = []
+    done: Future[Result] = Future()
 
     def run() -> None:
         try:
-            results.append(work())
+            done.set_result(work())
         except BaseException as error:
-            failures.append(error)
+            done.set_exception(error)
         finally:
             queue.put(None)
 
@@ -52,8 +52,5 @@ def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Resu
         except Empty:
             continue
         if errand is None:
-            break
+            return done.result()
         errand()
-    if failures:
-        raise failures[0]
-    return results[0]

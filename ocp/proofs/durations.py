@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..audits.tensions import INDEPENDENT
 from ..tasks.scenario import Scenario
 
 PLACES = 41
 FASTEST = 1e4  # of X: a hundredth of the duration
 SLACK = 1e-6  # relative: by so much the linear programs may be off
-INDEPENDENT = 1e-3  # of the largest singular value, as the audit has it
 
 
 class Durations(NamedTuple):

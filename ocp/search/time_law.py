@@ -22,8 +22,8 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
 
     Limits of the task that `time_along` does not know are left out: its time is a lower bound even so.
     """
-    task, still = scenario.task, [RestPath]
-    if any(type(path) not in still for path in scenario.carrier_paths.values()):
+    task = scenario.task
+    if not all(isinstance(path, RestPath) for path in scenario.carrier_paths.values()):
         return None, "not computed: carriers have time laws of their own"
     if scenario.wind_box is not None:
         return None, "not computed: in moving air the drag is not proportional to the square of the speed"

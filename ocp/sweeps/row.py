@@ -63,14 +63,10 @@ def plan_case(number: int, robot: Robot, task: Task, file: Path | None) -> tuple
 
 
 def _row(planned: Plan) -> Row:
+    """Return the row of a plan; its cost, where no program was solved, is that of the audited tensions."""
     least, largest = (math.nan if value is None else value for value in (planned.margin, planned.tension_max))
-    duration = planned.scenario.duration
-    reason = "" if planned.feasible else decisive(planned)
-    return Row(planned.status.value, reason, _cost(planned), duration, least, largest, planned.iterations, 0.0)
-
-
-def _cost(planned: Plan) -> float:
-    """Return the objective of a feasible plan; where no program was solved, from the audited tensions."""
+    duration, iterations = planned.scenario.duration, planned.iterations
     if not planned.feasible:
-        return math.nan
-    return cost(planned) if planned.objective is None else planned.objective
+        return Row(planned.status.value, decisive(planned), math.nan, duration, least, largest, iterations, 0.0)
+    objective = cost(planned) if planned.objective is None else planned.objective
+    return Row(planned.status.value, "", objective, duration, least, largest, iterations, 0.0)

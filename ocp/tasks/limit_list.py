@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from ...models import Robot
-from ..limits.cables import CableClearance, CableLength, CableSpeed
+from ..limits.cables import CableAcceleration, CableClearance, CableLength, CableSpeed, WinchPower
 from ..limits.carriers import (
     CarrierAcceleration,
     CarrierReach,
@@ -19,7 +19,14 @@ from ..limits.efforts import efforts
 from ..limits.limit import Limit
 from ..limits.limits import Limits
 from ..limits.places import CablesOutside, CarriersOutside, PlatformOutside
-from ..limits.platform import PlatformAcceleration, PlatformBox, PlatformSpeed, PlatformTilt, PlatformTurn
+from ..limits.platform import (
+    PlatformAcceleration,
+    PlatformBox,
+    PlatformLateralAcceleration,
+    PlatformSpeed,
+    PlatformTilt,
+    PlatformTurn,
+)
 from ..limits.tensions import Margin, TensionRate
 from ..limits.tube import TubeAttitude, TubePosition
 from .task import FreeBase, Task
@@ -45,6 +52,10 @@ def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
     given = task.limits
     if given.cable_speed is not None:
         yield CableSpeed(robot, given.cable_speed)
+    if given.cable_acceleration is not None:
+        yield CableAcceleration(robot, given.cable_acceleration)
+    if given.winch_power is not None:
+        yield WinchPower(robot, given.winch_power)
     if given.cable_length is not None:
         yield CableLength(robot, given.cable_length.min, given.cable_length.max)
     if given.cable_clearance is not None and (clearance := CableClearance(robot, given.cable_clearance)).labels:
@@ -56,7 +67,8 @@ def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
 
 
 def _of_platform(given: TaskLimits) -> Iterator[Limit]:
-    for kind in (PlatformSpeed, PlatformAcceleration, PlatformTurn, PlatformTilt):
+    kinds = PlatformSpeed, PlatformAcceleration, PlatformLateralAcceleration, PlatformTurn, PlatformTilt
+    for kind in kinds:
         if (most := getattr(given, kind.name)) is not None:
             yield kind(most)
     if given.platform_box is not None:

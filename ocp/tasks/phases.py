@@ -49,11 +49,6 @@ class LaidPhase(Displayed):
         """Return whether it is on the ground."""
         return self.columns.shape[1] > 0
 
-    @property
-    def carries(self) -> bool:
-        """Return whether the platform carries a load."""
-        return bool(self.load[0])
-
 
 @dataclass(frozen=True, eq=False)
 class Phases(Displayed):
@@ -69,7 +64,7 @@ class Phases(Displayed):
     @cached_property
     def carry(self) -> bool:
         """Return whether the platform carries a load in some phase."""
-        return any(phase.carries for phase in self.all)
+        return any(phase.load[0] for phase in self.all)
 
     @cached_property
     def rest(self) -> bool:

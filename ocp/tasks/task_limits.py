@@ -107,11 +107,22 @@ class TaskLimits(Part):
     cable_speed: Positive | None = Field(
         default=None, description="rate of every cable's length, the speed of its winch [m/s]"
     )
+    cable_acceleration: Positive | None = Field(
+        default=None, description="second derivative of every cable's length, the acceleration of its winch [m/s^2]"
+    )
+    winch_power: Positive | None = Field(
+        default=None, description="mechanical power of every winch, tension times rate of the length [W]"
+    )
     cable_length: Range | None = Field(default=None, description="range of every cable's length [m]")
     tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
     platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
     platform_acceleration: Positive | None = Field(
         default=None, description="acceleration of the platform frame's origin [m/s^2]"
+    )
+    platform_lateral_acceleration: Positive | None = Field(
+        default=None,
+        description="what an open cup on the platform feels sideways: acceleration less gravity in the platform's x "
+        "and y [m/s^2]",
     )
     platform_turn: Positive | None = Field(default=None, description="angular velocity of the platform [rad/s]")
     platform_tilt: Positive | None = Field(

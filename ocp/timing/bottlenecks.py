@@ -53,7 +53,9 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     platform, carriers = (motion.timed(sd, sdd) for motion in parametrised.at(s))
     names, shares = [], []
     for each in limits:
-        names += [f"{limit.name.partition('_')[2]} of {label}" for limit in each for label in limit.labels]
+        names += [
+            f"{limit.name.partition('_')[2].replace('_', ' ')} of {label}" for limit in each for label in limit.labels
+        ]
         shares.append(relative(each, platform, carriers))
     reached = np.hstack(shares)
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)

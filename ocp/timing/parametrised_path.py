@@ -18,13 +18,14 @@ from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
 from ...models.part import COORDINATES
+from ..audits.checks import LENGTH_TOLERANCE
+from ..limits.limit import Magnitude
 from ..limits.limits import Limits
 from ..tasks.paths import CirclePath, Curve, Motion, RestPath
 from ..tasks.scenario import in_world
 
 STILL = 1e-6  # of the largest speed along s: slower than this the path rests
 SAME = 1e-7  # [m, rad]
-LENGTH_TOLERANCE = 1e-4  # [m], of lengths that the drive keeps
 SIDES = 64  # of the polygon inside the circle of accelerations: it gives away 0.12 %
 LEAST = 40  # intervals between two rests, or between a rest and a bend
 SHARE_OF_BEND = 0.5  # of all intervals, that each bend has: there the limits of speed change at once
@@ -150,21 +151,37 @@ class ParametrisedPath:
             return 1.0 / relative(limits.speeds, platform, carriers).max(axis=1, initial=0.0)
 
     def acceleration_rows(
-        self, carriers: Motion, limits: PathLimits
+        self, platform: Motion, carriers: Motion, limits: PathLimits, shrink: float
     ) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Return the limits of accelerations as a u + b x + c <= 0, (n, SIDES) each, relative.
+        """Return the limits of accelerations, less the share `shrink`, as a u + b x + c <= 0, (n, K) each, relative.
 
-        |P' u + P'' x| lies in the plane of P' and P''; a polygon inside the circle there stands for it.
+        Their values are P u + Q x + R, with R those at rest, Q what velocities add and P what accelerations do. Of a
+        vector, a polygon inside the circle of its bound stands for its length: in the plane of P and Q, if R is zero.
         """
         angle = np.arange(SIDES) * 2 * np.pi / SIDES
         around = np.stack([np.cos(angle), np.sin(angle)])  # (2, SIDES)
-        still = Motion(*(np.zeros_like(part[:, 0]) for part in carriers))
-        by_each = (limits.accelerations.along(still, carriers._replace(acceleration=part)) for part in carriers[1:])
+        bodies = (platform, carriers)
+        still = [np.zeros_like(body.pose) for body in bodies]
+        rest, first, second = (
+            limits.accelerations.along(*map(Motion, (body.pose for body in bodies), velocity, acceleration))
+            for velocity, acceleration in (
+                (still, still),
+                (still, [body.velocity for body in bodies]),
+                ([body.velocity for body in bodies], [body.acceleration for body in bodies]),
+            )
+        )
         rows = []
-        for limit, first, second in zip(limits.accelerations, *by_each, strict=True):
-            R = np.asarray(np.linalg.qr(np.stack([first, second], axis=2), mode="r"))  # (n, 2, 2)
-            a, b = (R[:, :, k] @ around / limit.high for k in (0, 1))
-            rows.append((a, b, np.full_like(a, -np.cos(np.pi / SIDES))))
+        for limit, R, P, Q in zip(limits.accelerations, rest, first, second, strict=True):
+            P, Q = P - R, Q - R
+            if not isinstance(limit, Magnitude):  # each value between two bounds
+                a, b, c = (np.hstack([part, -part]) / limit.high for part in (P, Q, R))
+                rows.append((a, b, c - (1 - shrink)))
+                continue
+            if P.shape[1] > 2:
+                P, Q = np.moveaxis(np.asarray(np.linalg.qr(np.stack([P, Q], axis=2), mode="r")), 2, 0)  # (n, 2) each
+                R = np.zeros_like(P)
+            a, b, c = (part @ around / limit.high for part in (P, Q, R))
+            rows.append((a, b, c - (1 - shrink) * np.cos(np.pi / SIDES)))
         return rows
 
     def _frame(self) -> bool:

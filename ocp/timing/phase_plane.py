@@ -31,14 +31,14 @@ class PhasePlane(Displayed):
         The wrench that the motion needs, (N, n) each, and the facets of the available wrench set.
     x_max
         The largest x that the limits of speed allow, (N,) [1/s^2].
-    carrier_rows
-        Limits of the carriers' accelerations, a u + b x + c <= 0 with (N, k) each.
+    acceleration_rows
+        Limits of accelerations, a u + b x + c <= 0 with (N, k) each.
     """
 
     wrench: Wrench
     available: Facets
     x_max: np.ndarray
-    carrier_rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
+    acceleration_rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
 
     def rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return all limits but x_max as a u + b x + c <= 0, (N, K) each, without units.
@@ -50,7 +50,7 @@ class PhasePlane(Displayed):
         beside = np.einsum("nij,nj->ni", self.available.outside, self.wrench.c - self.available.offset)
         out = np.linalg.norm(beside, axis=1) > FLAT * (weight + np.linalg.norm(self.wrench.c, axis=1))
         never = np.where(out, 1.0, -1.0)[:, None]
-        rows = [(a, b, c), *self.carrier_rows, (np.zeros_like(never), np.zeros_like(never), never)]
+        rows = [(a, b, c), *self.acceleration_rows, (np.zeros_like(never), np.zeros_like(never), never)]
         a, b, c = (np.hstack(parts) for parts in zip(*rows, strict=True))
         return a, b, c
 
@@ -111,8 +111,7 @@ def phase_plane(
     middle = (low + high) / 2
     available = replace(available, low=np.minimum(low + inside, middle), high=np.maximum(high - inside, middle))
     x_max = (parametrised.speed_limit(platform, carriers, limits) * (1 - shrink)) ** 2
-    lowered = [(a, b, c * (1 - shrink)) for a, b, c in parametrised.acceleration_rows(carriers, limits)]
-    return PhasePlane(wrench, available, x_max, lowered)
+    return PhasePlane(wrench, available, x_max, parametrised.acceleration_rows(platform, carriers, limits, shrink))
 
 
 def proofs(parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float) -> list[Proof]:

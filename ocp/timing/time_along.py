@@ -33,7 +33,9 @@ from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import PhasePlane, phase_plane, proofs
 
-KNOWN_LIMITS = ("platform_speed", "cable_speed", "carrier_speed", "carrier_acceleration")
+SPEEDS = ("platform_speed", "cable_speed", "carrier_speed")
+ACCELERATIONS = ("platform_acceleration", "platform_lateral_acceleration", "cable_acceleration", "carrier_acceleration")
+KNOWN_LIMITS = (*SPEEDS, *ACCELERATIONS)
 ATTEMPTS = 8
 MOST_INTERVALS = 6400
 FINER_TRIES = 2  # after a grid on which the search ended without a law
@@ -136,7 +138,7 @@ def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
         for limit in limit_list(robot, task)
         if limit.name in KNOWN_LIMITS and (not limit.name.startswith("carrier") or limit.labels[0] in names)
     ]
-    parts = [tuple(limit for limit in kept if limit.name.endswith(ending)) for ending in ("speed", "acceleration")]
+    parts = (tuple(limit for limit in kept if limit.name in names) for names in (SPEEDS, ACCELERATIONS))
     return PathLimits(*(Limits(robot, part) for part in parts))
 
 
