@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, get_args
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from ...base.display import Displayed
 from ...control.trajectory import Trajectory
 from ...models.part import Part
 from ...models.robot import Robot
@@ -30,7 +31,7 @@ Seconds = Annotated[float, BeforeValidator(number_in), Field(ge=0, le=LONGEST, a
 
 
 @dataclass
-class Running:
+class Running(Displayed):
     """A simulation that runs, as events change it.
 
     Attributes

@@ -1,5 +1,6 @@
 """Wrenches on the platform: a push for some time, and a wall that it meets."""
 
+from abc import ABC
 from math import inf
 from typing import Any, Literal, Self
 
@@ -13,14 +14,25 @@ from ...models.robot import Robot
 from .event import Event, Seconds, number_in
 
 
-class Push(Event):
+class Lasting(Event, ABC):
+    """An event that acts on the platform for some time."""
+
+    duration: Seconds | None = Field(default=None, description="how long it acts [s]; default: until the end")
+
+    @property
+    @override
+    def until(self) -> float:
+        """Return the time at which it ends [s]; infinity if it does not."""
+        return inf if self.duration is None else self.at + self.duration
+
+
+class Push(Lasting):
     """A force and a moment on the platform, from one time to another."""
 
     kind: Literal["push"] = "push"
     short = "push FX FY FZ [MX MY MZ]"
     force: Vector3 = Field(default=(0.0, 0.0, 0.0), description="force in {G} [N]")
     moment: Vector3 = Field(default=(0.0, 0.0, 0.0), description="moment about the CoM in {G} [N m]")
-    duration: Seconds | None = Field(default=None, description="how long it acts [s]; default: until the end")
 
     @override
     @classmethod
@@ -28,12 +40,6 @@ class Push(Event):
         """Return force and moment from their numbers."""
         numbers = [number_in(word) for word in words]
         return {"force": numbers[:3]} | ({"moment": numbers[3:]} if len(numbers) > 3 else {})
-
-    @property
-    @override
-    def until(self) -> float:
-        """Return the time at which it ends [s]; infinity if it does not."""
-        return inf if self.duration is None else self.at + self.duration
 
     @override
     def describe(self, robot: Robot) -> str:
@@ -49,7 +55,7 @@ class Push(Event):
         return np.array([*self.force, *self.moment])
 
 
-class Wall(Event):
+class Wall(Lasting):
     """A plane that pushes the platform away, with a spring and a damper and without friction.
 
     It touches the ball of the given radius about the origin of the platform frame. The force acts along the normal and
@@ -63,19 +69,12 @@ class Wall(Event):
     stiffness: Positive = Field(description="force per depth [N/m]")
     damping: NonNegative = Field(default=0.0, description="force per speed into the wall [N s/m]")
     radius: NonNegative = Field(default=0.0, description="of the ball that it touches [m]")
-    duration: Seconds | None = Field(default=None, description="how long it stands [s]; default: until the end")
 
     @model_validator(mode="after")
     def _has_normal(self) -> Self:
         if not any(self.normal):
             raise ValueError("normal must have a length, got zeros")
         return self
-
-    @property
-    @override
-    def until(self) -> float:
-        """Return the time at which it ends [s]; infinity if it does not."""
-        return inf if self.duration is None else self.at + self.duration
 
     @override
     def describe(self, robot: Robot) -> str:
