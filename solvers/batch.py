@@ -16,12 +16,10 @@ from ..base.errors import InputError
 from ..base.inputs import leading, number, real_array, shown, whole_number
 from ..base.text import quantity
 from ..core import CABLES, ROWS, solve_rows
-from .problem import TensionProblem
+from .problem import Array, TensionProblem
 from .solution import TensionSolution
 from .solve import solve
 from .status import INVALID, STATUSES, UNSURE, Status
-
-Array = NDArray[np.float64]
 
 ROWS_WORTH_A_THREAD = 2000  # about a millisecond
 BACKENDS = LANES, ONE_BY_ONE = "lanes", "c"

@@ -8,18 +8,17 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
 from ..base.inputs import shown, whole_number
 from .derivatives import derivatives
-from .problem import TensionProblem
+from .problem import Array, TensionProblem
 from .solve import solve
 
 if TYPE_CHECKING:
     import casadi
 
-Array = NDArray[np.float64]
 _Matrix = tuple[str, tuple[int, int]]  # name and shape
 _Options = Mapping[str, Any]
 

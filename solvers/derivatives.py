@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 
 from ..base.errors import InputError
 from ..base.inputs import required
-from .problem import TensionProblem
+from .problem import Array, TensionProblem
 from .solution import TensionSolution
-
-Array = NDArray[np.float64]
 
 # A tension this near to its limit, relative to the largest tension, is at it; a multiplier this small, relative to the
 # largest gradient of the cost, does not hold it there. Singular values this small count as zero.

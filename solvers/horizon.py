@@ -6,14 +6,12 @@ The method, its conditions and its sources are described in `docs/horizon.md`.
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.display import Displayed, record
 from ..base.errors import InputError
 from ..base.inputs import real_array, shown, whole_number
 from ..core import PROCESSOR, horizon_places, horizon_relative_to, horizon_size, horizon_solve
-
-Array = NDArray[np.float64]
+from .problem import Array
 
 COLD, WARM, SHIFTED = 0, 1, 2  # of `towline_beginning`
 

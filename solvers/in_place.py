@@ -4,15 +4,12 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..core import CABLES, ROWS, solve_rows
 from .batch import solve_batch
-from .problem import TensionProblem
+from .problem import Array, TensionProblem
 from .solve import solve
 from .status import INFEASIBLE, INVALID, OPTIMAL, SINGULAR, UNSURE
-
-Array = NDArray[np.float64]
 
 RHO = 1e8  # weight of the squared wrench error in a soft solution, beside the squared tensions
 

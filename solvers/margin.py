@@ -12,7 +12,6 @@ from math import comb
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.display import record
 from ..base.inputs import required
@@ -20,9 +19,7 @@ from ..base.tolerances import NEGLIGIBLE, OPTIMALITY, RANK
 from .box_least_squares import Projection, project
 from .certificate import certificate_along
 from .exact_arithmetic import exact_optimum
-from .problem import TensionProblem
-
-Array = NDArray[np.float64]
+from .problem import Array, TensionProblem
 
 
 class Margin(NamedTuple):
