@@ -26,10 +26,10 @@ def time(
 ) -> None:
     """Find the fastest motion along a task's path with every tension inside its limits; exit code 1 if none exists.
 
-    It uses these keys of the task: `path`, `base` (hold or given), `margin`, and in `limits` platform_speed,
-    cable_speed, carrier_speed and carrier_acceleration. `duration` is ignored, except for circles. `wind: [0, 0, 0]`
-    includes the drag of still air; without `wind` there are no aerodynamic forces. Any other wind or limit, a tube and
-    a free base are refused.
+    It uses these keys of the task: `path`, `base` (hold or given), `margin`, and in `limits` the speeds of platform,
+    cables and carriers, their accelerations, and platform_lateral_acceleration. `duration` is ignored, except for
+    circles. `wind: [0, 0, 0]` includes the drag of still air; without `wind` there are no aerodynamic forces. Any other
+    wind or limit, a tube and a free base are refused.
 
     The motion is audited like every plan. The result is a task file that contains the time law, and `towline plan`
     reads it like any other task.

@@ -64,6 +64,12 @@ def acceleration(found, poses):
     return np.linalg.norm(rate(found, rate(found, poses[:, :3]))[3:-3], axis=1)
 
 
+def felt(found):
+    """What a body on the platform feels in the axes of the platform, (n, 3) [m/s^2]."""
+    poses = found.audit.motion.pose
+    return turned(poses).inv().apply(rate(found, rate(found, poses[:, :3])) + UP)
+
+
 def tilt(poses):
     return np.arccos(np.clip(turned(poses).apply([0, 0, 1])[:, 2], -1, 1))
 
@@ -203,6 +209,27 @@ CASES = {
         lambda b: {"platform_box": {"min": [-1, -1, 0], "max": [b, 1, 2]}},
     ),
     "cable_speed": Case("ipanema-1", OUT, lambda p: np.abs(rate(p, lengths(p))), lambda b: {"cable_speed": b}),
+    "cable_acceleration": Case(
+        "ipanema-1",
+        OUT,
+        lambda p: np.abs(rate(p, rate(p, lengths(p)))[3:-3]),
+        lambda b: {"cable_acceleration": b},
+        tolerance=5e-3,
+    ),
+    "winch_power": Case(
+        "ipanema-1",
+        OUT,
+        lambda p: np.abs(rate(p, lengths(p)) * p.audit.tensions),
+        lambda b: {"winch_power": b},
+        tolerance=1e-3,
+    ),
+    "platform_lateral_acceleration": Case(
+        "ipanema-1",
+        OUT,
+        lambda p: np.linalg.norm(felt(p)[3:-3, :2], axis=1),
+        lambda b: {"platform_lateral_acceleration": b},
+        tolerance=5e-3,
+    ),
     "cable_length": Case("ipanema-1", OUT, lengths, lambda b: {"cable_length": {"min": 0, "max": b}}, share=0.97),
     "tension_rate": Case(
         "wang-flying",

@@ -5,6 +5,7 @@ import sys
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError, SolverError
 from towline.models import Dynamics, Robot, load
@@ -440,3 +441,61 @@ def test_without_the_extra_it_says_how_to_install_it(monkeypatch):
     robot = point_mass([[0, 0, 4]], ["z"])
     with pytest.raises(SolverError, match=r"pip install 'towline\[timing\]'"):
         time_along(robot, along(straight(robot, [0, 0, 1, 0, 0, 0])))
+
+
+FACADE = [[x, 0.0, 0.4 + 0.2 * (k // 2)] for k, x in enumerate([-1, 1, 1, -1, -1, 1, 1, -1])]
+
+
+def test_a_facade_is_painted_at_a_steady_speed_with_gentle_ends():
+    """Lines at 0.3 m/s, 0.2 m apart: without a limit the ends were taken at 33 m/s^2."""
+    path = {"kind": "waypoints", "points": FACADE, "blend": 0.002}
+    timing = time_along("ipanema-1", {"path": path, "limits": {"platform_speed": 0.3, "platform_acceleration": 5}})
+    assert timing.feasible
+    times = np.linspace(0, timing.duration, 40_001)
+    platform, _ = timing.scenario.motion(times, None)
+    position = platform.pose[:, :3]
+    velocity = np.gradient(position, times, axis=0)
+    assert np.abs(np.diff(velocity, axis=0) / np.diff(times)[:, None]).max() <= 5 * 1.05
+    speed = np.linalg.norm(velocity, axis=1)
+    assert speed.max() <= 0.3 * (1 + 1e-4)
+    assert np.mean(speed > 0.98 * 0.3) > 0.9
+    from_point = np.linalg.norm(position[:, None] - np.array(FACADE), axis=2).min(axis=0)
+    assert from_point.max() <= 0.002 * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("name", ["cable_acceleration", "platform_lateral_acceleration", "platform_acceleration"])
+@pytest.mark.parametrize("tilts", [False, True])
+def test_accelerations_stay_inside_their_limits_and_one_holds_it_back(name, tilts):
+    """By differences of poses and lengths alone; a platform that tilts feels gravity sideways."""
+    turned = [0.03, -0.02, 0.1] if tilts else [0, 0, 0]
+    path = {
+        "kind": "waypoints",
+        "points": [[0, 0, 1, 0, 0, 0], [0.4, 0.2, 1.1, *turned], [0.1, -0.3, 1.2, 0, 0, 0]],
+        "blend": 0.05,
+    }
+    robot, most = load("cogiro"), 0.8
+    free = time_along(robot, {"path": path})
+    timing = time_along(robot, {"path": path, "limits": {name: most}})
+    assert timing.feasible
+    assert timing.duration > free.duration
+    times = np.linspace(0, timing.duration, 4001)
+    pose = timing.scenario.motion(times, None)[0].pose
+    h = times[1]
+    if name == "cable_acceleration":
+        size = np.abs(np.diff(Dynamics(robot).cable_lengths(pose), 2, axis=0)).max(axis=1) / h**2
+    else:
+        felt = np.diff(pose[:, :3], 2, axis=0) / h**2
+        if name == "platform_lateral_acceleration":
+            R = Rotation.from_euler("ZYX", pose[1:-1, 5:2:-1])
+            felt = R.inv().apply(felt + np.array([0, 0, 9.81]))[:, :2]
+        size = np.linalg.norm(felt, axis=1)
+    assert size.max() <= most * (1 + 5e-3)
+    assert size.max() > 0.98 * most
+    assert any(name.partition("_")[2].replace("_", " ") in each.limit for each in timing.law.bottlenecks)
+
+
+def test_a_lateral_acceleration_that_rest_exceeds_has_no_law():
+    path = {"kind": "line", "start": [0, 0, 1, 0, 0, 0], "end": [0.3, 0, 1, 0.1, 0, 0]}
+    timing = time_along("cogiro", {"path": path, "limits": {"platform_lateral_acceleration": 0.5}})
+    assert not timing.feasible
+    assert timing.status is not MotionStatus.FEASIBLE

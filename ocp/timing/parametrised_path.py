@@ -160,15 +160,9 @@ class ParametrisedPath:
         """
         angle = np.arange(SIDES) * 2 * np.pi / SIDES
         around = np.stack([np.cos(angle), np.sin(angle)])  # (2, SIDES)
-        bodies = (platform, carriers)
-        still = [np.zeros_like(body.pose) for body in bodies]
         rest, first, second = (
-            limits.accelerations.along(*map(Motion, (body.pose for body in bodies), velocity, acceleration))
-            for velocity, acceleration in (
-                (still, still),
-                (still, [body.velocity for body in bodies]),
-                ([body.velocity for body in bodies], [body.acceleration for body in bodies]),
-            )
+            limits.accelerations.along(Motion(platform.pose, *of(platform)), Motion(carriers.pose, *of(carriers)))
+            for of in (_at_rest, _accelerated, _moving)
         )
         rows = []
         for limit, R, P, Q in zip(limits.accelerations, rest, first, second, strict=True):
@@ -228,6 +222,21 @@ class ParametrisedPath:
         )
         still = speed <= max(STILL * speed.max(), SAME)
         _refuse(s, still, "path must move platform or carriers everywhere, as lines, circles and waypoints do", "rest")
+
+
+def _at_rest(body: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return velocity and acceleration of a motion by s for u = x = 0."""
+    return np.zeros_like(body.pose), np.zeros_like(body.pose)
+
+
+def _accelerated(body: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return them for u = 1 and x = 0."""
+    return np.zeros_like(body.pose), body.velocity
+
+
+def _moving(body: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Return them for u = 0 and x = 1."""
+    return body.velocity, body.acceleration
 
 
 def _grid(start: float, end: float, intervals: int, bent: bool) -> np.ndarray:
