@@ -27,17 +27,6 @@ from .run_statistics import Extremes
 if TYPE_CHECKING:
     import xarray as xr
 
-# The statistics of a run: its number of periods, errors [m], tensions [N], their excess over t_max relative to the
-# cable's range, the number of periods that begin with a slack cable, and the number of periods with each status.
-FIGURES = np.dtype(
-    [
-        ("lasted", "<i8"),
-        *((name, "<f8") for name in ("error_rms", "error_max", "tension_min", "tension_max", "exceeded")),
-        ("slack", "<i8"),
-        ("answered", "<i8", (len(ANSWERS),)),
-    ]
-)
-
 
 def copies(controller: Controller, count: int) -> list[Controller]:
     """Return a controller for each of `count` runs, or the given one if it accepts batches.
@@ -58,15 +47,9 @@ def copies(controller: Controller, count: int) -> list[Controller]:
 
 def fly_block(plant: Plant, controller: Controller, conditions: Experiment, seeds: Sequence[int]) -> np.ndarray:
     """Simulate a block of runs in parallel, and return the statistics of each, (N,) of `FIGURES`."""
-    robot = plant.robot
-    kept = Extremes(conditions, robot.t_min, robot.t_max, len(seeds))
+    kept = Extremes(conditions, plant.robot, len(seeds))
     lasted, _ = fly(plant, copies(controller, len(seeds)), conditions, seeds, kept)
-    figures = np.zeros(len(seeds), dtype=FIGURES)
-    figures["lasted"], figures["error_rms"] = lasted, np.sqrt(kept.squares / np.maximum(lasted, 1))
-    figures["answered"] = kept.answers
-    for name in ("error_max", "tension_min", "tension_max", "exceeded", "slack"):
-        figures[name] = getattr(kept, name)
-    return figures
+    return kept.figures(lasted)
 
 
 def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:

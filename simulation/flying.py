@@ -16,7 +16,7 @@ from .checking import check_command, check_wrench
 from .command_conversion import Orders
 from .events import Event, Running
 from .experiment import Experiment
-from .recorder import Period, Recorder
+from .record import Period, Recorder
 from .sensors import Reading, Sensors
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite

@@ -1,12 +1,46 @@
-"""`Record`: the complete history of one run."""
+"""Record runs `Period` by `Period`: `Recorder`, and `Record`, the complete history of one run."""
+
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ..base.display import Displayed
-from ..control import ANSWERS
+from ..control import ANSWERS, Command
 from ..control.command import NOTHING
 from ..models.robot import Robot
-from .recorder import Period
+
+
+class Period(NamedTuple):
+    """A period of parallel runs, from its beginning on. The next one overwrites its arrays.
+
+    Attributes
+    ----------
+    number
+        Number of the period, from 0.
+    alive
+        Runs that have not diverged at its end, (N,).
+    motions, lengths
+        As `core.sense` writes them.
+    tensions
+        Mean tensions over the period, (N, m) [N].
+    command
+        Command of all runs; for a single run its arrays have no leading dimension.
+    """
+
+    number: int
+    alive: np.ndarray
+    motions: np.ndarray
+    lengths: np.ndarray
+    tensions: np.ndarray
+    command: Command
+
+
+class Recorder(Protocol):
+    """A record of runs."""
+
+    def take(self, period: Period) -> None:
+        """Record a period."""
+        ...
 
 
 class Record(Displayed):

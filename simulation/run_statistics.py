@@ -4,35 +4,35 @@ import numpy as np
 
 from ..control import ANSWERS
 from ..control.command import PLANNED
+from ..models.robot import Robot
 from .experiment import Experiment
-from .recorder import Period
+from .record import Period
+
+# The statistics of a run: its number of periods, errors [m], tensions [N] of cables that are not cut, their excess over
+# t_max relative to the cable's range, the number of periods that begin with a slack cable whose t_min is above zero,
+# and the number of periods with each status.
+FIGURES = np.dtype(
+    [
+        ("lasted", "<i8"),
+        *((name, "<f8") for name in ("error_rms", "error_max", "tension_min", "tension_max", "exceeded")),
+        ("slack", "<i8"),
+        ("answered", "<i8", (len(ANSWERS),)),
+    ]
+)
 
 
 class Extremes:
-    """Accumulate per-run statistics.
+    """Accumulate per-run statistics. Each period takes a few operations on whole arrays."""
 
-    Each period takes a few operations on whole arrays. The properties reduce them to one number per run.
-
-    Attributes
-    ----------
-    squares
-        Sum of the squared position errors [m^2], (N,).
-    slack
-        Number of periods that begin with a slack cable whose t_min is above zero, (N,).
-    answers
-        Number of control steps with each status of `ANSWERS`, (N, 5).
-    """
-
-    def __init__(self, conditions: Experiment, t_min: np.ndarray, t_max: np.ndarray, flights: int):
-        self._references, self._t_max, self._range = conditions.references, t_max, t_max - t_min
+    def __init__(self, conditions: Experiment, robot: Robot, flights: int):
+        self._references, self._t_max, self._range = conditions.references, robot.t_max, robot.t_max - robot.t_min
         periods = np.arange(len(conditions.references))
-        self._taut = conditions.should_pull(t_min, periods)
-        self._cut = conditions.cut(len(t_min), periods + 1)  # also inside the period
+        self._taut = conditions.should_pull(robot.t_min, periods)
+        self._cut = conditions.cut(robot.m, periods + 1)  # also inside the period
         self._rows = np.arange(flights)
-        self.squares, self.slack = np.zeros(flights), np.zeros(flights, dtype=int)
-        self.answers = np.zeros((flights, len(ANSWERS)), dtype=int)
-        self._largest = np.zeros(flights)  # squared error
-        self._least, self._most = np.full((flights, len(t_max)), np.inf), np.full((flights, len(t_max)), -np.inf)
+        self._squares, self._largest = np.zeros(flights), np.zeros(flights)  # of the errors: sum, and largest
+        self._slack, self._answers = np.zeros(flights, dtype=int), np.zeros((flights, len(ANSWERS)), dtype=int)
+        self._least, self._most = np.full((flights, robot.m), np.inf), np.full((flights, robot.m), -np.inf)
 
     def take(self, period: Period) -> None:
         """Keep a period."""
@@ -42,37 +42,26 @@ class Extremes:
         off = period.motions[rows, 0, :3] - self._references[period.number].pose[:3]
         off *= off
         square = off[:, 0] + off[:, 1] + off[:, 2]
-        self.squares[rows] += square
+        self._squares[rows] += square
         self._largest[rows] = np.maximum(self._largest[rows], square)
         whole = ~self._cut[period.number]
         self._least[rows] = np.minimum(self._least[rows], tensions, where=whole, out=self._least[rows])
         self._most[rows] = np.maximum(self._most[rows], tensions, where=whole, out=self._most[rows])
         if not tensions.min() > 0:
-            self.slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
+            self._slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
         answered = np.atleast_1d(command.answered)[rows]
         if answered.any():
-            self.answers[self._rows[rows], answered] += 1
+            self._answers[self._rows[rows], answered] += 1
         else:
-            self.answers[rows, PLANNED] += 1
+            self._answers[rows, PLANNED] += 1
 
-    @property
-    def error_max(self) -> np.ndarray:
-        """Return the largest position error [m], (N,)."""
-        return np.sqrt(self._largest)
-
-    @property
-    def tension_min(self) -> np.ndarray:
-        """Return the smallest tension of cables that are not cut [N], (N,); 0 if all are."""
-        least = self._least.min(axis=1)
-        return np.where(np.isinf(least), 0.0, least)
-
-    @property
-    def tension_max(self) -> np.ndarray:
-        """Return the largest tension of cables that are not cut [N], (N,); 0 if all are."""
-        most = self._most.max(axis=1)
-        return np.where(np.isinf(most), 0.0, most)
-
-    @property
-    def exceeded(self) -> np.ndarray:
-        """Return the largest excess of tensions over t_max relative to the cable's range, at least 0, (N,)."""
-        return np.maximum(((self._most - self._t_max) / self._range).max(axis=1), 0.0)
+    def figures(self, lasted: np.ndarray) -> np.ndarray:
+        """Return the statistics of runs of `lasted` periods each, (N,) of `FIGURES`; no tensions are 0 N."""
+        result = np.zeros(len(lasted), dtype=FIGURES)
+        result["lasted"], result["slack"], result["answered"] = lasted, self._slack, self._answers
+        result["error_rms"] = np.sqrt(self._squares / np.maximum(lasted, 1))
+        result["error_max"] = np.sqrt(self._largest)
+        for name, each in (("tension_min", self._least.min(axis=1)), ("tension_max", self._most.max(axis=1))):
+            result[name] = np.where(np.isinf(each), 0.0, each)
+        result["exceeded"] = np.maximum(((self._most - self._t_max) / self._range).max(axis=1), 0.0)
+        return result

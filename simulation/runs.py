@@ -17,9 +17,10 @@ from ..base.version import __version__
 from ..control import Controller
 from ..plant import Plant
 from .experiment import Experiment, Wind
-from .flights import FIGURES, copies, fly_block, passed
+from .flights import copies, fly_block, passed
 from .identity import identity
-from .winds import ConstantWind
+from .run_statistics import FIGURES
+from .winds import MeanWind
 
 SIDE_BY_SIDE = 250  # flights in one block, at most
 BLOCK_TIME = 3.0  # [s] that a block should take: what is computed is stored so often, and lost if the process ends
@@ -162,5 +163,5 @@ def _header(plant: Plant, controller: Controller, conditions: Experiment, seeds:
 
 def _named(wind: Wind) -> str:
     """Return an identification of a wind, readable unless it is a user's function."""
-    known = f"{wind} " if isinstance(wind, ConstantWind) else ""
+    known = f"{wind} " if isinstance(wind, MeanWind) else ""
     return known + identity(wind)

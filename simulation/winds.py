@@ -12,36 +12,23 @@ from ..models.robot import Robot
 from .experiment import Wind
 
 
-class ConstantWind:
-    """The same wind at all times."""
-
-    def __init__(self, velocity: np.ndarray):
-        self._velocity = velocity
-
-    @override
-    def __str__(self) -> str:
-        return f"{' '.join(f'{part:g}' for part in self._velocity)} m/s"
-
-    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
-        """Return it, (K, 3) [m/s]."""
-        return air.constant(times, self._velocity.tolist())
-
-
-class Gusts(ConstantWind):
-    """Dryden turbulence about a mean wind, with half the intensity vertically."""
+class MeanWind:
+    """A mean wind [m/s] with Dryden turbulence about it, half as intense vertically; an intensity of 0: none."""
 
     def __init__(self, velocity: np.ndarray, intensity: float):
-        super().__init__(velocity)
-        self._intensity = intensity
+        self._velocity, self._intensity = velocity.tolist(), intensity
 
     @override
     def __str__(self) -> str:
-        return f"{super().__str__()} with gusts of {self._intensity:g} m/s"
+        gusts = f" with gusts of {self._intensity:g} m/s" if self._intensity else ""
+        return f"{' '.join(f'{part:g}' for part in self._velocity)} m/s{gusts}"
 
     def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
         """Return the wind of a seed, (K, 3) [m/s]."""
+        if not self._intensity:
+            return air.constant(times, self._velocity)
         intensity = (self._intensity, self._intensity, self._intensity / 2)
-        return air.dryden(times, self._velocity.tolist(), intensity, seed=seed)
+        return air.dryden(times, self._velocity, intensity, seed=seed)
 
 
 def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
@@ -66,4 +53,4 @@ def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
         velocity = np.empty(0)
     if velocity.shape != (3,) or not (np.abs(velocity) <= 1e3).all():
         raise InputError(f"wind must be three numbers from -1000 to 1000 m/s or a function of times, got {shown(wind)}")
-    return Gusts(velocity, gusts) if gusts else ConstantWind(velocity)
+    return MeanWind(velocity, gusts)
