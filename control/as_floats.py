@@ -1,4 +1,4 @@
-"""Check the arguments of a controller: `as_floats`, a state or a reference as arrays; `rows_of`, `is_time`."""
+"""Check the arguments of a controller: `as_floats`, a state or a reference as arrays; `rows_of`, times."""
 
 from numbers import Real
 from typing import Any, TypeVar
@@ -13,6 +13,7 @@ from .state import State
 
 Given = TypeVar("Given", State, Reference)
 
+ROUNDING = 1e-9  # [s]
 LATEST = 1e300  # [s]: a later time, and one that is not finite, is refused
 
 
@@ -22,6 +23,13 @@ def is_time(value: object) -> bool:
         return abs(value) <= LATEST
     number: Any = value
     return isinstance(value, Real) and not isinstance(value, np.timedelta64) and bool(abs(number) <= LATEST)
+
+
+def measured_at(seen: Any, time: float) -> float:
+    """Return when a state was measured, if that is a time up to the step's [s]; otherwise raise InputError."""
+    if not is_time(seen) or not float(seen) <= time + ROUNDING:
+        raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
+    return float(seen)
 
 
 def rows_of(state: State) -> int | None:

@@ -15,7 +15,7 @@ from ..models.record import record_of
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
-from .as_floats import as_floats, is_time, rows_of
+from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
 from .boxes import boxes, stay_inside
 from .command import HOLD, NOTHING, NOWHERE, PLANNED, SOFT, Command
 from .command_delay import Pending
@@ -30,7 +30,6 @@ from .tension_loop import TensionLoop
 
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
 SHORTEST_LAG = 0.005  # [s]
-ROUNDING = 1e-9  # [s]
 OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; of the time since a state was measured
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
@@ -253,7 +252,7 @@ class ComputedTorque(Controller):
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
         self._senses = state.tensions is not None
-        seen = time if state.time is None else self._time_of(state.time, time)
+        seen = time if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
         own = self._robot, self._settings
         if time - seen <= ROUNDING and since == dt:
@@ -273,13 +272,6 @@ class ComputedTorque(Controller):
         self._first = time if self._time is None else self._first
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
-
-    @staticmethod
-    def _time_of(seen: Any, time: float) -> float:
-        """Return when a state was measured, if that is a time up to the step's [s]."""
-        if not is_time(seen) or not float(seen) <= time + ROUNDING:
-            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
-        return float(seen)
 
     def _remember(self, time: float, dt: float) -> None:
         """Add the command that has acted since the last step to those that states may be too old to show."""

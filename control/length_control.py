@@ -11,11 +11,13 @@ from ..base.inputs import number, repeated, required, shown
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
 from ..models.robot import Robot
-from .as_floats import as_floats, is_time, rows_of
+from .as_floats import as_floats, is_time, measured_at, rows_of
 from .command import HOLD, PLANNED, Command
 from .controller import Controller
+from .open_loop import planned_command
 from .reference import Reference
 from .state import State
+from .trajectory import moved_on
 
 SHARE = 0.05  # of the robot's length: the default of `most`
 CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]
@@ -112,32 +114,21 @@ class LengthControl(Controller):
         if not is_time(time) or (self._time is not None and not float(time) > self._time):
             raise InputError(f"time must be a finite number that increases from step to step, got {shown(time)}")
         dt = 0.0 if self._time is None else float(time) - self._time
-        seen = time if state.time is None else state.time
-        if not is_time(seen) or float(seen) > float(time):
-            raise InputError(f"state.time must be a number up to the step's time, {time:g} s, got {shown(seen)}")
-        corrected, held = self._correction(dt, float(time) - float(seen), state, reference)
-        lead, (pose, carriers, tensions) = () if rows is None else (rows,), self._ahead(dt, reference)
+        age = 0.0 if state.time is None else time - measured_at(state.time, time)
+        corrected, held = self._correction(dt, age, state, reference)
+        pose, carriers, tensions = self._ahead(dt, reference)
         lengths = self._dynamics.cable_lengths(pose, carriers) / (1.0 + tensions / self._EA) + corrected
         self._time, self._tensions = float(time), reference.tensions
-        planned = self.robot.t_min if reference.tensions is None else reference.tensions
-        motions = (reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration)
-        pose, velocity, acceleration = (np.broadcast_to(part, (*lead, *part.shape[-2:])) for part in motions)
-        return Command(
-            tensions=np.broadcast_to(np.clip(planned, self.robot.t_min, self.robot.t_max), (*lead, self.robot.m)),
-            carrier_pose=pose,
-            carrier_velocity=velocity,
-            carrier_acceleration=acceleration,
+        command = planned_command(self.robot, reference, rows)
+        return command._replace(
             answered=np.where(held, HOLD, PLANNED).astype(np.int8),
-            lengths=np.broadcast_to(lengths, (*lead, self.robot.m)),
+            lengths=np.broadcast_to(lengths, command.tensions.shape),
         )
 
     def _ahead(self, dt: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the planned pose, poses of carriers and tensions when winches will have followed."""
         lag, tensions = self._lag, reference.tensions
-        pose = reference.pose + lag * (reference.velocity + 0.5 * lag * reference.acceleration)
-        carriers = reference.carrier_pose + lag * (
-            reference.carrier_velocity + 0.5 * lag * reference.carrier_acceleration
-        )
+        (pose, *_), (carriers, *_) = moved_on(reference[:3], lag), moved_on(reference[3:6], lag)
         if tensions is None or not np.isfinite(tensions).all():
             if np.isfinite(self._EA).any():
                 raise InputError(
@@ -150,8 +141,7 @@ class LengthControl(Controller):
 
     def _correction(self, dt: float, age: float, state: State, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
         """Return the corrections of the lengths [m], (..., m), and where they are held at their bound, (...)."""
-        planned = reference.pose - age * (reference.velocity - 0.5 * age * reference.acceleration)
-        error = planned - state.pose
+        error = moved_on(reference[:3], -age)[0] - state.pose
         error[..., 3:] = (error[..., 3:] + np.pi) % (2 * np.pi) - np.pi
         known = np.asarray(np.isfinite(error).all(axis=-1))
         error = np.where(known[..., None], error, 0.0) * self.robot.dof_mask

@@ -59,11 +59,14 @@ class OpenLoop(Controller):
         """
         rows = rows_of(required("state", state, State))
         reference = as_floats(required("reference", reference, Reference), self.robot, rows)
-        lead, planned = () if rows is None else (rows,), reference.tensions
-        known = planned is not None and bool(np.isfinite(planned).all())
-        tensions = self.robot.t_min if planned is None or not known else planned
-        carriers = (reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration)
-        answered = np.full(lead, PLANNED if known else HOLD, dtype=np.int8)
-        given = np.broadcast_to(np.clip(tensions, self.robot.t_min, self.robot.t_max), (*lead, self.robot.m))
-        pose, velocity, acceleration = (np.broadcast_to(part, (*lead, *np.shape(part)[-2:])) for part in carriers)
-        return Command(given, pose, velocity, acceleration, answered)
+        return planned_command(self.robot, reference, rows)
+
+
+def planned_command(robot: Robot, reference: Reference, rows: int | None) -> Command:
+    """Return planned tensions inside their limits, or the lowest, and motion of carriers, for a batch of `rows`."""
+    lead, planned = () if rows is None else (rows,), reference.tensions
+    known = planned is not None and bool(np.isfinite(planned).all())
+    tensions = np.clip(robot.t_min if planned is None or not known else planned, robot.t_min, robot.t_max)
+    answered = np.full(lead, PLANNED if known else HOLD, dtype=np.int8)
+    pose, velocity, acceleration = (np.broadcast_to(part, (*lead, *np.shape(part)[-2:])) for part in reference[3:6])
+    return Command(np.broadcast_to(tensions, (*lead, robot.m)), pose, velocity, acceleration, answered)

@@ -30,7 +30,7 @@ from ..solvers import Certificate, certify, solve_batch
 from ..solvers.available_wrench import facets
 from ..statics.distribution import wrench_problem
 from .planned_references import SOFT, planned
-from .trajectory import HasTrajectory, Motion, Trajectory
+from .trajectory import HasTrajectory, Motion, Trajectory, moved_on
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -178,15 +178,9 @@ def _continued(trajectory: Trajectory, end: float) -> Trajectory:
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         more = [np.maximum(times - end, 0.0).reshape(-1, *[1] * (motion[0].ndim - 1)) for motion in last]
         platform, carriers = trajectory.at(np.minimum(times, end))
-        return _moved_on(platform, more[0]), _moved_on(carriers, more[1])
+        return moved_on(platform, more[0]), moved_on(carriers, more[1])
 
     return trajectory._replace(at=at)
-
-
-def _moved_on(motion: Motion, more: np.ndarray) -> Motion:
-    """Return a motion that goes on with its acceleration for some time [s]."""
-    pose, velocity, acceleration = motion
-    return pose + more * (velocity + 0.5 * more * acceleration), velocity + more * acceleration, acceleration
 
 
 class _Law(NamedTuple):

@@ -29,6 +29,12 @@ _PARTS = ("pose", "velocity", "acceleration")
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
+def moved_on(motion: Motion, time: float | np.ndarray) -> Motion:
+    """Return a motion some time [s] later, or earlier, with its acceleration."""
+    pose, velocity, acceleration = motion
+    return pose + time * (velocity + 0.5 * time * acceleration), velocity + time * acceleration, acceleration
+
+
 class Trajectory(NamedTuple):
     """A reference over time.
 

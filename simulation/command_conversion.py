@@ -6,6 +6,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..control import Command
+from ..control.trajectory import moved_on
 from ..core import winch_lengths
 from ..plant import Plant, layout
 from .experiment import Experiment, Wind
@@ -54,12 +55,9 @@ class Orders:
             # What a constant acceleration misses of the next reference: pose, velocity and acceleration, (K, 3, c, 6).
             motion = np.array([reference[3:6] for reference in conditions.references])
             self._missed = np.zeros_like(motion)
-            self._missed[:-1] = motion[1:] - np.stack(self._steadily(*np.moveaxis(motion[:-1], 1, 0)), axis=1)
-
-    def _steadily(self, pose: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return pose, velocity and acceleration at the end of a period in which the acceleration is constant."""
-        h = self._period
-        return pose + h * (velocity + 0.5 * h * acceleration), velocity + h * acceleration, acceleration
+            pose, velocity, acceleration = np.moveaxis(motion[:-1], 1, 0)
+            ends = moved_on((pose, velocity, acceleration), self._period)
+            self._missed[:-1] = motion[1:] - np.stack(ends, axis=1)
 
     def push(self, wrench: np.ndarray) -> None:
         """Add a wrench, (N, 6) [N, N m], to the constant one on the platform, until the next call."""
@@ -87,7 +85,8 @@ class Orders:
         if self._moves:
             self._poses[:], self._velocities[:] = command.carrier_pose, command.carrier_velocity
             self._accelerations[:] = command.carrier_acceleration
-            for order, end in enumerate(self._steadily(self._poses, self._velocities, self._accelerations)):
+            motion = self._poses, self._velocities, self._accelerations
+            for order, end in enumerate(moved_on(motion, self._period)):
                 np.add(end, self._missed[k, order], out=self._ends[:, :, order])
         if command.actuation is not None:
             self._actuation[:] = command.actuation

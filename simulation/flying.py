@@ -9,6 +9,7 @@ import numpy as np
 
 from ..control import Command, Controller, Reference, State
 from ..control.command import HOLD
+from ..control.trajectory import moved_on
 from ..core import sense
 from ..plant import Plant
 from ..plant.periods import Periods
@@ -157,9 +158,10 @@ def _held(command: Command, period: float) -> Command:
     carriers back to their last pose.
     """
     pose, velocity, acceleration = (np.asarray(part, dtype=float) for part in command[1:4])
+    pose, velocity, _ = moved_on((pose, velocity, acceleration), period)
     return command._replace(
-        carrier_pose=pose + period * (velocity + 0.5 * period * acceleration),
-        carrier_velocity=velocity + period * acceleration,
+        carrier_pose=pose,
+        carrier_velocity=velocity,
         carrier_acceleration=np.zeros_like(acceleration),
         answered=np.full(np.shape(command.answered), HOLD, dtype=np.int8),
     )
