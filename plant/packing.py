@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..base.inputs import leading
 from ..models import points
@@ -22,20 +23,14 @@ def place(block: np.ndarray, pose: np.ndarray, velocity: np.ndarray, com: np.nda
     """Write blocks (..., 13) of bodies with the CoM at `com` in their frame, whose motion is given."""
     R = points.rotations(pose[..., 3:])
     (sr, sp, _), (cr, cp, _) = np.moveaxis(np.sin(pose[..., 3:]), -1, 0), np.moveaxis(np.cos(pose[..., 3:]), -1, 0)
-    (hr, hp, hy), (kr, kp, ky) = (np.moveaxis(f(pose[..., 3:] / 2), -1, 0) for f in (np.sin, np.cos))
     d_roll, d_pitch, d_yaw = np.moveaxis(velocity[..., 3:], -1, 0)
     rate = np.stack(
         np.broadcast_arrays(d_roll - sp * d_yaw, cr * d_pitch + sr * cp * d_yaw, cr * cp * d_yaw - sr * d_pitch),
         axis=-1,
     )
     block[..., :3] = pose[..., :3] + R @ com
-    quaternion = (
-        kr * kp * ky + hr * hp * hy,
-        hr * kp * ky - kr * hp * hy,
-        kr * hp * ky + hr * kp * hy,
-        kr * kp * hy - hr * hp * ky,
-    )
-    block[..., layout.QUATERNION : layout.VELOCITY] = np.stack(quaternion, axis=-1)
+    quaternions = Rotation.from_euler("ZYX", pose[..., :2:-1].reshape(-1, 3)).as_quat(scalar_first=True)
+    block[..., layout.QUATERNION : layout.VELOCITY] = quaternions.reshape(*pose.shape[:-1], 4)
     block[..., layout.VELOCITY : layout.RATE] = velocity[..., :3] + np.einsum(
         "...ij,...j->...i", R, np.cross(rate, com)
     )
@@ -64,10 +59,10 @@ def command_rows(
     row[..., layout.WIND : layout.WRENCH] = parts["wind"]
     row[..., layout.WRENCH : layout.COMMANDS] = parts["wrench"]
     row[..., layout.COMMANDS : layout.COMMANDS + m] = cables
-    for index in range(count):
-        first = layout.COMMANDS + m + layout.CARRIER * index
-        row[..., first : first + actuators] = actuation[..., index, :]
-        for order, name in enumerate(("pose", "velocity", "acceleration")):
-            at = first + layout.REFERENCE_POSE + 6 * order
-            row[..., at : at + 6] = of_carriers[f"carrier_{name}"][..., index, :]
+    carriers = np.zeros((*batch, count, layout.CARRIER))
+    carriers[..., :actuators] = actuation
+    for order, name in enumerate(("pose", "velocity", "acceleration")):
+        at = layout.REFERENCE_POSE + 6 * order
+        carriers[..., at : at + 6] = of_carriers[f"carrier_{name}"]
+    row[..., layout.COMMANDS + m :] = carriers.reshape(*batch, -1)
     return row
