@@ -76,12 +76,12 @@ class Execution:
         object.__setattr__(self, "checkpoint", checkpoint_path(self.checkpoint, self.resume, self.progress))
 
     def check_alone(self) -> None:
-        """Check that nothing is asked for that a single run has no use for.
+        """Check that no field is set that applies only to many runs.
 
         Raises
         ------
         InputError
-            If something is.
+            If one is.
         """
         if self.workers != 1:
             raise InputError(f"workers must be 1 without runs, got {self.workers}")

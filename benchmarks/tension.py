@@ -251,9 +251,9 @@ def markdown(report: Report) -> str:
         "# Tension distribution in a hot loop",
         "",
         f"Measured on {report.machine}.",
-        f"{report.count} random problems a task, {report.repeats} turns after one that is not counted.",
-        f"Ratio: to `{REFERENCE}` in the same turn. Error: largest of a tension, in units of the largest tension; - if "
-        "there is nothing to compare.",
+        f"{report.count} random problems per task, {report.repeats} rounds after a warm-up round.",
+        f"Ratio: to `{REFERENCE}` in the same round. Error: largest error of a tension, in units of the largest "
+        "tension; - if there is nothing to compare.",
         f"Failures: no result, or off by more than {FAILED:g}; for infeasible problems, a result.",
     ]
     for task in dict.fromkeys(row.task for row in report.rows):

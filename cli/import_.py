@@ -28,7 +28,7 @@ def caspr(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Convert a CASPR robot to a robot file, and report what a robot file cannot express."""
+    """Convert a CASPR robot to a robot file, and list what is lost."""
     from ..base.writing import whole_file
     from ..models.caspr import read_caspr
     from ..models.parsing import to_yaml

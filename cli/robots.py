@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..workspace.resting_box import RestingBox
 
 MOVES = {
-    "both": "winches change the lengths of cables, and carriers may move",
+    "both": "winches change the lengths of cables, and carriers that can move may move too",
     "fixed-length": "carriers move, and cables keep their lengths",
     "variable-length": "winches change the lengths of cables, and mobile carriers stay",
 }

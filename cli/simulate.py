@@ -88,7 +88,7 @@ ToleranceOption = Annotated[float, typer.Option(help="Largest position error all
 SeedOption = Annotated[int, typer.Option(help="Seed of gusts and noise; the same seed gives the same run.")]
 RunsOption = Annotated[
     int | None,
-    typer.Option(help="Number of runs, with the seeds from --seed on. Writes one table instead of one motion."),
+    typer.Option(help="Number of runs, with the seeds --seed, --seed + 1, ... Writes one table instead of one motion."),
 ]
 WorkersOption = Annotated[int, typer.Option(help="With --runs: number of processes on this machine.")]
 SchedulerOption = Annotated[str | None, scheduler_option(_MANY)]

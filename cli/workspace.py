@@ -66,7 +66,8 @@ CarriersOption = Annotated[
 LengthsOption = Annotated[
     str | None,
     typer.Option(
-        help="Range 'min max' of the lengths of three cables [m]; the positions follow from them. Instead of --box."
+        help="For robots with three cables, instead of --box: range 'min max' of their lengths [m]; the positions "
+        "follow from them."
     ),
 ]
 SamplesOption = Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")]

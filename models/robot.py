@@ -98,7 +98,7 @@ class Robot(DisplayedRobot):
         Raises
         ------
         InputError
-            If `names` is no list of names, or the robot has no such parameter.
+            If `names` is not a list of names, or the robot has no such parameter.
         """
         try:
             listed = None if isinstance(names, str) else list(names)
@@ -116,7 +116,7 @@ class Robot(DisplayedRobot):
         Raises
         ------
         InputError
-            If `values` is no mapping, the robot has no such parameter, or a value is impossible.
+            If `values` is not a mapping, the robot has no such parameter, or a value is impossible.
         """
         data = self.model_dump()
         cables = [dict(cable) for cable in data["cables"]]

@@ -30,8 +30,8 @@ def test_the_controller_has_15_lines():
 
 
 def test_the_example_flies(example):
-    assert example["flight"].passed
-    assert example["flight"].answered["as planned"] == 1000
+    assert example["run"].passed
+    assert example["run"].answered["as planned"] == 1000
 
 
 def test_a_constant_push_moves_it_as_far_as_the_spring_gives(example):

@@ -86,7 +86,7 @@ class Condition(Part, ABC):
         Raises
         ------
         InputError
-            If `robust` is no number between 0 and 1.
+            If `robust` is not a number between 0 and 1.
         """
         share = number("robust", robust, LEAST_SHARE, 1 - LEAST_SHARE)
         return self.model_copy(update={"robust": share}) if "robust" in type(self).model_fields else self
@@ -121,7 +121,7 @@ def condition_from(data: Any) -> Condition:
 def for_robots(condition: Condition, share: float | None) -> Condition:
     """Return a condition for a fraction of the uncertain robots, or unchanged if `share` is None.
 
-    Raises `InputError` if `share` is no number between 0 and 1, or no part of the condition is about tension
+    Raises `InputError` if `share` is not a number between 0 and 1, or no part of the condition is about tension
     limits.
     """
     if share is None:

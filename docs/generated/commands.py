@@ -13,7 +13,7 @@ HEAD = """# Commands
 {intro}
 
 `towline COMMAND --help` prints the same in a terminal. Every command has the same [exit codes](status.md#exit-codes):
-0 if the answer is yes, 1 if it is no, 2 for wrong input.
+0 if the result is positive, 1 if it is negative, 2 for wrong input.
 
 """
 

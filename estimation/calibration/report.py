@@ -67,7 +67,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         return []
     held_out = result.held_out
     if not np.isfinite(held_out.after):
-        return ["too few samples, or no convergence: half of the samples do not determine these parameters"]
+        return ["no cross-validation: half of the samples are too few, or their fit did not converge"]
     lines = [f"on validation samples {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
     fitted = held_out.sets[-1].fitted
     if not held_out.best:
