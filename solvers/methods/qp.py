@@ -4,7 +4,6 @@ import warnings
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.errors import InputError
 from .method import Method, Proposal, StandardForm
@@ -63,40 +62,32 @@ class QuadraticProgram(Method):
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Minimise |s|^2 / 2 with Q s = b as equality rows and the finite limits as inequality rows."""
         name = backend or self.backends()[0]
-        proposal = _call(name, form, form.lower >= -_FAR, form.upper <= _FAR, options)
+        proposal = _call(name, form, _FAR, options)
         s = proposal.s
         if s is not None and ((s < np.minimum(form.lower, -_FAR)) | (s > np.maximum(form.upper, _FAR))).any():
-            proposal = _call(name, form, np.isfinite(form.lower), np.isfinite(form.upper), options)
+            proposal = _call(name, form, np.finfo(float).max, options)
         return proposal
 
 
-def _call(
-    name: str, form: StandardForm, use_lower: NDArray[np.bool_], use_upper: NDArray[np.bool_], options: dict[str, Any]
-) -> Proposal:
-    """Run one back end, again with other settings if it gets nowhere."""
-    first = _SETTINGS.get(name, {})
-    proposal = _call_once(name, form, use_lower, use_upper, first, options)
-    for change in _SECOND_THOUGHTS.get(name, []):
+def _call(name: str, form: StandardForm, far: float, options: dict[str, Any]) -> Proposal:
+    """Run one back end with the limits up to `far`, again with other settings if it gets nowhere."""
+    first, proposal = _SETTINGS.get(name, {}), Proposal(None)
+    for change in ({}, *_SECOND_THOUGHTS.get(name, [])):
+        proposal = _call_once(name, form, far, first | change, options)
         if proposal.s is not None or "infeasible" in proposal.detail:
             break
-        proposal = _call_once(name, form, use_lower, use_upper, first | change, options)
     return proposal
 
 
 def _call_once(
-    name: str,
-    form: StandardForm,
-    use_lower: NDArray[np.bool_],
-    use_upper: NDArray[np.bool_],
-    settings: dict[str, Any],
-    options: dict[str, Any],
+    name: str, form: StandardForm, far: float, settings: dict[str, Any], options: dict[str, Any]
 ) -> Proposal:
     """Run one back end once; whatever it raises or warns stays here."""
     import qpsolvers
     from scipy.sparse import csc_matrix
 
-    k = form.lower.size
-    identity = np.eye(k)
+    identity = np.eye(form.lower.size)
+    use_lower, use_upper = form.lower >= -far, form.upper <= far
     G = np.vstack([identity[use_upper], -identity[use_lower]])
     h = np.concatenate([form.upper[use_upper], -form.lower[use_lower]])
     convert = np.ascontiguousarray if name in qpsolvers.dense_solvers else csc_matrix
@@ -105,19 +96,15 @@ def _call_once(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            program = qpsolvers.Problem(convert(identity), np.zeros(k), **limits, **equations)
+            program = qpsolvers.Problem(convert(identity), np.zeros(len(identity)), **limits, **equations)
             answer = qpsolvers.solve_problem(program, solver=name, **(settings | options))
         except Exception as error:
             if options and isinstance(error, TypeError | AttributeError | ValueError):
                 raise InputError(
-                    f"options must be settings of {name}, got {', '.join(options)}: {_one_line(error)}"
+                    f"options must be settings of {name}, got {', '.join(options)}: {' '.join(str(error).split())}"
                 ) from None
             return Proposal(None, detail=f"{name}: {type(error).__name__}: {error}")
     if not answer.found or answer.x is None or not np.isfinite(answer.x).all():
         reason = answer.extras.get("status") or getattr(answer.extras.get("info"), "status", "no solution")
         return Proposal(None, detail=f"{name}: {reason}")
     return Proposal(np.asarray(answer.x, dtype=np.float64))
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
