@@ -1,7 +1,8 @@
 """Count the processors that this process may use, and limit them, so that parallel jobs can take one each."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -13,6 +14,16 @@ def available() -> int:
     there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     most = _most.get()
     return there if most is None else min(there, most)
+
+
+def in_threads(work: Callable[[int, int], object], count: int, threads: int) -> None:
+    """Call `work` with the begin and the end of each of `threads` parts of `count` rows, all at once."""
+    if threads == 1:
+        work(0, count)
+        return
+    edges = [count * i // threads for i in range(threads + 1)]
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, edges[:-1], edges[1:]))
 
 
 @contextmanager

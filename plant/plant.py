@@ -3,7 +3,6 @@
 import math
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -356,13 +355,7 @@ class Plant:
 
         worth = count * steps * substeps // STEPS_WORTH_A_THREAD
         threads = min(processors.available(), worth) if threads is None else whole_number("threads", threads, 1, 10**4)
-        threads = max(1, min(threads, count))
-        if threads == 1:
-            run_rows(0, count)
-        else:
-            edges = [count * i // threads for i in range(threads + 1)]
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(run_rows, edges[:-1], edges[1:]))
+        processors.in_threads(run_rows, count, max(1, min(threads, count)))
         if not np.isfinite(history[:, -1]).all():
             raise SolverError(
                 f"the motion of {self.robot.name} diverges in steps of {period / substeps:g} s: use "

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
@@ -249,19 +248,14 @@ def _solve_by_core(
     """Solve all rows by the core, shared among threads; those of which it is not sure stay unsure."""
     count, m = rows.tensions.shape
     share = threads or min(processors.available(), max(1, count // ROWS_WORTH_A_THREAD))
-    block = max(1, -(-count // share))
     per = np.array([size for _, size in columns], dtype=np.float64)
 
-    def work(first: int) -> None:
-        part = slice(first, first + block)
+    def work(begin: int, end: int) -> None:
+        part = slice(begin, end)
         own = (array[part] if size else array for array, size in columns)
         solve_rows(rows.direction.shape[1], m, rho, in_lanes, *own, per, *(array[part] for array in rows))
 
-    if share == 1:
-        work(0)
-    else:
-        with ThreadPoolExecutor(share) as pool:
-            list(pool.map(work, range(0, count, block)))
+    processors.in_threads(work, count, min(share, count))
 
 
 def _solve_others(rows: _Rows, code: NDArray[np.int8], problem: dict[str, Array], rho: float | None) -> None:
