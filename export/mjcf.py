@@ -74,15 +74,10 @@ def _check(robot: Robot) -> None:
 
 def _add_carriers(robot: Robot, world: ET.Element, motors: ET.Element) -> None:
     for index, carrier in enumerate(robot.carriers):
-        if not carrier.moves:
-            body = ET.SubElement(
-                world, "body", name=carrier.name, pos=_text(carrier.home[:3]), euler=_euler(carrier.home)
-            )
-        elif carrier.body is None:
-            body = _body(world, carrier.name, carrier.home)
+        body = _body(world, carrier.name, carrier.home)
+        if carrier.moves and carrier.body is None:
             body.set("mocap", "true")
-        else:
-            body = _body(world, carrier.name, carrier.home)
+        elif carrier.body is not None:
             ET.SubElement(body, "freejoint", name=carrier.name)
             _add_inertia(body, (0.0, 0.0, 0.0), *carrier.body)
             site = f"{carrier.name} centre"  # no part of a robot has a blank in its name

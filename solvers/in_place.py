@@ -100,7 +100,9 @@ class InPlace:
         if self._has_core:
             solve_rows(*self._soft)
         for row in np.flatnonzero(self.code == UNSURE):
-            solution = solve(self._problem(int(row)), "soft-wrench", rho=RHO)
+            given = (self.A[row], self.w[row], *self.bounds[:, row])
+            problem = TensionProblem(*given, t_ref=self.t_ref[row], length=self.length)
+            solution = solve(problem, "soft-wrench", rho=RHO)
             self.tensions[row] = np.nan if solution.tensions is None else solution.tensions
         self.code[:] = exact
         self.tensions[exact == INVALID] = np.nan
@@ -117,7 +119,3 @@ class InPlace:
         )
         self.code[rows], self.tensions[rows], self.direction[rows] = batch.code, batch.tensions, batch.direction
         self._info[rows] = np.stack([batch.support, batch.shortfall], axis=1)
-
-    def _problem(self, row: int) -> TensionProblem:
-        given = (self.A[row], self.w[row], *self.bounds[:, row])
-        return TensionProblem(*given, t_ref=self.t_ref[row], length=self.length)

@@ -36,7 +36,6 @@ from ..models.uncertainty import Uncertainty
 __all__ = ["RobotShare", "Spread", "check_share", "ellipsoid_factor", "motion_factor", "share_of_robots", "spread"]
 
 RANK = 1e-9  # of the largest singular value
-HALVINGS = 60
 ROUNDING = 1e-9  # of the force scale, in comparisons of tensions
 
 
@@ -178,6 +177,7 @@ def motion_factor(changes: ArrayLike, share: float) -> float:
 
     Raises `InputError` if an argument has a wrong type, shape or value.
     """
+    from scipy.optimize import brentq
     from scipy.special import erfc
 
     share, changes = _share("share", share), real_array("changes", changes).astype(float)
@@ -202,11 +202,7 @@ def motion_factor(changes: ArrayLike, share: float) -> float:
     def excess(k: float) -> float:
         return float(curves * erfc(k / np.sqrt(2)) + length / np.pi * np.exp(-(k**2) / 2) - (1 - share))
 
-    low, high = 0.0, most
-    for _ in range(HALVINGS if excess(most) < 0 else 0):
-        middle = (low + high) / 2
-        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
-    return high
+    return float(brentq(excess, 0.0, most)) if excess(most) < 0 else most
 
 
 def _chi(rank: int, share: float) -> float:

@@ -10,13 +10,7 @@ from typing import Any
 
 import compiler
 from setuptools import build_meta
-
-build_editable = build_meta.build_editable
-build_sdist = build_meta.build_sdist
-build_wheel = build_meta.build_wheel
-get_requires_for_build_sdist = build_meta.get_requires_for_build_sdist
-prepare_metadata_for_build_editable = build_meta.prepare_metadata_for_build_editable
-prepare_metadata_for_build_wheel = build_meta.prepare_metadata_for_build_wheel
+from setuptools.build_meta import *  # noqa: F403 -- all hooks but those below
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
