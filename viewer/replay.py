@@ -2,7 +2,7 @@
 
 import json
 import math
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import xarray as xr
@@ -27,7 +27,7 @@ LONGEST = 100  # letters of a text of the file
 
 
 class Replay:
-    """A plan that `Plan.save` wrote, or a flight that `Simulation.save` wrote.
+    """A plan that `Plan.save` wrote, or a simulation that `Simulation.save` wrote.
 
     Parameters
     ----------
@@ -65,19 +65,16 @@ class Replay:
         self._task = None if self._flown else parse_yaml(dataset.attrs["task"], Task, f"{where}, task")
         self.title = printable(str(dataset.attrs.get("title", self.robot.name)), LONGEST)
         self.geometry = Geometry(self.robot)
-        self.times = numbers_of(dataset, "time", (-1,), where, largest=FARTHEST)
-        n, c = len(self.times), len(self.robot.carriers)
-        self._pose = numbers_of(dataset, "pose", (n, 6), where, largest=FARTHEST)
-        self._velocity, self._acceleration = (
-            numbers_of(dataset, name, (n, 6), where) for name in ("velocity", "acceleration")
-        )
-        self._carriers = numbers_of(dataset, "carrier_pose", (n, c, 6), where, largest=FARTHEST)
-        self.tensions = numbers_of(dataset, "tensions", (n, self.robot.m), where, gaps=True)
-        self.reference = (
-            numbers_of(dataset, "reference_pose", (n, 6), where, largest=FARTHEST)[:, :3] if self._flown else None
-        )
+        read = partial(numbers_of, dataset, where=where)
+        self.times = read("time", (-1,), largest=FARTHEST)
+        n, c, m = len(self.times), len(self.robot.carriers), self.robot.m
+        self._pose = read("pose", (n, 6), largest=FARTHEST)
+        self._velocity, self._acceleration = read("velocity", (n, 6)), read("acceleration", (n, 6))
+        self._carriers = read("carrier_pose", (n, c, 6), largest=FARTHEST)
+        self.tensions = read("tensions", (n, m), gaps=True)
+        self.reference = read("reference_pose", (n, 6), largest=FARTHEST)[:, :3] if self._flown else None
         self._words = _answers(dataset) if self._flown else None
-        self._cut = numbers_of(dataset, "cut", (n, self.robot.m), where) > 0 if "cut" in dataset.variables else None
+        self._cut = read("cut", (n, m)) > 0 if "cut" in dataset.variables else None
         self._events = _events(dataset) if self._flown else []
         self.obstacles = outlines_from(dataset, where)
         if n == 0 or not (np.diff(self.times) > 0).all():

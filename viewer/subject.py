@@ -40,7 +40,7 @@ class Subject(Displayed):
     cloud
         The points of a workspace, or None.
     other
-        A plan or a flight of the same robot to compare the replay with, or None.
+        A plan or a simulation of the same robot to compare the replay with, or None.
     """
 
     title: str
@@ -87,7 +87,7 @@ def read(
     robot
         The robot of a workspace, if it is not in the library: a workspace file has only the name.
     other
-        A plan or a flight to compare a plan or a simulation with.
+        A plan or a simulation to compare a plan or a simulation with.
 
     Raises
     ------
