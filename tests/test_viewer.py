@@ -288,11 +288,8 @@ def test_an_address_of_ipv6_is_one_that_a_browser_takes():
 def test_nobody_can_have_it_open_a_tunnel():
     from towline.viewer import server
 
-    started = server._start("127.0.0.1", 0)
-    try:
+    with server._started("127.0.0.1", 0) as started:
         assert started.request_share_url() is None
-    finally:
-        server._stop(started)
 
 
 def answer(url, upgrade=True, **changed):

@@ -36,18 +36,17 @@ class Panel:
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, stage: Stage):
         self._subject, self._stage = subject, stage
         self._server, self._gui = server, cast("Any", server.gui)
-        self._time_line: TimeLine | None = None
-        self._posing: Posing | None = None
         self._gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self._gui.main_panel.dock_right()
         self._gui.set_panel_label(subject.title)
         self._readout = self._gui.add_html("")
         frames = Frames(server)
         self._gui.add_html(labels.NARROW)
+        self._controls: Posing | TimeLine
         if subject.replay is None:
-            self._posing = Posing(server, frames, subject.robot, geometry, self._show, self._refuse)
+            self._controls = Posing(server, frames, subject.robot, geometry, self._show, self._refuse)
         else:
-            self._time_line = TimeLine(server, frames, subject.replay, self._show, subject.other)
+            self._controls = TimeLine(server, frames, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):
             numbers = self._gui.add_checkbox("numbers at the cables", True)
             numbers.on_update(lambda _: stage.show_numbers(numbers.value))
@@ -127,10 +126,7 @@ class Panel:
 
     def close(self) -> None:
         """Stop playing and shading."""
-        if self._time_line is not None:
-            self._time_line.close()
-        if self._posing is not None:
-            self._posing.close()
+        self._controls.close()
 
     def _refuse(self, reason: str) -> None:
         """Show why there is no instant to draw."""

@@ -56,26 +56,14 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     """
     required("subject", subject, Subject)
     _check_address(host, port)
-    with quiet("websockets.server", "asyncio"):  # of connections that break off and messages that are none
-        yield from _served(subject, host, port)
-
-
-def _served(subject: Subject, host: str, port: int) -> Iterator[str]:
-    """Start the server, yield its address once, and stop it."""
-    server = _start(host, port)
-    try:
+    # Quiet about connections that break off and messages that are none.
+    with quiet("websockets.server", "asyncio"), _started(host, port) as server:
         geometry = Geometry(subject.robot)
         stage = Stage(server, subject, geometry, captioned=False)
-        panel = Panel(server, subject, geometry, stage)
-
-        server.on_client_connect(stage.mind)
-        try:
+        with contextlib.closing(Panel(server, subject, geometry, stage)):
+            server.on_client_connect(stage.mind)
             # An address of IPv6 has colons of its own.
             yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
-        finally:
-            panel.close()
-    finally:
-        _stop(server)
 
 
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
@@ -105,8 +93,7 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
 
 def _page(subject: Subject) -> str:
     # viser records what a server is told, so there is one, on a port that nobody is told.
-    server = _start(LOOPBACK, 0)
-    try:
+    with _started(LOOPBACK, 0) as server:
         geometry = Geometry(subject.robot)
         stage = Stage(server, subject, geometry, captioned=True)
         replay = subject.replay
@@ -124,8 +111,6 @@ def _page(subject: Subject) -> str:
             with marks.instant():
                 stage.show(instant, subject.other_at(instant))
         document = with_script(recording.as_html())
-    finally:
-        _stop(server)
     title = escape(subject.title)
     head, _, rest = document.partition("<head>")
     body, end, tail = rest.rpartition("</body>")
@@ -147,7 +132,9 @@ def _check_address(host: str, port: int) -> None:
         ) from None
 
 
-def _start(host: str, port: int) -> viser.ViserServer:
+@contextlib.contextmanager
+def _started(host: str, port: int) -> Iterator[viser.ViserServer]:
+    """Run a server until the block ends. Suppress what viser prints then, because --json prints JSON only."""
     try:
         import viser
     except ImportError:
@@ -159,19 +146,13 @@ def _start(host: str, port: int) -> viser.ViserServer:
         def request_share_url(self, verbose: bool = True) -> str | None:
             return None
 
-    with _quiet(), guarded(host) as guards:
+    with contextlib.redirect_stdout(io.StringIO()), guarded(host) as guards:
         server = Unshared(host=host, port=port, verbose=False)
-    if not guards:
-        _stop(server)
-        raise InputError("viser must start its server with websockets.serve; install the version of constraints.txt")
-    return server
-
-
-def _stop(server: viser.ViserServer) -> None:
-    with _quiet():
-        server.stop()
-
-
-def _quiet() -> contextlib.AbstractContextManager[object]:
-    """Suppress what viser prints when it starts and stops, because --json prints JSON only."""
-    return contextlib.redirect_stdout(io.StringIO())
+    try:
+        if not guards:
+            accepted = "viser must start its server with websockets.serve"
+            raise InputError(f"{accepted}; install the version of constraints.txt")
+        yield server
+    finally:
+        with contextlib.redirect_stdout(io.StringIO()):
+            server.stop()
