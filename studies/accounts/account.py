@@ -35,24 +35,12 @@ class Chapter:
 
 @dataclass(frozen=True)
 class Account:
-    """The claims of a paper, each with its verdict.
-
-    Attributes
-    ----------
-    paper
-        Its name and source.
-    chapters
-        Chapters by title, in order.
-    broken
-        Reasons by title, of chapters that could not be computed.
-    seconds
-        Wall time of the whole run.
-    """
+    """The claims of a paper, each with its verdict."""
 
     paper: Paper
-    chapters: dict[str, Chapter]
-    broken: dict[str, str]
-    seconds: float
+    chapters: dict[str, Chapter]  # by title, in order
+    broken: dict[str, str]  # reasons by title, of chapters that could not be computed
+    seconds: float  # wall time of the whole run
 
     @property
     def claims(self) -> list[Claim]:
@@ -90,15 +78,7 @@ class Account:
 
 
 def gather(paper: Paper, chapters: Mapping[str, Callable[[], Chapter]], progress: Progress | None = None) -> Account:
-    """Compute the chapters of a paper, in order.
-
-    Parameters
-    ----------
-    chapters
-        Functions that compute the chapters, by title.
-    progress
-        Called before each chapter and once at the end.
-    """
+    """Compute the chapters, by title, of a paper in order; `progress` is called before each one and once at the end."""
     computed: dict[str, Chapter] = {}
     broken: dict[str, str] = {}
     start = time.perf_counter()

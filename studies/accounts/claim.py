@@ -48,34 +48,19 @@ class Verdict(StrEnum):
 class Claim:
     """One claim of a paper and its verdict.
 
-    Attributes
-    ----------
-    id
-        Unique in its account: letters, digits, dots and hyphens.
-    place
-        Where in the paper: an equation, a table, a figure, a section.
-    statement
-        The statement of the paper, in a sentence.
-    printed, computed
-        Numbers in `unit`, or text. `printed` is what the paper gives: a number that it prints, or the one that follows
-        from what it prints; None where it gives none.
-    verdict, why
-        The verdict, and the reason in one sentence.
-    unit
-        Unit of printed and computed; default: no unit.
-    figure
-        Name of the figure that shows it, if there is one.
+    `printed` is what the paper gives: a number that it prints, or the one that follows from what it prints; None where
+    it gives none. Numbers are in `unit`.
     """
 
-    id: str
-    place: str
-    statement: str
+    id: str  # unique in its account: letters, digits, dots and hyphens
+    place: str  # in the paper: an equation, a table, a figure, a section
+    statement: str  # of the paper, in a sentence
     printed: Value
     computed: Value
     verdict: Verdict
-    why: str
-    unit: str = ""
-    figure: str | None = None
+    why: str  # in one sentence
+    unit: str = ""  # of printed and computed
+    figure: str | None = None  # name of the one that shows it
 
     def to_dict(self) -> dict[str, Any]:
         """Return all fields for JSON."""
@@ -88,31 +73,20 @@ class Statement:
 
     All texts may have fields such as `{least:.1f}`, whose names begin with a small letter; whoever computes the claim
     gives their values. Computed and printed numbers are kept as a float or a tuple of floats, whatever they come in.
-
-    Attributes
-    ----------
-    within
-        The allowed difference in `unit`: the precision of the printed digits, or of the lines of a figure.
-    agrees, differs
-        The reason for either verdict, reproduced or another.
-    missing
-        What the paper does not print, and what was assumed.
-    works, fails
-        The reason why something possible stands in the place of what is impossible, or why not.
     """
 
     id: str
     place: str
     statement: str
     printed: ArrayLike | None = None
-    within: float = 0.0
+    within: float = 0.0  # allowed difference in `unit`: the precision of the printed digits, or of a figure's lines
     unit: str = ""
     figure: str | None = None
-    agrees: str = ""
-    differs: str = ""
-    missing: str = ""
-    works: str = ""
-    fails: str = ""
+    agrees: str = ""  # the reason for the verdict reproduced
+    differs: str = ""  # and for another
+    missing: str = ""  # what the paper does not print, and what was assumed
+    works: str = ""  # the reason why something possible stands in the place of what is impossible
+    fails: str = ""  # and why not
 
     def compared(
         self, computed: ArrayLike, printed: ArrayLike | None = None, within: float | None = None, **fields: Any

@@ -43,22 +43,12 @@ class Turning(NamedTuple):
 
 
 class Instants(NamedTuple):
-    """Motions at n independent instants.
+    """Motions at n independent instants, and their rotations."""
 
-    Attributes
-    ----------
-    body
-        Of the platform relative to {A}.
-    base
-        Of {A} in {G}.
-    R_B, R_A
-        Their rotations.
-    """
-
-    body: Motion
-    base: Motion
-    R_B: Turning
-    R_A: Turning
+    body: Motion  # of the platform relative to {A}
+    base: Motion  # of {A} in {G}
+    R_B: Turning  # of `body`
+    R_A: Turning  # of `base`
 
 
 def instants(seed: int = 0) -> Instants:

@@ -18,6 +18,7 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...models.air import trapezoid
 from ...models.cables.driving_force import DrivingForce, driving_force
+from ...models.part import COORDINATES
 from ...plant import Plant
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim
@@ -36,32 +37,19 @@ USED = STEPS[1]  # that of `vibration`
 SHOWN = slice(2000, 2801)  # the rows of the figure
 SAME = 0.01  # of what is compared
 RELEASED = np.diag([1e-4] * 6)  # velocities of the platform in the beginning [m/s, rad/s], one coordinate in each row
-COORDINATES: tuple[str, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
 LASTS = 2.0  # of a free vibration [s]
 TENTH, SLOW = 0.1, 10.0  # what is left of a vibration, and how many of its periods that takes if it decays slowly
 HOLDS = (10, 100)  # periods between two samples of the wind's noise
 
 
 class Shaken(NamedTuple):
-    """Vibration of cable 1 at the instants `SHAKEN`, (n,) each.
+    """Vibration of cable 1 at the instants `SHAKEN`, (n,) each; `dT` is what it adds to the tension [N]."""
 
-    Attributes
-    ----------
-    vibration
-        Of the platform's pose, (n, 6) [m, rad].
-    added
-        By the vibration to the distance from anchor to attachment [m].
-    dT
-        And to the tension [N].
-    elastic, damping
-        E A / l times `added`, and C times its rate [N].
-    """
-
-    vibration: np.ndarray
-    added: np.ndarray
+    vibration: np.ndarray  # of the platform's pose, (n, 6) [m, rad]
+    added: np.ndarray  # what it adds to the distance from anchor to attachment [m]
     dT: np.ndarray  # noqa: N815
-    elastic: np.ndarray
-    damping: np.ndarray
+    elastic: np.ndarray  # E A / l times `added` [N]
+    damping: np.ndarray  # C times the rate of `added` [N]
 
 
 def chapter() -> Chapter:

@@ -67,9 +67,9 @@ def vibration(amplitude: float) -> np.ndarray:
     return np.hstack([shift, np.zeros_like(shift)])
 
 
-def forces(robot: Robot, amplitude: float, step: float = STEP) -> DrivingForce:
+def forces(robot: Robot, amplitude: float) -> DrivingForce:
     """Return the driving forces on the small circle with that vibration."""
-    return driving_force(robot, *circle(FEASIBLE), vibration(amplitude), step, ELEMENTS)
+    return driving_force(robot, *circle(FEASIBLE), vibration(amplitude), STEP, ELEMENTS)
 
 
 def largest_ratios(robot: Robot, amplitudes: np.ndarray, step: float = STEP) -> np.ndarray:

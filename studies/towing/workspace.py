@@ -21,13 +21,12 @@ the printed x and y and at 1 m, their lowest height, cables of 1.2 m hold the lo
 W1 is printed as 0.6 m.
 """
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...models import Robot
-from ...workspace import Condition, ExistsPlacement, ForceBalance, Places
+from ...workspace import ExistsPlacement, ForceBalance, Places
 from ...workspace.region import reach_boxes
 from ...workspace.three_cable_pose import three_cable_pose
 from ...workspace.volume import Volume, volume
@@ -47,26 +46,15 @@ TRIES = 256
 
 @dataclass(frozen=True, eq=False)
 class Loops:
-    """Results of 60 000 loops of one system type.
-
-    Attributes
-    ----------
-    robot, places
-        The system and the poses that were checked.
-    held
-        Whether the condition holds at each, (n,) of bool.
-    seconds
-        Wall time.
-    """
+    """Results of the loops of one system type."""
 
     robot: Robot
-    places: Places
-    held: np.ndarray  # (n,)
-    seconds: float
+    places: Places  # the poses that were checked
+    held: np.ndarray  # whether forces balance at each, (n,) of bool
 
     @property
     def points(self) -> np.ndarray:
-        """Return the positions of the platform where the condition holds, (k, 3) [m]."""
+        """Return the positions of the platform where forces balance, (k, 3) [m]."""
         return self.places.pose[self.held, :3]
 
     @property
@@ -75,19 +63,15 @@ class Loops:
         return np.stack([self.points.min(axis=0), self.points.max(axis=0)], axis=1)
 
 
-def loops(
-    drive: Drive, condition: Condition | None = None, count: int = LOOPS, seed: int = 0, widths: bool = True
-) -> Loops:
-    """Draw poses of one system type and check whether a condition holds there; default: force balance, as in the paper.
+def loops(drive: Drive, count: int = LOOPS, seed: int = 0, widths: bool = True) -> Loops:
+    """Draw poses of one system type and check whether forces balance there, as in the paper.
 
-    With `EquilibriumPosture` and fixed lengths the returned poses are those at which the load rests. Without `widths`
-    the robot-ends have the printed x and y and any of the printed heights, which all boxes contain, however wide.
+    Without `widths` the robot-ends have the printed x and y and any of the printed heights, which all boxes contain,
+    however wide.
     """
-    system, condition = robot("wang-ctmrts", drive), condition or ForceBalance()
-    start = time.perf_counter()
+    system = robot("wang-ctmrts", drive)
     places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]), widths)
-    held = condition.holds(system, places)
-    return Loops(system, places, held, time.perf_counter() - start)
+    return Loops(system, places, ForceBalance().holds(system, places))
 
 
 def volume_of(drive: Drive, samples: int = 20_000, tries: int = TRIES, seed: int = 0) -> Volume:
