@@ -1,5 +1,6 @@
 """`WaypointSpline`: a curve of degree 5 through points, from rest to rest."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -24,9 +25,9 @@ class WaypointSpline:
         (n,), the times of the points [s]; default: any duration.
     """
 
-    def __init__(self, points: np.ndarray, times: np.ndarray | None):
-        self._points, self._times = points.copy(), times
-        self._points[:, 3:] = np.unwrap(points[:, 3:], axis=0)
+    def __init__(self, points: Sequence[Sequence[float]], times: Sequence[float] | None):
+        self._points, self._times = np.array(points), None if times is None else np.array(times)
+        self._points[:, 3:] = np.unwrap(self._points[:, 3:], axis=0)
         self._steps = np.linalg.norm(np.diff(self._points, axis=0), axis=1)  # a radian counts as a metre
 
     def check(self) -> None:

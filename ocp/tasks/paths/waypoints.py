@@ -17,7 +17,6 @@ from .motion import Motion
 from .stations import Stations
 from .waypoint_spline import WaypointSpline
 
-BLEND = 0.01  # of the span of the points; accelerations hardly fall with more
 LOOKS = 2001  # at the box of the points
 SAME = 1e-12  # [rad], of an attitude after whole turns
 GIMBAL = 0.05  # [rad] from a pitch of 90 degrees
@@ -31,6 +30,9 @@ def _or_file(schema: dict[str, Any]) -> None:
     """Add the name of a file to what a schema accepts."""
     points = {key: schema.pop(key) for key in ("type", "items", "minItems") if key in schema}
     schema["anyOf"] = [points, {"type": "string"}]
+
+
+_legs, _spline = lru_cache(maxsize=64)(Legs), lru_cache(maxsize=64)(WaypointSpline)
 
 
 class WaypointPath(PathBase):
@@ -198,25 +200,3 @@ class WaypointPath(PathBase):
     @override
     def bends(self) -> np.ndarray:
         return super().bends() if self.shape == "spline" else self._legs.bends()
-
-
-@lru_cache(maxsize=64)
-def _legs(
-    points: tuple[tuple[float, ...], ...],
-    blend: float | None,
-    times: tuple[float, ...] | None,
-    dwell: tuple[float, ...] | None,
-) -> Legs:
-    poses = np.array(points)
-    legs = Legs(
-        points=poses,
-        blend=0.0 if blend is None else blend,
-        times=None if times is None else np.array(times),
-        dwell=np.zeros(len(points)) if dwell is None else np.array(dwell),
-    )
-    return legs if blend is not None else legs.blended(BLEND)
-
-
-@lru_cache(maxsize=64)
-def _spline(points: tuple[tuple[float, ...], ...], times: tuple[float, ...] | None) -> WaypointSpline:
-    return WaypointSpline(np.array(points), None if times is None else np.array(times))
