@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -195,10 +195,12 @@ def solve_batch(
     problem = {
         name: np.broadcast_to(value, lead + value.shape[value.ndim - core[name] :]) for name, value in given.items()
     }
-    rows, backend = _Rows.unsolved(int(np.prod(lead, dtype=np.int64)), n, m), _backend(backend, n, m)
-    if backend != BEYOND_THE_CORE and rows.status.size:
+    count, backend = int(np.prod(lead, dtype=np.int64)), _backend(backend, n, m)
+    unsure = np.full(count, float(UNSURE))
+    rows = _Rows(np.empty((count, m)), np.empty((count, n)), np.empty((count, 2)), np.empty(count), unsure)
+    if backend != BEYOND_THE_CORE and count:
         columns = [
-            (NONE, 0) if name == "weights" and weights is None else _column(value, core[name], rows.status.size, lead)
+            (NONE, 0) if name == "weights" and weights is None else _column(value, core[name], count, lead)
             for name, value in given.items()
         ]
         _solve_by_core(rows, columns, backend == LANES, rho or 0.0, threads)
@@ -226,11 +228,6 @@ class _Rows(NamedTuple):
     info: Array  # (rows, 2)
     residual: Array  # (rows,)
     status: Array  # (rows,)
-
-    @classmethod
-    def unsolved(cls, rows: int, n: int, m: int) -> Self:
-        status = np.full(rows, float(UNSURE))
-        return cls(np.empty((rows, m)), np.empty((rows, n)), np.empty((rows, 2)), np.empty(rows), status)
 
 
 def _column(value: Array, core: int, rows: int, lead: tuple[int, ...]) -> tuple[Array, int]:

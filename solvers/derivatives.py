@@ -72,7 +72,9 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     InputError
         If an argument is something else, or the solution has no tensions or those of another number of cables.
     """
-    tensions = _tensions(required("solution", solution, TensionSolution))
+    tensions = required("solution", solution, TensionSolution).tensions
+    if tensions is None:
+        raise InputError(f"solution must be one with tensions, got status {solution.status}")
     if tensions.size != required("problem", problem, TensionProblem).m:
         raise InputError(
             f"solution must have {problem.m} tensions, one for each cable of the problem, got {tensions.size}"
@@ -141,9 +143,3 @@ def _active_set(problem: TensionProblem, tensions: Array) -> tuple[NDArray[np.bo
     low = fixed | (at_low & (rest > weak))
     high = ~fixed & at_high & (rest < -weak)
     return low, high, ~(low | high)
-
-
-def _tensions(solution: TensionSolution) -> Array:
-    if solution.tensions is None:
-        raise InputError(f"solution must be one with tensions, got status {solution.status}")
-    return solution.tensions

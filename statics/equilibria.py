@@ -98,7 +98,7 @@ def equilibria(
     try:
         longest = np.asarray(lengths, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}") from None
+        longest = np.empty(0)
     if longest.shape != (robot.m,) or not (np.isfinite(longest) & (longest > 0)).all():
         raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}")
     if robot.weight == 0:

@@ -7,6 +7,7 @@ import xarray as xr
 
 from ..base.display import Displayed
 from ..base.errors import InputError
+from ..base.netcdf import numbers_of
 from ..base.text import quantity
 from ..figures import style
 from ..figures.tension_colours import rgb
@@ -46,10 +47,7 @@ def cloud(dataset: xr.Dataset, where: str) -> Cloud:
     """
     if "position" not in dataset:
         return _cells(dataset, where)
-    positions = dataset["position"].to_numpy()
-    if positions.ndim != 2 or positions.shape[1:] != (3,) or positions.dtype.kind != "f":
-        raise InputError(f"{where}: position must be an array of numbers of shape (points, 3), got {positions.shape}")
-    _check_places(positions, where)
+    positions = _places(dataset, "position", (-1, 3), where)
     accepted = (
         dataset["accepted"].to_numpy().astype(bool) if "accepted" in dataset else np.ones(len(positions), dtype=bool)
     )
@@ -70,25 +68,20 @@ def _count(dataset: xr.Dataset, name: str) -> str:
     return quantity(int(value)) if isinstance(value, int | np.integer) else "?"
 
 
-def _check_places(positions: np.ndarray, where: str) -> None:
-    """Raise InputError unless all numbers are positions that can be drawn."""
+def _places(dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str) -> np.ndarray:
+    """Return a variable of positions; raise InputError unless all of them can be drawn."""
+    positions = numbers_of(dataset, name, shape, where, gaps=True, largest=np.inf)
     wrong = ~(np.abs(positions) <= FARTHEST)
     if wrong.any():
         raise InputError(f"{where}: positions must be within {FARTHEST:g} m, got {positions[wrong][0]:g}")
+    return positions
 
 
 def _cells(dataset: xr.Dataset, where: str) -> Cloud:
     if "reached" not in dataset or dataset["reached"].dims != ("x", "y", "z"):
         raise InputError(f"{where} must be a file written by `towline workspace`, got one without positions and cells")
-    reached = dataset["reached"].to_numpy()
-    if reached.dtype.kind not in "fiu":
-        raise InputError(f"{where}: reached must be an array of numbers, got {reached.dtype}")
-    cells = np.argwhere(reached > 0)
-    axes = [dataset[name].to_numpy() for name in ("x", "y", "z")]
-    for axis in axes:
-        if axis.dtype.kind != "f":
-            raise InputError(f"{where}: x, y and z must be arrays of numbers, got {axis.dtype}")
-        _check_places(axis, where)
+    cells = np.argwhere(numbers_of(dataset, "reached", (-1, -1, -1), where) > 0)
+    axes = [_places(dataset, name, (-1,), where) for name in ("x", "y", "z")]
     positions = np.stack([axis[column] for axis, column in zip(axes, cells.T, strict=True)], axis=1)
     colours = np.tile(np.array(rgb(ACCEPTED), np.uint8), (len(positions), 1))
     summary = f"{len(positions)} cells with accepted samples, shown by their centres"

@@ -67,10 +67,11 @@ def barrier_point(form: StandardForm, square: float, mu: float, start: Array | N
         used += more
         if point is not None:
             return Proposal(point, used)
-    inner = _interior_point(form)
-    if inner is None:
+    # As far inside the limits as a linear program finds a point; of wide ranges, a unit of s is space enough.
+    inner, share = deepest(form, np.minimum(form.upper - form.lower, 1.0), most=0.5)
+    if inner.s is None or share <= 1e-9:
         return Proposal(None, used, "the feasible tensions have no interior")
-    point, more = _damped(form, square, mu, inner)
+    point, more = _damped(form, square, mu, inner.s)
     if point is None and square == 0.0:
         return Proposal(None, used + more, "the feasible tensions are unbounded: no centre", final=True)
     return Proposal(point, used + more, "" if point is not None else f"not converged in {_DAMPED_STEPS} Newton steps")
@@ -87,12 +88,6 @@ def _pulled_inside(form: StandardForm, start: Array | None) -> Array:
         # Of a range much wider than the load, the middle is far from everything.
         start = np.minimum(np.maximum(start, -2.0 + np.maximum(lower, 0.0)), 2.0 + np.maximum(lower, 0.0))
     return np.minimum(np.maximum(start, lower + 1e-3 * space), upper - 1e-3 * space)
-
-
-def _slopes(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array, Array]:
-    """Return gradient and (diagonal) Hessian, both (k,)."""
-    below, above = 1.0 / (s - form.lower), 1.0 / (form.upper - s)
-    return square * s + mu * (above - below), square + mu * (above**2 + below**2)
 
 
 def _newton_step(form: StandardForm, gradient: Array, hessian: Array, error: Array) -> Array:
@@ -145,7 +140,8 @@ def _damped(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Arr
     """Take Newton steps from a point inside that gives w: always downhill, never outside."""
     last = np.inf
     for iteration in range(_DAMPED_STEPS):
-        gradient, hessian = _slopes(form, square, mu, s)
+        below, above = 1.0 / (s - form.lower), 1.0 / (form.upper - s)
+        gradient, hessian = square * s + mu * (above - below), square + mu * (above**2 + below**2)
         step = _newton_step(form, gradient, hessian, form.b - form.Q @ s)
         decrement = float(np.sqrt(step @ (hessian * step) / mu))
         if decrement**2 <= _CONVERGED or last <= decrement < _ROUNDING:
@@ -184,10 +180,3 @@ def _way_to_limits(form: StandardForm, s: Array, step: Array) -> float:
     space = np.where(step > 0, form.upper - s, s - form.lower)
     moving = step != 0.0
     return float((space[moving] / np.abs(step[moving])).min(initial=np.inf))
-
-
-def _interior_point(form: StandardForm) -> Array | None:
-    """Return a point as far inside the limits as a linear program finds one, or None."""
-    # Of wide ranges, a unit of s is space enough.
-    program, share = deepest(form, np.minimum(form.upper - form.lower, 1.0), most=0.5)
-    return program.s if share > 1e-9 else None
