@@ -1,7 +1,6 @@
 """Write the rows of an interval: exact integration, and limits that hold at every time in between."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import chain, pairwise
 from typing import NamedTuple
@@ -9,15 +8,13 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ...base.display import Displayed
 from ..limits import Rate
 from ..tasks import bernstein
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .layout import Layout
-from .near import is_local
-from .objective import cost_function, costs_at
-from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread, stretch
+from .part import Constraints, Part, part_of
+from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread, stretch
 from .thin import swept
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
@@ -31,28 +28,6 @@ class Points(NamedTuple):
     acceleration: list[Values]
 
 
-@dataclass(frozen=True)
-class Interval(Displayed):
-    """One interval as functions of its columns: all but the end's, one below the other, and the end's.
-
-    Attributes
-    ----------
-    cost
-        (x, x_end, grid) -> cost, with `Grid`'s numbers of the interval.
-    function
-        (x, x_end, p, p_end, grid) -> values, with the reference motions p at the same points.
-    rows
-        Names and bounds of `values`.
-    local
-        Index of each local limit, its function (x, x_end, p, p_end) -> values, and its rows.
-    """
-
-    cost: ca.Function
-    function: ca.Function
-    rows: list[Row]
-    local: list[tuple[int, ca.Function, list[Row]]]
-
-
 def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, columns: Sequence[Values]) -> Points:
     """Return the Bernstein points of the free coordinates, by integration from the first column."""
     first, last = columns[0], columns[-1]
@@ -62,7 +37,7 @@ def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, column
     return Points(bernstein.integral(h, first[layout.q], speed), speed, acceleration)
 
 
-def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, grid: np.ndarray) -> Interval:
+def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, grid: np.ndarray) -> Part:
     """Return cost of jerk and constraints of one interval: integration, and limits at the Bernstein points.
 
     The functions are for the nodes of these `references`, (18 (1 + c), nodes), and the intervals of `grid`, (2, n).
@@ -84,18 +59,12 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     whole = [
         [ca.vertcat(*body) for body in (in_world(scenario, bodies[0], bodies[1:]), *bodies[1:])] for bodies in moving
     ]
-    cost = _jerk_cost(scenario, h, own)
+    # The mean square of the jerk, and what rates cost.
+    jerks = [point / scenario.costs.jerk for point in bernstein.derivative(h, own.acceleration)]
+    cost = bernstein.mean_square(jerks, ca.dot)
     cost += _rate_cost(scenario, layout, h, columns, whole, take_up)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
     constraints += _rate_rows(scenario, mesh, layout, h, columns, whole)
-    local = []
-    for index, more, named in _way_rows(scenario, mesh, layout, columns, whole):
-        if is_local(scenario.limits.all[index]):
-            inputs, names = [x, x_end, parameters, parameters_end], ["x", "x_end", "p", "p_end"]
-            its = ca.Function("near", inputs, [ca.vertcat(*more)], names, ["values"], differentiated(4, 2))
-            local.append((index, its, named))
-        else:
-            constraints.append((more, named))
 
     @cache
     def points_of(carrier: int | None) -> Points:
@@ -111,12 +80,9 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         return _total(scenario, h, motion, [of_body @ column[layout.a] for column in columns], jerk)
 
     constraints += _hull_rows(scenario, mesh, points_of)
-    values, rows = ([*chain(*parts)] for parts in zip(*constraints, strict=True))
-    inputs = [x, x_end, parameters, parameters_end, numbers]
-    names = ["x", "x_end", "p", "p_end", "grid"]
-    function = ca.Function("interval", inputs, [ca.vertcat(*values)], names, ["values"], differentiated(5, 2))
-    ends, given_at = {"x": x, "x_end": x_end}, {"p": parameters, "p_end": parameters_end}
-    return Interval(cost_function("interval_cost", cost, ends, given_at, {"grid": numbers}), function, rows, local)
+    unknowns, known = {"x": x, "x_end": x_end}, {"p": parameters, "p_end": parameters_end, "grid": numbers}
+    of_limits = _way_rows(scenario, mesh, layout, columns, whole)
+    return part_of("interval", unknowns, known, cost, constraints, scenario.limits, of_limits)
 
 
 def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX]) -> tuple[ca.SX, ca.SX]:
@@ -128,9 +94,7 @@ def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca
     return a, first[layout.jerk] + share / 2 * (snap + snap_end)
 
 
-def _chain_rows(
-    layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], own: Points
-) -> tuple[list[ca.SX], list[Row]]:
+def _chain_rows(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], own: Points) -> Constraints:
     """Return values and rows: the end is the result of the integration, with equal shared unknowns."""
     x_end, n = columns[-1], layout.n
     values = [x_end[layout.q] - own.position[-1], (x_end[layout.v] - own.speed[-1]) * h]
@@ -145,7 +109,7 @@ def _chain_rows(
 
 def _inner_rows(
     scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], own: Points
-) -> Iterator[tuple[list[ca.SX], list[Row]]]:
+) -> Iterator[Constraints]:
     """Yield values and rows: inner points lie on the polynomials, with equal shared unknowns."""
     names = ["position"] * layout.n + ["velocity"] * layout.n + ["shared"] * len(layout.carried)
     for share, column in zip(scenario.scheme.inner, columns[1:-1], strict=True):
@@ -153,12 +117,6 @@ def _inner_rows(
         speed = (column[layout.v] - bernstein.value(own.speed, share)) * h
         shared = column[layout.shared] - columns[0][layout.shared]
         yield [position, speed, shared], [Row(name, 0.0, 0.0) for name in names]
-
-
-def _jerk_cost(scenario: Scenario, h: ca.SX | float, own: Points) -> ca.SX:
-    """Return the mean square of the jerk in units of the objective's."""
-    scale = scenario.costs.jerk
-    return bernstein.mean_square([point / scale for point in bernstein.derivative(h, own.acceleration)], ca.dot)
 
 
 def _rate_cost(
@@ -187,7 +145,7 @@ def _pieces(scenario: Scenario, at_points: list[ca.SX]) -> list[tuple[float, ca.
 
 def _rate_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: list[list[ca.SX]]
-) -> Iterator[tuple[list[ca.SX], list[Row]]]:
+) -> Iterator[Constraints]:
     """Yield values and rows of the limits of how fast something changes, from point to point."""
     limits = scenario.limits
     if not any(isinstance(limit, Rate) for limit in limits):
@@ -205,19 +163,17 @@ def _rate_rows(
 
 def _way_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], whole: list[list[ca.SX]]
-) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
-    """Yield index, values and rows of the distances from thin regions on the straight way from point to point."""
+) -> Iterator[tuple[int, Constraints]]:
+    """Yield index and constraints of the distances from thin regions on the straight way from point to point."""
     held = mesh.held(scenario)
     for limit, on_the_way in swept(scenario, mesh).items():
         slack = layout.slack(columns[0], limit)
         pieces = [bounded(limit, on_the_way(*first, *second), mesh, slack, held) for first, second in pairwise(whole)]
         values, rows = ([*chain(*parts)] for parts in zip(*pieces, strict=True))
-        yield scenario.limits.all.index(limit), values, rows
+        yield scenario.limits.all.index(limit), (values, rows)
 
 
-def _hull_rows(
-    scenario: Scenario, mesh: Mesh, points_of: Callable[[int | None], Points]
-) -> Iterator[tuple[list[ca.SX], list[Row]]]:
+def _hull_rows(scenario: Scenario, mesh: Mesh, points_of: Callable[[int | None], Points]) -> Iterator[Constraints]:
     """Yield values and rows of the hard convex limits at Bernstein points: so they hold between the nodes too."""
     held = mesh.held(scenario)
     for limit in scenario.limits:

@@ -18,7 +18,8 @@ from .columns import Columns
 from .derivatives import Block
 from .held import at_ends, held_spans
 from .layout import Layout
-from .rows import Row, differentiated, in_world, motions, reference_symbols
+from .part import function_of
+from .rows import Row, in_world, motions, reference_symbols
 
 ON_IT = 1e-6  # of the scale of a limit: an end so near to a bound is on it
 
@@ -43,8 +44,7 @@ def leaving_rows(scenario: Scenario, layout: Layout, references: np.ndarray, col
                 values.append(value)
                 rows.append(Row(f"slope of {name}", -np.inf, 0.0))
         if rows:
-            inputs, outputs = [x, parameters], [ca.vertcat(*values)]
-            function = ca.Function("leaving", inputs, outputs, ["x", "p"], ["values"], differentiated(2, 1))
+            function = function_of("leaving", {"x": x}, {"p": parameters}, ca.vertcat(*values))
             mapped = columns.at_nodes(function, np.array([node]))
             blocks.append(Block(mapped.values, rows, np.array([node // size]), mapped))
     return blocks

@@ -1,7 +1,6 @@
 """Write the rows and the cost of one node: the balance A t = w, and the limits that hold at an instant."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -12,9 +11,8 @@ from ..limits import Rate
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
-from .near import is_local
-from .objective import cost_function, costs_at
-from .rows import OTHER_COSTS, Mesh, Row, bounded, differentiated, in_world, motions, reference_symbols, spread
+from .part import Constraints, Part, part_of
+from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread
 from .thin import swept
 
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
@@ -23,29 +21,7 @@ SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to 
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
 
 
-class Node(NamedTuple):
-    """One node as functions of its column.
-
-    Attributes
-    ----------
-    cost
-        x -> cost, or (x, p) where costs of the user's own depend on where the robot is. It is a function of its own,
-        since IPOPT evaluates objective and constraints one after the other.
-    function
-        (x, p, carried) -> values, with the reference motions p, loads and columns of the ground.
-    rows
-        Names and bounds of `values`.
-    local
-        Index of each local limit, its function (x, p) -> values, and its rows.
-    """
-
-    cost: ca.Function
-    function: ca.Function
-    rows: list[Row]
-    local: list[tuple[int, ca.Function, list[Row]]]
-
-
-def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, carried: np.ndarray) -> Node:
+def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, carried: np.ndarray) -> Part:
     """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant.
 
     The functions are for the nodes of these `references`, (18 (1 + c), nodes), with the load and the columns of the
@@ -82,34 +58,22 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
         balances = [each - missing[moving, i] for i, each in enumerate(balances)]
         cost = OTHER_COSTS * cost + SLACK_COST * ca.sumsqr(missing)
 
-    values: list[ca.SX] = balances
     axes = ("fx", "fy", "fz", "mx", "my", "mz")
-    rows: list[Row] = [Row(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving]
+    constraints = [(balances, [Row(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving])]
     if robot.fixed_lengths is not None and not scenario.relative:
         lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
-        values.append((lengths / robot.fixed_lengths) ** 2)  # squared: no square root in the derivatives
-        rows += [Row(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]
+        squares = (lengths / robot.fixed_lengths) ** 2  # no square root in the derivatives
+        constraints.append(([squares], [Row(f"length of cable {i + 1}", 1.0, 1.0) for i in range(robot.m)]))
     if (place := layout.at(MARGIN)) is not None:
         low, high = (np.tile(bound / robot.force_scale, 1 + layout.winds) for bound in scenario.bounds())
         all_tensions = ca.vertcat(x[layout.tensions], x[layout.wind_tensions])
-        values += [all_tensions - x[place] - low, high - x[place] - all_tensions]
-        rows += [Row("margin", 0.0, np.inf)] * (2 * all_tensions.numel())
+        inside = [all_tensions - x[place] - low, high - x[place] - all_tensions]
+        constraints.append((inside, [Row("margin", 0.0, np.inf)] * (2 * all_tensions.numel())))
     cost += _slack_cost(scenario, mesh, layout, x)
-    state, local = [*whole, tensions, spread(scenario, None) @ x[layout.q]], []
-    for index, more, named in _limit_rows(scenario, mesh, layout, x, state):
-        if is_local(scenario.limits.all[index]):
-            function = ca.Function(
-                "near", [x, parameters], [ca.vertcat(*more)], ["x", "p"], ["values"], differentiated(2, 1)
-            )
-            local.append((index, function, named))
-        else:
-            values += more
-            rows += named
-    inputs = [x, parameters, parameters_carried]
-    function = ca.Function(
-        "node", inputs, [ca.vertcat(*values)], ["x", "p", "carried"], ["values"], differentiated(3, 1)
-    )
-    return Node(cost_function("node_cost", cost, {"x": x}, {"p": parameters}), function, rows, local)
+    state = [*whole, tensions, spread(scenario, None) @ x[layout.q]]
+    of_limits = _limit_rows(scenario, mesh, layout, x, state)
+    known = {"p": parameters, "carried": parameters_carried}
+    return part_of("node", {"x": x}, known, cost, constraints, scenario.limits, of_limits)
 
 
 def _in_frame(scenario: Scenario, wrench: ca.SX, carriers: list[list[ca.SX]]) -> ca.SX:
@@ -146,8 +110,8 @@ def _slack_cost(scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX) -> ca.
 
 def _limit_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX, state: list[ca.SX]
-) -> Iterator[tuple[int, list[ca.SX], list[Row]]]:
-    """Yield index, values and rows of each limit that holds at a node; `interval` has those between two points."""
+) -> Iterator[tuple[int, Constraints]]:
+    """Yield index and constraints of each limit that holds at a node; `interval` has those between two points."""
     limits, held = scenario.limits, mesh.held(scenario)
     if not limits.all:
         return
@@ -157,7 +121,7 @@ def _limit_rows(
         elsewhere = isinstance(limit, Rate) or limit in on_the_way
         if elsewhere or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
             continue
-        yield index, *bounded(limit, evaluated[place], mesh, layout.slack(x, limit), held)
+        yield index, bounded(limit, evaluated[place], mesh, layout.slack(x, limit), held)
 
 
 def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX, cost: ca.SX) -> ca.SX:

@@ -37,11 +37,12 @@ from .columns import Columns
 from .derivatives import Block, Mapped, derivatives
 from .grid import Grid
 from .held import eased, held_wrench
-from .interval import Interval, interval_of, points
+from .interval import interval_of, points
 from .layout import DURATION, MARGIN, Layout
 from .leaving import leaving_rows
 from .near import Near
-from .node import Node, node_of
+from .node import node_of
+from .part import Part
 from .rows import Mesh, Row, stretch
 
 
@@ -235,20 +236,18 @@ def _made_to_vary(scenario: Scenario, references: np.ndarray) -> np.ndarray:
     return np.hstack([references, references + varies.reshape(-1, 1)])
 
 
-def _near_rows(near: Near, scheme: Scheme, node: Node, interval: Interval, columns: Columns) -> list[Block]:
+def _near_rows(near: Near, scheme: Scheme, node: Part, interval: Part, columns: Columns) -> list[Block]:
     """Return the rows of local limits where they are near, at nodes and between them."""
-    blocks = []
-    for index, function, rows in node.local:
-        chosen = np.flatnonzero(near.chosen[index])
-        if len(chosen):
-            mapped = columns.at_nodes(function, chosen)
-            blocks.append(Block(mapped.values, rows, chosen // scheme.size, mapped))
-    for index, function, rows in interval.local:
-        inside = np.lib.stride_tricks.sliding_window_view(near.chosen[index], scheme.size + 1)[:: scheme.size]
-        chosen = np.flatnonzero(inside.any(axis=1))
-        if len(chosen):
-            mapped = columns.between(function, chosen)
-            blocks.append(Block(mapped.values, rows, chosen, mapped))
+    blocks, size = [], scheme.size
+    windows: np.ndarray = np.lib.stride_tricks.sliding_window_view(near.chosen, size + 1, axis=1)
+    inside = windows[:, ::size].any(axis=2)
+    at_nodes, between = (node, columns.at_nodes, near.chosen, size), (interval, columns.between, inside, 1)
+    for part, mapped_at, near_to, points_of_stage in (at_nodes, between):
+        for index, function, rows in part.local:
+            chosen = np.flatnonzero(near_to[index])
+            if len(chosen):
+                mapped = mapped_at(function, chosen)
+                blocks.append(Block(mapped.values, rows, chosen // points_of_stage, mapped))
     return blocks
 
 

@@ -1,6 +1,6 @@
 """Define what the parts of a program share: its mesh, its rows, and the motions that its unknowns stand for."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from ..limits import Limit
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .held import Spans, held_spans
-from .layout import DURATION, Layout
+from .layout import DURATION, MARGIN, Layout
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 MANY = 12  # free coordinates: robots with more are teams
@@ -86,15 +86,6 @@ def stretch(layout: Layout, x: Values) -> Values:
     return 1.0 if place is None else x[place]
 
 
-def differentiated(inputs: int, unknown: int) -> dict[str, Any]:
-    """Return the options of a CasADi function whose first `unknown` inputs are unknowns, the others parameters.
-
-    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
-    long.
-    """
-    return {"cse": True, "is_diff_in": [i < unknown for i in range(inputs)]}
-
-
 def reference_symbols(name: str, references: np.ndarray) -> tuple[ca.SX, ca.SX]:
     """Return symbols for one column of `references` (k, points), and the same with what is constant as numbers.
 
@@ -128,6 +119,18 @@ def offsets(scenario: Scenario, layout: Layout, x: ca.SX) -> list[ca.SX]:
     owners: list[int | None] = [None, *range(len(scenario.robot.carriers))]
     deviation = (x[layout.q], x[layout.v], x[layout.a])
     return [ca.vertcat(*(spread(scenario, owner) @ part for part in deviation)) for owner in owners]
+
+
+def costs_at(scenario: Scenario, layout: Layout, x: ca.SX, bodies: Sequence[ca.SX]) -> tuple[ca.SX, ca.SX]:
+    """Return what costs in column x, and the values whose rates cost, in amounts (`Costs.function`).
+
+    `bodies` are the motions of the platform in {G} and of the carriers, (18, 1) each.
+    """
+    force, place = scenario.robot.force_scale, layout.at(MARGIN)
+    duration, margin = scenario.duration * stretch(layout, x), 0.0 if place is None else force * x[place]
+    inputs = [*bodies, *offsets(scenario, layout, x), force * x[layout.tensions], duration, margin]
+    outputs: Any = scenario.costs.function.call(inputs)
+    return tuple(outputs)
 
 
 def in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.SX]]) -> list[ca.SX]:

@@ -1,0 +1,69 @@
+"""`Part`: a node or an interval of a program as functions of its columns, which `part_of` makes of expressions."""
+
+from collections.abc import Iterable
+from itertools import chain
+from typing import NamedTuple, TypeAlias
+
+import casadi as ca
+
+from ..limits.limits import Limits
+from .near import is_local
+from .rows import Row
+
+Constraints: TypeAlias = tuple[list[ca.SX], list[Row]]  # values, and their names and bounds
+
+
+class Part(NamedTuple):
+    """A node or an interval.
+
+    Attributes
+    ----------
+    cost
+        A function of its own, since IPOPT evaluates objective and constraints one after the other.
+    function
+        The values of its rows.
+    rows
+        Names and bounds of these.
+    local
+        Index of each local limit, the function of its values, and its rows.
+    """
+
+    cost: ca.Function
+    function: ca.Function
+    rows: list[Row]
+    local: list[tuple[int, ca.Function, list[Row]]]
+
+
+def part_of(
+    name: str,
+    unknowns: dict[str, ca.SX],
+    parameters: dict[str, ca.SX],
+    cost: ca.SX,
+    constraints: list[Constraints],
+    limits: Limits,
+    of_limits: Iterable[tuple[int, Constraints]],
+) -> Part:
+    """Return the functions of a part whose symbols have the names that `Columns` has.
+
+    `of_limits` are the constraints of `limits`, each with the index of its limit.
+    """
+    local = []
+    for index, (values, rows) in of_limits:
+        if is_local(limits.all[index]):
+            local.append((index, function_of("near", unknowns, parameters, ca.vertcat(*values)), rows))
+        else:
+            constraints.append((values, rows))
+    values, rows = ([*chain(*parts)] for parts in zip(*constraints, strict=True))
+    function = function_of(name, unknowns, parameters, ca.vertcat(*values))
+    return Part(function_of(f"{name}_cost", unknowns, parameters, cost), function, rows, local)
+
+
+def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> ca.Function:
+    """Return the function of all unknowns and of those parameters on which its value depends.
+
+    CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
+    long.
+    """
+    inputs = unknowns | {key: each for key, each in parameters.items() if ca.depends_on(value, each)}
+    options = {"cse": True, "is_diff_in": [key in unknowns for key in inputs]}
+    return ca.Function(name, [*inputs.values()], [value], [*inputs], ["value"], options)
