@@ -5,6 +5,7 @@ import numpy as np
 from ...base.text import quantity, quantity_row
 from ...models.part import Vector3
 from ..result import PlanData
+from ..tasks.paths import FeedPath, PathBase, TimedPath
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
@@ -18,14 +19,24 @@ def motion_facts(plan: PlanData) -> list[Fact]:
         np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
     )
     kind = f"{len(plan.phases)} phases" if plan.phases else task.path.kind
-    law = "" if plan.scenario.path is task.path else ", with the fastest time law"
+    timed = isinstance(plan.scenario.path, TimedPath) and plan.scenario.path is not task.path
+    law = ", with the fastest time law" if timed else ""
     return [
         ("duration", quantity(plan.scenario.duration, "s", digits=6)),
         ("path", f"{kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
+        *_feed(task.path),
         *_accuracy(plan),
         ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
         *([("wind", _task_wind(task))] if task.wind is not None else []),
     ]
+
+
+def _feed(path: PathBase) -> list[Fact]:
+    """Return how steady the speed of a path at a feed is, and which words of its file were not used."""
+    if not isinstance(path, FeedPath):
+        return []
+    ignored = [("ignored words", ", ".join(path.ignored))] if path.ignored else []
+    return [("feed", path.steadiness()), *ignored]
 
 
 def _accuracy(plan: PlanData) -> list[Fact]:

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from .base import PathBase, PoseOrPosition
 from .circle import CirclePath
+from .feed import FeedPath
 from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
@@ -20,6 +21,7 @@ __all__ = [
     "AnyPath",
     "CirclePath",
     "Curve",
+    "FeedPath",
     "LinePath",
     "Motion",
     "PathBase",
@@ -35,6 +37,6 @@ __all__ = [
 ]
 
 AnyPath: TypeAlias = Annotated[
-    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath | SequencePath | ReturnPath,
+    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | FeedPath | TimedPath | SequencePath | ReturnPath,
     Field(discriminator="kind"),
 ]

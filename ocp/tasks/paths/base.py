@@ -1,10 +1,12 @@
 """`PathBase`: what every path has: a frame, a duration or none, and a pose at every time."""
 
+from collections.abc import Collection
 from itertools import pairwise
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, ValidationInfo
 
 from ....models.part import Part, Pose
 from .motion import Motion
@@ -16,6 +18,26 @@ def _with_level_attitude(value: object) -> object:
     if not isinstance(value, list | tuple) or len(value) not in (3, 6):
         raise ValueError("must be 3 numbers (x y z) or 6 (x y z roll pitch yaw)")
     return (*value, 0.0, 0.0, 0.0) if len(value) == 3 else value
+
+
+def or_file(schema: dict[str, Any]) -> None:
+    """Add the name of a file to what a schema of points accepts."""
+    points = {key: schema.pop(key) for key in ("type", "items", "minItems") if key in schema}
+    schema["anyOf"] = [points, {"type": "string"}]
+
+
+def with_points_of_file(data: dict[str, Any], info: ValidationInfo, wanted: Collection[str]) -> dict[str, Any]:
+    """Return a path's fields with those `wanted` of the file that `points` names, if it is the name of one."""
+    if not isinstance(data.get("points"), str):
+        return data
+    from .point_file import read_points  # compiles patterns, which lists of points do not need
+
+    read = read_points(data["points"], (info.context or {}).get("folder", Path()))
+    read = {name: value for name, value in read.items() if name in wanted}
+    for name in read:
+        if name != "points" and data.get(name) is not None:
+            raise ValueError(f"{name} must be left out, since {data['points']!r} has them")
+    return data | read
 
 
 PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]

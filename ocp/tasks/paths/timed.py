@@ -16,6 +16,7 @@ from .motion import Motion
 from .rest import RestPath
 from .samples import SamplePath
 from .stations import Stations
+from .time_law import TimeLaw
 from .waypoints import WaypointPath
 
 Curve: TypeAlias = Annotated[RestPath | LinePath | CirclePath | WaypointPath | SamplePath, Field(discriminator="kind")]
@@ -65,45 +66,30 @@ class TimedPath(PathBase):
         return self
 
     @cached_property
+    def _law(self) -> TimeLaw:
+        return TimeLaw(np.array(self.s), np.array(self.speeds), np.array(self.dwell or np.zeros(len(self.s))))
+
+    @property
     def times(self) -> np.ndarray:
         """Return the time at which the path arrives at each s, (n,) [s]."""
-        speeds = np.array(self.speeds)
-        return np.append(0.0, np.cumsum(2 * np.diff(self.s) / (speeds[1:] + speeds[:-1]) + self._dwell[:-1]))
-
-    @cached_property
-    def _dwell(self) -> np.ndarray:
-        return np.zeros(len(self.s)) if self.dwell is None else np.array(self.dwell)
+        return self._law.times
 
     @property
     @override
     def natural_duration(self) -> float | None:
-        return float(self.times[-1] + self._dwell[-1])
+        return self._law.duration
 
     def law(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
-        knots, s, speeds = self.times, np.array(self.s), np.array(self.speeds)
-        k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
-        rate = (speeds[k + 1] ** 2 - speeds[k] ** 2) / (2 * (s[k + 1] - s[k]))
-        since = np.minimum(times, knots[-1]) - knots[k] - self._dwell[k]
-        # The last instant belongs to the motion, as the first does: d2s/dt2 counts there too.
-        still = (times > knots[-1] * (1 + 1e-12)) | (since < 0)
-        at = s[k] + np.maximum(since, 0.0) * (speeds[k] + since * rate / 2)
-        # Where the path turns at once, the acceleration before the place must not be taken along what comes after it.
-        end = np.where(times < knots[k + 1], np.nextafter(s[k + 1], 0.0), s[k + 1])
-        return np.minimum(at, end), np.where(still, 0.0, speeds[k] + since * rate), np.where(still, 0.0, rate)
+        return self._law.at(times)
 
     def time_at(self, s: np.ndarray) -> np.ndarray:
         """Return the time at which it arrives at s, (n,) [s]."""
-        knots, speeds = np.array(self.s), np.array(self.speeds)
-        k = np.clip(np.searchsorted(knots, s, side="left") - 1, 0, len(knots) - 2)
-        rate = (speeds[k + 1] ** 2 - speeds[k] ** 2) / (knots[k + 1] - knots[k])
-        mean = (speeds[k] + np.sqrt(np.maximum(speeds[k] ** 2 + rate * (s - knots[k]), 0.0))) / 2
-        since = np.divide(s - knots[k], mean, out=np.zeros_like(mean), where=mean > 0)
-        return self.times[k] + self._dwell[k] * (since > 0) + since
+        return self._law.time_at(s)
 
     @override
     def jumps(self) -> np.ndarray:
-        return np.unique(np.concatenate([self.times, self.times + self._dwell]))
+        return self._law.jumps()
 
     @override
     def stations(self, duration: float) -> Stations:

@@ -3,7 +3,6 @@
 from functools import lru_cache
 from itertools import pairwise
 from math import remainder
-from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -11,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
 from ....models.part import Finite, NonNegative
-from .base import PathBase, PoseOrPosition, check_times
+from .base import PathBase, PoseOrPosition, check_times, or_file, with_points_of_file
 from .legs import Legs
 from .motion import Motion
 from .stations import Stations
@@ -24,13 +23,6 @@ GONE = {
     "smooth": "write 'shape: spline' for a smooth curve through the points, or nothing for straight legs",
     "uniform": "write nothing, for straight legs, which `towline time` takes at any speed",
 }
-
-
-def _or_file(schema: dict[str, Any]) -> None:
-    """Add the name of a file to what a schema accepts."""
-    points = {key: schema.pop(key) for key in ("type", "items", "minItems") if key in schema}
-    schema["anyOf"] = [points, {"type": "string"}]
-
 
 _legs, _spline = lru_cache(maxsize=64)(Legs), lru_cache(maxsize=64)(WaypointSpline)
 
@@ -49,7 +41,7 @@ class WaypointPath(PathBase):
     kind: Literal["waypoints"]
     points: tuple[PoseOrPosition, ...] = Field(
         min_length=2,
-        json_schema_extra=_or_file,
+        json_schema_extra=or_file,
         description="two poses or positions or more [m, rad]; in a task also the name of a file of them, .csv with "
         "units in its header or .gcode, relative to the task file",
     )
@@ -80,15 +72,7 @@ class WaypointPath(PathBase):
         if "timing" in data:
             known = GONE.get(str(data["timing"]), GONE["smooth"])
             raise ValueError(f"'timing' must be left out of waypoints: {known}")
-        if not isinstance(data.get("points"), str):
-            return data
-        from .point_file import read_points  # compiles patterns, which lists of points do not need
-
-        read = read_points(data["points"], (info.context or {}).get("folder", Path()))
-        for name in read:
-            if name != "points" and data.get(name) is not None:
-                raise ValueError(f"{name} must be left out, since {data['points']!r} has them")
-        return data | read
+        return with_points_of_file(data, info, ("points", "times", "dwell"))
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

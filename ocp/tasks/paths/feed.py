@@ -1,0 +1,187 @@
+"""`FeedPath`: lines through points at a steady speed, as machines work along them."""
+
+from functools import cached_property
+from itertools import pairwise
+from math import sqrt
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+from typing_extensions import override
+
+from ....base.text import quantity
+from ....models.part import NonNegative, Positive
+from .base import PathBase, PoseOrPosition, or_file, with_points_of_file
+from .motion import Motion
+from .rounded_corners import CELLS, RoundedCorners
+from .time_law import TimeLaw
+
+SAME = 1e-12  # [rad]
+STEADY, LOOKS = 0.02, 20_001  # of the feed; instants at which the speed is looked at
+SHORTEST = 1e-12  # of the length: a shorter piece has no nodes
+
+
+class FeedPath(PathBase):
+    """Lines through given positions at a steady speed, the feed; corners are rounded within a tolerance.
+
+    The speed is the feed wherever the acceleration permits: it is lower at sharp corners, and where it rises or falls.
+    At points with a dwell, and where the path turns back, the motion stops. The attitude is the same everywhere.
+    """
+
+    kind: Literal["feed"]
+    points: tuple[PoseOrPosition, ...] = Field(
+        min_length=2,
+        json_schema_extra=or_file,
+        description="two positions or more [m], or poses with one attitude [m, rad]; in a task also the name of a file "
+        "of them, .csv with units in its header or .gcode, relative to the task file",
+    )
+    feed: Positive | None = Field(default=None, description="speed [m/s]; default: that of each line of a .gcode file")
+    acceleration: Positive = Field(description="largest acceleration, along the path and across it in corners [m/s^2]")
+    tolerance: NonNegative = Field(default=1e-3, description="by how much a corner may be missed [m]; 0: stop at each")
+    feeds: tuple[Positive, ...] | None = Field(default=None, description="speed of each line, instead of `feed` [m/s]")
+    dwell: tuple[NonNegative, ...] | None = Field(
+        default=None, description="how long the path stops at each point [s]; default: no stop"
+    )
+    ignored: tuple[str, ...] = Field(default=(), description="words of the .gcode file that were not used")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, dict):
+            return data
+        read = with_points_of_file(data, info, ("points", "feeds", "dwell", "ignored"))
+        if data.get("feed") is not None and data.get("feeds") is None:
+            read.pop("feeds", None)  # those of the file
+        return read
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        if (self.feed is None) == (self.feeds is None):
+            raise ValueError("feed must be given once: one for all lines, or feeds, one for each")
+        count = len(self.points)
+        if self.feeds is not None and len(self.feeds) != count - 1:
+            raise ValueError(f"feeds must have one number for each of the {count - 1} lines, got {len(self.feeds)}")
+        if self.dwell is not None and len(self.dwell) != count:
+            raise ValueError(f"dwell must have one number for each of the {count} points, got {len(self.dwell)}")
+        for index, (before, after) in enumerate(pairwise(self.points)):
+            if before[:3] == after[:3]:
+                raise ValueError(
+                    f"points[{index + 1}] must differ from points[{index}]; to stop at a point, write dwell"
+                )
+            if max(abs(a - b) for a, b in zip(before[3:], after[3:], strict=True)) > SAME:
+                raise ValueError(f"points[{index + 1}] must have the attitude of points[0]: at a feed it does not turn")
+        return self
+
+    @cached_property
+    def curve(self) -> RoundedCorners:
+        """Return the curve, by its length."""
+        stops = np.array(self.dwell or np.zeros(len(self.points))) > 0
+        return RoundedCorners(np.array(self.points)[:, :3], self.tolerance, stops | (self.tolerance == 0))
+
+    @cached_property
+    def law(self) -> TimeLaw:
+        """Return the length over time."""
+        curve, a = self.curve, self.acceleration
+        nodes, curvature = _cells(curve)
+        feed = self._feed_at((nodes[1:] + nodes[:-1]) / 2)
+        with np.errstate(divide="ignore"):
+            most = np.minimum(feed**2, a / curvature)  # of the squared speed, in each cell
+        square = np.minimum(np.append(most, 0.0), np.append(0.0, most))
+        stops = np.searchsorted(nodes, curve.tips[curve.sharp] - SHORTEST * nodes[-1])
+        square[stops] = 0.0
+        reach, bent = 2 * a * np.diff(nodes), 2 * curvature * np.diff(nodes)
+        square = _reached(square, reach, bent)
+        square = _reached(square[::-1], reach[::-1], bent[::-1])[::-1]
+        dwell = np.zeros(len(nodes))
+        if self.dwell is not None:
+            dwell[stops] = np.array(self.dwell)[curve.sharp]
+        # On a line the speed rises and falls by the whole acceleration, between its ends and the feed.
+        rise, fall = square[:-1], square[1:]
+        top = np.minimum(feed**2, (rise + fall) / 2 + a * np.diff(nodes))
+        up, down = nodes[:-1] + (top - rise) / (2 * a), nodes[1:] - (top - fall) / (2 * a)
+        line, least = curvature == 0, SHORTEST * nodes[-1]
+        rises = line & (up > nodes[:-1] + least) & (up < nodes[1:] - least)
+        falls = line & (down > up + least) & (down < nodes[1:] - least)
+        s = np.concatenate([nodes, up[rises], down[falls]])
+        order = np.argsort(s, kind="stable")
+        speeds = np.sqrt(np.concatenate([square, top[rises], top[falls]]))
+        return TimeLaw(s[order], speeds[order], np.pad(dwell, (0, len(s) - len(dwell)))[order])
+
+    def steadiness(self) -> str:
+        """Return for how much of the time the speed is the feed, and where it is slowest between its ends."""
+        length, speed, _ = self.law.at(np.linspace(0.0, self.law.duration, LOOKS))
+        share = float(np.mean(speed >= (1 - STEADY) * self._feed_at(length)))
+        slower = self.law.at(self.law.time_at(self.curve.tips))[1] / self._feed_at(self.curve.tips)
+        between = (slower < 1 - STEADY) & ~self.curve.sharp
+        text = f"within {quantity(100 * STEADY, '%')} for {quantity(100 * share, '%', digits=3)} of the time"
+        if between.any():
+            worst = int(np.argmin(np.where(between, slower, np.inf)))
+            percent = quantity(100 * slower[worst], "%", digits=3)
+            text += f"; slower in {between.sum()} corners, down to {percent} of it at points[{worst}]"
+        stops = int(self.curve.sharp[1:-1].sum())
+        return text + (f"; {stops} stop{'s' * (stops > 1)} between the ends" if stops else "")
+
+    def _feed_at(self, length: np.ndarray) -> np.ndarray:
+        """Return the feed at lengths of the curve, (n,) [m/s]."""
+        piece = np.clip(np.searchsorted(self.curve.edges, length, side="right") - 1, 0, len(self.curve.edges) - 2)
+        line = piece // 2
+        after = np.minimum(line + piece % 2, len(self.points) - 2)
+        return np.minimum(self._feeds[line], self._feeds[after])
+
+    @property
+    def _feeds(self) -> np.ndarray:
+        """Return the feed of each line, (n - 1,) [m/s]."""
+        return np.full(len(self.points) - 1, self.feed) if self.feeds is None else np.array(self.feeds)
+
+    @property
+    @override
+    def natural_duration(self) -> float | None:
+        return self.law.duration
+
+    @property
+    @override
+    def resting(self) -> float:
+        return sum(self.dwell or ())
+
+    @override
+    def jumps(self) -> np.ndarray:
+        return self.law.jumps()
+
+    @override
+    def at(self, times: np.ndarray, duration: float) -> Motion:
+        length, speed, rate = self.law.at(np.asarray(times, dtype=float))
+        position, tangent, bend = self.curve.at(length)
+        pose, velocity, acceleration = (np.zeros((len(length), 6)) for _ in range(3))
+        pose[:] = self.points[0]
+        pose[:, :3], velocity[:, :3] = position, tangent * speed[:, None]
+        acceleration[:, :3] = tangent * rate[:, None] + bend * speed[:, None] ** 2
+        return Motion(pose, velocity, acceleration)
+
+
+def _cells(curve: RoundedCorners) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of cells of the curve, (k + 1,) [m], and the largest curvature in each, (k,) [1/m]."""
+    corners = curve.edges[1:-1:2, None] + curve.lengths  # (n - 2, CELLS + 1)
+    nodes = np.unique(np.concatenate([curve.edges[[0, -1]], corners.ravel()]))
+    nodes = nodes[np.diff(nodes, append=np.inf) > SHORTEST * nodes[-1]]
+    middle = (nodes[1:] + nodes[:-1]) / 2
+    piece = np.clip(np.searchsorted(curve.edges, middle, side="right") - 1, 0, len(curve.edges) - 2)
+    turns = np.flatnonzero(piece % 2 == 1)
+    curvature, corner = np.zeros(len(middle)), piece[turns] // 2
+    cell = np.clip((corners[corner] <= middle[turns, None]).sum(axis=1) - 1, 0, CELLS - 1)
+    curvature[turns] = curve.curvature[corner, cell]
+    return nodes, curvature
+
+
+def _reached(square: np.ndarray, reach: np.ndarray, bent: np.ndarray) -> np.ndarray:
+    """Return the squared speeds at the ends of cells, (k + 1,), that are reached one after the other.
+
+    In a cell of the length h and the curvature c the acceleration along the path leaves room for that across it,
+    |a_t|^2 + (c v^2)^2 <= a^2: `reach` is 2 a h and `bent` 2 c h, so that y from x obeys (y - x)^2 + (bent y)^2 <=
+    reach^2.
+    """
+    x = float(square[0])
+    result, whole = [x], (1 + bent**2).tolist()
+    for most, r, b, w in zip(square[1:].tolist(), reach.tolist(), bent.tolist(), whole, strict=True):
+        x = min(most, (x + sqrt(max(w * r * r - (b * x) ** 2, 0.0))) / w)
+        result.append(x)
+    return np.array(result)

@@ -1,0 +1,59 @@
+"""`TimeLaw`: the motion along a curve, with a constant second derivative between given points."""
+
+from functools import cached_property
+
+import numpy as np
+
+
+class TimeLaw:
+    """A motion s(t): d2s/dt2 is constant between the given points; where ds/dt is zero it can dwell.
+
+    Parameters
+    ----------
+    s
+        Increasing, (n,), of any unit.
+    speeds
+        ds/dt there, (n,), never zero at two neighbours.
+    dwell
+        How long it stops at each s, (n,) [s].
+    """
+
+    def __init__(self, s: np.ndarray, speeds: np.ndarray, dwell: np.ndarray):
+        self.s, self.speeds, self.dwell = s, speeds, dwell
+        self.rates = (speeds[1:] ** 2 - speeds[:-1] ** 2) / (2 * np.diff(s))  # d2s/dt2 between two points
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Return the time at which it arrives at each s, (n,) [s]."""
+        steps = 2 * np.diff(self.s) / (self.speeds[1:] + self.speeds[:-1])
+        return np.append(0.0, np.cumsum(steps + self.dwell[:-1]))
+
+    @property
+    def duration(self) -> float:
+        """Return the time at which it ends [s]."""
+        return float(self.times[-1] + self.dwell[-1])
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return s, ds/dt and d2s/dt2 at `times` [s], (n,) each."""
+        knots, s, speeds = self.times, self.s, self.speeds
+        k = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
+        rate = self.rates[k]
+        since = np.minimum(times, knots[-1]) - knots[k] - self.dwell[k]
+        # The last instant belongs to the motion, as the first does: d2s/dt2 counts there too.
+        still = (times > knots[-1] * (1 + 1e-12)) | (since < 0)
+        at = s[k] + np.maximum(since, 0.0) * (speeds[k] + since * rate / 2)
+        # Where the path turns at once, the acceleration before the place must not be taken along what comes after it.
+        end = np.where(times < knots[k + 1], np.nextafter(s[k + 1], 0.0), s[k + 1])
+        return np.minimum(at, end), np.where(still, 0.0, speeds[k] + since * rate), np.where(still, 0.0, rate)
+
+    def time_at(self, s: np.ndarray) -> np.ndarray:
+        """Return the time at which it arrives at s, (n,) [s]."""
+        k = np.clip(np.searchsorted(self.s, s, side="left") - 1, 0, len(self.s) - 2)
+        moved = s - self.s[k]
+        mean = (self.speeds[k] + np.sqrt(np.maximum(self.speeds[k] ** 2 + 2 * self.rates[k] * moved, 0.0))) / 2
+        since = np.divide(moved, mean, out=np.zeros_like(mean), where=mean > 0)
+        return self.times[k] + self.dwell[k] * (since > 0) + since
+
+    def jumps(self) -> np.ndarray:
+        """Return the times at which d2s/dt2 may change at once, (n,) [s]."""
+        return np.unique(np.concatenate([self.times, self.times + self.dwell]))
