@@ -1,7 +1,7 @@
 """`Experiment`: the settings of all runs, for one robot and one reference."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,13 +10,7 @@ from ..control import Reference
 from .events import Cut, Event
 from .sensors import Noise
 
-
-class Wind(Protocol):
-    """Wind as a function of time and seed."""
-
-    def __call__(self, times: np.ndarray, seed: int) -> np.ndarray:
-        """Return the wind at the times (K,) [s] for this seed, (K, 3) [m/s]."""
-        ...
+Wind = Callable[[np.ndarray, int], np.ndarray]  # the wind at times (K,) [s] for a seed, (K, 3) [m/s]
 
 
 class Experiment(NamedTuple):

@@ -48,7 +48,7 @@ def copies(controller: Controller, count: int) -> list[Controller]:
 def fly_block(plant: Plant, controller: Controller, conditions: Experiment, seeds: Sequence[int]) -> np.ndarray:
     """Simulate a block of runs in parallel, and return the statistics of each, (N,) of `FIGURES`."""
     kept = Extremes(conditions, plant.robot, len(seeds))
-    lasted, _ = fly(plant, copies(controller, len(seeds)), conditions, seeds, kept)
+    lasted, _ = fly(plant, copies(controller, len(seeds)), conditions, seeds, kept.take)
     return kept.figures(lasted)
 
 

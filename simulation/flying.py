@@ -1,6 +1,6 @@
 """Close the loop of plant, sensors and controller, for one run or many in parallel: `fly`."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 from time import perf_counter
 from typing import Any
@@ -17,7 +17,7 @@ from .checking import check_command, check_wrench
 from .command_conversion import Orders
 from .events import Event, Running
 from .experiment import Experiment
-from .record import Period, Recorder
+from .record import Period
 from .sensors import Reading, Sensors
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
@@ -69,9 +69,15 @@ def _stacked(commands: list[Command]) -> Command:
 
 
 def fly(
-    plant: Plant, controllers: Sequence[Controller], conditions: Experiment, seeds: Sequence[int], recorder: Recorder
+    plant: Plant,
+    controllers: Sequence[Controller],
+    conditions: Experiment,
+    seeds: Sequence[int],
+    take: Callable[[Period], None],
 ) -> tuple[np.ndarray, list[float]]:
     """Simulate one run per seed from the beginning of the reference, with a controller for each or one for all.
+
+    Each `Period` that runs live is given to `take`.
 
     Returns
     -------
@@ -131,7 +137,7 @@ def fly(
         if k == 0 or going:
             lived = alive if k else np.ones(flights, dtype=bool)
             try:
-                recorder.take(Period(k, lived, motions, lengths, pulls, command))
+                take(Period(k, lived, motions, lengths, pulls, command))
             except IndexError:
                 check_command(command, robot, flights, time)
                 raise

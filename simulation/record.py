@@ -1,6 +1,6 @@
-"""Record runs `Period` by `Period`: `Recorder`, and `Record`, the complete history of one run."""
+"""`Record`: the complete history of one run, `Period` by `Period`."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,14 +33,6 @@ class Period(NamedTuple):
     lengths: np.ndarray
     tensions: np.ndarray
     command: Command
-
-
-class Recorder(Protocol):
-    """A record of runs."""
-
-    def take(self, period: Period) -> None:
-        """Record a period."""
-        ...
 
 
 class Record(Displayed):

@@ -67,10 +67,8 @@ class Sensors:
 
     def __init__(self, noise: Noise, seeds: Sequence[int], period: float, m: int):
         self._noise, self._period, self._m = noise, period, m
-        self._delay, self._exact = (
-            round(noise.delay / period),
-            not noise.model_dump(exclude=_WHEN, exclude_defaults=True),
-        )
+        self._delay = round(noise.delay / period)
+        self._exact = not noise.model_dump(exclude=_WHEN, exclude_defaults=True)
         self._random = [np.random.default_rng([seed, 1]) for seed in seeds]
         draws = [random.normal(size=12 + m) for random in self._random]
         self._bias = np.array(draws)[:, :12] * noise.bias_of_motion

@@ -238,7 +238,7 @@ def _one(plant: Plant, controller: Controller, experiment: Experiment, seed: int
     robot, periods = plant.robot, len(experiment.references)
     record = Record(robot, periods)
     start = perf_counter()
-    lasted, seconds = fly(plant, [controller], experiment, [seed], record)
+    lasted, seconds = fly(plant, [controller], experiment, [seed], record.take)
     wall = perf_counter() - start
     wind = Orders(plant, experiment, [seed]).wind
     return Simulation(

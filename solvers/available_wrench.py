@@ -73,10 +73,7 @@ def facets(A: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> Facets:
             normals = normals @ basis.transpose(0, 2, 1)
             outside[rows] = np.eye(n) - basis @ basis.transpose(0, 2, 1)
         described.append((rows, normals, least, most))
-    if len(described) == 1:
-        _, normals, least, most = described[0]
-    else:
-        normals, least, most = _together(described, count, n)
+    normals, least, most = _together(described, count, n)
     if not moving.all():
         shift = np.einsum("nki,ni->nk", normals, offset)
         least, most = least + shift, most + shift

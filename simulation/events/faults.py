@@ -1,8 +1,10 @@
 """Faults: a cable breaks, a winch sticks, a carrier loses its actuators, the controller does not respond."""
 
 from abc import ABC
-from typing import Annotated, Literal
+from collections.abc import Callable
+from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field
 from typing_extensions import override
 
@@ -11,12 +13,15 @@ from ...base.inputs import shown
 from ...base.text import quantity
 from ...models.part import Whole
 from ...models.robot import Robot
+from ...plant import Plant
 from .event import Event, Running, Seconds, number_in
 
 
 class OfCable(Event, ABC):
-    """A fault of one cable."""
+    """A fault of one cable: what happened to it, and how it changes states of a plant."""
 
+    happened: ClassVar[str]
+    change: ClassVar[Callable[[Plant, np.ndarray, int], np.ndarray]]
     said = "cable"
     cable: Annotated[Whole, BeforeValidator(number_in)] = Field(description="number of the cable, from 1")
 
@@ -32,39 +37,29 @@ class OfCable(Event, ABC):
         if not 1 <= self.cable <= robot.m:
             raise InputError(f"must name a cable of {robot.name!r}, 1 to {robot.m}, got {shown(self.cable)}")
 
+    @override
+    def describe(self, robot: Robot) -> str:
+        """Return what happened."""
+        return self.happened.format(self.cable)
+
+    @override
+    def begin(self, running: Running) -> None:
+        """Let it happen."""
+        running.states = type(self).change(running.plant, running.states, self.cable - 1)
+
 
 class Cut(OfCable):
     """A cable breaks."""
 
     kind: Literal["cut"] = "cut"
-    short = "cut CABLE"
-
-    @override
-    def describe(self, robot: Robot) -> str:
-        """Return what happened."""
-        return f"cable {self.cable} was cut"
-
-    @override
-    def begin(self, running: Running) -> None:
-        """Let it happen."""
-        running.states = running.plant.cut(running.states, self.cable - 1)
+    short, happened, change = "cut CABLE", "cable {} was cut", Plant.cut
 
 
 class Stick(OfCable):
     """The winch of a cable holds its length."""
 
     kind: Literal["stick"] = "stick"
-    short = "stick CABLE"
-
-    @override
-    def describe(self, robot: Robot) -> str:
-        """Return what happened."""
-        return f"the winch of cable {self.cable} stuck"
-
-    @override
-    def begin(self, running: Running) -> None:
-        """Let it happen."""
-        running.states = running.plant.stick(running.states, self.cable - 1)
+    short, happened, change = "stick CABLE", "the winch of cable {} stuck", Plant.stick
 
 
 class Lose(Event):
