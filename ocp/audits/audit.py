@@ -115,7 +115,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     intervals = scenario.output_samples * (1 if to_show else _audits_per_output(scenario))
     times = np.linspace(0.0, scenario.duration, intervals + 1)
     regular = instants(scenario, deviation, times)
-    seen = regular if to_show else with_peaks(scenario, regular)
+    seen = regular if to_show else with_peaks(regular)
     exceeded = excesses(seen) + came_too_near(seen)
     beyond, at = seen.beyond
     if beyond > TOLERANCE:
@@ -136,7 +136,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
         tensions_unlimited=regular.tensions_unlimited,
         violation=violation,
         tolerance=regular.tolerance,
-        supports=regular.supports,
+        supports=regular.supports if scenario.phases.rest else None,
         tracking_error=np.linalg.norm(regular.off_path[:, :3], axis=1),
         excess=[excess for excess in exceeded if excess.limit not in soft],
         soft_excess=[excess for excess in exceeded if excess.limit in soft],

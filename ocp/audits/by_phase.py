@@ -46,7 +46,7 @@ class _ByPhase(Distribution):
             found = result.certificate
             if found is not None and result.row is not None and (worst is None or found.shortfall > worst.shortfall):
                 worst, row = _of_cables(found, m), int(rows[result.row])
-        return AuditedTensions(tensions, violation, worst, row, beyond, supports if scenario.phases.rest else None)
+        return AuditedTensions(tensions, violation, worst, row, beyond, supports)
 
 
 def worst_certificate(scenario: Scenario, time: float, platform: Motion, carriers: np.ndarray) -> Certificate | None:

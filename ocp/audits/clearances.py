@@ -14,7 +14,7 @@ import numpy as np
 
 from ...models.points import placed
 from ..limits.distance import Distance
-from ..limits.limits import Separating, in_blocks, motions
+from ..limits.limits import Motion, Separating, in_blocks, motions
 from .curvature import is_jump, leaves
 from .excess import Excess
 from .instants import Instants
@@ -83,7 +83,7 @@ def _least(audited: Instants, limit: Distance, values: np.ndarray, found: _Least
     Wherever the distance may be too small, and less than the smallest so far, the instant in the middle is looked at.
     """
     separating, times = audited.scenario.limits.separating(limit), audited.times
-    points = _points(separating, audited)
+    points = _points(separating, audited.motion, audited.carriers)
     ways, bends = _both(separating, _ways(times, points)), _both(separating, _bends(times, points))
     wanted = _wanted(limit, found)
     row, which = np.nonzero((values[:-1] + values[1:] - ways < 2 * wanted) & ~is_jump(times)[:, None])
@@ -152,15 +152,14 @@ def _ends(separating: Separating, times: np.ndarray, points: np.ndarray) -> _End
     return _Ends(times, points, planes[:, 0], planes[:, 1:])
 
 
-def _points(separating: Separating, audited: Instants) -> np.ndarray:
-    """Return the points of all pairs at the instants of the audit, (n, pairs, s, 3)."""
-    values = in_blocks(separating.points, motions(audited.motion, audited.carriers))
+def _points(separating: Separating, platform: Motion, carriers: Motion) -> np.ndarray:
+    """Return the points of all pairs along a motion, (n, pairs, s, 3)."""
+    values = in_blocks(separating.points, motions(platform, carriers))
     return values.reshape(len(values), separating.pairs, -1, 3)
 
 
 def _at(audited: Instants, separating: Separating, times: np.ndarray, which: np.ndarray) -> _Ends:
     """Return the pairs `which` (k,) at other `times` (k,)."""
     instants, rows = np.unique(times, return_inverse=True)
-    platform, carriers = audited.scenario.motion(instants, audited.deviation)
-    values = in_blocks(separating.points, motions(platform, carriers)).reshape(len(instants), separating.pairs, -1, 3)
-    return _ends(separating, times, values[rows, which])
+    points = _points(separating, *audited.scenario.motion(instants, audited.deviation))
+    return _ends(separating, times, points[rows, which])

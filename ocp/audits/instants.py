@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,68 +17,37 @@ from ..tasks.scenario import Scenario
 from .by_phase import distribution, taken_up
 from .tensions import in_all_winds, scaled
 
-OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "violation")
+OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "violation", "supports")
 MOTIONS = ("motion", "carriers")
 
 
 @dataclass(frozen=True)
 class Instants(Displayed):
-    """A motion and its tensions at some instants, with all that an audit computes from them.
-
-    Attributes
-    ----------
-    scenario, deviation
-        What the motion was made from.
-    times
-        (n,) [s].
-    motion, carriers
-        Motions in {G} of the platform, (n, 6) each, and of the carriers, (n, c, 6) each.
-    tensions
-        (n, m) [N], nan where there are none.
-    off_path
-        Offset of the platform from its path, along the path's axes, (n, 6) [m, rad].
-    few, tolerance
-        Whether the cables are too few for some wrenches, and the largest violation that passes [N].
-    A, w
-        Wrench matrices and required wrenches, with moments over `Robot.length`, (n, 6, m) and (n, 6) [N].
-    tensions_unlimited
-        The tensions of least norm without limits, (n, m) [N].
-    violation
-        Distance of the required wrench from the available ones, (n,) [N].
-    supports
-        The forces of the ground, (n, s) [N]; None for a task without ground.
-    values
-        What each limit bounds, (n, k) each.
-    certificate
-        That with the largest shortfall, with its time.
-    beyond
-        Beyond the limits within the range of few cables [N], and when [s].
-    """
+    """A motion and its tensions at some instants, with all that an audit computes from them."""
 
     scenario: Scenario
-    deviation: Deviation | None
-    times: np.ndarray
-    motion: Motion
-    carriers: Motion
-    tensions: np.ndarray
-    off_path: np.ndarray
-    few: bool
-    tolerance: float
-    A: np.ndarray
-    w: np.ndarray
-    tensions_unlimited: np.ndarray
-    violation: np.ndarray
-    supports: np.ndarray | None
-    values: list[np.ndarray]
-    certificate: Certificate | None
-    beyond: tuple[float, float]
+    deviation: Deviation | None  # of the motion from the references of `scenario`
+    times: np.ndarray  # (n,) [s]
+    motion: Motion  # of the platform in {G}, (n, 6) each
+    carriers: Motion  # in {G}, (n, c, 6) each
+    tensions: np.ndarray  # (n, m) [N], nan where there are none
+    off_path: np.ndarray  # offset of the platform from its path, along the path's axes, (n, 6) [m, rad]
+    few: bool  # whether the cables are too few for some wrenches
+    tolerance: float  # the largest violation that passes [N]
+    A: np.ndarray  # wrench matrices with moments over `Robot.length`, (n, 6, m)
+    w: np.ndarray  # required wrenches, with the same moments, (n, 6) [N]
+    tensions_unlimited: np.ndarray  # of least norm without limits, (n, m) [N]
+    violation: np.ndarray  # distance of the required wrench from the available ones, (n,) [N]
+    supports: np.ndarray  # forces of the ground, (n, s) [N]; s = 0 for a task without ground
+    values: list[np.ndarray]  # what each limit bounds, (n, k) each
+    certificate: Certificate | None  # that with the largest shortfall, with its time
+    beyond: tuple[float, float]  # beyond the limits within the range of few cables [N], and when [s]
 
     def of(self, rows: np.ndarray) -> Instants:
         """Return some of them."""
         parts = {name: getattr(self, name)[rows] for name in OF_INSTANTS}
         motions = {name: Motion(*(part[rows] for part in getattr(self, name))) for name in MOTIONS}
-        supports = None if self.supports is None else self.supports[rows]
-        return replace(self, **parts, **motions, supports=supports, values=[each[rows] for each in self.values])
+        return replace(self, **parts, **motions, values=[each[rows] for each in self.values])
 
 
 def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray) -> Instants:
@@ -92,20 +62,20 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     distribute = distribution(scenario, times, A)
     # Near the plan's own tensions a redundant robot keeps the planned distribution.
     result = distribute(w, taken_up(scenario, times) if deviation is None else deviation.tensions_at(times))
-    tensions, supports, certificate = result.tensions, result.supports, result.certificate
     if (box := scenario.wind_box) is not None:
-        result, certificate = in_all_winds(distribute, box, motion, w, result)
+        result = in_all_winds(distribute, box, motion, w, result)
+    certificate = result.certificate
     if certificate is not None and result.row is not None:
         certificate = replace(certificate, time=float(times[result.row]))
     off_path = scenario.off_path(times, motion, carriers)
-    limited = zip(scenario.limits, scenario.limits.along(motion, carriers, tensions, off_path), strict=True)
+    limited = zip(scenario.limits, scenario.limits.along(motion, carriers, result.tensions, off_path), strict=True)
     return Instants(
         scenario=scenario,
         deviation=deviation,
         times=times,
         motion=motion,
         carriers=carriers,
-        tensions=tensions,
+        tensions=result.tensions,
         off_path=off_path,
         few=distribute.few,
         tolerance=distribute.tolerance,
@@ -113,7 +83,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         w=scaled(scenario, w),
         tensions_unlimited=distribute.unlimited(w),
         violation=result.violation,
-        supports=supports,
+        supports=result.supports,
         values=[limit.over(times, its) for limit, its in limited],
         certificate=certificate,
         beyond=(result.beyond, float(times[result.row or 0])),
@@ -129,14 +99,10 @@ def joined(some: Instants, others: Instants) -> Instants:
     def both(first: np.ndarray, second: np.ndarray) -> np.ndarray:
         return np.concatenate([first, second])[order]
 
-    changed = {}
-    for name in OF_INSTANTS:
-        changed[name] = both(getattr(some, name), getattr(others, name))
+    changed: dict[str, Any] = {name: both(getattr(some, name), getattr(others, name)) for name in OF_INSTANTS}
     for name in MOTIONS:
         pairs = zip(getattr(some, name), getattr(others, name), strict=True)
         changed[name] = Motion(*(both(*pair) for pair in pairs))
-    if some.supports is not None and others.supports is not None:
-        changed["supports"] = both(some.supports, others.supports)
     changed["values"] = [
         mine[before] if isinstance(limit, Rate) else both(mine, its)
         for limit, mine, its in zip(some.scenario.limits, some.values, others.values, strict=True)

@@ -13,7 +13,7 @@ import numpy as np
 from ...solvers import solve_batch
 from ..limits import Rate
 from ..limits.distance import Distance
-from ..tasks.scenario import MOST_SAMPLES, Scenario
+from ..tasks.scenario import MOST_SAMPLES
 from .checks import LENGTH_TOLERANCE
 from .curvature import between, is_jump, leaves
 from .instants import Instants, instants, joined
@@ -28,12 +28,12 @@ MOST_ROOM = 1e3  # of the weight: limits may be infinite
 UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
 
 
-def _corners(scenario: Scenario, seen: Instants) -> np.ndarray:
+def _corners(seen: Instants) -> np.ndarray:
     """Return the instants at corners of the motion, and just before its jumps, (k,).
 
     It jumps where its load or the acceleration of a time law may. Of laws there is an instant between two jumps too.
     """
-    nodes = np.zeros(0) if seen.deviation is None else seen.deviation.nodes
+    scenario, nodes = seen.scenario, np.zeros(0) if seen.deviation is None else seen.deviation.nodes
     laws = np.concatenate([[], *(path.jumps() for path in (scenario.path, *scenario.carrier_paths.values()))])
     laws, duration = np.unique(laws), float(seen.times[-1])
     jumps = np.unique(np.concatenate([laws, scenario.phases.boundaries]))
@@ -44,13 +44,13 @@ def _corners(scenario: Scenario, seen: Instants) -> np.ndarray:
     return np.unique(corners[(corners > 0.0) & (corners < duration)])
 
 
-def with_peaks(scenario: Scenario, seen: Instants) -> Instants:
+def with_peaks(seen: Instants) -> Instants:
     """Return instants with all others that it takes to decide whether something is exceeded between them."""
-    corners = _corners(scenario, seen)
+    scenario, corners = seen.scenario, _corners(seen)
     if corners.size:
         seen = joined(seen, instants(scenario, seen.deviation, corners))
     jumps = is_jump(seen.times)
-    spans = np.flatnonzero(_open(scenario, seen, jumps))
+    spans = np.flatnonzero(_open(seen, jumps))
     near, further = seen, list[Instants]()
     for _ in range(MOST_HALVES):
         if not spans.size or sum(len(each.times) for each in further) > MOST_SAMPLES:
@@ -62,7 +62,7 @@ def with_peaks(scenario: Scenario, seen: Instants) -> Instants:
         jumps = np.insert(jumps, halved, False)
         spans = halved + np.arange(len(halved))  # the first half of each, its second half is the next span
         spans = np.sort(np.concatenate([spans, spans + 1]))
-        undecided = _open(scenario, near, jumps)
+        undecided = _open(near, jumps)
         spans = spans[undecided[spans]]
     return joined(seen, reduce(joined, further)) if further else seen
 
@@ -77,9 +77,9 @@ def _about(seen: Instants, jumps: np.ndarray, spans: np.ndarray) -> tuple[Instan
     return seen.of(rows), apart, np.searchsorted(rows, spans)
 
 
-def _open(scenario: Scenario, seen: Instants, jumps: np.ndarray) -> np.ndarray:
+def _open(seen: Instants, jumps: np.ndarray) -> np.ndarray:
     """Return between which instants something may be exceeded, (n - 1,), that is not exceeded at one of them."""
-    times = seen.times
+    scenario, times = seen.scenario, seen.times
     spans = np.zeros(len(times) - 1, bool)
     for limit, values in zip(scenario.limits, seen.values, strict=True):
         if not isinstance(limit, Rate | Distance):
@@ -93,7 +93,7 @@ def _open(scenario: Scenario, seen: Instants, jumps: np.ndarray) -> np.ndarray:
             spans |= _may_exceed(times, beyond, jumps, -np.inf, 0.0, TOLERANCE)
         spans |= _may_exceed(times, seen.violation[:, None], jumps, -np.inf, 0.0, seen.tolerance)
     elif (seen.violation <= seen.tolerance).all():
-        spans |= _may_be_short(scenario, seen, jumps)
+        spans |= _may_be_short(seen, jumps)
     return spans & ~jumps
 
 
@@ -110,18 +110,18 @@ def _may_exceed(
     return np.any(above | below, axis=1)
 
 
-def _may_be_short(scenario: Scenario, seen: Instants, jumps: np.ndarray) -> np.ndarray:
+def _may_be_short(seen: Instants, jumps: np.ndarray) -> np.ndarray:
     """Return between which instants there may be no tensions inside their limits, (n - 1,).
 
     Tensions between those of two instants are inside their limits, since these are convex. What their wrench misses is
     bounded by its curvature, and is nothing if it is small, or if all cables together can make up for it from what they
     have left to their limits. Where they have not, other tensions of the same instants, far from their limits, may.
     """
-    times, open_spans = seen.times, np.zeros(len(seen.times) - 1, bool)
+    scenario, times, open_spans = seen.scenario, seen.times, np.zeros(len(seen.times) - 1, bool)
     low, high = scenario.bounds_at(times)
     resting = scenario.phases.resting(times)
     rows = np.arange(1, len(times) - 1)
-    missing, reached = _missing_and_reached(scenario, seen, jumps, low, high, seen.tensions, rows)
+    missing, reached = _missing_and_reached(seen, jumps, low, high, seen.tensions, rows)
     spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & ~(resting[1:] & resting[:-1]) & ~jumps)
     if spans.size:
         rows = np.unique(np.concatenate([spans, spans + 1]))
@@ -130,25 +130,19 @@ def _may_be_short(scenario: Scenario, seen: Instants, jumps: np.ndarray) -> np.n
         tensions = seen.tensions.copy()
         tensions[rows[solved.feasible]] = solved.tensions[solved.feasible]
         rows = rows[(rows > 0) & (rows < len(times) - 1)]
-        missing, reached = _missing_and_reached(scenario, seen, jumps, low, high, tensions, rows)
+        missing, reached = _missing_and_reached(seen, jumps, low, high, tensions, rows)
         open_spans[spans] = (missing > np.maximum(seen.tolerance, reached))[spans]
     return open_spans
 
 
 def _missing_and_reached(
-    scenario: Scenario,
-    seen: Instants,
-    jumps: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    t: np.ndarray,
-    rows: np.ndarray,
+    seen: Instants, jumps: np.ndarray, low: np.ndarray, high: np.ndarray, t: np.ndarray, rows: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what tensions between t (n, m) of two instants miss at most, and what cables make up for, (n - 1,) [N].
 
     The second derivatives are those at `rows`. The second value is known where the first is more than is tolerated.
     """
-    times, A, w = seen.times, seen.A, seen.w
+    times, A, w, robot = seen.times, seen.A, seen.w, seen.scenario.robot
     h = np.diff(times)
     after = ((A[rows + 1] - A[rows]) @ t[rows, :, None])[..., 0] - (w[rows + 1] - w[rows])
     before = ((A[rows] - A[rows - 1]) @ t[rows, :, None])[..., 0] - (w[rows] - w[rows - 1])
@@ -160,9 +154,9 @@ def _missing_and_reached(
     missing += np.linalg.norm((np.diff(A, axis=0) @ np.diff(t, axis=0)[..., None])[..., 0], axis=1) / 4
     reached = np.zeros(len(missing))
     spans = np.flatnonzero((missing > seen.tolerance) & ~jumps)
-    room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * scenario.robot.force_scale)
+    room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * robot.force_scale)
     room = np.minimum(room[spans], room[spans + 1])
-    moving = np.flatnonzero(scenario.robot.dof_mask)
+    moving = np.flatnonzero(robot.dof_mask)
     weighted = (A[spans] + A[spans + 1])[:, moving] / 2 * room[:, None, :]
     square = weighted @ weighted.swapaxes(1, 2)
     size = np.einsum("nii->n", square)

@@ -34,7 +34,7 @@ class AuditedTensions(NamedTuple):
     certificate: Certificate | None  # that with the largest shortfall; without time
     row: int | None  # of the certificate
     beyond: float  # [N] beyond the limits within the range of few cables, whose other errors are tolerated
-    supports: np.ndarray | None = None  # (n, s) [N], forces of the ground
+    supports: np.ndarray  # (n, s) [N], forces of the ground
 
 
 def scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
@@ -103,7 +103,7 @@ class Distribution:
             tensions[k], violation[k], certificate = self._single(problem)
             if certificate is not None and (worst is None or certificate.shortfall > worst.shortfall):
                 worst, worst_row = certificate, k
-        return AuditedTensions(tensions, violation, worst, worst_row, beyond)
+        return AuditedTensions(tensions, violation, worst, worst_row, beyond, supports=np.zeros((len(w), 0)))
 
     def _single(self, problem: TensionProblem) -> tuple[np.ndarray, float, Certificate | None]:
         """Return tensions, violation and, if there is one, the certificate of one instant, by the exact solver."""
@@ -117,7 +117,9 @@ class Distribution:
         violation = float(np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w))
         if not self.few:
             return np.full(problem.m, np.nan), violation, certificate
-        return closest, violation, certify(_inside_range(problem)) or certificate
+        within = _in_span(problem.scaled_A[None], problem.scaled_w[None])[0] / problem.row_scale
+        in_range = TensionProblem(problem.A, within, problem.t_min, problem.t_max, length=problem.length)
+        return closest, violation, certify(in_range) or certificate
 
 
 def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
@@ -140,8 +142,8 @@ def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
 
 def in_all_winds(
     distribute: Distribution, box: WindBox, motion: Motion, w: np.ndarray, middle: AuditedTensions
-) -> tuple[AuditedTensions, Certificate | None]:
-    """Return the result of the worst wind of a box at each instant, and its certificate with its wind.
+) -> AuditedTensions:
+    """Return the result of the worst wind of a box at each instant, whose certificate has its wind.
 
     `middle` is the result of the planned tensions for w (n, 6), the wrench in the box's middle. At no wind is the
     wrench farther from the available ones than at those that decide: if these pass, others in the box are tried only to
@@ -150,26 +152,24 @@ def in_all_winds(
     scenario = distribute.scenario
     without_air = w + scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, np.array(box.middle))
     planned, n = np.nan_to_num(middle.tensions), len(motion.pose)
-    worst, certificate = middle, middle.certificate and replace(middle.certificate, wind=box.middle)
+    worst = middle._replace(certificate=middle.certificate and replace(middle.certificate, wind=box.middle))
 
     def include(winds: np.ndarray) -> None:
-        nonlocal worst, certificate
+        nonlocal worst
         push = scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, winds)
         result = distribute(without_air - push, planned)
-        worse = _shortfall(result) > _shortfall(worst)
-        if worse and result.certificate is not None and result.row is not None:
-            certificate = replace(result.certificate, wind=as_wind(winds[result.row]))
-        violation = np.maximum(worst.violation, result.violation)
-        kept = result if worse else worst
-        beyond = max(worst.beyond, result.beyond)
-        worst = AuditedTensions(middle.tensions, violation, kept.certificate, kept.row, beyond)
+        if result.certificate is not None and result.row is not None and _shortfall(result) > _shortfall(worst):
+            proof = replace(result.certificate, wind=as_wind(winds[result.row]))
+            worst = worst._replace(certificate=proof, row=result.row)
+        violation, beyond = np.maximum(worst.violation, result.violation), max(worst.beyond, result.beyond)
+        worst = worst._replace(violation=violation, beyond=beyond)
 
     for winds in decisive_winds_at(box, scenario.robot, motion.pose, motion.velocity):
         include(winds)
     if worst.violation.max() <= distribute.tolerance:
         for winds in inner_winds(box, INNER_WINDS * n).reshape(n, INNER_WINDS, 3).swapaxes(0, 1):
             include(winds)
-    return worst, certificate
+    return worst
 
 
 def _nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -180,19 +180,16 @@ def _nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) ->
 
 def _short_in_range(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return how far the part of w in the span of A's columns is from what they give inside the limits, (n,) [N]."""
-    U, values, _ = np.linalg.svd(A, full_matrices=False)
-    U = np.where(values[:, None] > INDEPENDENT * values[:, None, :1], U, 0.0)
-    within = (U @ (U.swapaxes(1, 2) @ w[..., None]))[..., 0]
+    within = _in_span(A, w)
     short = ~solve_batch(A, within, low, high).feasible
     return np.where(short, _nearest(A, within, low, high)[1], 0.0)
 
 
-def _inside_range(problem: TensionProblem) -> TensionProblem:
-    """Return the same problem with the part of w that lies in the span of A's columns."""
-    U, values, _ = np.linalg.svd(problem.scaled_A, full_matrices=False)
-    span = U[:, values > INDEPENDENT * values[0]]
-    w = span @ (span.T @ problem.scaled_w) / problem.row_scale
-    return TensionProblem(problem.A, w, problem.t_min, problem.t_max, length=problem.length)
+def _in_span(A: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Return the parts of wrenches w (n, 6) that lie in the span of the columns of A (n, 6, m), (n, 6)."""
+    U, values, _ = np.linalg.svd(A, full_matrices=False)
+    U = np.where(values[:, None] > INDEPENDENT * values[:, None, :1], U, 0.0)
+    return (U @ (U.swapaxes(1, 2) @ w[..., None]))[..., 0]
 
 
 def _shortfall(result: AuditedTensions) -> float:

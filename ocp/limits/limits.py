@@ -26,22 +26,13 @@ BLOCK = 64  # instants: to make a map of all costs more than to evaluate it
 class Separating(NamedTuple):
     """The distances of a limit, and planes between its bodies, for `BLOCK` instants.
 
-    Attributes
-    ----------
-    moving
-        How many points the first body of each pair has.
-    pairs
-        How many pairs it has.
-    points
-        Motions of platform and carriers, (18,) each -> points of all pairs, one after the other.
-    plane
-        The points of a pair -> its distance, and the derivative by a shift of the first body: the direction of a plane
-        between the bodies, (4,).
+    `plane` returns the distance of a pair from its points, and the derivative by a shift of the first body: the
+    direction of a plane between the bodies, (4,).
     """
 
-    moving: int
-    pairs: int
-    points: ca.Function
+    moving: int  # how many points the first body of each pair has
+    pairs: int  # how many there are
+    points: ca.Function  # of the motions of platform and carriers, (18,) each: those of all pairs, one after the other
     plane: ca.Function
 
 

@@ -18,18 +18,12 @@ from ..tasks.task import FreeBase, GivenBase
 
 
 class Remainder(NamedTuple):
-    """The remainder of a motion.
+    """The remainder of a motion."""
 
-    Attributes
-    ----------
-    scenario
-        It starts as measured.
-    guess
-        The last plan, with what the carriers are off it decaying; None if the task fixes the motion.
-    """
-
-    scenario: Scenario
-    guess: Deviation | None
+    scenario: Scenario  # it starts as measured
+    guess: (
+        Deviation | None
+    )  # the last plan, with what the carriers are off it decaying; None if the task fixes the motion
 
 
 def final_of(plan: Plan) -> Final | None:
