@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 
-from .piecewise import largest, within_segment
+from .piecewise import within_segment
 
 Point: TypeAlias = Any  # (3, 1), SX or DM
 _Line: TypeAlias = tuple[Any, Any]  # height above a face at the start of a segment, and its change to the end [m]
@@ -69,9 +69,9 @@ def _depth(low: Point, high: Point, p: Point, p_end: Point) -> Any:
     before, half, slope = forward * (p - (low + high) / 2), (high - low) / 2, forward * along
     falling = [(-(before + half)[i], -slope[i]) for i in range(3)]
     rising = [((before - half)[i], slope[i]) for i in range(3)]
-    meetings = [[_meeting(fall, rise) for rise in rising] for fall in falling]
-    deepest = largest([value for row in meetings for value in row])
-    left = _first([largest(row) >= deepest for row in meetings])
+    meetings = [ca.vertcat(*(_meeting(fall, rise) for rise in rising)) for fall in falling]
+    deepest = ca.mmax(ca.vertcat(*meetings))
+    left = _first([ca.mmax(row) >= deepest for row in meetings])
     of_left = [sum(chosen * row[j] for chosen, row in zip(left, meetings, strict=True)) for j in range(3)]
     right = _first([value >= deepest for value in of_left])
     return _meeting(_weighted(left, falling), _weighted(right, rising))

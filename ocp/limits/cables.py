@@ -20,42 +20,38 @@ def names(robot: Robot) -> tuple[str, ...]:
     return tuple(f"cable {i + 1}" for i in range(robot.m))
 
 
-class CableSpeed(Limit):
-    """Limit the rate of each cable's length, that is, the speed of its winch."""
-
-    name, unit = "cable_speed", "m/s"
+class EachCable(Limit):
+    """Limit the size of a value of each cable, of either sign."""
 
     def __init__(self, robot: Robot, most: float):
         self.low, self.high, self.scale = -most, most, most
         self.labels = names(robot)
+
+
+class CableSpeed(EachCable):
+    """Limit the rate of each cable's length, that is, the speed of its winch."""
+
+    name, unit = "cable_speed", "m/s"
 
     @override
     def values(self, state: State) -> ca.SX:
         return state.rate(state.run.lengths)
 
 
-class CableAcceleration(Limit):
+class CableAcceleration(EachCable):
     """Limit the second derivative of each cable's length, that is, the acceleration of its winch."""
 
     name, unit = "cable_acceleration", "m/s^2"
-
-    def __init__(self, robot: Robot, most: float):
-        self.low, self.high, self.scale = -most, most, most
-        self.labels = names(robot)
 
     @override
     def values(self, state: State) -> ca.SX:
         return state.rate(state.rate(state.run.lengths))
 
 
-class WinchPower(Limit):
+class WinchPower(EachCable):
     """Limit the mechanical power of each winch, the tension times the rate of the length, in both directions."""
 
     name, unit = "winch_power", "W"
-
-    def __init__(self, robot: Robot, most: float):
-        self.low, self.high, self.scale = -most, most, most
-        self.labels = names(robot)
 
     @override
     def values(self, state: State) -> ca.SX:

@@ -11,7 +11,7 @@ import casadi as ca
 from ...models.shapes import Block, Capsule, ConvexMesh, Shape, Sphere
 from .box_clearance import segment_outside_box
 from .convex_clearance import cable_outside_mesh, point_outside_mesh
-from .piecewise import largest, within_segment
+from .piecewise import within_segment
 
 Point: TypeAlias = Any  # (3, 1), SX or DM
 Place: TypeAlias = Shape
@@ -46,8 +46,10 @@ def point_outside(place: Place, p: Point) -> Any:
     if isinstance(place, Capsule):
         return _from_segment(p, ca.DM(place.start), ca.DM(place.end)) - place.radius
     if isinstance(place, Block):
-        beyond = _beyond(ca.DM(place.min), ca.DM(place.max), _before_turn(place, p))
-        return ca.if_else(largest(beyond) <= 0, largest(beyond), ca.sqrt(_squared(beyond) + _TINY))
+        low, high = ca.DM(place.min), ca.DM(place.max)
+        beyond = ca.fabs(_before_turn(place, p) - (low + high) / 2) - (high - low) / 2  # the faces along each axis
+        most = ca.mmax(beyond)
+        return ca.if_else(most <= 0, most, ca.sqrt(ca.sumsqr(ca.fmax(beyond, 0.0)) + _TINY))
     if isinstance(place, ConvexMesh):
         return point_outside_mesh(place, p)
     raise TypeError(f"{type(place).__name__} is not an obstacle")
@@ -73,17 +75,6 @@ def _before_turn(place: Block, p: Point) -> Point:
         return p
     centre = ca.DM(place.centre)
     return centre + ca.mtimes(ca.DM(place.axes.T), p - centre)
-
-
-def _beyond(low: Point, high: Point, p: Point) -> list[Any]:
-    """Return how far p is beyond the faces of a box along each axis [m]; all negative inside."""
-    beyond = ca.fabs(p - (low + high) / 2) - (high - low) / 2
-    return [beyond[i] for i in range(3)]
-
-
-def _squared(beyond: list[Any]) -> Any:
-    """Return the squared distance from a box [m^2], zero inside."""
-    return sum(ca.fmax(value, 0.0) ** 2 for value in beyond)
 
 
 def _from_segment(p: Point, start: Point, end: Point) -> Any:

@@ -4,7 +4,7 @@ import casadi as ca
 from typing_extensions import override
 
 from ...models import Robot
-from .cables import names
+from .cables import EachCable, names
 from .limit import Limit, Rate
 from .state import State
 
@@ -24,14 +24,10 @@ class Margin(Limit):
         return ca.vertcat(state.tensions - low, high - state.tensions)
 
 
-class TensionRate(Rate):
+class TensionRate(EachCable, Rate):
     """Limit the rate of each tension."""
 
     name, unit = "tension_rate", "N/s"
-
-    def __init__(self, robot: Robot, most: float):
-        self.low, self.high, self.scale = -most, most, most
-        self.labels = names(robot)
 
     @override
     def values(self, state: State) -> ca.SX:
