@@ -53,7 +53,7 @@ class Program(Displayed):
     Attributes
     ----------
     problem
-        {"x", "f", "g"} for `casadi.nlpsol`.
+        {"x", "p", "f", "g"} for `casadi.nlpsol`.
     lower, upper, lower_g, upper_g
         Bounds of x and g.
     near
@@ -65,7 +65,7 @@ class Program(Displayed):
     local
         How many of the first blocks are of local limits.
     parameters
-        Values of the parameters of `problem`; None if it has none.
+        Values of the parameters p of `problem`; only a movable one has some.
     """
 
     scenario: Scenario
@@ -81,7 +81,7 @@ class Program(Displayed):
     costs: list[tuple[Mapped, np.ndarray]]
     blocks: list[Block]
     local: int
-    parameters: np.ndarray | None = None
+    parameters: np.ndarray
 
     def of(self, scenario: Scenario) -> Program:
         """Return the program, which has parameters, of another scenario that differs in its references and ends only.
@@ -123,8 +123,7 @@ class Program(Displayed):
     @cached_property
     def derivatives(self) -> dict[str, ca.Function]:
         """Return options of `casadi.nlpsol`: Jacobian and Hessian."""
-        x = self.problem["x"]
-        return derivatives(x, self.problem.get("p", ca.MX.sym("p", 0, 1)), self.costs, self.blocks)
+        return derivatives(self.problem["x"], self.problem["p"], self.costs, self.blocks)
 
     def suffices(self, motion: Deviation) -> bool:
         """Return whether a motion can exceed no local limit where the program does not have its rows."""
@@ -166,7 +165,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
     near = near or Near.everywhere(scenario, grid.shares)
     times = grid.shares * scenario.duration
     references, carried = _parameters(scenario, times), _carried(scenario, times)
-    p, given, intervals = None, ca.DM(references), ca.DM(grid.intervals)
+    p, given, intervals = ca.MX.sym("p", 0), ca.DM(references), ca.DM(grid.intervals)
     shown, lengths = references, grid.intervals
     if movable:
         p, given, intervals = _as_parameters(references.shape, steps)
@@ -202,7 +201,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         mesh=mesh,
         layout=layout,
         shares=grid.shares,
-        problem={"x": x, "f": objective, "g": g} | ({} if p is None else {"p": p}),
+        problem={"x": x, "p": p, "f": objective, "g": g},
         lower=lower,
         upper=upper,
         lower_g=bounds[:, 0],
@@ -211,7 +210,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         costs=costs,
         blocks=blocks,
         local=len(local),
-        parameters=None if p is None else _values(references, grid.steps[0]),
+        parameters=_values(references, grid.steps[0]) if movable else np.zeros(0),
     )
 
 
@@ -240,7 +239,7 @@ def _near_rows(near: Near, scheme: Scheme, node: Part, interval: Part, columns: 
     """Return the rows of local limits where they are near, at nodes and between them."""
     blocks, size = [], scheme.size
     windows: np.ndarray = np.lib.stride_tricks.sliding_window_view(near.chosen, size + 1, axis=1)
-    inside = windows[:, ::size].any(axis=2)
+    inside = windows[:, ::size].max(axis=2)
     at_nodes, between = (node, columns.at_nodes, near.chosen, size), (interval, columns.between, inside, 1)
     for part, mapped_at, near_to, points_of_stage in (at_nodes, between):
         for index, function, rows in part.local:

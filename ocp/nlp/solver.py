@@ -100,21 +100,17 @@ class Solver:
         self.program = self._watch.program = self.program.of(scenario)
 
     def _make(self, start: dict[str, Any]) -> ca.Function:
+        scenario = self.program.scenario
+        thrusts = any(scenario.robot.carriers[index].efforts for index, _ in scenario.carrier_free)
+        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
+        accuracy |= TEAM if thrusts and scenario.count > MANY else {}
         # What its check of the inputs warns of, more equations than unknowns, is an answer here: no solution.
-        common = {"print_time": False, "error_on_fail": False, "inputs_check": False, "calc_lam_p": False}
-        options = common | self._options(start)
+        options = {"print_time": False, "error_on_fail": False, "inputs_check": False, "calc_lam_p": False}
+        options |= {"ipopt": {"print_level": 0, "sb": "yes"} | accuracy | start, "iteration_callback": self._watch}
+        options |= self.program.derivatives
         made = wait_for(lambda: _checked(ca.nlpsol, "planner", "ipopt", self.program.problem, options))
         run_in_one_thread()
         return made
-
-    def _options(self, start: dict[str, Any]) -> dict[str, Any]:
-        quiet = {"print_level": 0, "sb": "yes"}
-        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
-        scenario = self.program.scenario
-        thrusts = any(scenario.robot.carriers[index].efforts for index, _ in scenario.carrier_free)
-        linear = TEAM if thrusts and scenario.count > MANY else {}
-        options = {"ipopt": quiet | accuracy | linear | start, "iteration_callback": self._watch}
-        return options | self.program.derivatives
 
     def solve(
         self,
@@ -134,14 +130,8 @@ class Solver:
         arrives; the solver's thread ends at its next iteration.
         """
         program, watch = self.program, self._watch
-        start: dict[str, Any] = {
-            "lbx": program.lower,
-            "ubx": program.upper,
-            "lbg": program.lower_g,
-            "ubg": program.upper_g,
-        }
-        if parameters is not None or program.parameters is not None:
-            start["p"] = program.parameters if parameters is None else parameters
+        start: dict[str, Any] = {"p": program.parameters if parameters is None else parameters}
+        start |= {"lbx": program.lower, "ubx": program.upper, "lbg": program.lower_g, "ubg": program.upper_g}
         own = self._last if near or guess is None else None
         nlp = self.prepare(guess, coarser, near)
         if own is not None:
@@ -246,10 +236,6 @@ class _Watch(ca.Callback):
         """Return whether `best` no longer improves."""
         return len(self.best) > 0 and self.iteration - self._since > PATIENCE
 
-    def infeasibility(self, g: np.ndarray) -> float:
-        """Return the largest violation of the constraints' bounds by their values g."""
-        return float(np.maximum(np.maximum(self.program.lower_g - g, g - self.program.upper_g), 0).max(initial=0.0))
-
     def get_n_in(self) -> int:
         return ca.nlpsol_n_out()
 
@@ -280,7 +266,8 @@ class _Watch(ca.Callback):
         if objective + (lam_g * missed).sum() < self._better():
             self._since = self.iteration
         if self._progress is not None:
-            self.errands.put(partial(self._progress, self.iteration, objective, self.infeasibility(g)))
+            infeasibility = float(np.abs(missed).max(initial=0.0))
+            self.errands.put(partial(self._progress, self.iteration, objective, infeasibility))
         self.iteration += 1
         self.late = time.perf_counter() > self._deadline
         np.frombuffer(res[0])[:] = self.abandoned or self.settled or self.late
