@@ -21,7 +21,7 @@ Statistics 14, 1986.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -202,7 +202,8 @@ def motion_factor(changes: ArrayLike, share: float) -> float:
     def excess(k: float) -> float:
         return float(curves * erfc(k / np.sqrt(2)) + length / np.pi * np.exp(-(k**2) / 2) - (1 - share))
 
-    return float(brentq(excess, 0.0, most)) if excess(most) < 0 else most
+    root: Any = brentq(excess, 0.0, most) if excess(most) < 0 else most
+    return float(root)
 
 
 def _chi(rank: int, share: float) -> float:
