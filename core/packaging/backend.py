@@ -10,7 +10,7 @@ from typing import Any
 
 import compiler
 from setuptools import build_meta
-from setuptools.build_meta import *  # noqa: F403 -- all hooks but those below
+from setuptools.build_meta import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:
