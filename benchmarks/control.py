@@ -41,29 +41,15 @@ class Step:
 
 @dataclass(frozen=True)
 class Error:
-    """A controller's errors over all seeds.
-
-    Attributes
-    ----------
-    task, controller :
-        The task and the controller.
-    rms_mm, max_mm :
-        Distance from the reference [mm]: root mean square, and largest of all runs.
-    ratio :
-        Median over the seeds of the largest error over that of computed torque with the same wind.
-    soft :
-        In how many steps, of all, there were no tensions for the wrench, or no new solution.
-    slack :
-        In how many steps a cable was slack.
-    """
+    """A controller's errors over all seeds; distances are from the reference [mm]."""
 
     task: str
     controller: str
     rms_mm: float
-    max_mm: float
-    ratio: float
-    soft: float
-    slack: float
+    max_mm: float  # of all runs
+    ratio: float  # median over the seeds of the largest error over that of computed torque with the same wind
+    soft: float  # share of the steps without tensions for the wrench, or without a new solution
+    slack: float  # share of the steps in which a cable was slack
 
 
 @dataclass(frozen=True)
@@ -83,20 +69,10 @@ class Report:
 
 
 def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progress: Progress | None = None) -> Report:
-    """Fly and measure.
+    """Fly and measure robots in winds, in runs of `steps` of a millisecond; errors are those of all `seeds` of gusts.
 
-    Parameters
-    ----------
-    steps :
-        Steps of a run, one per millisecond.
-    seeds :
-        Of gusts, for the errors.
-    tasks :
-        Robots and winds.
-    progress :
-        Called with the task's name and how many of how many parts are done.
-
-    Raises `InputError` if a number is out of range.
+    `progress` is called with the task's name and how many of how many parts are done. Raises `InputError` if a number
+    is out of range.
     """
     for name, value, most in (("steps", steps, 1_000_000), ("seeds", seeds, 10_000)):
         if not 1 <= value <= most:

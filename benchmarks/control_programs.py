@@ -18,38 +18,22 @@ BLOCK = 25  # programs of a turn
 
 @dataclass(frozen=True)
 class Row:
-    """A solver at the programs of a task.
+    """A solver at the programs of a task; errors are in units of the range of a control.
 
-    Attributes
-    ----------
-    task, contender, tolerance :
-        The task, the contender, and the accuracy required.
-    median_us, p99_us :
-        Time of a program [us].
-    ratio, ratio_to_horizon :
-        To condensing and `daqp.solve`, and to `Horizon` as it was simulated: medians over the turns.
-    max_error :
-        Largest error of the first stage's controls, in units of their range.
-    residual :
-        Largest step of a control of any stage along its gradient, over its curvature, inside its bounds; in the same
-        units.
-    failures :
-        Programs, of `programs`, without a result or with an error above `FAILED`.
-    programs :
-        How many it was given.
+    `residual` is the largest step of a control of any stage along its gradient, over its curvature, inside its bounds.
     """
 
     task: str
     contender: str
-    tolerance: str
-    median_us: float
+    tolerance: str  # the accuracy required
+    median_us: float  # of a program [us]
     p99_us: float
-    ratio: float
-    ratio_to_horizon: float
-    max_error: float | None
+    ratio: float  # to condensing and `daqp.solve`, median over the turns
+    ratio_to_horizon: float  # to `Horizon` as it was simulated, likewise
+    max_error: float | None  # of the first stage's controls
     residual: float | None
-    failures: int
-    programs: int
+    failures: int  # programs, of `programs`, without a result or with an error above `FAILED`
+    programs: int  # how many it was given
 
 
 def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contender]) -> list[Row]:

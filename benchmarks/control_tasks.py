@@ -18,29 +18,15 @@ STANDARD = "computed torque"
 
 @dataclass(frozen=True)
 class Task:
-    """A robot in a wind, and the options of its controllers.
-
-    Attributes
-    ----------
-    name, robot :
-        The task's name, and the robot.
-    wind, gusts :
-        Mean wind and intensity of the gusts [m/s]; None and 0 for a robot without drag.
-    push :
-        Constant force on the platform [N].
-    reach :
-        How far carriers may leave their reference [m]; 0: the controllers' default.
-    stage :
-        Of predictive control [s]; default: its own.
-    """
+    """A robot in a wind, and the options of its controllers."""
 
     name: str
     robot: Callable[[], Robot]
-    wind: tuple[float, float, float] | None
-    gusts: float
-    reach: float = 0.0
-    stage: float | None = None
-    push: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    wind: tuple[float, float, float] | None  # mean [m/s]; None for a robot without drag
+    gusts: float  # intensity [m/s]
+    reach: float = 0.0  # how far carriers may leave their reference [m]; 0: the controllers' default
+    stage: float | None = None  # of predictive control [s]; default: its own
+    push: tuple[float, float, float] = (0.0, 0.0, 0.0)  # constant force on the platform [N]
 
     def conditions(self) -> dict[str, Any]:
         """Return the options of `simulate`."""
@@ -103,18 +89,13 @@ class Keeping(Horizon):
 
 
 class Recording(Predictive):
-    """Predictive control that keeps its programs."""
+    """Predictive control that keeps its programs, in `keeping.kept`."""
 
     batches = True  # so that a flight uses this one and no copy
 
     def __init__(self, robot: Robot, **options: Any):
         super().__init__(robot, **options)
-        self._horizon = self._keeping = Keeping(self._horizon)
-
-    @property
-    def programs(self) -> list[Program]:
-        """Return the programs so far."""
-        return self._keeping.kept
+        self._horizon = self.keeping = Keeping(self._horizon)
 
 
 def record(task: Task, robot: Robot, steps: int) -> list[Program]:
@@ -124,4 +105,4 @@ def record(task: Task, robot: Robot, steps: int) -> list[Program]:
     """
     controller = Recording(robot, **task.options)
     simulate(robot, robot.home, controller, duration=steps * 1e-3, **task.conditions())
-    return controller.programs
+    return controller.keeping.kept

@@ -118,25 +118,12 @@ def _equations(A: Array, b: Array) -> list[tuple[Array, Array]]:
 
 
 def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return the multipliers of the equations and the limits at an optimum x.
+    """Return the multipliers of the equations and the limits at an optimum x (n,), y (rows,) and z_box (n,).
 
+    `gradient` is P x + q. The entries of z_box are negative at lower limits and positive at upper ones.
     The variables between their limits determine y by least squares, as long as the signs that it gives at the limits
     are right. At a degenerate vertex they need not be, since too few variables are between: then y and z_box
     are computed together, under the signs that the limits allow.
-
-    Parameters
-    ----------
-    gradient :
-        P x + q, shape (n,).
-    A, b :
-        Equations, shapes (rows, n) and (rows,).
-    x, lower, upper :
-        The optimum and its limits, shape (n,).
-
-    Returns
-    -------
-    y, z_box :
-        Shapes (rows,) and (n,); z_box is negative at lower limits and positive at upper ones.
     """
     near = _AT_LIMIT * np.maximum(1.0, np.abs(x))
     at_lower, at_upper = x <= lower + near, x >= upper - near

@@ -37,36 +37,21 @@ SOLVERS = ("daqp", "osqp", "clarabel", "piqp", "proxsuite", "quadprog", "highspy
 class Row:
     """One contender at one task.
 
-    Attributes
-    ----------
-    task, contender, tolerance :
-        The contender, the task, and the accuracy required.
-    median_us, p99_us :
-        Time of a call [us]; for a batch, of a call divided by its problems: its p99 is one of calls, not of problems.
-    ratio :
-        To `daqp.solve`; above 1 is slower.
-    max_error :
-        Largest error of a tension among its results, in units of the largest tension; None if the task is
-        infeasible, if it gave none or if it minimises something else.
-    failures :
-        Problems, of `problems`, that it got wrong: none, or tensions or a wrench off by more than `FAILED`, for a
-        feasible problem; tensions for an infeasible one.
-    problems :
-        How many it was given; fewer than requested if it ran out of time.
-    detail :
-        What went wrong beyond that, else empty.
+    Times are of a call; for a batch, of a call divided by its problems: its p99 is one of calls, not of problems. Wrong
+    is, for a feasible problem, no result, or tensions or a wrench off by more than `FAILED`; for an infeasible one,
+    tensions.
     """
 
     task: str
     contender: str
-    tolerance: str
+    tolerance: str  # the accuracy required
     median_us: float
     p99_us: float
-    ratio: float
-    max_error: float | None
-    failures: int
-    problems: int
-    detail: str = ""
+    ratio: float  # to `daqp.solve`; above 1 is slower
+    max_error: float | None  # of a tension, in units of the largest; None if the task is infeasible or nothing compares
+    failures: int  # problems, of `problems`, that it got wrong
+    problems: int  # how many it was given; fewer than requested if it ran out of time
+    detail: str = ""  # what went wrong beyond that
 
 
 @dataclass(frozen=True)
@@ -128,7 +113,7 @@ def run(
 
 
 class _Runner:
-    """One contender at one task: its results, its times, and whether it is still in."""
+    """One contender at one task: its results, its times, and why it is out."""
 
     def __init__(self, contender: Contender, task: Task, limit: float) -> None:
         self.contender, self.task, self.limit = contender, task, limit
@@ -136,10 +121,6 @@ class _Runner:
         self.answers: list[Array | None] = []
         self.detail = ""
         self.spent = 0.0
-
-    @property
-    def running(self) -> bool:
-        return not self.detail
 
     def turn(self, number: int) -> None:
         """Solve every problem once; turn 0 is the one whose results are kept and whose times are not."""
@@ -189,7 +170,7 @@ def measure(
     runners = [_Runner(contender, task, limit) for contender in who if task.kind in contender.kinds]
     for turn, runner in alternating(runners, repeats + 1):
         show(turn)
-        if runner.running:
+        if not runner.detail:  # it is still in
             runner.turn(turn)
     show(repeats + 1)
     reference = next(runner for runner in runners if runner.contender.name == REFERENCE)

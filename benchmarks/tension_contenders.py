@@ -48,29 +48,16 @@ _QPSOLVERS: dict[str, dict[str, Any]] = {
 class Contender(NamedTuple):
     """A solver as it takes part.
 
-    Attributes
-    ----------
-    name :
-        For tables.
-    tolerance :
-        The accuracy that it was set to.
-    prepare :
-        From a task to a function of the problem's index that returns x, shape (variables,), or None; for a batch, of 0
-        alone: it returns x of all, shape (batch, variables), and which of them are results.
-    batch :
-        True if it takes all problems at once.
-    same_aim :
-        False if it minimises something else than the QP, so that its tensions may differ.
-    kinds :
-        Kinds of tasks that it can take part in.
+    `prepare` makes of a task a function of the problem's index that returns x, (variables,), or None; for a batch, of 0
+    alone: it returns x of all, (batch, variables), and which of them are results.
     """
 
-    name: str
-    tolerance: str
+    name: str  # for tables
+    tolerance: str  # the accuracy that it was set to
     prepare: Callable[[Task], Any]
-    batch: bool = False
-    same_aim: bool = True
-    kinds: tuple[str, ...] = KINDS
+    batch: bool = False  # whether it takes all problems at once
+    same_aim: bool = True  # False if it minimises something else than the QP, so that its tensions may differ
+    kinds: tuple[str, ...] = KINDS  # of tasks that it can take part in
 
 
 def contenders() -> list[Contender]:

@@ -22,25 +22,13 @@ STIFFNESS = 1e3  # What a missing wrench costs in soft problems, relative to the
 
 
 class Task(NamedTuple):
-    """Problems of one kind, each as a tension problem and as a QP.
+    """Problems of one kind, each as a tension problem and as a QP."""
 
-    Attributes
-    ----------
-    kind, m :
-        One of `KINDS`, and the number of cables.
-    problems :
-        The problems; soft ones have m + 6 variables, t and e.
-    qps :
-        The same as P, q, A, b, lb, ub.
-    optima :
-        The optimum of each, shape (variables,), proven by its multipliers; None if the task is infeasible.
-    """
-
-    kind: str
-    m: int
-    problems: list[TensionProblem]
-    qps: list[dict[str, Any]]
-    optima: list[Array] | None
+    kind: str  # one of `KINDS`
+    m: int  # number of cables
+    problems: list[TensionProblem]  # soft ones have m + 6 variables, t and e
+    qps: list[dict[str, Any]]  # the same as P, q, A, b, lb, ub
+    optima: list[Array] | None  # of each, (variables,), proven by its multipliers; None if the task is infeasible
 
     @property
     def name(self) -> str:
@@ -48,9 +36,9 @@ class Task(NamedTuple):
         return f"{self.kind}, m = {self.m}"
 
 
-def make_task(kind: str, m: int, count: int, seed: int = 0) -> Task:
-    """Make `count` problems of a kind, m cables; the same seed makes the same problems."""
-    rng = np.random.default_rng([seed, m, KINDS.index(kind)])
+def make_task(kind: str, m: int, count: int) -> Task:
+    """Make `count` problems of a kind, m cables; the same ones each time."""
+    rng = np.random.default_rng([0, m, KINDS.index(kind)])
     problems = [_problem(rng, kind, m) for _ in range(count)]
     qps = [as_qp(problem) for problem in problems]
     return Task(kind, m, problems, qps, None if kind == "infeasible" else [_optimum(qp) for qp in qps])

@@ -71,13 +71,8 @@ def near_singular(rng: np.random.Generator) -> Iterator[TensionProblem]:
 def degenerate(rng: np.random.Generator) -> Iterator[TensionProblem]:
     """Yield wrenches on the boundary of the available wrench set, where the limits alone determine the tensions."""
     for name in REDUNDANT:
-        dynamics = Dynamics(load(name))
-        robot = dynamics.robot
         for _ in range(2):
-            A = dynamics.wrench_matrix(_nearby(rng, dynamics)) * robot.dof_mask[:, None]
-            direction = rng.normal(size=6) * robot.wrench_scale
-            corner = np.where(direction @ A > 0, robot.t_max, robot.t_min)
-            yield wrench_problem(dynamics.robot, A, A @ corner, robot.t_min, robot.t_max)
+            yield _beyond(rng, name, 0.0)
 
 
 def soft(rng: np.random.Generator) -> Iterator[TensionProblem]:
@@ -113,7 +108,7 @@ def _given(rng: np.random.Generator, name: str, offset: np.ndarray) -> TensionPr
     robot = dynamics.robot
     A = dynamics.wrench_matrix(robot.home + offset)
     tensions = robot.t_min + rng.uniform(0.02, 0.98, robot.m) * (robot.t_max - robot.t_min)
-    return wrench_problem(dynamics.robot, A, A @ tensions, robot.t_min, robot.t_max)
+    return wrench_problem(robot, A, A @ tensions)
 
 
 def _beyond(rng: np.random.Generator, name: str, part: float) -> TensionProblem:
@@ -126,7 +121,7 @@ def _beyond(rng: np.random.Generator, name: str, part: float) -> TensionProblem:
     normal /= np.linalg.norm(normal)
     corner = np.where((scale * normal) @ A > 0, robot.t_max, robot.t_min)
     w = A @ corner + part * robot.t_max.max() * normal / np.where(scale > 0, scale, 1.0)
-    return wrench_problem(dynamics.robot, A, w, robot.t_min, robot.t_max)
+    return wrench_problem(robot, A, w)
 
 
 SETS = {"STATIC": static_poses, "TRAJ": trajectories, "SINGULAR": near_singular, "DEGEN": degenerate, "SOFT": soft}
