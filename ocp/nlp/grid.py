@@ -37,20 +37,15 @@ class Grid(Displayed):
     def of(scenario: Scenario, steps: int) -> Grid:
         """Return the grid of so many steps."""
         scheme, phases = scenario.scheme, scenario.phases
-        even = scheme.shares(steps)
-        if not phases.all:
-            lengths = np.full(steps, scenario.duration / steps)
-            return Grid(even, scheme.quadrature(steps), lengths, np.zeros(steps))
-        counts = _counts(np.diff(phases.boundaries), steps)
-        boundaries = np.append(0.0, np.cumsum(counts)) / steps
-        shares = np.interp(even, boundaries, phases.boundaries / phases.boundaries[-1])
-        shares[np.round(boundaries * steps).astype(int) * scheme.size] = phases.boundaries / phases.boundaries[-1]
-        lengths = np.diff(shares[:: scheme.size])
-        weights = np.zeros(len(shares))
-        for k in range(steps):
-            weights[k * scheme.size : (k + 1) * scheme.size + 1] += np.array(scheme.weights) * lengths[k]
-        take_up = np.repeat([(phase.end - phase.start) * phase.rests for phase in phases.all], counts)
-        return Grid(shares, weights, lengths * scenario.duration, take_up)
+        boundaries = phases.boundaries / phases.boundaries[-1] if phases.all else np.array([0.0, 1.0])
+        durations, rests = np.diff(boundaries) * scenario.duration, [phase.rests for phase in phases.all] or [False]
+        counts = _counts(durations, steps)
+        starts = np.append(0, np.cumsum(counts))
+        shares = np.interp(scheme.shares(steps), starts / steps, boundaries)
+        shares[starts * scheme.size] = boundaries
+        lengths = np.repeat(durations / counts, counts)
+        weights = scheme.quadrature(lengths / scenario.duration)
+        return Grid(shares, weights, lengths, np.repeat(durations * rests, counts))
 
     @property
     def intervals(self) -> np.ndarray:

@@ -32,8 +32,8 @@ class Near(Displayed):
 
         `shares` are those of the motion's duration at the program's points.
         """
-        there = _At(scenario, shares, motion)
-        chosen = there.slack <= reach * there.extent
+        slack, _, extent = _kept(scenario, shares, motion)
+        chosen = slack <= reach * extent
         wide = chosen.copy()
         wide[:, 1:] |= chosen[:, :-1]
         wide[:, :-1] |= chosen[:, 1:]
@@ -46,10 +46,10 @@ class Near(Displayed):
 
     def suffices(self, scenario: Scenario, shares: np.ndarray, motion: Deviation) -> bool:
         """Return whether a motion can exceed no limit where it is left out, at the points or between them."""
-        there = _At(scenario, shares, motion)
+        slack, moved, _ = _kept(scenario, shares, motion)
         left_out = ~self.chosen
-        between = left_out[:, 1:] & left_out[:, :-1] & (there.slack[:, 1:] + there.slack[:, :-1] < there.moved)
-        return not ((there.slack < 0.0) & left_out).any() and not between.any()
+        between = left_out[:, 1:] & left_out[:, :-1] & (slack[:, 1:] + slack[:, :-1] < moved)
+        return not ((slack < 0.0) & left_out).any() and not between.any()
 
 
 def is_local(limit: Limit) -> bool:
@@ -62,27 +62,18 @@ def has_places(scenario: Scenario) -> bool:
     return any(is_local(limit) for limit in scenario.limits)
 
 
-class _At:
-    """A motion at shares of its duration.
+def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return how local limits are kept at shares of a motion, (limits, points) [m]: infinite slack for all others.
 
-    Attributes
-    ----------
-    slack
-        (limits, points) [m]: by how much local limits are kept; infinite for all others.
-    moved
-        (points - 1,) [m]: what any point of platform or carriers moves from one to the next.
-    extent
-        The largest distance of two places of the same point [m], at least; at most sqrt(3) times less.
+    Then what any point of platform or carriers moves from one share to the next, (points - 1,) [m], and the largest
+    distance of two places of the same point [m], at least; at most sqrt(3) times less.
     """
-
-    def __init__(self, scenario: Scenario, shares: np.ndarray, motion: Deviation):
-        lasting = scenario.lasting(float(motion.nodes[-1]))
-        platform, carriers = lasting.motion(shares * lasting.duration, motion)
-        points = np.concatenate(scenario.dynamics.points(platform.pose, carriers.pose), axis=1)
-        self.moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1, initial=0.0)
-        self.extent = float(np.ptp(points, axis=0).max())
-        self.slack = np.full((len(lasting.limits.all), len(shares)), np.inf)
-        evaluated = lasting.limits.along(platform, carriers)
-        for row, limit, values in zip(self.slack, lasting.limits, evaluated, strict=True):
-            if is_local(limit):
-                row[:] = np.minimum(values - limit.low, limit.high - values).min(axis=1)
+    lasting = scenario.lasting(float(motion.nodes[-1]))
+    platform, carriers = lasting.motion(shares * lasting.duration, motion)
+    points = np.concatenate(scenario.dynamics.points(platform.pose, carriers.pose), axis=1)
+    slack = np.full((len(lasting.limits.all), len(shares)), np.inf)
+    for row, limit, values in zip(slack, lasting.limits, lasting.limits.along(platform, carriers), strict=True):
+        if is_local(limit):
+            row[:] = np.minimum(values - limit.low, limit.high - values).min(axis=1)
+    moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1, initial=0.0)
+    return slack, moved, float(np.ptp(points, axis=0).max())

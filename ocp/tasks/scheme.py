@@ -70,12 +70,22 @@ class Scheme(Displayed):
         starts = np.arange(steps)[:, None] + np.array([0.0, *self.inner])
         return np.append(starts.ravel(), steps) / steps
 
-    def quadrature(self, steps: int) -> np.ndarray:
-        """Return the weights of the mean over the duration at all points, (steps * size + 1,)."""
-        weights = np.zeros(steps * self.size + 1)
-        for k in range(steps):
-            weights[k * self.size : (k + 1) * self.size + 1] += np.array(self.weights) / steps
-        return weights + _snap_share(steps) / steps if self.smooth else weights
+    def quadrature(self, lengths: np.ndarray) -> np.ndarray:
+        """Return the weights of the integral over intervals of these `lengths` (n,) at all points, (n * size + 1,).
+
+        Those of a smooth scheme are of the spline itself, whose snap is equal in the first two nodes and in the last
+        two: if the cost had other weights than the motion, motion at the ends would cost too little.
+        """
+        if self.smooth:
+            from scipy.interpolate import make_interp_spline  # loads for longer than a plan of another scheme takes
+
+            nodes = np.append(0.0, np.cumsum(lengths))
+            equal = [(3, np.zeros(len(nodes)))]
+            return make_interp_spline(nodes, np.eye(len(nodes)), bc_type=(equal, equal)).integrate(0.0, nodes[-1])
+        weights = np.zeros(len(lengths) * self.size + 1)
+        for k, length in enumerate(lengths):
+            weights[k * self.size : (k + 1) * self.size + 1] += np.array(self.weights) * length
+        return weights
 
     @cached_property
     def _to_points(self) -> np.ndarray:
@@ -131,25 +141,6 @@ class Scheme(Displayed):
             weights = bernstein.basis(len(points) - 1, shares)
             motion.append(sum(weights[:, i : i + 1] * point[index] for i, point in enumerate(points)))
         return motion
-
-
-def _snap_share(steps: int) -> np.ndarray:
-    """Return the weights that the mean of a cubic spline adds to those of the trapezoid rule, (steps + 1,).
-
-    Over an interval the mean is (a + a')/2 - h^2/24 (s + s') with the snaps of s_{k-1} + 4 s_k + s_{k+1} =
-    6/h^2 (a_{k-1} - 2 a_k + a_{k+1}), equal in the first two nodes and in the last two. If the cost had other weights
-    than the motion, motion at the ends would cost too little.
-    """
-    snaps = 4 * np.eye(steps + 1) + np.eye(steps + 1, k=1) + np.eye(steps + 1, k=-1)
-    snaps[0, :2] = snaps[-1, :-3:-1] = 1, -1
-    counted = np.full(steps + 1, -2 / 24)
-    counted[[0, -1]] /= 2
-    back = 6 * np.linalg.solve(snaps.T, counted)
-    back[[0, -1]] = 0.0  # the rows of the two ends have no second difference
-    weights = -2 * back
-    weights[:-1] += back[1:]
-    weights[1:] += back[:-1]
-    return weights
 
 
 SCHEMES: dict[str, Scheme] = {
