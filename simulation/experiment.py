@@ -73,5 +73,5 @@ class Experiment(NamedTuple):
             "substeps": self.substeps,
             "disturbance": self.disturbance.tolist(),
             "noise": self.noise.model_dump(exclude_defaults=True),
-            "events": [event.model_dump() for event in self.events],
+            "events": [event.model_dump(mode="json") for event in self.events],
         }

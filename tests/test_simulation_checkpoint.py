@@ -86,6 +86,7 @@ def stored(file):
         ({"disturbance": np.ones(6)}, "disturbance"),
         ({"noise": {"position": 1e-3}}, "noise"),
         ({"events": ["cut 1 at 0.01"]}, "events"),
+        ({"events": ["push 1 0 0 at 0.01"]}, "events"),
         ({"controller": ComputedTorque("wang-flying", bandwidth=9.0)}, "controller"),
         ({"drive": "tensions"}, "robot"),
     ],

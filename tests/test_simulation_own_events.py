@@ -146,6 +146,14 @@ def test_many_runs_are_pushed_as_one_is(robot):
     np.testing.assert_allclose(runs["error_max"].values, run.error.max(), rtol=1e-9)
 
 
+def test_runs_with_events_resume(robot, tmp_path):
+    events = ["push 20 0 0 at 0.01 for 0.05", Wall(at=0, point=(0.1, 0, 0), normal=(-1, 0, 0), stiffness=1e4)]
+    given = {"duration": 0.1, "events": events, "runs": 2, "checkpoint": tmp_path / "runs.checkpoint"}
+    first = simulate(robot, robot.home, **given)
+    again = simulate(robot, robot.home, **given, resume=True)
+    np.testing.assert_array_equal(first["error_max"].values, again["error_max"].values)
+
+
 def test_the_example_of_the_page_is_short_and_runs(capsys):
     assert len([line for line in CODE.splitlines() if line.strip()]) <= 30
     names = {}
