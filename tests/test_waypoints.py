@@ -271,6 +271,14 @@ def test_points_come_from_files_beside_the_task(tmp_path):
     np.testing.assert_allclose(np.diff(path.times), [5, 2.5, 1, (0.8 - 0.762) / (100 * 0.0254 / 60)], atol=1e-9)
 
 
+def test_one_dwell_is_that_of_every_point():
+    points = [[0, 0, 1], [1, 0, 1], [1, 1, 1]]
+    for kind, keys in (("waypoints", {}), ("feed", {"feed": 1, "acceleration": 2})):
+        path = {"kind": kind, "points": points, **keys}
+        one, each = (read_task({"path": {**path, "dwell": dwell}}).path for dwell in (0.5, [0.5] * 3))
+        assert one == each
+
+
 WRONG = {
     "unit missing": ("a.csv", CSV.replace("z [m]", "z"), "a.csv: the unit of z must be one of m, .*got ''"),
     "unit unknown": ("a.csv", CSV.replace("[deg]", "[turns]"), "the unit of yaw must be one of rad, .*got 'turns'"),

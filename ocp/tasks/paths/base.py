@@ -26,9 +26,17 @@ def or_file(schema: dict[str, Any]) -> None:
     schema["anyOf"] = [points, {"type": "string"}]
 
 
+def or_number(schema: dict[str, Any]) -> None:
+    """Add one number for all points to what a schema accepts."""
+    schema["anyOf"].append({"type": "number", "minimum": 0})
+
+
 def with_points_of_file(data: dict[str, Any], info: ValidationInfo, wanted: Collection[str]) -> dict[str, Any]:
-    """Return a path's fields with those `wanted` of the file that `points` names, if it is the name of one."""
-    if not isinstance(data.get("points"), str):
+    """Return a path's fields with those `wanted` of the file that `points` names, and one dwell for each point."""
+    dwell, points = data.get("dwell"), data.get("points")
+    if isinstance(points, list | tuple) and isinstance(dwell, int | float) and not isinstance(dwell, bool):
+        return data | {"dwell": [dwell] * len(points)}
+    if not isinstance(points, str):
         return data
     from .point_file import read_points  # compiles patterns, which lists of points do not need
 

@@ -11,7 +11,7 @@ from typing_extensions import override
 
 from ....base.text import quantity
 from ....models.part import NonNegative, Positive
-from .base import PathBase, PoseOrPosition, or_file, with_points_of_file
+from .base import PathBase, PoseOrPosition, or_file, or_number, with_points_of_file
 from .motion import Motion
 from .rounded_corners import CELLS, RoundedCorners
 from .time_law import TimeLaw
@@ -40,7 +40,8 @@ class FeedPath(PathBase):
     tolerance: NonNegative = Field(default=1e-3, description="by how much a corner may be missed [m]; 0: stop at each")
     feeds: tuple[Positive, ...] | None = Field(default=None, description="speed of each line, instead of `feed` [m/s]")
     dwell: tuple[NonNegative, ...] | None = Field(
-        default=None, description="how long the path stops at each point [s]; default: no stop"
+        default=None,
+        description="how long the path stops at each point, a number or one for each [s]; default: no stop",
     )
     ignored: tuple[str, ...] = Field(default=(), description="words of the .gcode file that were not used")
 

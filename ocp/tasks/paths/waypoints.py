@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
 from ....models.part import Finite, NonNegative
-from .base import PathBase, PoseOrPosition, check_times, or_file, with_points_of_file
+from .base import PathBase, PoseOrPosition, check_times, or_file, or_number, with_points_of_file
 from .legs import Legs
 from .motion import Motion
 from .stations import Stations
@@ -61,7 +61,9 @@ class WaypointPath(PathBase):
     )
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
-        description="for legs: how long the path stops at each point [s]; included in the duration; default: no stop",
+        json_schema_extra=or_number,
+        description="for legs: how long the path stops at each point, a number or one for each [s]; included in the "
+        "duration; default: no stop",
     )
 
     @model_validator(mode="before")
