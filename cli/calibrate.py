@@ -10,59 +10,53 @@ from ..base.inputs import check_ending, one_of
 from .options import FormatOption, JsonOption, RobotArgument, print_result
 from .outputs import check_outputs
 
-LogArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="LOG",
-        help="Log of lengths and, if known, poses, tensions and times: NetCDF, or CSV with a header such as "
-        "'t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
-    ),
-]
-FreeOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAMES",
-        help="Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, clock; or "
-        "auto. "
-        "Default: anchors, offsets, and clock if the log records times and poses of a motion.",
-    ),
-]
-PriorOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="NAME=SIGMA,...",
-        help="Standard deviations of the file's values [m] (scales [1], clock [s]), as "
-        "'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.",
-    ),
-]
-SigmaOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="SIGMA|NAME=SIGMA,...",
-        help="Standard deviation of the lengths [m], or of lengths [m], position [m] and rotation [rad], as "
-        "'lengths=0.001,position=0.0005'; default: the log's, or 1 mm and exact poses.",
-    ),
-]
-OutliersOption = Annotated[bool, typer.Option("--outliers/--no-outliers", help="Detect outliers and slipped winches.")]
-OutOption = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE.yaml", help="Robot file to write; default: ROBOT-calibrated.yaml in this folder."),
-]
-FiguresOption = Annotated[
-    Path | None,
-    typer.Option(metavar="FOLDER", help="Folder for figures of residuals, anchors and standard deviations."),
-]
-
 
 def calibrate(
     robot: RobotArgument,
-    log: LogArgument,
-    free: FreeOption = None,
-    prior: PriorOption = None,
-    sigma: SigmaOption = None,
-    outliers: OutliersOption = True,
-    out: OutOption = None,
-    figures: FiguresOption = None,
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="Log of lengths and, if known, poses, tensions and times: NetCDF, or CSV with a header such as "
+            "'t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
+        ),
+    ],
+    free: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, clock; or "
+            "auto. "
+            "Default: anchors, offsets, and clock if the log records times and poses of a motion.",
+        ),
+    ] = None,
+    prior: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=SIGMA,...",
+            help="Standard deviations of the file's values [m] (scales [1], clock [s]), as "
+            "'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.",
+        ),
+    ] = None,
+    sigma: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SIGMA|NAME=SIGMA,...",
+            help="Standard deviation of the lengths [m], or of lengths [m], position [m] and rotation [rad], as "
+            "'lengths=0.001,position=0.0005'; default: the log's, or 1 mm and exact poses.",
+        ),
+    ] = None,
+    outliers: Annotated[
+        bool, typer.Option("--outliers/--no-outliers", help="Detect outliers and slipped winches.")
+    ] = True,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.yaml", help="Robot file to write; default: ROBOT-calibrated.yaml in this folder."),
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for figures of residuals, anchors and standard deviations."),
+    ] = None,
     form: FormatOption = "png",
     as_json: JsonOption = False,
 ) -> None:

@@ -33,76 +33,62 @@ def _print_schema(requested: bool) -> None:
         raise typer.Exit
 
 
-TaskArgument = Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")]
-OutOption = Annotated[
-    Path | None,
-    typer.Option(
-        help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files, and "
-        "ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing file is "
-        "overwritten."
-    ),
-]
-FiguresOption = Annotated[
-    Path | None,
-    typer.Option(
-        help="Folder for figures: path.png, views.png, tensions.png and, if applicable, base.png (carriers), "
-        "limits.png and convergence.png."
-    ),
-]
-ReportOption = Annotated[
-    Path | None, typer.Option(help="HTML file to write: the report with its figures, in one file.")
-]
-AnimateOption = Annotated[Path | None, typer.Option(help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")]
-RobustOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="SHARE",
-        help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
-        "limits must hold; default: the task's value.",
-    ),
-]
-VaryOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="KEY=VALUES",
-        help="Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
-        "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
-        "robot.platform.mass. Repeat the option to plan all combinations. Writes one table instead of one plan: "
-        "--out names its NetCDF file, and a CSV file of the same name is written too (default: ROBOT-TASK-sweep.nc). "
-        "--figures draws sweep.png with feasibility, cost and margin. The exit code is 1 if no plan is feasible.",
-    ),
-]
-WorkersOption = Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")]
-SchedulerOption = Annotated[str | None, scheduler_option("With --vary: ")]
-CheckpointOption = Annotated[Path | None, checkpoint_option("With --vary: ")]
-ResumeOption = Annotated[Path | None, resume_option("With --vary: ")]
-KeepOption = Annotated[
-    Path | None, typer.Option(metavar="FOLDER", help="With --vary: folder in which to save every plan (NetCDF).")
-]
-SchemaOption = Annotated[
-    bool, typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files.")
-]
-
-
 def plan(
     robot: RobotArgument,
-    task: TaskArgument,
-    out: OutOption = None,
-    figures: FiguresOption = None,
+    task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files, and "
+            "ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing file is "
+            "overwritten."
+        ),
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for figures: path.png, views.png, tensions.png and, if applicable, base.png (carriers), "
+            "limits.png and convergence.png."
+        ),
+    ] = None,
     form: FormatOption = "png",
-    report: ReportOption = None,
-    animate: AnimateOption = None,
+    report: Annotated[
+        Path | None, typer.Option(help="HTML file to write: the report with its figures, in one file.")
+    ] = None,
+    animate: Annotated[Path | None, typer.Option(help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")] = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
-    robust: RobustOption = None,
-    vary: VaryOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    checkpoint: CheckpointOption = None,
-    resume: ResumeOption = None,
-    keep: KeepOption = None,
+    robust: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SHARE",
+            help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
+            "limits must hold; default: the task's value.",
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=VALUES",
+            help="Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
+            "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
+            "robot.platform.mass. Repeat the option to plan all combinations. Writes one table instead of one plan: "
+            "--out names its NetCDF file, and a CSV file of the same name is written too (default: "
+            "ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility, cost and margin. The exit code is 1 if no plan is feasible.",
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")] = 1,
+    scheduler: Annotated[str | None, scheduler_option("With --vary: ")] = None,
+    checkpoint: Annotated[Path | None, checkpoint_option("With --vary: ")] = None,
+    resume: Annotated[Path | None, resume_option("With --vary: ")] = None,
+    keep: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="With --vary: folder in which to save every plan (NetCDF).")
+    ] = None,
     as_json: JsonOption = False,
-    schema: SchemaOption = False,
+    schema: Annotated[
+        bool,
+        typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files."),
+    ] = False,
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or report why none exists.
 

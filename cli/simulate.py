@@ -42,92 +42,80 @@ _MANY = "With --runs: "
 CONTROLLERS = ("computed-torque", "predictive", "open-loop")
 
 
-PlanArgument = Annotated[
-    Path,
-    typer.Argument(
-        metavar="PLAN", help="A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF)."
-    ),
-]
-ControllerOption = Annotated[
-    str, typer.Option(help=f"The controller: {', '.join(CONTROLLERS)}; Python accepts controllers of your own.")
-]
-WindOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="'X Y Z'",
-        help="Velocity of the air [m/s], for robots with platform.aero; default: no air, and so no drag.",
-    ),
-]
-GustsOption = Annotated[
-    float, typer.Option(metavar="SIGMA", help="With --wind: intensity of turbulence (Dryden) about it [m/s].")
-]
-NoiseOption = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE", help="Errors and delay of the sensors (YAML), such as {position: 0.001, delay: 0.002}."
-    ),
-]
-EventOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--event",
-        "--fault",
-        metavar="EVENT",
-        help="Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
-        "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'stop at 3' "
-        "(the reference stops on its path), 'follow next.nc at 3' (it becomes another plan), "
-        "'push 20 0 0 at 1 for 0.5' (a force on the platform [N]), or the YAML file of a list of events. Repeat the "
-        "option for more.",
-    ),
-]
-DurationOption = Annotated[
-    float | None,
-    typer.Option(help="Simulated time [s]; default: the plan's. After its end the robot holds the final pose."),
-]
-ToleranceOption = Annotated[float, typer.Option(help="Largest position error allowed for a pass [m].")]
-SeedOption = Annotated[int, typer.Option(help="Seed of gusts and noise; the same seed gives the same run.")]
-RunsOption = Annotated[
-    int | None,
-    typer.Option(help="Number of runs, with the seeds --seed, --seed + 1, ... Writes one table instead of one motion."),
-]
-WorkersOption = Annotated[int, typer.Option(help="With --runs: number of processes on this machine.")]
-SchedulerOption = Annotated[str | None, scheduler_option(_MANY)]
-CheckpointOption = Annotated[Path | None, checkpoint_option(_MANY)]
-ResumeOption = Annotated[Path | None, resume_option(_MANY)]
-OutOption = Annotated[
-    Path | None,
-    typer.Option(
-        help="NetCDF file to write; default: PLAN-flight.nc in this folder, with --runs PLAN-flights.nc. An "
-        "existing file is overwritten."
-    ),
-]
-FiguresOption = Annotated[
-    Path | None,
-    typer.Option(help="Folder for figures of error, tensions and controller status; with --runs: errors of all runs."),
-]
-AnimateOption = Annotated[Path | None, typer.Option(help="Film of the simulation to write: .gif, or .mp4 with ffmpeg.")]
-
-
 def simulate(
     robot: RobotArgument,
-    plan: PlanArgument,
-    controller: ControllerOption = CONTROLLERS[0],
-    wind: WindOption = None,
-    gusts: GustsOption = 0.0,
-    noise: NoiseOption = None,
-    event: EventOption = None,
-    duration: DurationOption = None,
-    tolerance: ToleranceOption = 0.05,
-    seed: SeedOption = 0,
-    runs: RunsOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    checkpoint: CheckpointOption = None,
-    resume: ResumeOption = None,
-    out: OutOption = None,
-    figures: FiguresOption = None,
+    plan: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PLAN",
+            help="A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF).",
+        ),
+    ],
+    controller: Annotated[
+        str, typer.Option(help=f"The controller: {', '.join(CONTROLLERS)}; Python accepts controllers of your own.")
+    ] = CONTROLLERS[0],
+    wind: Annotated[
+        str | None,
+        typer.Option(
+            metavar="'X Y Z'",
+            help="Velocity of the air [m/s], for robots with platform.aero; default: no air, and so no drag.",
+        ),
+    ] = None,
+    gusts: Annotated[
+        float, typer.Option(metavar="SIGMA", help="With --wind: intensity of turbulence (Dryden) about it [m/s].")
+    ] = 0.0,
+    noise: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Errors and delay of the sensors (YAML), such as {position: 0.001, delay: 0.002}."
+        ),
+    ] = None,
+    event: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--event",
+            "--fault",
+            metavar="EVENT",
+            help="Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
+            "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'stop at 3' "
+            "(the reference stops on its path), 'follow next.nc at 3' (it becomes another plan), "
+            "'push 20 0 0 at 1 for 0.5' (a force on the platform [N]), or the YAML file of a list of events. Repeat "
+            "the option for more.",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(help="Simulated time [s]; default: the plan's. After its end the robot holds the final pose."),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="Largest position error allowed for a pass [m].")] = 0.05,
+    seed: Annotated[int, typer.Option(help="Seed of gusts and noise; the same seed gives the same run.")] = 0,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            help="Number of runs, with the seeds --seed, --seed + 1, ... Writes one table instead of one motion."
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="With --runs: number of processes on this machine.")] = 1,
+    scheduler: Annotated[str | None, scheduler_option(_MANY)] = None,
+    checkpoint: Annotated[Path | None, checkpoint_option(_MANY)] = None,
+    resume: Annotated[Path | None, resume_option(_MANY)] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="NetCDF file to write; default: PLAN-flight.nc in this folder, with --runs PLAN-flights.nc. An "
+            "existing file is overwritten."
+        ),
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for figures of error, tensions and controller status; with --runs: errors of all runs."
+        ),
+    ] = None,
     form: FormatOption = "png",
-    animate: AnimateOption = None,
+    animate: Annotated[
+        Path | None, typer.Option(help="Film of the simulation to write: .gif, or .mp4 with ffmpeg.")
+    ] = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
     as_json: JsonOption = False,

@@ -28,98 +28,81 @@ _FILES = (Path(__file__).parent.parent / "workspace" / "conditions").glob("[a-z]
 CONDITIONS = ", ".join(sorted(["all", "any", *(file.stem.replace("_", "-") for file in _FILES)]))
 
 
-ConditionOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="Condition: its kind, or JSON with the kind and its keys, such as "
-        f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
-        "Default: static-equilibrium."
-    ),
-]
-DefineOption = Annotated[
-    list[Path] | None, typer.Option(metavar="FILE.py", help="Python file with conditions of your own.")
-]
-RobustOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="SHARE",
-        help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
-        "conditions hold at all accepted poses simultaneously. Default: the nominal robot only.",
-    ),
-]
-BoxOption = Annotated[
-    str | None,
-    typer.Option(
-        help="Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors."
-    ),
-]
-AttitudeOption = Annotated[
-    str | None,
-    typer.Option(
-        help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: the attitude at "
-        "home."
-    ),
-]
-CarriersOption = Annotated[
-    str, typer.Option(help="Positions of the carriers: home, or reach (mobile carriers anywhere in their reach boxes).")
-]
-LengthsOption = Annotated[
-    str | None,
-    typer.Option(
-        help="For robots with three cables, instead of --box: range 'min max' of their lengths [m]; the positions "
-        "follow from them."
-    ),
-]
-SamplesOption = Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")]
-MethodOption = Annotated[str, typer.Option(help="Sampling method: random, sobol, grid or adaptive.")]
-SeedOption = Annotated[int, typer.Option(help="Seed of the random numbers.")]
-SizeOption = Annotated[
-    float | None,
-    typer.Option(
-        help="Smallest cell edge of the method adaptive [m]. Default: as small as the number of samples permits."
-    ),
-]
-WorkersOption = Annotated[int, typer.Option(help="Number of processes on this machine.")]
-SchedulerOption = Annotated[str | None, scheduler_option()]
-CheckpointOption = Annotated[Path | None, checkpoint_option()]
-ResumeOption = Annotated[Path | None, resume_option()]
-KeepOption = Annotated[str, typer.Option(help="Samples to keep in the file, at most a million: accepted, all or none.")]
-OutOption = Annotated[
-    Path | None,
-    typer.Option(
-        help="NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: "
-        "ROBOT-workspace.nc in this folder, from the robot's `name`."
-    ),
-]
-FigureOption = Annotated[
-    Path | None, typer.Option(help="Picture of the reached positions to write: .png, .pdf or .svg.")
-]
-MeshOption = Annotated[
-    Path | None, typer.Option(help="STL file for the boundary, at one attitude and with carriers at home (extra mesh).")
-]
-
-
 def workspace(
     robot: RobotArgument,
-    condition: ConditionOption = None,
-    define: DefineOption = None,
-    robust: RobustOption = None,
-    box: BoxOption = None,
-    attitude: AttitudeOption = None,
-    carriers: CarriersOption = "home",
-    lengths: LengthsOption = None,
-    samples: SamplesOption = 60_000,
-    method: MethodOption = "random",
-    seed: SeedOption = 0,
-    size: SizeOption = None,
-    workers: WorkersOption = 1,
-    scheduler: SchedulerOption = None,
-    checkpoint: CheckpointOption = None,
-    resume: ResumeOption = None,
-    keep: KeepOption = "accepted",
-    out: OutOption = None,
-    figure: FigureOption = None,
-    mesh: MeshOption = None,
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Condition: its kind, or JSON with the kind and its keys, such as "
+            f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
+            "Default: static-equilibrium."
+        ),
+    ] = None,
+    define: Annotated[
+        list[Path] | None, typer.Option(metavar="FILE.py", help="Python file with conditions of your own.")
+    ] = None,
+    robust: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SHARE",
+            help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
+            "conditions hold at all accepted poses simultaneously. Default: the nominal robot only.",
+        ),
+    ] = None,
+    box: Annotated[
+        str | None,
+        typer.Option(
+            help="Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors."
+        ),
+    ] = None,
+    attitude: Annotated[
+        str | None,
+        typer.Option(
+            help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: the attitude at "
+            "home."
+        ),
+    ] = None,
+    carriers: Annotated[
+        str,
+        typer.Option(help="Positions of the carriers: home, or reach (mobile carriers anywhere in their reach boxes)."),
+    ] = "home",
+    lengths: Annotated[
+        str | None,
+        typer.Option(
+            help="For robots with three cables, instead of --box: range 'min max' of their lengths [m]; the positions "
+            "follow from them."
+        ),
+    ] = None,
+    samples: Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")] = 60_000,
+    method: Annotated[str, typer.Option(help="Sampling method: random, sobol, grid or adaptive.")] = "random",
+    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
+    size: Annotated[
+        float | None,
+        typer.Option(
+            help="Smallest cell edge of the method adaptive [m]. Default: as small as the number of samples permits."
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(help="Number of processes on this machine.")] = 1,
+    scheduler: Annotated[str | None, scheduler_option()] = None,
+    checkpoint: Annotated[Path | None, checkpoint_option()] = None,
+    resume: Annotated[Path | None, resume_option()] = None,
+    keep: Annotated[
+        str, typer.Option(help="Samples to keep in the file, at most a million: accepted, all or none.")
+    ] = "accepted",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: "
+            "ROBOT-workspace.nc in this folder, from the robot's `name`."
+        ),
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Picture of the reached positions to write: .png, .pdf or .svg.")
+    ] = None,
+    mesh: Annotated[
+        Path | None,
+        typer.Option(help="STL file for the boundary, at one attitude and with carriers at home (extra mesh)."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Sample the poses at which a condition holds; the exit code is 1 if there are none."""
