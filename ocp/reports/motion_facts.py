@@ -2,14 +2,13 @@
 
 import numpy as np
 
+from ...base.display import Fact
 from ...base.text import quantity, quantity_row
 from ...models.part import Vector3
 from ..result import PlanData
 from ..tasks.paths import FeedPath, PathBase, TimedPath
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
-
-Fact = tuple[str, str]  # its name, and the fact with its unit
 
 
 def motion_facts(plan: PlanData) -> list[Fact]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from ...base.display import Fact
 from ...base.text import at_most, quantity, quantity_row
 from ...figures.drawing import Drawing
 from ...figures.report import Report, Section, Table
@@ -11,8 +12,7 @@ from ...models.parsing import to_yaml
 from ...solvers import Certificate
 from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
-from ..timing.fastest_law import FastestLaw
-from .motion_facts import Fact, motion_facts, wind
+from .motion_facts import motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
 RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding
@@ -34,11 +34,12 @@ def decisive(plan: PlanData) -> str:
 def sections(plan: PlanData) -> list[Section]:
     """Return the report below its first line; sections without facts are left out."""
     titles = {"infeasible": "Why it is infeasible", "not-found": "What the closest motion violates"}
+    bottlenecks = [] if plan.law is None else [("", each.describe()) for each in plan.law.bottlenecks]
     every = [
         Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
         Section("What you can try", [_relaxation(plan, relaxed) for relaxed in plan.relaxations]),
         Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
-        Section("Active limits along the path (s = 0 at its start, 1 at its end)", _bottlenecks(plan)),
+        Section("Active limits along the path (s = 0 at its start, 1 at its end)", bottlenecks),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
         Section("Tensions", _tensions(plan)),
         Section("Uncertain geometry", _robots(plan)),
@@ -130,7 +131,9 @@ def _up(plan: PlanData) -> np.ndarray:
 
 def _of_the_motion(plan: PlanData) -> str:
     if plan.law is not None and not plan.law.exists:
-        return _without_law(plan.law)
+        if (proof := plan.law.certificate) is None:
+            return "the motion only shows the path"
+        return f"short by {quantity(proof.shortfall, 'N')} at s = {plan.law.at:.4g}, whatever the speed"
     if plan.law is not None and plan.feasible:
         return f"shortest duration {quantity(plan.duration, 's', 6)}"
     if plan.feasible:
@@ -147,16 +150,6 @@ def _of_the_motion(plan: PlanData) -> str:
     if certificate.wind is not None:
         short += f" in wind {wind(certificate.wind)}"
     return f"{short}{_more(len(excess))}"
-
-
-def _without_law(law: FastestLaw) -> str:
-    if law.certificate is None:
-        return "the motion only shows the path"
-    return f"short by {quantity(law.certificate.shortfall, 'N')} at s = {law.at:.4g}, whatever the speed"
-
-
-def _bottlenecks(plan: PlanData) -> list[Fact]:
-    return [] if plan.law is None else [("", each.describe()) for each in plan.law.bottlenecks]
 
 
 def _in_phase(plan: PlanData, time: float | None) -> str:

@@ -39,29 +39,29 @@ class Cases:
         """Return the number of combinations."""
         return prod(self.shape)
 
-    def indices(self, number: int) -> tuple[int, ...]:
-        """Return the index of the value on each axis."""
-        return tuple(int(index) for index in np.unravel_index(number, self.shape))
+    def places(self, number: int) -> list[tuple[Axis, int]]:
+        """Return each axis with the index of its value in a combination."""
+        indices = np.unravel_index(number, self.shape)
+        return [(axis, int(index)) for axis, index in zip(self.axes, indices, strict=True)]
 
     def described(self, number: int) -> str:
         """Return the values of a combination as text: "margin = 5, duration = 4"."""
-        places = zip(self.axes, self.indices(number), strict=True)
-        return ", ".join(f"{axis.field.key} = {axis.texts[index]}" for axis, index in places)
+        return ", ".join(f"{axis.field.key} = {axis.texts[index]}" for axis, index in self.places(number))
 
     def case(self, number: int) -> tuple[Robot, Task]:
         """Return robot and task of a combination, validated like a robot and task file.
 
         Raises `InputError` if the values are not valid.
         """
-        data = self._data
-        indices = self.indices(number)
-        for axis, index in zip(self.axes, indices, strict=True):
-            if not axis.field.of_robot:
+        data, of_robot = self._data, list[tuple[Axis, int]]()
+        for axis, index in self.places(number):
+            if axis.field.of_robot:
+                of_robot.append((axis, index))
+            else:
                 data = axis.field.set(data, axis.values[index])
-        return self._robot(indices), validate(data, Task, f"task {self.task.name!r}")
+        return self._robot(of_robot), validate(data, Task, f"task {self.task.name!r}")
 
-    def _robot(self, indices: tuple[int, ...]) -> Robot:
-        varied = [(axis, index) for axis, index in zip(self.axes, indices, strict=True) if axis.field.of_robot]
+    def _robot(self, varied: list[tuple[Axis, int]]) -> Robot:
         if not varied:
             return self.robot
         place = tuple(index for _, index in varied)

@@ -168,8 +168,7 @@ class Sweep(Displayed, Reported):
         writer.writerow(["plan", *(f"{name} [{unit}]" if unit else name for name, unit in units)])
         for number, row in enumerate(self.rows):
             cells = ["" if isinstance(value, float) and math.isnan(value) else value for value in row]
-            places = zip(self.cases.axes, self.cases.indices(number), strict=True)
-            writer.writerow([number, *(axis.labels[index] for axis, index in places), *cells])
+            writer.writerow([number, *(axis.labels[index] for axis, index in self.cases.places(number)), *cells])
         return stream.getvalue()
 
     def to_dict(self) -> dict[str, Any]:
@@ -178,11 +177,9 @@ class Sweep(Displayed, Reported):
         def existing(value: Any) -> Any:
             return None if isinstance(value, float) and math.isnan(value) else value
 
-        axes = self.cases.axes
         rows = []
         for number, row in enumerate(self.rows):
-            places = zip(axes, self.cases.indices(number), strict=True)
-            varied = {axis.field.key: axis.values[index] for axis, index in places}
+            varied = {axis.field.key: axis.values[index] for axis, index in self.cases.places(number)}
             results = {name: existing(value) for name, value in row._asdict().items()}
             rows.append({"plan": number, "varied": varied, **results})
         every = [*(str(status) for status in MotionStatus), FAILED]
@@ -190,7 +187,7 @@ class Sweep(Displayed, Reported):
             "plans": len(rows),
             "feasible": self.feasible,
             "counts": {status: self.counts[status] for status in every},
-            "vary": {axis.field.key: list(axis.values) for axis in axes},
+            "vary": {axis.field.key: list(axis.values) for axis in self.cases.axes},
             "rows": rows,
         }
 
@@ -248,9 +245,9 @@ class Sweep(Displayed, Reported):
 
     def _table(self) -> Table:
         units = {name: unit for name, unit, _ in _RESULTS}
-        indices = [self.cases.indices(number) for number in range(len(self.rows))]
         heads = [axis.field.key for axis in self.cases.axes]
-        columns = [[axis.texts[index[place]] for index in indices] for place, axis in enumerate(self.cases.axes)]
+        texts = [[axis.texts[index] for axis, index in self.cases.places(number)] for number in range(len(self.rows))]
+        columns = [list(of_axis) for of_axis in zip(*texts, strict=True)]
         columns.append([row.status for row in self.rows])
         columns += [column([getattr(row, name) for row in self.rows]) for name in _NUMBERS]
         columns.append([row.reason for row in self.rows])
