@@ -119,14 +119,7 @@ def equilibria(
 def rest_near(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray) -> Equilibrium | None:
     """Return a stable equilibrium near a pose or None, by Newton's method if all cables are taut, else by descent.
 
-    Parameters
-    ----------
-    lengths
-        (m,) [m].
-    start
-        Pose (6,), in {G}.
-    carriers
-        (c, 6), in {G}.
+    The cables have `lengths` (m,) [m]; the pose is `start` (6,) and those of the carriers (c, 6), in {G}.
     """
     return _newton(robot, lengths, start, carriers) or _descend(robot, start, carriers, lengths)
 
@@ -158,8 +151,7 @@ def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.n
     frequencies, _ = dynamics.natural_frequencies(pose, np.maximum(tensions, 0.0), carriers)
     if len(frequencies) and frequencies[0] < -UNSTABLE:
         return None
-    neutral = bool(len(frequencies)) and bool(np.abs(frequencies).min() < UNSTABLE)
-    return replace(reached, neutral=neutral)
+    return replace(reached, neutral=bool(np.abs(frequencies).min(initial=np.inf) < UNSTABLE))
 
 
 def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> np.ndarray | None:
@@ -218,14 +210,11 @@ def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.
             return None
         frequencies, modes = dynamics.natural_frequencies(pose, tensions, carriers)
         if not len(frequencies) or frequencies[0] > -UNSTABLE:
-            return replace(candidate, neutral=bool(len(frequencies)) and bool(np.abs(frequencies).min() < UNSTABLE))
-        start = _displaced(pose, 0.1 * _unit(modes[:, 0], robot.length), np.array(robot.platform.com))
+            return replace(candidate, neutral=bool(np.abs(frequencies).min(initial=np.inf) < UNSTABLE))
+        mode = modes[:, 0]
+        size = max(np.linalg.norm(mode[:3]) / robot.length, np.linalg.norm(mode[3:]))  # in robot lengths, radians
+        start = _displaced(pose, 0.1 * mode / size, np.array(robot.platform.com))
     return None
-
-
-def _unit(mode: np.ndarray, length: float) -> np.ndarray:
-    """Return a mode scaled to move the platform by about its own size, at most by a radian."""
-    return mode / max(np.linalg.norm(mode[:3]) / length, np.linalg.norm(mode[3:]))
 
 
 @lru_cache(maxsize=16)
