@@ -41,6 +41,7 @@ class FeedPath(PathBase):
     feeds: tuple[Positive, ...] | None = Field(default=None, description="speed of each line, instead of `feed` [m/s]")
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
+        json_schema_extra=or_number,
         description="how long the path stops at each point, a number or one for each [s]; default: no stop",
     )
     ignored: tuple[str, ...] = Field(default=(), description="words of the .gcode file that were not used")
