@@ -74,7 +74,8 @@ def plan(
             "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
             "robot.platform.mass. Repeat the option to plan all combinations. Writes one table instead of one plan: "
             "--out names its NetCDF file, and a CSV file of the same name is written too (default: "
-            "ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility, cost and margin. The exit code is 1 if no plan is feasible.",
+            "ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility, cost and margin. The exit code is 1 if "
+            "no plan is feasible.",
         ),
     ] = None,
     workers: Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")] = 1,
