@@ -159,7 +159,7 @@ def _check(path: Path, database: sqlite3.Connection, header: dict[str, Any]) -> 
 
 def _foreign(path: Path, kind: Kind) -> InputError:
     what = f"towline's {kind.what}"
-    return InputError(f"checkpoint must be {ACCEPTED} or a new file, got {path}, which is no checkpoint of {what}")
+    return InputError(f"checkpoint must be {ACCEPTED} or a new file, got {path}, which is not a checkpoint of {what}")
 
 
 def _refusal(path: Path, kind: Kind, error: sqlite3.Error) -> InputError:

@@ -28,9 +28,9 @@ class LengthControl(Controller):
 
         L0 = l(x) / (1 + t / EA) + J (P e + I \int e dt)
 
-    with the planned pose x and tensions t when winches will have followed, the Jacobian J of the lengths, and the
-    error e of the measured pose. The tensions of a robot with more cables than degrees of freedom follow from the
-    lengths; they are not controlled.
+    with the planned pose x and tensions t at the time when the winches will have followed, the Jacobian J of the
+    lengths, and the error e of the measured pose. The tensions of a robot with more cables than degrees of freedom
+    follow from the lengths; they are not controlled.
 
     Parameters
     ----------
@@ -40,13 +40,13 @@ class LengthControl(Controller):
         E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does not
         stretch (also the default of a cable without a value in the file).
     lag
-        Time by which the winches follow their commands late [s]: lengths are commanded so much earlier.
+        Time by which the winches follow their commands late [s]: lengths are commanded earlier by this time.
     proportional, integral
         P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 2 and 10 if
         it is current, 0.3 and 2 up to 20 ms, less beyond. A pose that is late without a time of its measurement needs
         gains for that age: with others the oscillations of the platform on its cables grow.
     most
-        Largest correction of a length [m]; default: 5 % of the robot's length. At it the integral stops, and the
+        Largest correction of a length [m]; default: 5 % of the robot's length. There the integral stops, and the
         status is "hold".
 
     Raises
@@ -126,7 +126,7 @@ class LengthControl(Controller):
         )
 
     def _ahead(self, dt: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the planned pose, poses of carriers and tensions when winches will have followed."""
+        """Return the planned pose, poses of carriers and tensions at the time when the winches will have followed."""
         lag, tensions = self._lag, reference.tensions
         (pose, *_), (carriers, *_) = moved_on(reference[:3], lag), moved_on(reference[3:6], lag)
         if tensions is None or not np.isfinite(tensions).all():

@@ -45,7 +45,7 @@ class Platform(Part):
     com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")
     home: Pose | None = Field(
         default=None,
-        description="initial and reference pose in {G} [m, rad]; default: level, amid or below the anchors",
+        description="initial and reference pose in {G} [m, rad]; default: level, between or below the anchors",
     )
     dof: tuple[Coordinate, ...] = Field(
         default=COORDINATES,

@@ -101,9 +101,10 @@ def plan(
     -------
     Plan
         With status `feasible`; or `infeasible` if no motion that the task allows is feasible, proven by the certificate
-        or by a limit that all exceed; or `not-found`, with the certificate at the worst time of the closest motion
-        known, or with the limits that it exceeds. `Plan.stages` records the stages, `Plan.infeasible_spans` the times
-        without tensions, and `Plan.relaxations` suggests feasible variations: a duration, or looser limits.
+        or by a limit that every such motion exceeds; or `not-found`, with the certificate at the worst time of the
+        closest motion known, or with the limits that it exceeds. `Plan.stages` records the stages,
+        `Plan.infeasible_spans` the times without tensions, and `Plan.relaxations` suggests feasible variations: a
+        duration, or looser limits.
 
     Raises
     ------

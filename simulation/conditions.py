@@ -28,7 +28,7 @@ class Conditions(Displayed):
         Sensor noise, a `Noise` or a mapping (default: none).
     events
         Events, each a line, a mapping, the YAML file of a list, or an `Event` (times in [s], cables count from 1): "cut
-        3 at 2.5", a cable breaks; "stick 2 at 1", its winch stops; "lose quad-1 at 2", the actuators of a carrier stop;
+        3 at 2.5", a cable breaks; "stick 2 at 1", its winch stops; "lose quad1 at 2", the actuators of a carrier stop;
         "miss 0.05 at 1.2", the controller does not respond; "stop at 3", the reference stops on its path as
         `control.stop` does; "follow next.nc at 3", it becomes another plan; "push 20 0 0 at 1 for 0.5", a force on the
         platform in {G} [N]; a `Wall` that it meets.

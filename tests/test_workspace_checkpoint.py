@@ -25,7 +25,7 @@ SAMPLES = 3 * CHUNK + 1000
 PAGE = 16_384 + 24  # bytes in the log of SQLite for each chunk, at least
 
 
-FOREIGN = "which is no checkpoint of towline's workspace"
+FOREIGN = "which is not a checkpoint of towline's workspace"
 
 
 class Counting(StaticEquilibrium):
@@ -214,7 +214,7 @@ def test_an_empty_file_is_a_new_one(tmp_path, whole):
 def test_a_checkpoint_of_another_command_is_refused(tmp_path, whole):
     file = tmp_path / "run.checkpoint"
     file.write_bytes(whole[0])
-    with pytest.raises(InputError, match="which is no checkpoint of towline's sweep"):
+    with pytest.raises(InputError, match="which is not a checkpoint of towline's sweep"):
         open_checkpoint(file, Kind("sweep", "plan"), {}, True).__enter__()
     assert file.read_bytes() == whole[0]
 

@@ -87,7 +87,7 @@ def phases_table(plan: PlanData) -> Table | None:
             quantity(phase.load),
             _or_none(phase.tension_min),
             _or_none(phase.tension_max),
-            "hangs" if phase.reaction_max is None else quantity(phase.reaction_max),
+            "in the air" if phase.reaction_max is None else quantity(phase.reaction_max),
         )
         for phase in plan.phases
     ]
