@@ -223,10 +223,8 @@ class _Limits:
         floor, after = np.zeros(len(self._rows.a)), 0.0
         if not self._goes_on or self._rows.can_rest.all():
             return floor
-        least, most = (
-            np.stack(parts)
-            for parts in zip(*(self._rows.range_of(np.full_like(floor, x)) for x in LEVELS), strict=True)
-        )
+        ranges = np.array([self._rows.range_of(np.full_like(floor, x)) for x in LEVELS])
+        least, most = ranges[:, 0], ranges[:, 1]
         free = most - least
         needed = np.clip(free[-1], 0.0, ROOM)  # where u has no room, no step ends
         for at in range(len(floor) - 1, -1, -1):
@@ -240,7 +238,7 @@ class _Limits:
         while place > len(self._lowest) - 3:
             self._extend(1)
         k = int(place)
-        least, most = self._rows.of(slice(k, k + 2)).range_of(np.full(2, rate * rate))
+        least, most = _Bounds(*(part[k : k + 2] for part in self._rows)).range_of(np.full(2, rate * rate))
         low, high = float(least.max()), float(most.min())
         if low > high:  # none is possible: of those between, the one nearest to the rate of now
             u = min(max(0.0, high), low)
@@ -261,10 +259,6 @@ class _Bounds(NamedTuple):
     vv: np.ndarray  # (n, c), v . v, and so on; nan where the carrier rests
     vg: np.ndarray
     gg: np.ndarray
-
-    def of(self, some: slice) -> _Bounds:
-        """Return those of some instants."""
-        return _Bounds(*(part[some] for part in self))
 
     @property
     def can_rest(self) -> np.ndarray:

@@ -119,12 +119,10 @@ def _still(times: np.ndarray, pose: np.ndarray) -> Motion:
 
 
 def _of_path(robot: Robot, path: Any, duration: float | None) -> Trajectory:
-    natural = getattr(path, "natural_duration", None)
-    lasting = (
-        number("duration", natural if duration is None else duration, 1e-3, 1e6) if (natural or duration) else None
-    )
-    if lasting is None:
+    wanted = getattr(path, "natural_duration", None) if duration is None else duration
+    if not wanted:
         raise InputError("duration must be the time that the path takes [s], got None")
+    lasting = number("duration", wanted, 1e-3, 1e6)
     if getattr(path, "frame", "world") != "world":
         raise InputError(f"reference must be a path in the frame world, got one in {path.frame!r}")
 

@@ -95,21 +95,14 @@ def terminal(A: np.ndarray, B: np.ndarray, by: Weights) -> np.ndarray:
     The recursion does not converge for uncontrollable motions, such as the swing of a load with few cables. Costs are
     then discounted over time.
     """
-    for discount in (1.0, DISCOUNT):
-        P, settled = _cost_to_go(np.sqrt(discount) * A, np.sqrt(discount) * B, by)
-        if settled:
-            break
-    return P
-
-
-def _cost_to_go(A: np.ndarray, B: np.ndarray, by: Weights) -> tuple[np.ndarray, bool]:
     Q, R = np.diag(by.states), np.diag(by.controls)
-    P = Q
-    for _ in range(ROUNDS):
-        PB = P @ B
-        gain = np.linalg.solve(R + B.T @ PB, PB.T @ A)
-        last, P = P, Q + A.T @ (P @ A - PB @ gain)
-        P = (P + P.T) / 2
-        if np.abs(P - last).max() <= SETTLED * np.abs(P).max():
-            return P, True
-    return P, False
+    for discount in (1.0, DISCOUNT):
+        a, b, P = np.sqrt(discount) * A, np.sqrt(discount) * B, Q
+        for _ in range(ROUNDS):
+            Pb = P @ b
+            gain = np.linalg.solve(R + b.T @ Pb, Pb.T @ a)
+            last, P = P, Q + a.T @ (P @ a - Pb @ gain)
+            P = (P + P.T) / 2
+            if np.abs(P - last).max() <= SETTLED * np.abs(P).max():
+                return P
+    return P

@@ -115,16 +115,12 @@ def _add_platform(robot: Robot, world: ET.Element) -> None:
 
 def _body(world: ET.Element, name: str, pose: Iterable[float]) -> ET.Element:
     numbers = list(pose)
-    return ET.SubElement(world, "body", name=name, pos=_text(numbers[:3]), euler=_euler(numbers))
+    euler = _text(numbers[:2:-1])  # in the order in which they turn the body: yaw, pitch, roll
+    return ET.SubElement(world, "body", name=name, pos=_text(numbers[:3]), euler=euler)
 
 
 def _add_inertia(body: ET.Element, com: Iterable[float], mass: float, inertia: Iterable[float]) -> None:
     ET.SubElement(body, "inertial", pos=_text(com), mass=repr(mass), fullinertia=_text(inertia))
-
-
-def _euler(pose: Iterable[float]) -> str:
-    """Return angles in the order in which they turn the body: yaw, pitch, roll."""
-    return _text(list(pose)[:2:-1])
 
 
 def _text(numbers: Iterable[float]) -> str:

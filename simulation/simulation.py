@@ -116,7 +116,8 @@ class Simulation(SimulationData, Filmed, Reported):
         if np.isfinite(record.unexplained[rows]).any():
             about = "mean acceleration of the platform that was not predicted, angles times the robot's length"
             variables["unexplained"] = over(("time",), record.unexplained[rows], "m/s^2", about)
-        words = {"flag_values": np.arange(len(ANSWERS), dtype=np.int8), "flag_meanings": " ".join(_flags())}
+        flags = " ".join(answer.replace(" ", "_") for answer in ANSWERS)  # words without blanks, by the CF conventions
+        words = {"flag_values": np.arange(len(ANSWERS), dtype=np.int8), "flag_meanings": flags}
         about = {"long_name": "status of the control step", **words}
         variables["answered"] = Variable(("time",), record.answered[rows], about)
         actuators = [actuator.name for actuator in max((c.actuators for c in robot.carriers), key=len)]
@@ -219,8 +220,3 @@ class Simulation(SimulationData, Filmed, Reported):
             f"computed torque from t = {at:.3f} s on: {quantity(missed, 'm/s^2')} of the platform's acceleration "
             "was not predicted"
         )
-
-
-def _flags() -> list[str]:
-    """Return the status words without blanks, as the CF conventions require."""
-    return [answer.replace(" ", "_") for answer in ANSWERS]

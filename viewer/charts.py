@@ -30,16 +30,13 @@ class Charts:
 
     def __init__(self, gui: Any, shown: Curves, other: Curves | None = None):
         self._curves = shown
-        beside = None if other is None else other.on(shown.times)
-        cables = shown.tensions.shape[1]
-        tensions = [(shown.tensions[:, i], f"cable {i + 1}", _stroke(i)) for i in range(cables)]
-        margins = [(shown.margins, "margin", {"stroke": style.colour(0), "width": 1.5})]
-        if beside is not None:
-            tensions += [
-                (beside.tensions[:, i], f"cable {i + 1}, other", _stroke(i) | {"dash": OTHER, "width": 1.0})
-                for i in range(cables)
-            ]
-            margins.append((beside.margins, "margin, other", {"stroke": style.colour(0), "width": 1.0, "dash": OTHER}))
+        drawn = [(shown, "", {})]
+        drawn += [] if other is None else [(other.on(shown.times), ", other", {"dash": OTHER, "width": 1.0})]
+        cables = range(shown.tensions.shape[1])
+        tensions = [
+            (its.tensions[:, i], f"cable {i + 1}{word}", _stroke(i) | look) for its, word, look in drawn for i in cables
+        ]
+        margins = [(its.margins, f"margin{word}", _stroke(0) | look) for its, word, look in drawn]
         self._charts = [
             self._chart(gui, "tensions [N]", tensions, TALL),
             self._chart(gui, "tension margin [N]", margins, LOW),

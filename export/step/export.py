@@ -111,7 +111,8 @@ def step_files(robot: Robot, precision: str = "double") -> dict[str, str]:
         "more": "".join([", carrier_pose" if moving else "", ", wind" if has_wind else ""]),
         **_costs(robot, function),
     }
-    return {name: _filled(name, values) for name in _FILES}
+    texts = {name: (_TEMPLATE / name).read_text(encoding="utf-8") for name in _FILES}
+    return {name: re.sub(r"@(\w+)@", lambda match: values[match[1]], text) for name, text in texts.items()}
 
 
 def _columns(moving: list[str], has_wind: bool) -> list[tuple[int, int, str]]:
@@ -164,8 +165,3 @@ def _comment(text: str) -> str:
     shown = "".join(char if char.isprintable() else f"U+{ord(char):04X}" for char in " ".join(text.split()))
     safe = shown.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
     return "\n * ".join(textwrap.wrap(safe, 112))
-
-
-def _filled(name: str, values: dict[str, str]) -> str:
-    text = (_TEMPLATE / name).read_text(encoding="utf-8")
-    return re.sub(r"@(\w+)@", lambda match: values[match[1]], text)
