@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -74,36 +74,30 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
 
 def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the heaviest platform that is feasible, with the moments of inertia that go with its mass."""
-    platform = scenario.robot.platform
+    data, mass = scenario.robot.model_dump(), scenario.robot.platform.mass
 
     def with_mass(share: float) -> Variation:
-        inertia = None if platform.inertia is None else [share * value for value in platform.inertia]
-        lighter = _with_robot(scenario, {"platform": {"mass": share * platform.mass, "inertia": inertia}})
-        return lighter, share * platform.mass, f"instead of {quantity(platform.mass, 'kg')}"
+        platform = data["platform"] | {"mass": share * mass}
+        if platform["inertia"] is not None:
+            platform["inertia"] = [share * value for value in platform["inertia"]]
+        lighter = Robot.model_validate(data | {"platform": platform})
+        return lay_out(lighter, scenario.task), share * mass, f"instead of {quantity(mass, 'kg')}"
 
     return _largest(search, with_mass, "platform.mass", "kg")
 
 
 def _stronger_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the smallest factor of all t_max that is feasible, as the largest t_max."""
-    t_max = scenario.robot.t_max
+    data, t_max = scenario.robot.model_dump(), scenario.robot.t_max
     largest, others = float(t_max.max()), "" if np.ptp(t_max) == 0 else ", and others alike"
 
     def with_limits(share: float) -> Variation:
         factor = 1 + (STRONGEST - 1) * (1 - share) ** 4  # fine steps near one
-        stronger = _with_robot(scenario, {"cables": [{"t_max": factor * high} for high in t_max]})
-        return stronger, factor * largest, f"instead of {quantity(largest, 'N')}{others}"
+        cables = [cable | {"t_max": factor * cable["t_max"]} for cable in data["cables"]]
+        stronger = Robot.model_validate(data | {"cables": cables})
+        return lay_out(stronger, scenario.task), factor * largest, f"instead of {quantity(largest, 'N')}{others}"
 
     return _largest(search, with_limits, "cables.t_max", "N", up=True)
-
-
-def _with_robot(scenario: Scenario, changes: dict[str, Any]) -> Scenario:
-    """Return the scenario with other numbers of its robot, by the structure of its file."""
-    data = scenario.robot.model_dump()
-    data["platform"] |= {name: value for name, value in changes.get("platform", {}).items() if value is not None}
-    for cable, change in zip(data["cables"], changes.get("cables", []), strict=False):
-        cable |= change
-    return lay_out(Robot.model_validate(data), scenario.task)
 
 
 def _largest(
