@@ -105,12 +105,8 @@ def _number(value: float) -> float | None:
 def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False) -> Audit:
     """Audit the motion of `deviation`, or that of the references alone.
 
-    Parameters
-    ----------
-    to_show
-        True for a motion that is known to be infeasible and only shown: at the output times, without its drift.
-
-    Raises `InputError` if a cable has zero length somewhere.
+    One that is known to be infeasible and only `to_show` is audited at the output times, without its drift. Raises
+    `InputError` if a cable has zero length somewhere.
     """
     intervals = scenario.output_samples * (1 if to_show else _audits_per_output(scenario))
     times = np.linspace(0.0, scenario.duration, intervals + 1)

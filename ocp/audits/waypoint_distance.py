@@ -61,16 +61,8 @@ def waypoint_distance(
 ) -> WaypointDistance | None:
     """Return where a motion passes its waypoints at the largest distance; None for a path without waypoints.
 
-    Each waypoint is compared with the motion from the waypoint before to the one after it.
-
-    Parameters
-    ----------
-    stations
-        The waypoints.
-    times, poses
-        Instants of the motion, (n,) [s], and its poses there in the frame of the path, (n, 6) [m, rad].
-    pose_at
-        Returns the poses at other times of the motion.
+    Each waypoint is compared with the motion from the waypoint before to the one after it. The motion has `poses`
+    (n, 6) [m, rad] in the frame of the path at `times` (n,) [s], and others by `pose_at`.
     """
     if not stations.names:
         return None

@@ -66,18 +66,10 @@ class Costs(Displayed):
     def along(
         self, times: np.ndarray, platform: Motion, carriers: Motion, tensions: np.ndarray, margin: float
     ) -> float:
-        """Return the objective of a motion that has no free coordinates, in {G}.
+        """Return the objective of a motion in {G} that has no free coordinates, at `times` (n,) [s] from 0.
 
-        Parameters
-        ----------
-        times
-            (n,) [s], from 0.
-        platform, carriers
-            Pose, velocity and acceleration, (n, 6) each and (n, c, 6) each.
-        tensions
-            (n, m) [N].
-        margin
-            Their least distance from the limits, beyond the task's `margin` [N].
+        Poses, velocities and accelerations are (n, 6) and (n, c, 6) each, tensions (n, m) [N]; `margin` is the least
+        distance of these from their limits, beyond the task's `margin` [N].
         """
         still = [np.zeros((len(times), 18))] * (1 + len(self.robot.carriers))
         whole = np.full((len(times), 1), times[-1]), np.full((len(times), 1), margin)

@@ -24,17 +24,9 @@ def shortest_phases(scenario: Scenario) -> tuple[Scenario, PlannerStep | None]:
     A phase is audited alone, at durations that double, and then halve the range in which the shortest lies. What its
     neighbours require of it, such as loads that the ground takes up, is only known to the audit of the whole. A phase
     that is not even feasible at its longest duration keeps this, and so do those left when the task's time limit has
-    passed.
+    passed. A scenario without a range of a phase is returned as it is.
 
-    Parameters
-    ----------
-    scenario
-        Of a task; without a range of a phase it is returned as it is.
-
-    Raises
-    ------
-    InputError
-        If a phase has a range although tube or base leave the motion free.
+    Raises `InputError` if a phase has a range although tube or base leave the motion free.
     """
     start, task = time.perf_counter(), scenario.task
     phases = list(task.phases or ())

@@ -39,8 +39,7 @@ def final_of(plan: Plan) -> Final | None:
     if scenario.platform_free and platform_ends(scenario.task) == "free":
         given |= {name: tuple(part[0].tolist()) for name, part in zip(names, platform, strict=False)}
     if scenario.carrier_free and carrier_ends(scenario.task) in ("free", "periodic"):
-        rows = [tuple(tuple(row) for row in part[0].tolist()) for part in carriers]
-        given |= {f"carrier_{name}": row for name, row in zip(names, rows, strict=False)}
+        given |= {f"carrier_{name}": _rows(part[0]) for name, part in zip(names, carriers, strict=False)}
     return Final(**given) if given else None
 
 
@@ -49,16 +48,8 @@ def remainder(
 ) -> Remainder:
     """Lay out what is left of the motion of `whole` at `time` [s] for a robot in the state `initial`.
 
-    Parameters
-    ----------
-    whole
-        The motion from its beginning to its end.
-    final
-        How it ends, beside what its task requires.
-    last
-        The plan that the robot followed, which `begun` at that time [s].
-    settle
-        How long the way back to the path takes at most [s].
+    `final` is how it ends, beside what its task requires, and `last` the plan that the robot followed, which `begun` at
+    that time [s]. The way back to the path takes `settle` [s] at most.
     """
     left = whole.duration - time
     at = np.array([time - begun])
@@ -170,4 +161,4 @@ def _guess(scenario: Scenario, last: Plan, at: np.ndarray, carriers: Motion, set
 
 
 def _rows(values: np.ndarray) -> Any:
-    return tuple(tuple(row) for row in values.tolist())
+    return tuple(map(tuple, values.tolist()))

@@ -25,14 +25,8 @@ class Replanner:
     """Replan the remainder of a motion.
 
     One program with parameters serves all calls: references, start and length change, and each starts from the last
-    solution and its multipliers.
-
-    Parameters
-    ----------
-    first
-        The plan of the whole motion.
-    climb
-        Plans from scratch: whenever the program with parameters does not lead to a plan.
+    solution and its multipliers. `first` is the plan of the whole motion, and `climb` plans from scratch whenever the
+    program with parameters does not lead to a plan.
 
     Raises `InputError` if the remainder of its task cannot be planned.
     """

@@ -51,16 +51,9 @@ class RunningStage:
 class Search:
     """Solve one scenario's programs, and record the time and the message of each stage.
 
-    Parameters
-    ----------
-    scenario
-        That of the task.
-    solvers
-        Those that exist already, by mesh; new ones are added.
-    progress
-        Called with (iteration, objective, infeasibility).
-    seconds
-        For all that the search does, from now on [s]; default: the task's time limit, less what the last audit takes.
+    New `solvers` are added to those that exist already, by mesh. `progress` is called with (iteration, objective,
+    infeasibility). All that the search does takes `seconds`, from now on; default: the task's time limit, less what the
+    last audit takes.
     """
 
     def __init__(

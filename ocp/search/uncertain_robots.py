@@ -30,16 +30,9 @@ MOST_OF_CURVE = 2000  # instants for the lengths of the curves
 
 
 def for_robots(first: Plan, share: float, climb: Callable[[Scenario, Deviation | None], Plan]) -> Plan:
-    """Return the plan for a share of the robots, from the plan for the robot of the file.
+    """Return the plan for a share of the robots, from the `first` one, which counts the robot of the file as exact.
 
-    Parameters
-    ----------
-    first
-        The plan that counts the robot of the file as exact.
-    share
-        Of the robots, above 0 and below 1.
-    climb
-        Plans a scenario from a start.
+    `climb` plans a scenario from a start.
     """
     robot, task = first.scenario.robot, first.scenario.task
     plan, stages = judged(first, robot, share), list(first.stages)
@@ -90,9 +83,7 @@ def judged(plan: Plan, robot: Robot, share: float) -> Plan:
     plan = replace(plan, robust=margin)
     if margin.holds:
         return plan
-    row, cable = np.unravel_index(int(margin.violation.argmax()), margin.violation.shape)
-    excess = _excess(scenario, plan, margin, int(row), int(cable))
-    audit = replace(audit, excess=[*audit.excess, excess])
+    audit = replace(audit, excess=[*audit.excess, _excess(scenario, plan, margin)])
     status = MotionStatus.NOT_FOUND if plan.feasible else plan.status
     return replace(plan, status=status, audit=audit)
 
@@ -119,7 +110,9 @@ def _limits(scenario: Scenario, times: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return scenario.t_min_at(times) + scenario.hard_margin, scenario.robot.t_max - scenario.hard_margin
 
 
-def _excess(scenario: Scenario, plan: Plan, margin: RobustMargin, row: int, cable: int) -> Excess:
+def _excess(scenario: Scenario, plan: Plan, margin: RobustMargin) -> Excess:
+    """Return the largest excess of a tension with its spread."""
+    row, cable = np.unravel_index(int(margin.violation.argmax()), margin.violation.shape)
     audit, reach = plan.audit, float(margin.reach[row, cable])
     low, high = _limits(scenario, audit.times)
     value = float(audit.tensions[row, cable])

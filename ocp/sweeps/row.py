@@ -35,16 +35,7 @@ _NO_PLAN = Row(FAILED, "", math.nan, math.nan, math.nan, math.nan, iterations=0,
 
 
 def plan_case(number: int, robot: Robot, task: Task, file: Path | None) -> tuple[int, Row]:
-    """Plan one combination with one processor; return its number and its row.
-
-    Parameters
-    ----------
-    number
-        Of the combination, returned as it is.
-    robot, task
-        What to plan.
-    file
-        Where to save the plan, or None.
+    """Plan a combination with one processor and save the plan, unless `file` is None; return its number and its row.
 
     Raises `InputError` if the file cannot be written. An error of planning is a row.
     """
