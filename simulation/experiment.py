@@ -18,19 +18,12 @@ class Experiment(NamedTuple):
 
     Attributes
     ----------
-    period
-        Period of the controller [s].
-    substeps
-        Runge-Kutta steps per period.
+    period, substeps, disturbance, noise
+        As in `Conditions`.
     references
         Reference of each period.
     wind
-        Velocity of the air in {G} [m/s], a function of the times (K,) and a seed that returns (K, 3); None without
-        air.
-    disturbance
-        Force [N] and moment about the CoM [N m] on the platform in {G}, (6,).
-    noise
-        Sensor noise.
+        Velocity of the air in {G}; None without air.
     events
         Events in order of time.
     keep_out

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.display import Displayed, record
 from ..base.errors import InputError
-from ..base.inputs import real_array, shown, whole_number
+from ..base.inputs import flag, real_array, whole_number
 from ..core import PROCESSOR, horizon_places, horizon_relative_to, horizon_size, horizon_solve
 from .problem import Array
 
@@ -194,9 +194,7 @@ class Horizon(Displayed):
         InputError
             If an argument is no truth.
         """
-        for name, value in (("shifted", shifted), ("warm", warm)):
-            if value is not True and value is not False:
-                raise InputError(f"{name} must be True or False, got {shown(value)}")
+        shifted, warm = flag("shifted", shifted), flag("warm", warm)
         beginning = SHIFTED if shifted else WARM if warm else COLD
         self._count, self._converged = horizon_solve(
             *self._sizes, PROCESSOR, beginning, int(self.iterations_max), self.tolerance, self._memory, self._residuals

@@ -99,17 +99,15 @@ class Stage:
         for cable, way, colour in zip(self._cables, ways.astype(np.float32), colours, strict=True):
             cable.points = way
             cable.colors = colour
-        if self._sheaves is not None:
-            rings = sheaves(self._robot, points)
-            self._sheaves.visible = len(rings) > 0
-            if len(rings):
-                self._sheaves.points = rings.astype(np.float32)
+        rings = sheaves(self._robot, points)
+        self._sheaves.visible = len(rings) > 0
+        if len(rings):
+            self._sheaves.points = rings.astype(np.float32)
         for dots, ends in zip(self._ends, (points.anchors, points.attachments), strict=True):
             dots.points = ends.astype(np.float32)
         move(self._platform, instant.pose)
-        for handle, pose in zip(self._carriers, instant.carriers, strict=True):
-            if handle is not None:
-                move(handle, pose)
+        for index, handle in self._carriers.items():
+            move(handle, instant.carriers[index])
         # Not all at one height, for cables that run close to each other.
         along = (np.arange(self._robot.m) % 2 * 0.2 + 0.3)[:, None]
         middles = (1 - along) * exits + along * ends
@@ -278,25 +276,17 @@ class Stage:
             scene.add_point_cloud(name, ends, BLACK, point_size=dot, point_shape="circle", precision="float32")
             for name, dot in (("/ends/anchors", DOT * size), ("/ends/attachments", small))
         ]
-        self._sheaves = None
-        if robot.pulley_radii.any():
-            self._sheaves = self._segments("/pulleys", nowhere, BLACK, 2 * THIN)
+        self._sheaves = self._segments("/pulleys", nowhere, BLACK, 2 * THIN)
         self._platform = scene.add_frame("/platform", show_axes=False)
         self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
         com = np.array([robot.platform.com], np.float32)
         scene.add_point_cloud("/platform/com", com, rgb(style.colour(0)), point_size=1.5 * small, point_shape="circle")
-        self._carriers: list[viser.FrameHandle | None] = []
+        self._carriers: dict[int, viser.FrameHandle] = {}
         for index, carrier in enumerate(robot.carriers):
             if not carrier.drawing.body:
-                self._carriers.append(None)
                 continue
-            name = f"/carriers/{carrier.name}"
-            axes = carrier.drawing.axes
-            self._carriers.append(
-                scene.add_frame(
-                    name, axes, axes_length=0.05 * size, axes_radius=0.003 * size, origin_radius=0.008 * size
-                )
-            )
+            name, axes = f"/carriers/{carrier.name}", {"axes_length": 0.05 * size, "axes_radius": 0.003 * size}
+            self._carriers[index] = scene.add_frame(name, carrier.drawing.axes, **axes, origin_radius=0.008 * size)
             self._body(f"{name}/body", robot.anchors[robot.carrier_of_cable == index], GREY)
             if carrier.drawing.rotors:
                 self._lines(f"{name}/rotors", rotors(float(robot.carrier_radius[index])), BLACK, 2 * THIN)
