@@ -121,22 +121,10 @@ def turns(off: np.ndarray) -> np.ndarray:
 def rows_at(
     motions: np.ndarray, tensions: np.ndarray, after: np.ndarray, before: np.ndarray, period: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate references.
+    """Interpolate references: position, rate and acceleration, (K, 3, d), and tensions, (K, m) [N], every `period` [s].
 
-    Accelerations and tensions are interpolated linearly; after the last reference accelerations are constant.
-
-    Parameters
-    ----------
-    motions
-        (K, 3, d), each position, rate and acceleration.
-    tensions
-        (K, m) [N].
-    after
-        Time since the preceding row, (N,) [s].
-    before
-        Index of that row, (N,).
-    period
-        Time between rows [s].
+    The results are those at times `after`, (N,) [s], the rows `before`, (N,). Accelerations and tensions are
+    interpolated linearly; after the last reference accelerations are constant.
     """
     motion, last = motions[before], tensions[before]
     if np.abs(after).max() <= ROUNDING * period:

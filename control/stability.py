@@ -20,18 +20,8 @@ def grows(controller: Controller, robot: Robot, tensions: np.ndarray, bandwidth:
     """Return whether a small error at rest at home grows in the closed loop, with the rotation of flying carriers.
 
     The loop is closed around `Plant` after a small push in all coordinates, in which unstable modes soon dominate.
-    So all states are included: attitudes of carriers, delayed commands, observers.
-
-    Parameters
-    ----------
-    controller
-        Controller; it is reset before and afterwards.
-    robot
-        Robot of the controller.
-    tensions
-        Tensions at rest at home, (m,) [N].
-    bandwidth
-        Bandwidth of the decay of pose errors [rad/s].
+    So all states are included: attitudes of carriers, delayed commands, observers. The controller of the robot is reset
+    before and afterwards. Tensions, (m,) [N], are those at rest at home; pose errors decay with `bandwidth` [rad/s].
     """
     plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
     still = np.zeros_like(robot.carrier_home)

@@ -21,6 +21,7 @@ Statistics 14, 1986.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,8 +109,7 @@ class Spread:
     def only(self, rows: ArrayLike) -> Spread:
         """Return the same for some configurations, by their indices."""
         rows = _indices("rows", rows, len(self._inverse))
-        part = object.__new__(Spread)
-        part._cables, part._factor = self._cables, self._factor
+        part = copy(self)
         part._D, part._inverse = self._D[rows], self._inverse[rows]
         return part
 

@@ -64,16 +64,14 @@ class TimeLine:
         self._now.on_update(self._dragged)
         self._play.on_click(lambda _: self._turn(not self._playing.is_set()))
         steps = {
-            "first": lambda: 0,
-            "back": lambda: self._index - 1,
-            "next": lambda: self._index + 1,
-            "last": lambda: len(replay.times) - 1,
+            "first": ("home", lambda: 0),
+            "back": ("J", lambda: self._index - 1),
+            "next": ("L", lambda: self._index + 1),
+            "last": ("end", lambda: len(replay.times) - 1),
         }
-        self._step.on_click(lambda _: self._jump(steps[self._step.value]))
-        keys = {"first": "home", "back": "J", "next": "L", "last": "end"}
-        for word, key in keys.items():
-            command = gui.add_command(f"Time: {word}", hotkey=key)
-            command.on_trigger(lambda _, step=steps[word]: self._jump(step))
+        self._step.on_click(lambda _: self._jump(steps[self._step.value][1]))
+        for word, (key, step) in steps.items():
+            gui.add_command(f"Time: {word}", hotkey=key).on_trigger(lambda _, step=step: self._jump(step))
         gui.add_command("Time: play or pause", hotkey="K").on_trigger(lambda _: self._turn(not self._playing.is_set()))
         self._go(0)
         threading.Thread(target=self._keep_playing, daemon=True).start()
