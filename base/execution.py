@@ -109,32 +109,28 @@ class Workers:
     failures: Mapping[type[Exception], str] = field(default_factory=dict)
     look: Callable[[], None] = lambda: None
 
-    def map(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
-        """Yield `function(*job)` of each job, in their order, while the next ones are being evaluated.
-
-        Raises `SolverError` if workers end before their work is done.
-        """
-        return self._results(function, jobs, in_order=True)
-
-    def as_completed(self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> Iterator[Result]:
-        """Yield `function(*job)` of each job as soon as it is there, so that no worker waits for a slow one.
-
-        Raises `SolverError` if workers end before their work is done.
-        """
-        return self._results(function, jobs, in_order=False)
-
-    def _results(
-        self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]], in_order: bool
+    def map(
+        self, function: Callable[..., Result], jobs: Iterable[tuple[Any, ...]], in_order: bool = True
     ) -> Iterator[Result]:
-        """Yield the results of all jobs."""
+        """Yield `function(*job)` of each job while the next ones are being evaluated.
+
+        Results come in the order of the jobs, or else as soon as they are there, so that no worker waits for a slow
+        job. Raises `SolverError` if workers end before their work is done.
+        """
         under_way: list[Future[Result]] = []
-        with self._ending(under_way):
+        try:
             for job in jobs:
                 under_way.append(self.executor.submit(function, *job))
                 while len(under_way) >= self.limit():
                     yield from self._done(under_way, in_order)
             while under_way:
                 yield from self._done(under_way, in_order)
+        except tuple(self.failures) as error:
+            message = next(text for kind, text in self.failures.items() if isinstance(error, kind))
+            raise SolverError(message.format(error)) from None
+        finally:
+            for future in under_way:
+                future.cancel()
 
     def _done(self, under_way: list[Future[Result]], in_order: bool) -> Iterator[Result]:
         """Wait until the first job is done, or any; remove those that are and yield their results."""
@@ -144,18 +140,6 @@ class Workers:
         for future in done:
             under_way.remove(future)
             yield future.result()
-
-    @contextmanager
-    def _ending(self, under_way: Iterable[Future[Any]]) -> Iterator[None]:
-        """Cancel what is under way at the end of the block, and name the workers where they have failed."""
-        try:
-            yield
-        except tuple(self.failures) as error:
-            message = next(text for kind, text in self.failures.items() if isinstance(error, kind))
-            raise SolverError(message.format(error)) from None
-        finally:
-            for future in under_way:
-                future.cancel()
 
 
 def check_workers(workers: object, scheduler: object) -> None:

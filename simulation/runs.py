@@ -60,7 +60,7 @@ def fly_many(
         fly = (lambda *job: fly_part(everything, *job)) if packed is None else fly_packed
         jobs = ((some.start, seeds[some.start : some.stop]) for some in _blocks(done, sizes))
         jobs = jobs if packed is None else ((packed, *job) for job in jobs)
-        for first, result, seconds in started.as_completed(fly, jobs):
+        for first, result, seconds in started.map(fly, jobs, in_order=False):
             sizes.learn(len(result), seconds)
             if stored is not None:
                 stored.put(first, result.tobytes())

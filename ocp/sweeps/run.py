@@ -108,7 +108,7 @@ def sweep(
             rows.update((number, Row(*json.loads(content))) for number, content in stored.items())
         feasible = sum(row.status == MotionStatus.FEASIBLE for row in rows.values())
         _report(progress, rows, cases, feasible)
-        for number, row in started.as_completed(plan_case, _jobs(cases, set(rows), folder)):
+        for number, row in started.map(plan_case, _jobs(cases, set(rows), folder), in_order=False):
             if stored is not None:
                 stored.put(number, json.dumps(row).encode())
             rows[number] = row
