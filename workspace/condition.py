@@ -146,69 +146,57 @@ class TensionCondition(Condition, ABC):
     )
 
 
-class AllOf(Condition):
+class _Joined(Condition, ABC):
+    """Conditions of which each is evaluated only where the previous ones do not decide."""
+
+    every: ClassVar[bool]  # whether all have to hold, not only one
+
+    conditions: tuple[AnyCondition, ...] = Field(min_length=1)
+
+    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
+        held = np.full(len(places), self.every)
+        rows = np.arange(len(places))
+        for condition in self.conditions:
+            if not rows.size:
+                break
+            some = places if rows.size == len(places) else places.only(rows)
+            held[rows] = condition.holds(robot, some)
+            rows = np.flatnonzero(held == self.every)
+        return held
+
+    def for_robots(self, robust: float) -> Condition:
+        """Return the joined conditions for a fraction `robust` of the robots."""
+        return type(self)(conditions=tuple(one.for_robots(robust) for one in self.conditions))
+
+    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
+        """Return the sum of the shortfalls x, or the smallest if one must hold, each as x / (1 + x) in its unit."""
+        shares = [1.0 - 1.0 / (1.0 + one.shortfall(robot, places)) for one in self.conditions]
+        return (np.sum if self.every else np.min)(shares, axis=0)
+
+    def why_nowhere(self, robot: Robot) -> str | None:
+        """Return the first reason of a condition; if one must hold, only where every condition has a reason."""
+        reasons = [one.why_nowhere(robot) for one in self.conditions]
+        return next(filter(None, reasons), None) if self.every or all(reasons) else None
+
+
+class AllOf(_Joined):
     """All conditions hold. Each is evaluated only where the previous ones hold."""
+
+    every: ClassVar[bool] = True
 
     kind: Literal["all"] = "all"
     conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions that must all hold")
 
-    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return where all hold, (n,) of bool."""
-        return _one_by_one(self.conditions, robot, places, undecided=True)
 
-    def for_robots(self, robust: float) -> Condition:
-        """Return all conditions for a fraction `robust` of the robots."""
-        return AllOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
-
-    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the sum of the shortfalls x, each mapped to x / (1 + x), in its unit of the condition."""
-        return np.sum([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
-
-    def why_nowhere(self, robot: Robot) -> str | None:
-        """Return the reason of the first condition that has one."""
-        return next((reason for one in self.conditions if (reason := one.why_nowhere(robot))), None)
-
-
-class AnyOf(Condition):
+class AnyOf(_Joined):
     """At least one condition holds. Each is evaluated only where no previous one holds."""
+
+    every: ClassVar[bool] = False
 
     kind: Literal["any"] = "any"
     conditions: tuple[AnyCondition, ...] = Field(min_length=1, description="conditions of which one must hold")
-
-    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return where one of them holds, (n,) of bool."""
-        return _one_by_one(self.conditions, robot, places, undecided=False)
-
-    def for_robots(self, robust: float) -> Condition:
-        """Return the alternatives for a fraction `robust` of the robots."""
-        return AnyOf(conditions=tuple(one.for_robots(robust) for one in self.conditions))
-
-    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the smallest of the shortfalls x, mapped to x / (1 + x), in its unit of the condition."""
-        return np.min([_share(one.shortfall(robot, places)) for one in self.conditions], axis=0)
-
-    def why_nowhere(self, robot: Robot) -> str | None:
-        """Return the first reason, if every condition has one."""
-        reasons = [one.why_nowhere(robot) for one in self.conditions]
-        return reasons[0] if all(reasons) else None
-
-
-def _share(amount: np.ndarray) -> np.ndarray:
-    return 1.0 - 1.0 / (1.0 + amount)
 
 
 def _parts(condition: Condition, joined: type[AllOf] | type[AnyOf]) -> tuple[Condition, ...]:
     required("condition", condition, Condition)
     return condition.conditions if isinstance(condition, joined) else (condition,)
-
-
-def _one_by_one(conditions: tuple[Condition, ...], robot: Robot, places: Places, undecided: bool) -> np.ndarray:
-    held = np.full(len(places), undecided)
-    rows = np.arange(len(places))
-    for condition in conditions:
-        if not rows.size:
-            break
-        some = places if rows.size == len(places) else places.only(rows)
-        held[rows] = condition.holds(robot, some)
-        rows = np.flatnonzero(held == undecided)
-    return held
