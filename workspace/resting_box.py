@@ -79,39 +79,23 @@ def largest_box(
     around
         How many nodes more to go on every side, where there are so many.
     """
-    x, y, z = (int(np.argmin(abs(axis - at))) for axis, at in zip(axes, centre, strict=True))
-    # Of each column: how many nodes below and above the middle are able; -1 if that in the middle is not.
-    down = np.cumprod(able[:, :, z::-1], axis=2).sum(axis=2) - 1
-    up = np.cumprod(able[:, :, z:], axis=2).sum(axis=2) - 1
-    # The same of rectangles of columns, by how many nodes they reach to each side of the middle.
-    lower, upper = _least_of_rectangles(down, x, y), _least_of_rectangles(up, x, y)
-    steps = np.indices(lower.shape)
-    nodes = [(x - steps[0], x + steps[1]), (y - steps[2], y + steps[3]), (z - lower, z + upper)]
-    inside = (lower >= 0) & (upper >= 0)
+    # In order of their distance from the middle, so that of equal boxes the one with fewer nodes is found.
+    middle = [int(np.argmin(abs(axis - at))) for axis, at in zip(axes, centre, strict=True)]
+    firsts = [np.arange(at, -1, -1) for at in middle]
+    lasts = [np.arange(at, len(axis)) for axis, at in zip(axes, middle, strict=True)]
+    # How many nodes are not able, in all boxes that begin at the corner of the grid, then in those about the middle.
+    unable = np.pad((~able).cumsum(0).cumsum(1).cumsum(2), ((1, 0),) * 3)
+    for first, last in zip(firsts, lasts, strict=True):
+        unable = np.moveaxis(unable[last + 1] - unable[first][:, None], (0, 1), (-2, -1))
     widths = [
-        axis[np.where(inside, last, 0)] - axis[np.where(inside, first, 0)]
-        for axis, (first, last) in zip(axes, nodes, strict=True)
-        if len(axis) > 1
+        axis[last] - axis[first][:, None] if len(axis) > 1 else np.ones((1, 1))
+        for axis, first, last in zip(axes, firsts, lasts, strict=True)
     ]
-    volume = np.where(inside, np.prod(widths, axis=0), -1.0)
+    volume = np.where(unable == 0, np.einsum("ab,cd,ef->abcdef", *widths), -1.0)
     best = np.unravel_index(int(np.argmax(volume)), volume.shape)
-    ends = [(max(int(first[best]) - around, 0), int(last[best]) + around) for first, last in nodes]
-    low = np.array([axis[first] for axis, (first, _) in zip(axes, ends, strict=True)])
-    high = np.array([axis[min(last, len(axis) - 1)] for axis, (_, last) in zip(axes, ends, strict=True)])
-    return low, high
-
-
-def _least_of_rectangles(columns: np.ndarray, x: int, y: int) -> np.ndarray:
-    """Return the least value in every rectangle about (x, y), by the nodes to its left, right, front and back."""
-
-    def quadrant(part: np.ndarray) -> np.ndarray:
-        return np.minimum.accumulate(np.minimum.accumulate(part, axis=0), axis=1)
-
-    left, right = columns[x::-1], columns[x:]
-    return np.minimum(
-        np.minimum(quadrant(left[:, y::-1])[:, None, :, None], quadrant(left[:, y:])[:, None, None, :]),
-        np.minimum(quadrant(right[:, y::-1])[None, :, :, None], quadrant(right[:, y:])[None, :, None, :]),
-    )
+    low = [a[max(f[i] - around, 0)] for a, f, i in zip(axes, firsts, best[::2], strict=True)]
+    high = [a[min(k[i] + around, len(a) - 1)] for a, k, i in zip(axes, lasts, best[1::2], strict=True)]
+    return np.array(low), np.array(high)
 
 
 def _moved_along(robot: Robot) -> RestingBox | None:
