@@ -39,57 +39,42 @@ class Counter(Displayed):
     keep: str
     samples: int
 
-    def chunk(self, counts: Counts, units: np.ndarray, known: bytes | None, keep: bool) -> bytes:
-        """Add the points of a chunk (n, d) to counts; return which of them are accepted, one bit per sample.
+    def count(
+        self, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
+    ) -> tuple[Counts, list[bytes]]:
+        """Count some chunks, one after the other, with one processor.
 
         Parameters
         ----------
+        first
+            Number of the first chunk.
         known
-            Known bits, if any.
+            Known bits of each chunk, else None.
+        points
+            Points of each chunk in the unit cube (n, d); default: the sampler's.
         keep
             True to keep samples, not only count them.
+
+        Returns
+        -------
+        The counts, and which samples of each chunk are accepted, one bit per sample.
         """
-        places, exists = self.domain.places(units)
-        if known is None:
-            held = np.asarray(self.condition.holds(self.domain.robot, places), dtype=bool) & exists
-        else:
-            held = np.unpackbits(np.frombuffer(known, np.uint8), count=len(units)).astype(bool)
-        counts.count(self.domain, places, exists, held)
-        if keep and self.keep != "none":
-            rows = slice(None) if self.keep == "all" else held
-            counts.keep(self.domain.numbers(places.only(rows)), held[rows])
-        return np.packbits(held).tobytes()
-
-
-def count(
-    counter: Counter, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
-) -> tuple[Counts, list[bytes]]:
-    """Count some chunks, one after the other, with one processor.
-
-    Parameters
-    ----------
-    counter
-        That of the run.
-    first
-        Number of the first chunk.
-    known
-        Known bits of each chunk, else None.
-    points
-        Points of each chunk in the unit cube (n, d); default: the sampler's.
-    keep
-        True to keep samples, not only count them.
-
-    Returns
-    -------
-    The counts, and which samples of each chunk are accepted, one bit per sample.
-    """
-    counts, flags = Counts(counter.domain), []
-    with processors.at_most(1):
-        for offset, bits in enumerate(known):
-            if points is not None:
-                units = points[offset]
-            else:
-                assert counter.sampler is not None
-                units = counter.sampler.units(first + offset)
-            flags.append(counter.chunk(counts, units, bits, keep))
-    return counts, flags
+        counts, flags = Counts(self.domain), []
+        with processors.at_most(1):
+            for offset, bits in enumerate(known):
+                if points is not None:
+                    units = points[offset]
+                else:
+                    assert self.sampler is not None
+                    units = self.sampler.units(first + offset)
+                places, exists = self.domain.places(units)
+                if bits is None:
+                    held = np.asarray(self.condition.holds(self.domain.robot, places), dtype=bool) & exists
+                else:
+                    held = np.unpackbits(np.frombuffer(bits, np.uint8), count=len(units)).astype(bool)
+                counts.count(self.domain, places, exists, held)
+                if keep and self.keep != "none":
+                    rows = slice(None) if self.keep == "all" else held
+                    counts.keep(self.domain.numbers(places.only(rows)), held[rows])
+                flags.append(np.packbits(held).tobytes())
+        return counts, flags

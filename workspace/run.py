@@ -20,7 +20,7 @@ from ..base.inputs import one_of, required, shown, whole_number, with_fields
 from ..base.version import __version__
 from ..models import Robot
 from .condition import Condition, condition_from, for_robots
-from .counting import Counter, count
+from .counting import Counter
 from .counts import Counts
 from .dataset import dataset
 from .domain import Domain
@@ -198,7 +198,7 @@ class _Run:
         points
             Of the unit cube, (samples, d); default: the sampler's.
         """
-        for counts, chunks in self._workers.map(count, self._jobs(samples, points)):
+        for counts, chunks in self._workers.map(self._counter.count, self._jobs(samples, points)):
             self._counts.add(counts)
             left = counts.tried
             for flags in chunks:
@@ -212,14 +212,14 @@ class _Run:
                 self._progress(self._counts.tried, self._counter.samples, self._counts.accepted)
 
     def _jobs(self, samples: int, points: np.ndarray | None) -> Iterator[tuple[Any, ...]]:
-        """Yield the arguments of `count`, a few chunks each, so that all workers have jobs at low cost."""
+        """Yield the arguments of `Counter.count`, a few chunks each, so that all workers have jobs at low cost."""
         first, chunks = self._chunk, chunks_of(samples)
         together = min(LARGEST_JOB, max(1, chunks // 64))
         for start in range(0, chunks, together):
             some = range(start, min(start + together, chunks))
             known = [self._checkpoint and self._checkpoint.get(first + i) for i in some]
             units = None if points is None else [points[i * CHUNK : (i + 1) * CHUNK] for i in some]
-            yield self._counter, first + start, known, units, self._counts.left > 0
+            yield first + start, known, units, self._counts.left > 0
 
 
 def _header(robot: Robot, requested: dict[str, Any]) -> dict[str, Any]:
