@@ -209,6 +209,13 @@ CASES = {
         lambda b: {"platform_box": {"min": [-1, -1, 0], "max": [b, 1, 2]}},
     ),
     "cable_speed": Case("ipanema-1", OUT, lambda p: np.abs(rate(p, lengths(p))), lambda b: {"cable_speed": b}),
+    "zone_speed": Case(
+        "ipanema-1",
+        OUT,
+        lambda p: speed(p, platform(p))[np.linalg.norm(platform(p)[:, :3] - [0.3, 0.15, 1.15], axis=1) < 0.15],
+        lambda b: {"zone_speed": [{"centre": [0.3, 0.15, 1.15], "radius": 0.15, "speed": b}]},
+        tolerance=2e-3,
+    ),
     "cable_acceleration": Case(
         "ipanema-1",
         OUT,

@@ -499,3 +499,22 @@ def test_a_lateral_acceleration_that_rest_exceeds_has_no_law():
     timing = time_along("cogiro", {"path": path, "limits": {"platform_lateral_acceleration": 0.5}})
     assert not timing.feasible
     assert timing.status is not MotionStatus.FEASIBLE
+
+
+@pytest.mark.parametrize("through", [[0, 0, 1.5], [0, 0.4, 1.5]])
+def test_it_is_slow_near_a_place(through):
+    """Also with the centre of the place on the path, where the distance has no derivative."""
+    path = {"kind": "line", "start": [-3, -1, 1.5], "end": [3, 1, 1.5]}
+    limits = {"zone_speed": [{"name": "crowd", "centre": through, "radius": 1.5, "speed": 0.25}]}
+    for found in (
+        time_along("cogiro", {"path": path, "limits": limits}),
+        plan("cogiro", {"path": path, "limits": limits, "duration": {"min": 5, "max": 60}, "objective": {"time": 1}}),
+    ):
+        assert found.feasible
+        times = np.linspace(0, found.duration, 20_001)
+        position = found.scenario.motion(times, None)[0].pose[:, :3]
+        speed = np.linalg.norm(np.diff(position, axis=0), axis=1) / times[1]
+        inside = np.linalg.norm(position - through, axis=1)[1:] < 1.5
+        assert speed[inside].max() <= 0.25 * (1 + 1e-3)
+        assert speed[inside].mean() > 0.24
+        assert speed.max() > 1

@@ -1,11 +1,14 @@
-"""Limits of the platform: speed, acceleration, angular velocity, tilt and position."""
+"""Limits of the platform: speed, also near places, acceleration, angular velocity, tilt and position."""
 
 import casadi as ca
 from typing_extensions import override
 
+from ...models.part import Vector3
 from ...models.rotation import body_rate, rotation
 from .limit import Angle, Limit, Magnitude
 from .state import State
+
+STEEPNESS = 10.0  # [1/s], of the bound of a speed outside of its zone
 
 
 class PlatformSpeed(Magnitude):
@@ -16,6 +19,27 @@ class PlatformSpeed(Magnitude):
     @override
     def values(self, state: State) -> ca.SX:
         return state.platform.velocity[:3]
+
+
+class ZoneSpeed(Magnitude):
+    """Limit the speed of the platform frame's origin within a distance of a place.
+
+    Outside, the bound rises with the distance, by `STEEPNESS`: a bound that ends at once has no derivative, and no
+    instant at which a motion has to be slow enough.
+    """
+
+    name, unit = "zone_speed", "m/s"
+
+    def __init__(self, name: str, centre: Vector3, radius: float, most: float):
+        super().__init__(most)
+        self._centre, self._radius, self.labels = centre, radius, (f"platform near {name}",)
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        from_centre = ca.sumsqr(state.platform.position - ca.DM(self._centre)) / self._radius**2
+        # At least one under the root, which has no derivative at zero.
+        outside = self._radius * (ca.sqrt(ca.fmax(from_centre, 1)) - 1)
+        return state.platform.velocity[:3] / (1 + STEEPNESS * outside / self.high)
 
 
 class PlatformAcceleration(Magnitude):

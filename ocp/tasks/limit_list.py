@@ -26,6 +26,7 @@ from ..limits.platform import (
     PlatformSpeed,
     PlatformTilt,
     PlatformTurn,
+    ZoneSpeed,
 )
 from ..limits.tensions import Margin, TensionRate
 from ..limits.tube import TubeAttitude, TubePosition
@@ -67,6 +68,8 @@ def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
 
 
 def _of_platform(given: TaskLimits) -> Iterator[Limit]:
+    for zone in given.zone_speed:
+        yield ZoneSpeed(zone.name, zone.centre, zone.radius, zone.speed)
     kinds = PlatformSpeed, PlatformAcceleration, PlatformLateralAcceleration, PlatformTurn, PlatformTilt
     for kind in kinds:
         if (most := getattr(given, kind.name)) is not None:

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_ser
 from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
-from ...models.part import Box, NonNegative, Part, Positive
+from ...models.part import Box, NonNegative, Part, Positive, Vector3
 from ...models.ranges import Range
 from ..limits.limit import Limit
 
@@ -91,6 +91,15 @@ class ConvexMesh(KeepOut, shapes.ConvexMesh):
 AnyKeepOut = Annotated[Sphere | Capsule | Block | ConvexMesh, Field(discriminator="kind")]
 
 
+class SpeedZone(Part):
+    """A ball in which the platform is slow."""
+
+    name: str = Field(default="zone", min_length=1, max_length=60, description="in reports and figures")
+    centre: Vector3 = Field(description="its centre in {G} [m]")
+    radius: Positive = Field(description="[m]")
+    speed: Positive = Field(description="largest speed of the platform frame's origin inside [m/s]")
+
+
 class TaskLimits(Part):
     """The limits of a task; default: no limit. Each is hard unless `soft` names it.
 
@@ -116,6 +125,9 @@ class TaskLimits(Part):
     cable_length: Range | None = Field(default=None, description="range of every cable's length [m]")
     tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
     platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
+    zone_speed: tuple[SpeedZone, ...] = Field(
+        default=(), description="places near which the platform is slow; outside, the limit rises by 10 m/s per metre"
+    )
     platform_acceleration: Positive | None = Field(
         default=None, description="acceleration of the platform frame's origin [m/s^2]"
     )

@@ -33,7 +33,7 @@ from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import PhasePlane, phase_plane, proofs
 
-SPEEDS = ("platform_speed", "cable_speed", "carrier_speed")
+SPEEDS = ("platform_speed", "zone_speed", "cable_speed", "carrier_speed")
 ACCELERATIONS = ("platform_acceleration", "platform_lateral_acceleration", "cable_acceleration", "carrier_acceleration")
 KNOWN_LIMITS = (*SPEEDS, *ACCELERATIONS)
 ATTEMPTS = 8
