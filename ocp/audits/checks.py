@@ -213,32 +213,27 @@ def _base_ends(audited: Instants) -> list[Excess]:
     word = carrier_ends(scenario.task)
     if not isinstance(base, FreeBase) or word == "free":
         return []
-    exceeded = []
     moving = sorted({index for index, _ in scenario.carrier_free})
     states = (0, scenario.task.initial), (-1, scenario.task.final)
     ends = [end for end, state in states if state is None or state.carrier_pose is None]
     if not ends:
         return []
     if word == "rest":
-        _, speeds, accelerations = audited.carriers
-        off = [np.abs(speeds[end, moving]).max() for end in ends]
+        off = [audited.carriers.velocity[:, moving]]
         if at_rest_without_acceleration(scenario.robot, moving[0], 0):
-            off = [
-                max(speed, np.abs(accelerations[end, moving, :3]).max()) for end, speed in zip(ends, off, strict=True)
-            ]
-        about, unit, why = "carriers", "m/s, m/s^2", "an end at which they should be at rest"
+            off.append(audited.carriers.acceleration[:, moving, :3])
+        unit, why = "m/s, m/s^2", "an end at which they should be at rest"
     elif word == "periodic":
-        off = [max(np.abs(part[0, moving] - part[-1, moving]).max() for part in audited.carriers)]
-        ends, about, unit, why = [-1], "carriers", "m, m/s, m/s^2", "away from where they started"
+        off, ends = [part[:, moving] - part[0, moving] for part in audited.carriers], [-1]
+        unit, why = "m, m/s, m/s^2", "away from where they started"
     else:
-        references = scenario.references(audited.times[ends])[1]
-        off = [
-            max(np.abs(audited.carriers[k][end, i] - references[i][k][end]).max() for i in moving for k in range(2))
-            for end in ends
-        ]
-        about, unit, why = "carriers", "m, m/s", "away from `around`"
-    for end, value in zip(ends, off, strict=True):
-        exceeded += _missed("base.ends", about, audited.times[end], value, END_TOLERANCE, unit, why)
+        references = scenario.references(audited.times)[1]
+        off = [audited.carriers[k][:, i] - references[i][k] for i in moving for k in range(2)]
+        unit, why = "m, m/s", "away from `around`"
+    exceeded = []
+    for end in ends:
+        worst = max(np.abs(part[end]).max() for part in off)
+        exceeded += _missed("base.ends", "carriers", audited.times[end], worst, END_TOLERANCE, unit, why)
     return exceeded
 
 
