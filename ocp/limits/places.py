@@ -20,18 +20,9 @@ CORNER = 0.25  # of the thickness of a place: a motion that is deeper in it betw
 
 
 class _Outside(Distance):
-    """Keep out of a region.
+    """Keep out of a region that is `called` so, by a distance of `least` [m].
 
-    Parameters
-    ----------
-    place
-        Its shape, in {G} or, if it moves with the platform, in the platform's frame.
-    called
-        The name of the region.
-    riding
-        Whether it moves with the platform.
-    least
-        Distance to keep [m].
+    Its shape is in {G} or, if it is `riding` on the platform, in the platform's frame.
     """
 
     per_metre = 1.0

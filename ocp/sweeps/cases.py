@@ -14,16 +14,9 @@ from .axis import Axis
 
 
 class Cases:
-    """The combinations of values, numbered from 0 with the last axis fastest.
+    """The combinations of values of `axes`, numbered from 0 with the last axis fastest.
 
-    Attributes
-    ----------
-    robot, task
-        Robot and task without variation.
-    axes
-        The varied fields and their values.
-    shape
-        Number of values of each axis.
+    `robot` and `task` are those without variation, `shape` has the number of values of each axis.
     """
 
     def __init__(self, robot: Robot, task: Task, axes: tuple[Axis, ...]):
@@ -75,10 +68,7 @@ class Cases:
     def check(self) -> None:
         """Check every combination: whether the values are valid and the task fits the robot.
 
-        Raises
-        ------
-        InputError
-            For the first one that is wrong, with its values.
+        Raises `InputError` for the first one that is wrong, with its values.
         """
         for number in range(len(self)):
             try:
