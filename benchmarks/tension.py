@@ -75,19 +75,11 @@ def run(
     limit: float = 5.0,
     progress: Progress | None = None,
 ) -> Report:
-    """Measure every contender at every task.
+    """Measure every contender at every task, of each kind and number `m` of cables, from 1 to 16.
 
-    Parameters
-    ----------
-    count, repeats :
-        Problems of a task, and turns that each contender has at them after one that is not counted.
-    m :
-        Numbers of cables, each from 1 to 16.
-    limit :
-        Seconds that one contender may spend on one task. It is checked between calls: a contender that passes it is
-        out, with the times that it has.
-    progress :
-        Called with the task's name and how many of how many turns at all tasks are done.
+    A task has `count` problems, at which each contender has `repeats` turns after one that is not counted. One that has
+    spent more than `limit` [s] on a task, which is checked between calls, is out, with the times that it has.
+    `progress` is called with the task's name and how many of how many turns at all tasks are done.
 
     Raises `InputError` if a number is out of range.
     """

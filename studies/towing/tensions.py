@@ -65,8 +65,7 @@ def _freedom() -> Claim:
 
 
 def _scalar() -> Claim:
-    low, high = _choices()
-    at, _ = _null_space(forces(load(SIZES[4])))
+    at, _, low, high = _choices()
     return claim("eq-17-lambda").stated((low, high), low <= 0 and high >= 1, at=", ".join(f"{T:.1f}" for T in at))
 
 
@@ -97,13 +96,13 @@ def _general() -> Claim:
     return claim("eq-17-general").compared(free, printed=1.0)
 
 
-def _choices() -> tuple[float, float]:
-    """Return the range of lambda inside the limits, m = 4, for a null vector of length one."""
+def _choices() -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Return T', the null vector of length one, and the range of lambda inside the limits, m = 4."""
     problem = forces(load(SIZES[4]))
     special, null = _null_space(problem)
     with np.errstate(divide="ignore"):
         ends = np.sort(np.stack([(problem.t_min - special) / null, (problem.t_max - special) / null]), axis=0)
-    return float(ends[0].max()), float(ends[1].min())
+    return special, null, float(ends[0].max()), float(ends[1].min())
 
 
 def _null_space(problem: TensionProblem) -> tuple[np.ndarray, np.ndarray]:
@@ -113,9 +112,7 @@ def _null_space(problem: TensionProblem) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _along_null_space() -> Drawing:
-    problem = forces(load(SIZES[4]))
-    special, null = _null_space(problem)
-    low, high = _choices()
+    special, null, low, high = _choices()
     choices = np.linspace(1.3 * low - 0.3 * high, 1.3 * high - 0.3 * low, 101)
     lines = {f"cable {i + 1}": special[i] + choices * null[i] for i in range(4)}
     panel, marks = Panel("tension [N]", lines, {"0 N": 0.0}), {"smallest": low, "largest": high}
