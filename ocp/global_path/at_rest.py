@@ -8,6 +8,7 @@ import numpy as np
 from ...solvers import solve_batch
 from ..audits.tensions import INDEPENDENT, scaled
 from ..limits import Limit, Rate
+from ..nlp.guess import with_tilts
 from ..tasks.scenario import Scenario
 
 UNKNOWN = 2.0  # metres by which a limit may change while what moves moves by one, if the limit does not state it
@@ -35,16 +36,6 @@ class Kept(NamedTuple):
     worst: np.ndarray
 
 
-class _Balance(NamedTuple):
-    """A (n, 6, m) and w (n, 6) in newtons, tensions (n, m), where they balance, and whether A spans all wrenches."""
-
-    A: np.ndarray
-    w: np.ndarray
-    tensions: np.ndarray
-    exists: np.ndarray
-    spans: bool
-
-
 class AtRest:
     """Evaluate the hard limits of a scenario, and whether there are tensions, for platform and carriers at rest.
 
@@ -54,10 +45,6 @@ class AtRest:
 
     def __init__(self, scenario: Scenario, size: float, spare: float = SPARE, balance: bool = True):
         self.scenario, self.size, self.spare, self.balance = scenario, size, spare, balance
-        robot = scenario.robot
-        self._tilting = [
-            i for i, carrier in enumerate(robot.carriers) if carrier.efforts and (i, 3) in scenario.carrier_free
-        ]
 
     @cached_property
     def _checked(self) -> list[tuple[int, Limit, float]]:
@@ -75,13 +62,13 @@ class AtRest:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
         anchors, attachments = self.scenario.dynamics.points(platform, carriers)
         points = np.concatenate([attachments, anchors], axis=1)
-        balance = self._balance(platform, carriers)
-        A, w, tensions, exist = balance.A, balance.w, balance.tensions, balance.exists
-        slack, worst = self._slack(platform, self._tilted(A, carriers, tensions), tensions, off_path)
+        A, w, tensions, exist, spans = self._balance(platform, carriers)
+        tilted = with_tilts(self.scenario, A, tensions, carriers, np.zeros_like(carriers))
+        slack, worst = self._slack(platform, tilted, tensions, off_path)
         # The exact solver decides only where nothing else does: it takes longer than all limits.
         exist |= not self.balance
         open_ones = np.flatnonzero((slack >= 0.0) & ~exist)
-        if open_ones.size and balance.spans:
+        if open_ones.size and spans:
             exist[open_ones] = solve_batch(A[open_ones], w[open_ones], *self._bounds).feasible
         return Kept(np.where(exist, slack, np.minimum(slack, -self.size)), points, np.where(exist, worst, -1))
 
@@ -100,8 +87,13 @@ class AtRest:
             return None
         return scaled(scenario, scenario.dynamics.required_wrench(scenario.robot.home, still, still)[None])[0]
 
-    def _balance(self, platform: np.ndarray, carriers: np.ndarray) -> _Balance:
-        """Return the tensions of least norm, cut to their limits, and where they balance what there is at rest."""
+    def _balance(
+        self, platform: np.ndarray, carriers: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
+        """Return A (n, 6, m) and w (n, 6) in newtons, and the tensions of least norm, cut to their limits, (n, m).
+
+        Then at which of the poses they balance what there is at rest, and whether A spans all wrenches.
+        """
         scenario, robot = self.scenario, self.scenario.robot
         A = scaled(scenario, scenario.dynamics.wrench_matrix(platform, carriers))
         if self._weight is not None:
@@ -116,21 +108,7 @@ class AtRest:
         missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)
         dof = len(robot.platform.dof)
         spans = robot.m >= dof and bool(kept[:, dof - 1].all())
-        return _Balance(A, w, tensions, missed <= (BALANCED if spans else MISSED) * robot.force_scale, spans)
-
-    def _tilted(self, A: np.ndarray, carriers: np.ndarray, tensions: np.ndarray) -> np.ndarray:
-        """Return the carriers tilted as their efforts balance their weight and their cables."""
-        if not self._tilting:
-            return carriers
-        robot, carriers = self.scenario.robot, carriers.copy()
-        for i in self._tilting:
-            cables = robot.carrier_of_cable == i
-            pull = -np.einsum("nij,nj->ni", A[:, :3, cables], tensions[:, cables])
-            still = np.zeros_like(carriers[:, i])
-            tilt = robot.carriers[i].balanced_tilt(carriers[:, i], still, pull, np.array(robot.gravity))
-            if tilt is not None:
-                carriers[:, i, 3:5] = tilt
-        return carriers
+        return A, w, tensions, missed <= (BALANCED if spans else MISSED) * robot.force_scale, spans
 
     def _slack(
         self, platform: np.ndarray, carriers: np.ndarray, tensions: np.ndarray, off_path: np.ndarray | None

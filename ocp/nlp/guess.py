@@ -59,9 +59,9 @@ def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
             continue
         if not robot.carriers[owner].confined:
             offset = robot.carrier_home[owner, coordinate] - robot.home[coordinate]
-            q[:, column] = platform.pose[:, coordinate] + offset - carriers[owner].pose[:, coordinate]
-            v[:, column] = platform.velocity[:, coordinate] - carriers[owner].velocity[:, coordinate]
-            a[:, column] = platform.acceleration[:, coordinate] - carriers[owner].acceleration[:, coordinate]
+            for part, its, own in zip((q, v, a), platform, carriers[owner], strict=True):
+                part[:, column] = its[:, coordinate] - own[:, coordinate]
+            q[:, column] += offset
     return Deviation(nodes, q, v, a, np.zeros((len(nodes), robot.m)))
 
 
@@ -97,21 +97,27 @@ def _pulled(scenario: Scenario, guess: Deviation) -> Deviation:
 
 def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
     """Return the motion with each carrier tilted as its efforts balance its motion and its cables."""
-    robot = scenario.robot
     A, _ = _balance(scenario, guess)
     _, carriers = scenario.motion(guess.nodes, guess)
-    references = scenario.references(guess.nodes)[1]
-    q = guess.q.copy()
+    q, turned = guess.q.copy(), with_tilts(scenario, A, guess.tensions, carriers.pose, carriers.acceleration)
     for column, (owner, coordinate) in enumerate(scenario.owners()):
-        if owner is None or coordinate not in (3, 4):
-            continue
-        cables = robot.carrier_of_cable == owner
-        pull = -np.einsum("nij,nj->ni", A[:, :3, cables], guess.tensions[:, cables])
-        motion = carriers.pose[:, owner], carriers.acceleration[:, owner]
-        tilt = robot.carriers[owner].balanced_tilt(*motion, pull, np.array(robot.gravity))
-        if tilt is not None:
-            q[:, column] = tilt[:, coordinate - 3] - references[owner].pose[:, coordinate]
+        if owner is not None:
+            q[:, column] += (turned - carriers.pose)[:, owner, coordinate]
     return _spline(scenario, guess.nodes, q)
+
+
+def with_tilts(
+    scenario: Scenario, A: np.ndarray, tensions: np.ndarray, carriers: np.ndarray, acceleration: np.ndarray
+) -> np.ndarray:
+    """Return the poses of carriers (n, c, 6), tilted as their efforts balance motion, weight and cables if they may."""
+    robot, carriers = scenario.robot, carriers.copy()
+    for i in {owner for owner, coordinate in scenario.carrier_free if coordinate == 3}:
+        cables = robot.carrier_of_cable == i
+        pull = -np.einsum("nij,nj->ni", A[:, :3, cables], tensions[:, cables])
+        tilt = robot.carriers[i].balanced_tilt(carriers[:, i], acceleration[:, i], pull, np.array(robot.gravity))
+        if tilt is not None:
+            carriers[:, i, 3:5] = tilt
+    return carriers
 
 
 def _balance(scenario: Scenario, guess: Deviation) -> tuple[np.ndarray, np.ndarray]:
