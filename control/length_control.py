@@ -38,7 +38,8 @@ class LengthControl(Controller):
         A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
     stiffness
         E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does not
-        stretch (also the default of a cable without a value in the file).
+        stretch (also the default of a cable without a value in the file, if there are no more cables than degrees of
+        freedom).
     lag
         Time by which the winches follow their commands late [s]: lengths are commanded earlier by this time.
     proportional, integral
@@ -73,6 +74,11 @@ class LengthControl(Controller):
             reason = f"the flying carrier {flying[0]!r}" if flying else "cables of fixed length"
             raise InputError(f"robot must be one with winches and without flying carriers, got {reason}")
         given = [cable.stiffness or np.inf for cable in self.robot.cables] if stiffness is None else stiffness
+        if stiffness is None and np.isinf(given).any() and self.robot.m > self.robot.dof_mask.sum():
+            raise InputError(
+                "stiffness must be given, or be in the robot's file, for a robot with more cables than degrees of freedom, "
+                f"whose lengths alone set its tensions, got none for {self.robot.name!r}"
+            )
         self._EA = repeated("stiffness", given, self.robot.m)
         if not (self._EA > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
