@@ -20,9 +20,9 @@ import numpy as np
 from ..base.display import Displayed, Fact
 from ..base.errors import InputError
 from ..base.inputs import number
-from ..base.netcdf import UNITS, Contents, Variable
+from ..base.netcdf import Contents
 from ..base.text import quantity
-from ..models.dimensions import dimensions
+from ..models.dimensions import dimensions, motion_variables, over
 from ..models.dynamics import dynamics_of
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
@@ -97,12 +97,8 @@ class Stop(Displayed):
     @property
     def trajectory(self) -> xr.Dataset:
         """Return the motion and its tensions over time, as `Plan.trajectory` does; `simulate` follows it."""
-        names = ("pose", "velocity", "acceleration")
-        variables = {"tensions": Variable(("time", "cable"), self.tensions, {"units": "N"})}
-        for name, part, its in zip(names, self.platform, self.carriers, strict=True):
-            units = {"units": UNITS[name]}
-            variables[name] = Variable(("time", "coordinate"), part, units)
-            variables[f"carrier_{name}"] = Variable(("time", "carrier", "coordinate"), its, units)
+        variables = motion_variables(self.platform, self.carriers)
+        variables["tensions"] = over(("time", "cable"), self.tensions, "N", "cable tensions")
         status = "feasible" if self.feasible else "not-found"
         attributes = {"title": f"{self.robot.name}, stop", "status": status, "robot": to_yaml(self.robot)}
         return Contents(variables, dimensions(self.robot, self.times), attributes).dataset()

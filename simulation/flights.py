@@ -16,6 +16,7 @@ from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import quantity
 from ..control import ANSWERS, Controller
 from ..figures.report import Report, Section
+from ..models.dimensions import over
 from ..models.parsing import parse_yaml, to_yaml
 from ..models.robot import Robot
 from ..plant import Plant
@@ -61,18 +62,14 @@ def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:
 def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], tolerance: float, of: np.ndarray) -> xr.Dataset:
     """Return the statistics of all runs, (N,) of `FIGURES`, as a dataset indexed by their seeds."""
     periods, period = len(conditions.references), conditions.period
-
-    def over(values: np.ndarray, unit: str, about: str) -> Variable:
-        return Variable(("seed",), values, {"units": unit, "long_name": about})
-
     variables = {
         "passed": Variable(("seed",), passed(of, periods, tolerance), {"long_name": "error, tensions and slack hold"}),
-        "duration": over(of["lasted"] * period, "s", "simulated time"),
-        "error_rms": over(of["error_rms"], "m", "rms position error"),
-        "error_max": over(of["error_max"], "m", "largest position error"),
-        "tension_min": over(of["tension_min"], "N", "smallest tension"),
-        "tension_max": over(of["tension_max"], "N", "largest tension"),
-        "slack_s": over(of["slack"] * period, "s", "time with a slack cable whose t_min is above zero"),
+        "duration": over(("seed",), of["lasted"] * period, "s", "simulated time"),
+        "error_rms": over(("seed",), of["error_rms"], "m", "rms position error"),
+        "error_max": over(("seed",), of["error_max"], "m", "largest position error"),
+        "tension_min": over(("seed",), of["tension_min"], "N", "smallest tension"),
+        "tension_max": over(("seed",), of["tension_max"], "N", "largest tension"),
+        "slack_s": over(("seed",), of["slack"] * period, "s", "time with a slack cable whose t_min is above zero"),
         "answered": Variable(
             ("seed", "answer"), of["answered"], {"long_name": "number of control steps with each status"}
         ),

@@ -19,7 +19,7 @@ from ..control import ANSWERS
 from ..figures.drawn import Filmed
 from ..figures.outlines import outline_variables
 from ..figures.report import Report, Reported, Section
-from ..models.dimensions import dimensions
+from ..models.dimensions import dimensions, motion_variables, over
 from ..models.parsing import to_yaml
 from .data import SimulationData
 from .occurrences import occurrences, sentence
@@ -82,23 +82,12 @@ class Simulation(SimulationData, Filmed, Reported):
     def _contents(self) -> Contents:
         robot, record, rows = self.robot, self.record, slice(self._recorded)
         motions, references = record.motions[rows], self.references[: self._recorded]
-
-        def over(dims: tuple[str, ...], values: np.ndarray, unit: str, about: str) -> Variable:
-            return Variable(dims, values, {"units": unit, "long_name": about})
-
         body, base, cable = ("time", "coordinate"), ("time", "carrier", "coordinate"), ("time", "cable")
         accelerations = (
             np.gradient(motions[..., 6:], self.period, axis=0) if self._recorded > 1 else 0 * motions[..., 6:]
         )
-        variables = {}
-        parts = {
-            "pose": (motions[..., :6], "m, rad"),
-            "velocity": (motions[..., 6:], "m/s, rad/s"),
-            "acceleration": (accelerations, "m/s^2, rad/s^2"),
-        }
-        for name, (values, unit) in parts.items():
-            variables[name] = over(body, values[:, 0], unit, f"{name} of the platform frame in G")
-            variables[f"carrier_{name}"] = over(base, values[:, 1:], unit, f"{name} of each carrier in G")
+        parts = motions[..., :6], motions[..., 6:], accelerations
+        variables = motion_variables((part[:, 0] for part in parts), (part[:, 1:] for part in parts))
         wanted = np.stack([reference.pose for reference in references])
         variables["reference_pose"] = over(body, wanted, "m, rad", "reference pose of the platform")
         stands = np.stack([reference.carrier_pose for reference in references])

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...base.netcdf import Contents, Variable
 from ...figures.outlines import outline_variables
-from ...models.dimensions import dimensions
+from ...models.dimensions import dimensions, motion_variables, over
 from ...models.parsing import to_yaml
 from ..result import PlanData
 from ..tasks.wind_set import WindBox
@@ -22,16 +22,7 @@ def trajectory(plan: PlanData) -> Contents:
     robot, task = plan.scenario.robot, plan.scenario.task
     rows = output_rows(plan)
     audit = plan.audit
-
-    def over(dims: tuple[str, ...], values: np.ndarray, unit: str, about: str) -> Variable:
-        return Variable(dims, values, {"units": unit, "long_name": about})
-
-    body, base = ("time", "coordinate"), ("time", "carrier", "coordinate")
-    names = {"pose": "m, rad", "velocity": "m/s, rad/s", "acceleration": "m/s^2, rad/s^2"}
-    variables = {}
-    for name, part, carrier_part in zip(names, audit.motion, audit.carriers, strict=True):
-        variables[name] = over(body, part[rows], names[name], f"{name} of the platform frame in G")
-        variables[f"carrier_{name}"] = over(base, carrier_part[rows], names[name], f"{name} of each carrier in G")
+    variables = motion_variables((part[rows] for part in audit.motion), (part[rows] for part in audit.carriers))
     variables["tensions"] = over(("time", "cable"), audit.tensions[rows], "N", "cable tensions")
     lengths = plan.scenario.dynamics.cable_lengths(audit.motion.pose[rows], audit.carriers.pose[rows])
     variables["cable_lengths"] = over(("time", "cable"), lengths, "m", "from anchor to attachment")
