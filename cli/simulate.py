@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from ..simulation import Execution, Simulation
 
 _MANY = "With --runs: "
-CONTROLLERS = ("computed-torque", "predictive", "open-loop")
+CONTROLLERS = ("computed-torque", "predictive", "lengths", "open-loop")
 
 
 def simulate(
@@ -139,7 +139,7 @@ def simulate(
         raise InputError(f"--animate must be left out with --runs, got {animate}")
     # Before libraries load: the processes of --workers share the processors.
     with one_thread_each(), _named(event or []):
-        from ..control import ComputedTorque, OpenLoop, Predictive
+        from ..control import ComputedTorque, LengthControl, OpenLoop, Predictive
         from ..models import load
         from ..models.parsing import read_yaml
         from ..simulation import Conditions, Execution, Noise, simulate
@@ -152,7 +152,8 @@ def simulate(
         outputs = {"the checkpoint": stored, "--out": target, "--animate": animate}
         outputs["--figures"] = figures and figures / f"error{end}.{form}"
         check_outputs(outputs, {"the plan": plan, "--noise": noise})
-        pilot = {"predictive": Predictive, "open-loop": OpenLoop}.get(controller, ComputedTorque)(loaded)
+        kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop)
+        pilot = dict(zip(CONTROLLERS, kinds, strict=True))[controller](loaded)
         air = None if wind is None else numbers("--wind", wind, 3)
         sensors = None if noise is None else read_yaml(noise, Noise)
         conditions = Conditions(air, gusts, sensors, events=event or (), duration=duration, tolerance=tolerance)
