@@ -1,5 +1,6 @@
 """`ClearSpace`: which configurations are clear, and how far straight pieces between them are."""
 
+import time
 from collections.abc import Iterator
 from functools import cached_property
 
@@ -29,16 +30,23 @@ class ClearSpace:
     ----------
     reserve
         By how much all limits are kept [m].
-    evaluated
-        How many configurations have been evaluated.
+    evaluated, most
+        How many configurations have been evaluated, and how many are in a search.
+    deadline
+        When a search ends, by `time.perf_counter` [s].
     """
 
-    def __init__(self, space: Space, rest: AtRest, reserve: float):
-        self.space, self.rest, self.reserve = space, rest, reserve
+    def __init__(self, space: Space, rest: AtRest, reserve: float, most: float = np.inf, deadline: float = np.inf):
+        self.space, self.rest, self.reserve, self.most, self.deadline = space, rest, reserve, most, deadline
         self.evaluated = 0
         kept = rest(*space.poses(space.ends))
         self._at_ends = np.minimum(reserve, OF_END * np.maximum(kept.slack, 0.0))
         self._longest = STEP * space.size
+
+    @property
+    def in_time(self) -> bool:
+        """Return whether there is time left."""
+        return time.perf_counter() < self.deadline
 
     def _evaluate(self, configurations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return by how much configurations (n, count) keep more than the reserve [m], and their points."""

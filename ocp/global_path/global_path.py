@@ -8,7 +8,6 @@ configurations that are checked (`clear_space`). Motion is left to the program.
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -85,10 +84,6 @@ def find_global_path(scenario: Scenario, seconds: float = np.inf, seed: int = 0)
     The same scenario and seed have the same path, unless the time of `seconds` ends first.
     """
     space, deadline = Space(scenario), time.perf_counter() + seconds
-
-    def in_time() -> bool:
-        return time.perf_counter() < deadline
-
     rest = AtRest(scenario, space.size)
     kept = rest(*space.poses(space.ends))
     for end, slack, worst in zip(("start", "end"), kept.slack, kept.worst, strict=True):
@@ -96,42 +91,21 @@ def find_global_path(scenario: Scenario, seconds: float = np.inf, seed: int = 0)
             return None, f"no path, since the {end} exceeds {limit_name(scenario, int(worst))} too"
     for part, most in zip(RESERVES, MOST, strict=True):
         rng = np.random.default_rng(seed)
-        clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE))
-
-        def go_on(clear: ClearSpace = clear, most: int = most) -> bool:
-            return clear.evaluated < most and in_time()
-
-        found = _connected(clear, rng, np.inf, go_on, in_time)
+        clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE), most, deadline)
+        found = _connected(clear, rng)
         if found is not None:
-            most = clear.evaluated + min(AGAIN * clear.evaluated, most)
-            shorter = _connected(
-                clear, rng, found.length, lambda clear=clear, most=most: clear.evaluated < most, in_time
-            )
+            clear.most = clear.evaluated + min(AGAIN * clear.evaluated, most)
+            shorter = _connected(clear, rng, found.length)
             if shorter is not None and shorter.length < found.length:
                 found = shorter
             inside = f"all limits kept by {quantity(1e3 * clear.reserve, 'mm', 3)}"
             return found, f"a path of {quantity(found.length, 'm', 3)}, {inside}"
-        if not in_time():
+        if not clear.in_time:
             return None, "no path found in its share of the time limit"
     return None, f"no path found among {sum(MOST)} configurations"
 
 
-def _connected(
-    clear: ClearSpace, rng: np.random.Generator, longest: float, go_on: Callable[[], bool], in_time: Callable[[], bool]
-) -> GlobalPath | None:
+def _connected(clear: ClearSpace, rng: np.random.Generator, longest: float = np.inf) -> GlobalPath | None:
     """Return a path that is made shorter and smoother, from configurations which one of this length may pass."""
-    space = clear.space
-    start, end = space.ends
-    path = connect(
-        start,
-        end,
-        space.scale,
-        space.groups[-1:] if space.shaped else [],
-        clear.targets(rng, longest),
-        clear.advance,
-        go_on,
-    )
-    if path is None:
-        return None
-    path = shortened(path, space.scale, space.groups, clear.is_clear, rng, in_time)
-    return GlobalPath(space, rounded(path, clear.is_clear))
+    path = connect(clear, clear.targets(rng, longest))
+    return None if path is None else GlobalPath(clear.space, rounded(shortened(path, clear, rng), clear))

@@ -1,33 +1,25 @@
 """Make a path of straight pieces shorter and smoother, as far as it stays clear: `shortened`, `rounded`."""
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
 
-Clear = Callable[[np.ndarray], bool]
-"""Return whether the straight pieces between configurations (k, count) are clear."""
+from .clear_space import ClearSpace
 
 SHORTCUTS = 150
 ROUNDS = 2  # of cutting corners
 CUT = 0.25  # of the two sides of a corner
 
 
-def shortened(
-    path: np.ndarray,
-    scale: np.ndarray,
-    groups: list[np.ndarray],
-    is_clear: Clear,
-    rng: Generator,
-    go_on: Callable[[], bool],
-) -> np.ndarray:
+def shortened(path: np.ndarray, clear: ClearSpace, rng: Generator) -> np.ndarray:
     """Return a path with straight pieces instead of detours, wherever random places of it can be joined.
 
-    `groups` are masks (count,) of coordinates that are made straight at once, while the others stay as they are.
+    A group of coordinates is made straight at once, while the others stay as they are.
     """
+    scale, groups = clear.space.scale, clear.space.groups
     for _ in range(SHORTCUTS):
-        if len(path) < 3 or not go_on():
+        if len(path) < 3 or not clear.in_time:
             break
         at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0) * scale, axis=1))])
         ends = np.sort(rng.uniform(0.0, at[-1], 2))
@@ -39,7 +31,7 @@ def shortened(
         piece = np.vstack([p, *([] if group.all() else path[i:j]), q])
         share = (np.r_[ends[0], at[i:j] if len(piece) > 2 else [], ends[1]] - ends[0]) / (ends[1] - ends[0])
         piece[:, group] = p[group] + share[:, None] * (q - p)[group]
-        if is_clear(piece):
+        if clear.is_clear(piece):
             path = _without_idle(np.vstack([path[:i], piece, path[j:]]), scale)
     return path
 
@@ -55,12 +47,12 @@ def _without_idle(path: np.ndarray, scale: np.ndarray) -> np.ndarray:
     return np.vstack([*kept, path[-1]])
 
 
-def rounded(path: np.ndarray, is_clear: Clear) -> np.ndarray:
+def rounded(path: np.ndarray, clear: ClearSpace) -> np.ndarray:
     """Return a path whose corners are cut where that is possible, again and again (Chaikin)."""
     for _ in range(ROUNDS):
         new = [path[0]]
         for before, corner, after in zip(path[:-2], path[1:-1], path[2:], strict=True):
             p, q = corner + CUT * (before - corner), corner + CUT * (after - corner)
-            new += [p, q] if is_clear(np.stack([p, q])) else [corner]
+            new += [p, q] if clear.is_clear(np.stack([p, q])) else [corner]
         path = np.vstack([*new, path[-1]])
     return path

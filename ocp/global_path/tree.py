@@ -3,12 +3,11 @@
 Source: Kuffner and LaValle, RRT-Connect: an efficient approach to single-query path planning, ICRA 2000.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
-Advance = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Return the farthest configuration that is reached from the first on the straight line to the second."""
+from .clear_space import ClearSpace
 
 LONGEST = 0.4  # of the distance of both ends: steps of the trees
 
@@ -16,32 +15,33 @@ LONGEST = 0.4  # of the distance of both ends: steps of the trees
 class _Tree:
     """Configurations, each with the one that it was reached from."""
 
-    def __init__(self, root: np.ndarray):
-        self.nodes = root[None].copy()
-        self.parents = [-1]
+    def __init__(self, root: np.ndarray, clear: ClearSpace):
+        self._clear, self.nodes, self.parents = clear, root[None].copy(), [-1]
 
-    def nearest(self, target: np.ndarray, scale: np.ndarray) -> int:
-        return int((((self.nodes - target) * scale) ** 2).sum(axis=1).argmin())
+    def nearest(self, target: np.ndarray) -> int:
+        return int((((self.nodes - target) * self._clear.space.scale) ** 2).sum(axis=1).argmin())
 
     def add(self, node: np.ndarray, parent: int) -> int:
         self.nodes = np.vstack([self.nodes, node])
         self.parents.append(parent)
         return len(self.parents) - 1
 
-    def grow(self, index: int, target: np.ndarray, groups: list[np.ndarray], advance: Advance) -> int:
-        """Return the node that is reached from node `index` towards `target`: straight, or else round a corner."""
-        at = self.nodes[index]
+    def grow(self, index: int, target: np.ndarray) -> int:
+        """Return the node that is reached from node `index` towards `target`: straight, or else round a corner.
+
+        At the corner the formation has changed, and nothing else.
+        """
+        at, advance = self.nodes[index], self._clear.advance
         reached = advance(at, target)
         if np.array_equal(reached, target):
             return self.add(reached, index)
-        for group in groups:
-            corner = np.where(group, target, at)
-            if np.array_equal(corner, at) or np.array_equal(corner, target):
-                continue
-            if not np.array_equal(advance(at, corner), corner):
-                continue
-            if np.array_equal(farther := advance(corner, target), target):
-                return self.add(farther, self.add(corner, index))
+        if self._clear.space.shaped:
+            corner = np.where(self._clear.space.groups[-1], target, at)
+            straight = np.array_equal(corner, at) or np.array_equal(corner, target)
+            if not straight and np.array_equal(advance(at, corner), corner):
+                farther = advance(corner, target)
+                if np.array_equal(farther, target):
+                    return self.add(farther, self.add(corner, index))
         return index if np.array_equal(reached, at) else self.add(reached, index)
 
     def to_root(self, index: int) -> list[np.ndarray]:
@@ -52,41 +52,25 @@ class _Tree:
         return path
 
 
-def connect(
-    start: np.ndarray,
-    end: np.ndarray,
-    scale: np.ndarray,
-    groups: list[np.ndarray],
-    targets: Iterator[np.ndarray],
-    advance: Advance,
-    go_on: Callable[[], bool],
-) -> np.ndarray | None:
-    """Return configurations (k, count) from `start` to `end`, each reached from the one before; None if none is found.
+def connect(clear: ClearSpace, targets: Iterator[np.ndarray]) -> np.ndarray | None:
+    """Return clear configurations (k, count), each reached straight from the one before; None if none are found.
 
-    Parameters
-    ----------
-    scale
-        (count,) what the unit of each coordinate counts in distances.
-    groups
-        Masks (count,) of coordinates that a tree also tries to change before all others.
-    targets
-        Configurations to grow to.
-    go_on
-        Returns whether there is time for another step.
+    The trees grow from start and end to `targets`.
     """
-    if np.array_equal(advance(start, end), end):
+    (start, end), scale = clear.space.ends, clear.space.scale
+    if np.array_equal(clear.advance(start, end), end):
         return np.stack([start, end])
-    near, far, swapped = _Tree(start), _Tree(end), False
+    near, far, swapped = _Tree(start, clear), _Tree(end, clear), False
     longest = LONGEST * float(np.linalg.norm((end - start) * scale))
-    while go_on():
+    while clear.evaluated < clear.most and clear.in_time:
         target = next(targets)
-        parent = near.nearest(target, scale)
+        parent = near.nearest(target)
         apart = float(np.linalg.norm((target - near.nodes[parent]) * scale))
         target = near.nodes[parent] + (target - near.nodes[parent]) * min(1.0, longest / max(apart, 1e-12))
-        new = near.grow(parent, target, groups, advance)
+        new = near.grow(parent, target)
         if new != parent:
             reached = near.nodes[new]
-            other = far.grow(far.nearest(reached, scale), reached, groups, advance)
+            other = far.grow(far.nearest(reached), reached)
             if np.array_equal(far.nodes[other], reached):
                 path = near.to_root(new)[::-1] + far.to_root(other)
                 return np.stack(path[::-1] if swapped else path)
