@@ -148,9 +148,9 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
     vertical = x <= VERTICAL * length
     across = np.where(vertical[..., None], 0.0, level) / np.where(vertical, 1.0, x)[..., None]
     unit = weight * length  # forces in weights of the cable, lengths in unstrained lengths
-    problem = _Problem(*(a.ravel() for a in (np.where(vertical, 0.0, x) / length, z / length, unit / stiffness)))
-    h, v, iterations = problem.solve()
-    H, V_m = h.reshape(batch) * unit, v.reshape(batch) * unit
+    spans = np.stack([np.where(vertical, 0.0, x), z]) / length
+    forces, iterations = _forces(spans.reshape(2, -1), (unit / stiffness).ravel())
+    H, V_m = forces.reshape(2, *batch) * unit
     return SaggingCable(start, length, stiffness, weight, upward, across, H, V_m, iterations)
 
 
@@ -172,87 +172,65 @@ def _artanh(h: np.ndarray, v: np.ndarray, half: np.ndarray, T_1: np.ndarray, T_2
         return np.where(h == 0, 0.0, np.log1p(4 * half / (below + above)) / 2)
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """Find (h, v) for spans (x, z), all (k,), of cables of unit length and weight and of softness w L0 / EA."""
+def _forces(spans: np.ndarray, softness: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return (h, v) for spans (x, z), (2, k) each, of cables of unit length and weight, and the number of steps.
 
-    x: np.ndarray
-    z: np.ndarray
-    softness: np.ndarray
-
-    def solve(self) -> tuple[np.ndarray, np.ndarray, int]:
-        """Return the forces, (k,) each, and the number of steps."""
-        h, v = self._first_guess()
-        open_ones = np.flatnonzero(self.x > 0)
-        if not len(open_ones):
-            return h, v, 0
-        for iteration in range(ITERATIONS):
-            part = _Problem(self.x[open_ones], self.z[open_ones], self.softness[open_ones])
-            d_h, d_v, slope = part.newton_step(h[open_ones], v[open_ones])
-            taken = part.line_search(h[open_ones], v[open_ones], d_h, d_v, slope)
-            h[open_ones] += taken * d_h
-            v[open_ones] += taken * d_v
-            miss_x, miss_z = part.misses(h[open_ones], v[open_ones])
-            met = np.maximum(np.abs(miss_x), np.abs(miss_z)) <= TOLERANCE * np.maximum(1, np.hypot(part.x, part.z))
-            open_ones = open_ones[~met]
-            if not len(open_ones):
-                return h, v, iteration + 1
-        worst = open_ones[0]
-        raise SolverError(
-            f"sag: {len(open_ones)} of {len(h)} cables did not converge in {ITERATIONS} steps; the first spans "
-            f"{self.x[worst]:.6g} lengths across and {self.z[worst]:.6g} up, w L0 / EA = {self.softness[worst]:.6g}"
-        )
-
-    def misses(self, h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distances of the end beyond its position, (k,) each: the gradient of the energy."""
-        x, z = _reach(h, v, 1.0, self.softness)
-        return x - self.x, z - self.z
-
-    def newton_step(self, h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the step in h and v and the energy's slope along it, (k,) each."""
-        miss_x, miss_z = self.misses(h, v)
-        c_xx, c_xz, c_zz = _compliance(h, v)
-        c_xx, c_zz = c_xx + self.softness, c_zz + self.softness
-        size = c_xx * c_zz - c_xz**2
-        d_h = -(c_zz * miss_x - c_xz * miss_z) / size
-        d_v = -(c_xx * miss_z - c_xz * miss_x) / size
-        return d_h, d_v, miss_x * d_h + miss_z * d_v
-
-    def line_search(
-        self, h: np.ndarray, v: np.ndarray, d_h: np.ndarray, d_v: np.ndarray, slope: np.ndarray
-    ) -> np.ndarray:
-        """Return the share of each step to take, (k,): halved while the energy rises steeply at its end; h stays > 0.
-
-        The energy is convex: while it still falls at the end of a step, the step was not too long.
-        """
-        taken = np.where(h + d_h > 0, 1.0, -0.9 * h / np.where(d_h < 0, d_h, -1.0))
-        allowed = STEEP * np.abs(slope) + 1e-15 * (np.abs(d_h) + np.abs(d_v))  # the second: rounding of the misses
-        for _ in range(60):
-            miss_x, miss_z = self.misses(h + taken * d_h, v + taken * d_v)
-            rising = miss_x * d_h + miss_z * d_v > allowed
-            if not rising.any():
-                break
-            taken = np.where(rising, taken / 2, taken)
-        return taken
-
-    def _first_guess(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return h and v to start from, (k,): along the chord, `BEGIN` and what stretches the cable to it."""
-        chord = np.hypot(self.x, self.z)
-        spread = self.x > 0
-        stretched = np.divide(chord - 1, self.softness, out=np.zeros_like(chord), where=chord > 1)
-        share = np.divide(BEGIN + stretched, chord, out=np.zeros_like(chord), where=spread)
-        return share * self.x, np.where(spread, share * self.z, self._vertical())
-
-    def _vertical(self) -> np.ndarray:
-        """Return V of a cable in a vertical line, (k,): taut, or folded where its ends are nearer than its length."""
-        folded = self.z / (self.softness + 2)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            taut = np.sign(self.z) * (np.abs(self.z) - 1) / self.softness
-        return np.where(np.abs(folded) <= 0.5, folded, taut)
+    `softness` is w L0 / EA, (k,).
+    """
+    (x, z), chord = spans, np.hypot(*spans)
+    # From a force along the chord: `BEGIN` and what stretches the cable to it.
+    stretched = np.divide(chord - 1, softness, out=np.zeros_like(chord), where=chord > 1)
+    forces = spans * np.divide(BEGIN + stretched, chord, out=np.zeros_like(chord), where=x > 0)
+    forces[1] = np.where(x > 0, forces[1], _vertical(z, softness))
+    left, steps = np.flatnonzero(x > 0), 0
+    while left.size:
+        if steps == ITERATIONS:
+            worst = left[0]
+            raise SolverError(
+                f"sag: {left.size} of {x.size} cables did not converge in {ITERATIONS} steps; the first spans "
+                f"{x[worst]:.6g} lengths across and {z[worst]:.6g} up, w L0 / EA = {softness[worst]:.6g}"
+            )
+        forces[:, left] += _step(forces[:, left], spans[:, left], softness[left])
+        misses = _misses(forces[:, left], spans[:, left], softness[left])
+        left = left[~(np.abs(misses).max(axis=0) <= TOLERANCE * np.maximum(1, chord[left]))]
+        steps += 1
+    return forces, steps
 
 
-def _compliance(h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the integrals of V^2 / T^3, -h V / T^3 and h^2 / T^3 over the cable, (k,) each: its shape's compliance."""
+def _vertical(z: np.ndarray, softness: np.ndarray) -> np.ndarray:
+    """Return V of a cable in a vertical line, (k,): taut, or folded where its ends are nearer than its length."""
+    folded = z / (softness + 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        taut = np.sign(z) * (np.abs(z) - 1) / softness
+    return np.where(np.abs(folded) <= 0.5, folded, taut)
+
+
+def _misses(forces: np.ndarray, spans: np.ndarray, softness: np.ndarray) -> np.ndarray:
+    """Return the distances of the ends beyond their positions, (2, k): the gradient of the energy."""
+    return np.stack(_reach(*forces, 1.0, softness)) - spans
+
+
+def _step(forces: np.ndarray, spans: np.ndarray, softness: np.ndarray) -> np.ndarray:
+    """Return Newton's step, (2, k), halved while the energy rises steeply at its end; h stays > 0.
+
+    The energy is convex: while it still falls at the end of a step, the step was not too long.
+    """
+    misses, compliance = _misses(forces, spans, softness), _compliance(*forces) + softness * np.eye(2)[..., None]
+    step = -np.linalg.solve(np.moveaxis(compliance, -1, 0), misses.T[..., None])[..., 0].T
+    # The second term: rounding of the misses.
+    allowed = STEEP * np.abs((misses * step).sum(axis=0)) + 1e-15 * np.abs(step).sum(axis=0)
+    (h, _), (d_h, _) = forces, step
+    taken = np.where(h + d_h > 0, 1.0, -0.9 * h / np.where(d_h < 0, d_h, -1.0))
+    for _ in range(60):
+        rising = (_misses(forces + taken * step, spans, softness) * step).sum(axis=0) > allowed
+        if not rising.any():
+            break
+        taken = np.where(rising, taken / 2, taken)
+    return taken * step
+
+
+def _compliance(h: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return the integral of ((V^2, -h V), (-h V, h^2)) / T^3 over the cable, (2, 2, k): its shape's compliance."""
     a, b = v - 0.5, v + 0.5
     T_1, T_2 = np.hypot(h, a), np.hypot(h, b)
     c_zz = b / T_2 - a / T_1
@@ -262,6 +240,6 @@ def _compliance(h: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, n
     nodes, weights = np.polynomial.legendre.leggauss(3)
     V = v[:, None] + nodes / 2
     T = np.hypot(h[:, None], V)
-    along = [(f / T**3) @ (weights / 2) for f in (V**2, -h[:, None] * V, np.broadcast_to(h[:, None] ** 2, V.shape))]
-    taut = T_1 + T_2 > TAUT
-    return np.where(taut, along[0], c_xx), np.where(taut, along[1], c_xz), np.where(taut, along[2], c_zz)
+    along = [(f / T**3) @ (weights / 2) for f in (V**2, -h[:, None] * V, h[:, None] ** 2 + 0 * V)]
+    xx, xz, zz = np.where(T_1 + T_2 > TAUT, along, [c_xx, c_xz, c_zz])
+    return np.array([[xx, xz], [xz, zz]])
