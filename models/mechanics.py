@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -134,16 +133,13 @@ class Mechanics:
         if count < 2 * ROWS_WORTH_A_THREAD:
             function(self._record, *arrays)
             return
-        threads = min(processors.available(), count // ROWS_WORTH_A_THREAD)
-        edges = [count * i // threads for i in range(threads + 1)]
 
         def run(start: int, stop: int) -> None:
             # What has not a row for each is None, or one row for all.
             rows = [a if a is None or a.size % count else a.reshape(count, -1)[start:stop] for a in arrays]
             function(self._record, *rows)
 
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(run, edges[:-1], edges[1:]))
+        processors.in_threads(run, count, min(processors.available(), count // ROWS_WORTH_A_THREAD))
 
 
 def _common(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
