@@ -39,7 +39,8 @@ class Row:
 
     Times are of a call; for a batch, of a call divided by its problems: its p99 is one of calls, not of problems. Wrong
     is, for a feasible problem, no result, or tensions or a wrench off by more than `FAILED`; for an infeasible one,
-    tensions.
+    tensions. Errors of tensions are None if the task is infeasible, if there is no result or if it minimises something
+    else.
     """
 
     task: str
@@ -48,7 +49,7 @@ class Row:
     median_us: float
     p99_us: float
     ratio: float  # to `daqp.solve`; above 1 is slower
-    max_error: float | None  # of a tension, in units of the largest; None if the task is infeasible or nothing compares
+    max_error: float | None  # largest of a tension, in units of the largest tension
     failures: int  # problems, of `problems`, that it got wrong
     problems: int  # how many it was given; fewer than requested if it ran out of time
     detail: str = ""  # what went wrong beyond that
