@@ -285,8 +285,10 @@ class Stage:
         for index, carrier in enumerate(robot.carriers):
             if not carrier.drawing.body:
                 continue
-            name, axes = f"/carriers/{carrier.name}", {"axes_length": 0.05 * size, "axes_radius": 0.003 * size}
-            self._carriers[index] = scene.add_frame(name, carrier.drawing.axes, **axes, origin_radius=0.008 * size)
+            name, axes = f"/carriers/{carrier.name}", carrier.drawing.axes
+            self._carriers[index] = scene.add_frame(
+                name, axes, axes_length=0.05 * size, axes_radius=0.003 * size, origin_radius=0.008 * size
+            )
             self._body(f"{name}/body", robot.anchors[robot.carrier_of_cable == index], GREY)
             if carrier.drawing.rotors:
                 self._lines(f"{name}/rotors", rotors(float(robot.carrier_radius[index])), BLACK, 2 * THIN)
