@@ -32,8 +32,8 @@ def wind_up(
 ) -> Wound:
     """Command lengths every `PERIOD` and let the plant move from the first pose and velocity of a motion on.
 
-    The cables are elastic. The motions of platform and carriers are in {G}, (n, 6) and (n, c, 6) each; default: carriers
-    at home. The wind is the velocity of the air in {G} [m/s], (..., n - 1, 3); default: no air. The wrench [N, N m] acts
+    The cables are elastic. Motions of platform and carriers are in {G}, (n, 6) and (n, c, 6) each; default: carriers at
+    home. The wind is the velocity of the air in {G} [m/s], (..., n - 1, 3); default: no air. The wrench [N, N m] acts
     on the platform, (..., n - 1, 6); default: none. Lengths are unstrained [m], (n, m); default: the distances from
     anchor to attachment, the paper's Eq. 5.
     """
