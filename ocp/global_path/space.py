@@ -223,15 +223,14 @@ class Space(Displayed):
         _, attachments = self.scenario.dynamics.points(platform, self.references[1][0])
         middles = np.stack([attachments[:, robot.carrier_of_cable == i].mean(axis=1) for i in self.loose], axis=1)
         turn = platform[:, 5] - self.references[0][0, 5]
-        flat = np.broadcast_to(self._flat, (len(platform), *self._flat.shape))
-        if self.shaped:
-            xx, xy, yy = shape[:, :3].T
-            x, y = flat[..., 0], flat[..., 1]
-            flat = np.stack([xx[:, None] * x + xy[:, None] * y, xy[:, None] * x + yy[:, None] * y], axis=2)
         if self.turns:
             turn = turn + shape[:, 3]
-        cos, sin = np.cos(turn)[:, None], np.sin(turn)[:, None]
-        flat = np.stack([cos * flat[..., 0] - sin * flat[..., 1], sin * flat[..., 0] + cos * flat[..., 1]], axis=2)
+        cos, sin = np.cos(turn), np.sin(turn)
+        matrix = np.array([[cos, -sin], [sin, cos]])  # (2, 2, n)
+        if self.shaped:
+            xx, xy, yy = shape[:, :3].T
+            matrix = np.einsum("ijn,jkn->ikn", matrix, np.array([[xx, xy], [xy, yy]]))
+        flat = np.einsum("ijn,kj->nki", matrix, self._flat)
         long = np.linalg.norm(self.offsets, axis=1)
         most = np.maximum(FLATTEST * long, np.linalg.norm(self._flat, axis=1))
         flat = flat * np.minimum(1.0, most / np.maximum(np.linalg.norm(flat, axis=2), 1e-12))[..., None]

@@ -51,12 +51,9 @@ def limit_list(robot: Robot, task: Task) -> Limits:
 
 def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
     given = task.limits
-    if given.cable_speed is not None:
-        yield CableSpeed(robot, given.cable_speed)
-    if given.cable_acceleration is not None:
-        yield CableAcceleration(robot, given.cable_acceleration)
-    if given.winch_power is not None:
-        yield WinchPower(robot, given.winch_power)
+    for kind in (CableSpeed, CableAcceleration, WinchPower):
+        if (most := getattr(given, kind.name)) is not None:
+            yield kind(robot, most)
     if given.cable_length is not None:
         yield CableLength(robot, given.cable_length.min, given.cable_length.max)
     if given.cable_clearance is not None and (clearance := CableClearance(robot, given.cable_clearance)).labels:

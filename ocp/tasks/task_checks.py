@@ -38,7 +38,8 @@ def check_task(robot: Robot, task: Task) -> None:
     _check_robust(robot, task, where)
     _check_times(task, where)
     _check_waypoints(task, where)
-    _check_periodic_end(task, where)
+    if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
+        raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
 
 
 def check_scenario(scenario: Scenario) -> None:
@@ -173,12 +174,6 @@ def _check_waypoints(task: Task, where: str) -> None:
                     f"{where}: tube.{name} must be at least {value:.3g} {unit}, by which legs pass points[{index}], "
                     f"since tube.waypoints is exact, got {most:g} {unit}; legs with path.blend 0 rest at their points"
                 )
-
-
-def _check_periodic_end(task: Task, where: str) -> None:
-    """Refuse a final pose of the carriers that their periodic motion contradicts."""
-    if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
-        raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
 
 
 def _check_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:

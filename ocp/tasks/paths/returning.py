@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from typing_extensions import override
 
 from ....models.part import AT_ORIGIN, NonNegative, Pose, Positive
+from .. import bernstein
 from .base import PathBase
 from .motion import Motion
 from .sequence import SequencePath, SinglePath
@@ -61,19 +62,15 @@ class ReturnPath(PathBase):
         return motion.plus(off)
 
 
-def decay(times: np.ndarray, settle: float, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def decay(times: np.ndarray, settle: float, offset: np.ndarray) -> list[np.ndarray]:
     """Return a value and its first two derivatives at `times`, (n, k) each, which are zero from `settle` [s] on.
 
-    They start as `offset` (3, k), and the value is (1 - s)^3 (c0 + c1 s + c2 s^2) with s = t / settle.
+    They start as `offset` (3, k), and the value is a polynomial of degree 5.
     """
-    c0, rate, bend = offset
-    c1 = settle * rate + 3 * c0
-    c2 = settle**2 * bend / 2 + 3 * settle * rate + 6 * c0
-    s = np.minimum(times / settle, 1.0)[:, None]
-    left = 1 - s
-    g, slope, curve = c0 + s * (c1 + s * c2), c1 + 2 * s * c2, 2 * c2
-    return (
-        left**3 * g,
-        left**2 * (left * slope - 3 * g) / settle,
-        left * (6 * g - 6 * left * slope + left**2 * curve) / settle**2,
-    )
+    value, rate, bend = offset
+    near = value + settle / 5 * rate
+    points, motion = [value, near, 2 * near - value + settle**2 / 20 * bend, *np.zeros((3, len(value)))], []
+    for _ in offset:
+        motion.append(bernstein.basis(len(points) - 1, np.minimum(times / settle, 1.0)) @ np.array(points))
+        points = bernstein.derivative(settle, points)
+    return motion
