@@ -1,7 +1,7 @@
 """Paths through points: legs stay where they must, by properties that hold for any list, and by other derivations."""
 
 import time
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import numpy as np
 import pytest
@@ -349,3 +349,42 @@ def test_exact_waypoints_are_passed_beside_legs():
     place, _ = found.scenario.motion(knots, found.deviation)
     np.testing.assert_allclose(place.pose[:, :3], path["points"], atol=1e-6)
     assert found.tracking_error_max > 0.001
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5, 7])
+def test_a_free_order_is_the_shortest_of_all(count):
+    rng = np.random.default_rng(count)
+    points = np.hstack(
+        [rng.uniform(-1, 1, (count + 2, 3)), np.zeros((count + 2, 2)), rng.uniform(-3, 3, (count + 2, 1))]
+    )
+    dwell = np.arange(count + 2.0)
+    path = WaypointPath(kind="waypoints", points=points.tolist(), order="free", dwell=dwell.tolist())
+
+    def length(order):
+        steps = np.diff(points[list(order)], axis=0)
+        steps[:, 3:] = (steps[:, 3:] + np.pi) % (2 * np.pi) - np.pi
+        return np.linalg.norm(steps, axis=1).sum()
+
+    found = [int(seconds) for seconds in path.dwell]
+    np.testing.assert_array_equal(np.array(path.points), points[found])
+    assert found[0] == 0
+    assert found[-1] == count + 1
+    shortest = min(length([0, *inner, count + 1]) for inner in permutations(range(1, count + 1)))
+    assert length(found) == pytest.approx(shortest, rel=1e-12)
+    assert WaypointPath.model_validate(path.model_dump()) == path
+
+
+def test_a_free_order_stays_when_it_is_read_again():
+    """A closed path is as long backwards."""
+    points = [[0, 0, 1], [2, 1, 1.5], [-2, -1, 1.2], [2, -1, 1], [-2, 1, 1.5], [0, 0, 1]]
+    once = WaypointPath(kind="waypoints", points=points, order="free")
+    assert WaypointPath.model_validate(once.model_dump()) == once
+    assert once.points[0] == once.points[-1]
+
+
+def test_a_free_order_of_many_points_or_with_times_is_refused():
+    points = [[k, 0, 1] for k in range(15)]
+    with pytest.raises(InputError, match="order must be given for more than 12 points between two, got 13"):
+        read_task({"path": {"kind": "waypoints", "points": points, "order": "free"}, "duration": 3})
+    with pytest.raises(InputError, match="order must be given with times"):
+        read_task({"path": {"kind": "waypoints", "points": points[:3], "times": [0, 1, 2], "order": "free"}})

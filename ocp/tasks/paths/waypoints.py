@@ -13,6 +13,7 @@ from ....models.part import Finite, NonNegative
 from .base import PathBase, PoseOrPosition, check_times, or_file, or_number, with_points_of_file
 from .legs import Legs
 from .motion import Motion
+from .shortest_order import MOST, shortest_order
 from .stations import Stations
 from .waypoint_spline import WaypointSpline
 
@@ -53,6 +54,10 @@ class WaypointPath(PathBase):
         description="for legs: largest distance from the points [m]; 0: stop at each; default: 1 % of the span of the "
         "points",
     )
+    order: Literal["given", "free"] = Field(
+        default="given",
+        description="free: between the first and the last point, the order of the shortest path, of up to 12 points",
+    )
     times: tuple[Finite, ...] | None = Field(
         default=None,
         description="time at which the path passes each point, from 0 on, increasing [s]; default: spread over the "
@@ -78,6 +83,8 @@ class WaypointPath(PathBase):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
+        if self.order == "free":
+            self._sort()
         if self.times is not None:
             check_times(self.times, len(self.points))
         if self.shape == "spline":
@@ -97,6 +104,17 @@ class WaypointPath(PathBase):
             self._check_dwell(self.dwell)
         self._check_pitch()
         return self
+
+    def _sort(self) -> None:
+        """Put points and dwell into the order of the shortest path."""
+        if self.times is not None:
+            raise ValueError("order must be given with times")
+        if len(self.points) > MOST + 2:
+            raise ValueError(f"order must be given for more than {MOST} points between two, got {len(self.points) - 2}")
+        order = shortest_order(np.array(self.points))
+        self.__dict__["points"] = tuple(self.points[index] for index in order)
+        if self.dwell is not None and len(self.dwell) == len(order):
+            self.__dict__["dwell"] = tuple(self.dwell[index] for index in order)
 
     def _check_dwell(self, dwell: tuple[float, ...]) -> None:
         if len(dwell) != len(self.points):
