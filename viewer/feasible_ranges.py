@@ -20,10 +20,7 @@ STRIP = "height:4px;margin:-19px calc(0.625rem + 3.84rem) 15px calc(0.625rem + 6
 def holding(robot: Robot, settings: list[Slider], pose: np.ndarray, carriers: np.ndarray) -> np.ndarray:
     """Return whether tensions inside their limits hold the platform at rest, (s, `PLACES`) along each of s sliders.
 
-    Parameters
-    ----------
-    settings
-        The sliders; along each, the other coordinates are those of `pose` (6,) and `carriers` (c, 6) in {G} [m, rad].
+    Along each, the other coordinates are those of `pose` (6,) and `carriers` (c, 6) in {G} [m, rad].
     """
     poses, others = np.tile(pose, (len(settings), PLACES, 1)), np.tile(carriers, (len(settings), PLACES, 1, 1))
     for number, setting in enumerate(settings):

@@ -19,12 +19,8 @@ SCRIPT, CAMERA = (Path(__file__).with_name(name).read_text(encoding="utf-8") for
 def camera(centre: np.ndarray, along: np.ndarray, nearest: float) -> str:
     """Return the script that moves the initial camera away from the robot on a screen that is higher than wide.
 
-    Parameters
-    ----------
-    centre, along
-        Where it looks, and the direction from there to the camera, (3,) in {G} [m].
-    nearest
-        Its distance on a screen that is wider than high [m].
+    It looks at `centre` from the direction `along`, (3,) each in {G} [m], at the distance `nearest` [m] on a screen
+    that is wider than high.
     """
     values = {"CENTRE": centre.tolist(), "ALONG": along.tolist(), "NEAREST": nearest}
     constants = ", ".join(f"{name} = {json.dumps(value)}" for name, value in values.items())
