@@ -10,15 +10,7 @@ Coordinates are (x, y, z, roll, pitch, yaw) and their derivatives. Source: Newto
 import casadi as ca
 import numpy as np
 
-from .rotation import (
-    Matrix,
-    body_acceleration,
-    body_rate,
-    inverse_rate_matrix,
-    rate_matrix,
-    rate_matrix_derivative,
-    rotation,
-)
+from .rotation import Matrix, inverse_rate_matrix, rate_matrix, rate_matrix_derivative, rotation, turning
 
 
 def acceleration(
@@ -31,29 +23,11 @@ def acceleration(
     pull: Matrix,
     gravity: np.ndarray,
 ) -> Matrix:
-    """Return ddq, (6, 1).
-
-    Parameters
-    ----------
-    inertia
-        About the CoM in the body's axes, (3, 3) [kg m^2].
-    pose, velocity
-        (6, 1) each, of its frame in {G}.
-    thrust
-        Total thrust f along its z axis [N].
-    torque
-        tau about its axes, (3, 1) [N m].
-    pull
-        Force in {G} [N] and moment about its CoM in its own axes [N m] of its cables, (6, 1).
-    gravity
-        (3,) in {G} [m/s^2].
-    """
+    """Return ddq, (6, 1), of a body with an inertia (3, 3) in its axes; the others are of `Carrier.acceleration`."""
     angles, rates = pose[3:6], velocity[3:6]
-    R = rotation(angles)
-    linear = ca.DM(gravity) + (R[:, 2] * thrust + pull[0:3]) / mass
-    I_b = ca.DM(inertia)
+    linear = ca.DM(gravity) + (rotation(angles)[:, 2] * thrust + pull[0:3]) / mass
     Omega = rate_matrix(angles) @ rates
-    alpha = ca.DM(np.linalg.inv(inertia)) @ (torque + pull[3:6] - ca.cross(Omega, I_b @ Omega))
+    alpha = ca.DM(np.linalg.inv(inertia)) @ (torque + pull[3:6] - ca.cross(Omega, ca.DM(inertia) @ Omega))
     angular = inverse_rate_matrix(angles) @ (alpha - rate_matrix_derivative(angles, rates) @ rates)
     return ca.vertcat(linear, angular)
 
@@ -69,14 +43,8 @@ def required_wrench(
 ) -> tuple[Matrix, Matrix]:
     """Return the force [N] and the torque [N m] in the body's axes that a motion requires, (3, 1) each.
 
-    Parameters
-    ----------
-    acceleration
-        (6, 1), of its frame in {G}; the other parameters are those of `acceleration`.
+    Its inertia is (3, 3) in its axes; the other parameters are those of `Carrier.required_effort`.
     """
-    R = rotation(pose[3:6])
+    R, Omega, alpha = turning(pose, velocity, acceleration)
     force = R.T @ (mass * (acceleration[:3] - ca.DM(gravity)) - pull[:3])
-    I_b = ca.DM(inertia)
-    Omega = body_rate(pose[3:6], velocity[3:6])
-    alpha = body_acceleration(pose[3:6], velocity[3:6], acceleration[3:6])
-    return force, I_b @ alpha + ca.cross(Omega, I_b @ Omega) - pull[3:6]
+    return force, ca.DM(inertia) @ alpha + ca.cross(Omega, ca.DM(inertia) @ Omega) - pull[3:6]
