@@ -205,8 +205,7 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
         tensions=at_home.tensions,
         t_min=robot.t_min,
         t_max=robot.t_max,
-        positions=positions,
-        feasible=feasible,
+        resting=positions[feasible],
         rotors=rotor_discs(robot, robot.carrier_home[None])[0],
     )
     style.save(figure.draw(sketch), file)

@@ -29,14 +29,14 @@ class RobotSketch:
         (c, 3) origins of the carriers' frames, and their names.
     boxes
         Corners (low, high) of reach boxes.
-    rotors
-        Circles in which rotors turn, (r, p, 3); default: none.
     tensions
         (m,) [N], or None for grey cables.
     t_min, t_max
         (m,) [N].
-    positions, feasible
-        (k, 3) positions of the platform, and (k,) whether it can rest there.
+    resting
+        Positions at which the platform can rest, (k, 3); default: none.
+    rotors
+        Circles in which rotors turn, (r, p, 3); default: none.
     """
 
     title: str
@@ -49,8 +49,7 @@ class RobotSketch:
     tensions: np.ndarray | None
     t_min: np.ndarray
     t_max: np.ndarray
-    positions: np.ndarray
-    feasible: np.ndarray
+    resting: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     rotors: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 
@@ -58,9 +57,8 @@ def draw(sketch: RobotSketch) -> Figure:
     """Draw a robot."""
     canvas = style.figure(height=3.2)
     ax = style.axes_in_space(canvas)
-    inside = sketch.positions[sketch.feasible]
-    if len(inside):
-        ax.scatter(*inside.T, s=5, color=style.colour(2), alpha=0.5, linewidths=0, label="can rest here")
+    if len(sketch.resting):
+        ax.scatter(*sketch.resting.T, s=5, color=style.colour(2), alpha=0.5, linewidths=0, label="can rest here")
     tensions = sketch.tensions
     known = np.full(len(sketch.anchors), np.nan) if tensions is None else tensions
     colours = shades(place(known, sketch.t_min, sketch.t_max)) / 255.0

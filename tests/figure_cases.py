@@ -103,8 +103,7 @@ def sketch(name: str) -> robot.RobotSketch:
         tensions=np.linspace(1, 40, len(model.cables)),
         t_min=model.t_min,
         t_max=model.t_max,
-        positions=model.home_com + 0.1 * np.eye(3),
-        feasible=np.array([True, True, False]),
+        resting=model.home_com + 0.1 * np.eye(3)[:2],
     )
 
 

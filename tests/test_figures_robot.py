@@ -24,8 +24,6 @@ def sketch(robot):
         tensions=None,
         t_min=robot.t_min,
         t_max=robot.t_max,
-        positions=np.zeros((0, 3)),
-        feasible=np.zeros(0, bool),
     )
 
 

@@ -87,9 +87,8 @@ def _structure() -> Drawing:
     robot = load("wang-flying-printed")
     tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home), rcond=RANK)[:, 2] * robot.weight
     places = robot.anchors, robot.home_attachments, robot.home[:3], robot.carrier_home[:, :3]
-    names, nowhere = [carrier.name for carrier in robot.carriers], (np.empty((0, 3)), np.empty(0, dtype=bool))
-    title = "the printed pairing at home"
-    sketch = RobotSketch(title, *places, names, [], tensions, robot.t_min, robot.t_max, *nowhere)
+    names, title = [carrier.name for carrier in robot.carriers], "the printed pairing at home"
+    sketch = RobotSketch(title, *places, names, [], tensions, robot.t_min, robot.t_max)
     return Drawing("Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1", draw(sketch))
 
 
