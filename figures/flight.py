@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Iterable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,11 +33,14 @@ def flight(trajectory: xr.Dataset) -> Figure:
     time = trajectory["time"].values
     draws: list[tuple[str, float, Any]] = [("", 1.7, _draw_error)]
     if "wind" in trajectory:
-        draws.append(("wind [m/s]", 1.3, _draw_wind))
+        wind = trajectory["wind"].values
+        draws.append(("wind [m/s]", 1.3, partial(_draw_named, names="xyz", values=wind)))
     if _offsets(trajectory).max(initial=0.0) > OFFSET:
         draws.append(("", 1.3, _draw_offsets))
     if "actuation" in trajectory and THRUST in trajectory["actuator"].values:
-        draws.append(("thrust\ncommanded [N]", 1.3, _draw_thrusts))
+        thrusts = trajectory["actuation"].sel(actuator=THRUST).values
+        of_carriers = partial(_draw_named, names=trajectory["carrier"].values, values=thrusts)
+        draws.append(("thrust\ncommanded [N]", 1.3, of_carriers))
     answers = _answers(trajectory)
     draws.append(("", 0.1 + 0.18 * len(answers), _draw_answers))
     heights = [height for _, height, _ in draws]
@@ -144,10 +148,6 @@ def _draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) ->
         style.far_limit(ax, f"{text}, above the plot")
 
 
-def _draw_wind(ax: Axes, trajectory: xr.Dataset) -> None:
-    _draw_named(ax, trajectory, "xyz", trajectory["wind"].values)
-
-
 def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
     offsets = _offsets(trajectory)
     scale, unit = _scale(float(offsets.max()))
@@ -155,11 +155,6 @@ def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
     names = trajectory["carrier"].values[trajectory["carrier_moves"].values]
     _draw_named(ax, trajectory, names, offsets / scale)
     ax.set_ylim(bottom=0.0)
-
-
-def _draw_thrusts(ax: Axes, trajectory: xr.Dataset) -> None:
-    thrusts = trajectory["actuation"].sel(actuator=THRUST).values
-    _draw_named(ax, trajectory, trajectory["carrier"].values, thrusts)
 
 
 def _draw_answers(ax: Axes, trajectory: xr.Dataset) -> None:
