@@ -5,6 +5,7 @@ import re
 from typing import Any
 
 from towline import Robot, Task
+from towline.figures.style import typeset
 from towline.models.part import LARGEST
 
 from .markup import escaped, table
@@ -90,7 +91,7 @@ class _Keys:
             unit = UNIT.search(description)
             text = escaped(UNIT.sub("", description, count=1).strip(" ;,"))
             default = "required" if key in required else _default(field)
-            rows.append([f"`{key}`", self._type(field), _typeset(unit[1]) if unit else "", default, text])
+            rows.append([f"`{key}`", self._type(field), typeset(unit[1]) if unit else "", default, text])
         return table(["key", "type", "unit", "default", "description"], rows)
 
     def _description_of_part(self, field: Schema) -> str:
@@ -125,10 +126,6 @@ class _Keys:
         if items:
             return f"{len(items)} numbers{_bounds(items[0])}"
         return f"list of: {self._type(field['items'])}"
-
-
-def _typeset(unit: str) -> str:
-    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def _referred(field: Any) -> list[str]:
