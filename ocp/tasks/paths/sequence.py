@@ -12,6 +12,7 @@ from typing_extensions import override
 from ....models.part import Part, Positive
 from .base import PathBase
 from .circle import CirclePath
+from .feed import FeedPath
 from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
@@ -23,7 +24,7 @@ from .waypoints import WaypointPath
 JOINED = 1e-7  # [m, rad, and per second and second squared]: a smaller gap is rounding
 
 SinglePath: TypeAlias = Annotated[
-    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | TimedPath, Field(discriminator="kind")
+    RestPath | LinePath | CirclePath | WaypointPath | SamplePath | FeedPath | TimedPath, Field(discriminator="kind")
 ]
 
 
