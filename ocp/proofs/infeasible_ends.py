@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
+import casadi as ca
 import numpy as np
 
 from ...solvers import Certificate
@@ -218,10 +219,9 @@ def _dependent(scenario: Scenario, freedom: np.ndarray) -> tuple[np.ndarray, np.
     of_input = [*freedom.reshape(len(freedom), -1), np.full(scenario.robot.m, FREE), np.where(on_platform, FREE, GIVEN)]
     chosen, near = np.zeros(count, bool), np.zeros(count, bool)
     for i, kinds in enumerate(of_input):
-        sparsity = function.jac_sparsity(0, i)
-        rows, columns = np.array(sparsity.row(), int), np.array(sparsity.get_col(), int)
-        chosen[rows[kinds[columns] == FREE]] = True
-        near[rows[kinds[columns] == NEAR]] = True
+        depends = ca.DM(function.jac_sparsity(0, i), 1.0).full() > 0
+        chosen |= depends[:, kinds == FREE].any(axis=1)
+        near |= depends[:, kinds == NEAR].any(axis=1)
     return chosen, near
 
 

@@ -1,32 +1,27 @@
 """`Instants`: the instants of a motion that warnings are about."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from ...base.display import Displayed
 from ...models import Dynamics, Robot, points
 
 
-class Instants:
-    """Compute where the parts of a robot are at some instants of its motion, in {G}.
+@dataclass(frozen=True)
+class Instants(Displayed):
+    """Compute where the parts of a robot are at some instants of its motion, in {G}."""
 
-    Parameters
-    ----------
-    dynamics
-        Of the robot.
-    times
-        (n,) [s].
-    pose, carriers
-        Poses of the platform, (n, 6), and of the carriers, (n, c, 6) [m, rad].
-    """
-
-    def __init__(self, dynamics: Dynamics, times: np.ndarray, pose: np.ndarray, carriers: np.ndarray):
-        self._dynamics, self.times, self._pose, self.carriers = dynamics, times, pose, carriers
+    dynamics: Dynamics
+    times: np.ndarray  # (n,) [s]
+    pose: np.ndarray  # (n, 6) [m, rad], of the platform
+    carriers: np.ndarray  # (n, c, 6) [m, rad]
 
     @property
     def robot(self) -> Robot:
         """Return the robot."""
-        return self._dynamics.robot
+        return self.dynamics.robot
 
     @cached_property
     def anchors(self) -> np.ndarray:
@@ -36,14 +31,9 @@ class Instants:
     @cached_property
     def platform(self) -> np.ndarray:
         """Return the CoM of the platform and its attachments, (n, 1 + m, 3) [m]."""
-        return points.placed(self._pose, np.vstack([self.robot.platform.com, self.robot.attachments]))
-
-    @property
-    def home_lengths(self) -> np.ndarray:
-        """Return the lengths of the cables at home, (m,) [m]."""
-        return self._dynamics.cable_lengths(self.robot.home)
+        return points.placed(self.pose, np.vstack([self.robot.platform.com, self.robot.attachments]))
 
     @cached_property
     def lengths(self) -> np.ndarray:
         """Return the lengths of the cables, (n, m) [m]."""
-        return self._dynamics.cable_lengths(self._pose, self.carriers)
+        return self.dynamics.cable_lengths(self.pose, self.carriers)

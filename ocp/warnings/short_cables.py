@@ -13,7 +13,7 @@ def short_cables(seen: Instants) -> list[str]:
     robot = seen.robot
     if robot.fixed_lengths is not None:
         return []
-    at_home = seen.home_lengths
+    at_home = seen.dynamics.cable_lengths(robot.home)
     shares = seen.lengths / at_home
     short = np.flatnonzero(shares.min(axis=0) < SHORT)
     if not short.size:
