@@ -108,26 +108,18 @@ def _exponential(axis: ca.SX, angle: ca.SX) -> ca.SX:
 
 def _turns(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return axes (n, 3) and angles (n,) [rad] of the shortest turns between attitudes, as quaternions (n, 4)."""
-    turns = _product(before * [1, -1, -1, -1], after)
-    turns = np.where(turns[:, :1] < -HALF_TURN, -turns, turns)
-    sine = np.linalg.norm(turns[:, 1:], axis=1)
-    angle = 2 * np.arctan2(sine, turns[:, 0])
-    return turns[:, 1:] / np.where(sine > 0, sine, 1.0)[:, None], np.where(angle > SAME, angle, 0.0)
+    # The product of the first one's conjugate and the second.
+    real, vector = np.sum(before * after, axis=1), before[:, :1] * after[:, 1:] - after[:, :1] * before[:, 1:]
+    vector = vector - np.cross(before[:, 1:], after[:, 1:])
+    back = np.where(real < -HALF_TURN, -1.0, 1.0)
+    sine = np.linalg.norm(vector, axis=1)
+    angle = 2 * np.arctan2(sine, back * real)
+    return vector * (back / np.where(sine > 0, sine, 1.0))[:, None], np.where(angle > SAME, angle, 0.0)
 
 
 def _quaternions(angles: np.ndarray) -> np.ndarray:
     """Return the unit quaternions (w, x, y, z) of Rz(yaw) Ry(pitch) Rx(roll), (n, 4)."""
-    c, s = np.cos(angles / 2), np.sin(angles / 2)
-    about = []
-    for k in range(3):
-        turn = np.zeros((len(angles), 4))
-        turn[:, 0], turn[:, 1 + k] = c[:, k], s[:, k]
-        about.append(turn)
-    return _product(_product(about[2], about[1]), about[0])
-
-
-def _product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return the products of quaternions, (n, 4)."""
-    scalar = p[:, 0] * q[:, 0] - np.sum(p[:, 1:] * q[:, 1:], axis=1)
-    vector = p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] + np.cross(p[:, 1:], q[:, 1:])
-    return np.column_stack([scalar, vector])
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles / 2).T, np.sin(angles / 2).T
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    return np.stack([w, x, y, z], axis=1)
