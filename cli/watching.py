@@ -15,21 +15,27 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def progress_bar(what: str, quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Show a bar while the block runs, unless `quiet`.
+def progress_bar(what: str, quiet: bool) -> Iterator[Callable[..., None]]:
+    """Show a bar with rate and remaining time while the block runs, on a terminal and unless `quiet`.
 
-    The block receives a function that moves the bar, of (what is being done, done, total).
+    The block receives a function that moves the bar, of (what is being done, done, total) and, if there are, details.
     """
+    # Rich takes longer to load than a short plan to compute.
+    if quiet or not sys.stderr.isatty():
+        yield lambda what, done, total, detail="": None
+        return
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    to = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=20), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=to, transient=True, disable=quiet or not to.is_terminal) as shown:
-        line = shown.add_task(what, total=None)
+    what_is_done, details = (TextColumn(f"{{task.{name}}}", markup=False) for name in ("description", "fields[detail]"))
+    columns = (what_is_done, BarColumn(bar_width=20), TaskProgressColumn(), details, TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        line = shown.add_task(what, detail="", total=None)
 
-        def move(what: str, done: int, total: int) -> None:
-            shown.update(line, description=what, completed=done, total=total)
+        def move(what: str, done: int, total: int, detail: str = "") -> None:
+            rate = shown.tasks[line].speed or shown.tasks[line].finished_speed or 0.0
+            detail = f"{rate:,.0f}/s  {detail}" if rate >= 1 else detail
+            shown.update(line, description=what, completed=done, total=total, detail=detail)
 
         yield move
 
@@ -101,40 +107,9 @@ def watching(what: str, quiet: bool = False, console: Console | None = None) -> 
 
 @contextmanager
 def counting(what: str, counted: str, quiet: bool = False) -> Iterator[Callable[[int, int, int], None]]:
-    """Show a bar with rate and remaining time while the block runs, on a terminal and unless `quiet`.
+    """Show a `progress_bar` for what is counted, such as "accepted" or "feasible", while the block runs.
 
-    Parameters
-    ----------
-    what
-        Label.
-    counted
-        Meaning of the last number: "accepted", "feasible".
-    quiet
-        Show nothing, because standard output is for a program (`--json`).
-
-    Yields
-    ------
-    A function of (how many are done, how many there are, how many of those done are counted).
+    The block receives a function of (how many are done, how many there are, how many of those done are counted).
     """
-    if quiet or not sys.stderr.isatty():
-        yield lambda done, total, count: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=20),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[detail]}", markup=False),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        line = shown.add_task(what, detail="", total=None)
-
-        def advance(done: int, total: int, count: int) -> None:
-            rate = shown.tasks[line].speed or shown.tasks[line].finished_speed or 0.0
-            detail = f"{rate:,.0f}/s  " if rate >= 1 else ""
-            shown.update(line, completed=done, total=total, detail=f"{detail}{counted} {count / max(done, 1):.2%}")
-
-        yield advance
+    with progress_bar(what, quiet) as move:
+        yield lambda done, total, count: move(what, done, total, f"{counted} {count / max(done, 1):.2%}")
