@@ -130,12 +130,17 @@ def _from_mesh(body: Polyhedron, p: np.ndarray, p_end: np.ndarray) -> np.ndarray
         below = end - height[:, None] * body.normals[heights.argmax(axis=1)]
         on_face = body.beyond(below).max(axis=1) <= _ROUNDING * body.size
         nearest = np.where(on_face, np.minimum(nearest, height), nearest)
-    at, along = body.beyond(p), body.beyond(p_end) - body.beyond(p)
+    return np.where(_meets(body.beyond(p), body.beyond(p_end)), 0.0, nearest)
+
+
+def _meets(at: np.ndarray, to: np.ndarray) -> np.ndarray:
+    """Return whether segments pass a place behind all planes, from how far both ends are beyond each, (n, f) [m]."""
+    along = to - at
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = -at / along
     entry = np.where(along < 0, crossing, np.where((along == 0) & (at > 0), np.inf, 0.0)).max(axis=1)
     leave = np.where(along > 0, crossing, 1.0).min(axis=1)
-    return np.where(np.maximum(entry, 0.0) <= np.minimum(leave, 1.0), 0.0, nearest)
+    return np.maximum(entry, 0.0) <= np.minimum(leave, 1.0)
 
 
 def _enters(low: np.ndarray, high: np.ndarray, attachment: np.ndarray, anchor: np.ndarray) -> np.ndarray:
@@ -144,17 +149,8 @@ def _enters(low: np.ndarray, high: np.ndarray, attachment: np.ndarray, anchor: n
     Touching the surface is allowed: attachments lie on it.
     """
     slack = 1e-9 * max(float(np.abs(high - low).max()), 1e-9)
-    low, high = low + slack, high - slack
-    if (low >= high).any():
-        return np.zeros(len(anchor), dtype=bool)
-    along = anchor - attachment
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at_low, at_high = (low - attachment) / along, (high - attachment) / along
-    still = along == 0.0
-    beside = still & ((attachment <= low) | (attachment >= high))
-    entry = np.where(still, -np.inf, np.minimum(at_low, at_high)).max(axis=1)
-    leave = np.where(still, np.inf, np.maximum(at_low, at_high)).min(axis=1)
-    return ~beside.any(axis=1) & (np.maximum(entry, 0.0) < np.minimum(leave, 1.0))
+    at, to = (np.concatenate([low - end, end - high], axis=-1) + slack for end in (attachment, anchor))
+    return _meets(at, to)
 
 
 def _dot(x: np.ndarray, y: np.ndarray) -> np.ndarray:
