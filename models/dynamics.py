@@ -324,9 +324,8 @@ class Dynamics(Displayed):
         Frequencies, ascending (k,) [Hz], negative where the motion is unstable, and modes (6, k): twists of
         translation of the CoM [m] and rotation vector [rad] in {G}.
         """
-        places = home = self.robot.carrier_home
-        if carrier_pose is not None:
-            places = carrier_pose
+        home = self.robot.carrier_home
+        places = home if carrier_pose is None else carrier_pose
         given = {"pose": (pose, (6,)), "tensions": (tensions, (self.robot.m,)), "carrier_pose": (places, home.shape)}
         pose, tensions, carrier_pose = checked = [as_array(name, value, core) for name, (value, core) in given.items()]
         for (name, (_, core)), array in zip(given.items(), checked, strict=True):
