@@ -524,7 +524,7 @@ WRONG = {
     ),
     "path without kind": (
         {"path": CIRCLE, "base": {"kind": "free", "around": {"quad": {"pose": [0, 0, 0]}}}},
-        "base.around.quad.kind is missing: one of circle, feed, line, rest, return, samples, sequence, timed, waypoints",
+        "base.around.quad.kind is missing: one of circle, feed, line, rest, return, samples, sequence, timed,",
     ),
     "same point twice": (
         {"path": {"kind": "waypoints", "points": [[0, 0, -1], [0, 0, -1], [0, 0, -2]]}, "duration": 2},

@@ -105,7 +105,7 @@ def test_a_start_outside_the_tube_is_proven_impossible():
             "initial.carrier_pose must have a row for",
         ),
         ({"initial": {"pose": [0, 0, 1, 0, 0, 0], "carrier_velocity": [[0] * 6]}}, "initial.carrier_velocity must"),
-        ({"initial": {"pose": [0, 0, 1]}}, "initial.pose"),
+        ({"initial": {"pose": [0, 1]}}, "initial.pose"),
         ({"initial": {"pose": [0, 0, float("nan"), 0, 0, 0]}}, "initial.pose"),
     ],
 )

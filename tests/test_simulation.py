@@ -392,7 +392,7 @@ def test_a_path_may_be_a_mapping():
     line = {"kind": "line", "start": [0, 0, -1], "end": [0.01, 0, -1.02]}
     alike = [simulate("wang-flying", path, duration=0.1) for path in (line, Task(path=line).path)]
     assert np.array_equal(*(flight.record.motions for flight in alike))
-    with pytest.raises(InputError, match=r"path\.kind must be one of circle, line, .*, got 'lin'"):
+    with pytest.raises(InputError, match=r"path\.kind must be one of circle, feed, line, .*, got 'lin'"):
         simulate("wang-flying", {**line, "kind": "lin"}, duration=0.1)
 
 

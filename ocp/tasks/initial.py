@@ -7,7 +7,8 @@ from pydantic import BeforeValidator, Field
 
 from ...base.errors import InputError
 from ...models import Robot
-from ...models.part import Finite, Part, Pose
+from ...models.part import Finite, Part, Pose, Vector3
+from .paths import PoseOrPosition
 
 STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -16,7 +17,7 @@ def _six_zeros(value: Any) -> Any:
     return STILL if isinstance(value, int | float) and not isinstance(value, bool) and value == 0 else value
 
 
-OrZero = Annotated[Pose, BeforeValidator(_six_zeros, json_schema_input_type=Pose | Literal[0])]
+OrZero = Annotated[PoseOrPosition, BeforeValidator(_six_zeros, json_schema_input_type=Pose | Vector3 | Literal[0])]
 
 
 class _State(Part):
@@ -39,9 +40,9 @@ class _State(Part):
 class Initial(_State):
     """The state at the start of a motion, in {G}; it overrides `tube.ends` and `base.ends` there."""
 
-    pose: Pose = Field(description="(x, y, z, roll, pitch, yaw) of the platform [m, rad]")
-    velocity: Pose = Field(default=STILL, description="their time derivatives [m/s, rad/s]")
-    acceleration: Pose | None = Field(
+    pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) of the platform [m, rad]")
+    velocity: PoseOrPosition = Field(default=STILL, description="their time derivatives [m/s, rad/s]")
+    acceleration: PoseOrPosition | None = Field(
         default=None, description="the second ones [m/s^2, rad/s^2]; default: as the planner chooses"
     )
     carrier_pose: tuple[Pose, ...] | None = Field(
@@ -60,7 +61,7 @@ class Initial(_State):
 class Final(_State):
     """The state at the end of a motion, in {G}; given fields override `tube.ends` and `base.ends`."""
 
-    pose: Pose | None = Field(
+    pose: PoseOrPosition | None = Field(
         default=None,
         description="of the platform [m, rad]; default: anywhere in the tube if velocity is given, else as tube.ends "
         "requires",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo
 
-from ....models.part import Part, Pose
+from ....models.part import Part, Pose, Vector3
 from .motion import Motion
 from .stations import Stations
 
@@ -48,7 +48,7 @@ def with_points_of_file(data: dict[str, Any], info: ValidationInfo, wanted: Coll
     return data | read
 
 
-PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude)]
+PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude, json_schema_input_type=Pose | Vector3)]
 
 
 class PathBase(Part):
