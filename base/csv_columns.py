@@ -27,10 +27,7 @@ def read_columns(
     those that begin with # are left out. `factor` returns the factor to SI units for a name and a unit, see
     `unit_factor`. With `gaps`, fields may be empty or nan.
 
-    Raises
-    ------
-    InputError
-        Naming line and column, but not the file.
+    Raises `InputError` that names line and column, but not the file.
     """
     rows = _rows(text)
     mark = max(",;\t", key=rows[0][1].count)

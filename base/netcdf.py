@@ -145,10 +145,7 @@ def numbers_of(
 ) -> np.ndarray:
     """Return a copy of a variable's numbers, of the expected shape, -1 for any length; `gaps` permits nan.
 
-    Raises
-    ------
-    InputError
-        Naming the dataset as `where`, if they are anything else.
+    Raises `InputError` that names the dataset as `where` if they are anything else.
     """
     if name not in dataset.variables or dataset[name].dtype.kind not in "fiu":
         given = f"an array of {dataset[name].dtype}" if name in dataset.variables else "none"

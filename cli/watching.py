@@ -77,17 +77,7 @@ class Watch:
 
 @contextmanager
 def watching(what: str, quiet: bool = False, console: Console | None = None) -> Iterator[Watch]:
-    """Show a solver's iterations while the block runs, on a terminal and unless `quiet`.
-
-    Parameters
-    ----------
-    what
-        Label.
-    quiet
-        Show nothing, because standard output is for a program (`--json`).
-    console
-        Where to print; default: standard error.
-    """
+    """Show a solver's iterations while the block runs, on a terminal and unless `quiet`; default: standard error."""
     # Rich takes longer to load than a short plan to compute.
     if quiet or (console is None and not sys.stderr.isatty()):
         yield Watch(None, what)

@@ -227,10 +227,7 @@ def save(canvas: Figure, path: Path) -> Path:
     PDF contains its fonts as TrueType (type 42), whose text can be searched and edited; SVG has letters as shapes.
     Equal figures give equal files.
 
-    Raises
-    ------
-    InputError
-        If the suffix is none of them, or the file cannot be written.
+    Raises `InputError` if the suffix is none of them, or the file cannot be written.
     """
     from matplotlib import rc_context
 

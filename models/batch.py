@@ -36,12 +36,8 @@ def call(function: ca.Function, arguments: dict[str, Any], matrices: tuple[str, 
     matrices
         Outputs that are matrices also when they happen to have one column, as the wrench matrix of one cable.
 
-    Raises
-    ------
-    InputError
-        Naming the argument whose shape or value does not fit.
-    SolverError
-        If CasADi cannot evaluate the Function, which happens only with external or iterative functions.
+    Raises `InputError` that names the argument whose shape or value does not fit; `SolverError` if CasADi cannot
+    evaluate the Function, which happens only with external or iterative functions.
     """
     if any(is_symbolic(value) for value in arguments.values()):
         outputs = function(**_as_symbols(function, arguments))

@@ -15,10 +15,7 @@ def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cabl
     radii
         Of the sheaves, (m,) [m]; 0 for a cable without.
 
-    Raises
-    ------
-    ValueError
-        Naming the attachment.
+    Raises `ValueError` that names the attachment.
     """
     up = np.sum(offsets * axes, axis=1)
     across = np.linalg.norm(offsets - up[:, None] * axes, axis=1)

@@ -25,10 +25,7 @@ def com_velocity(robot: Robot, pose: Matrix, velocity: Matrix) -> Matrix:
 def inertial_wrench(robot: Robot, pose: Matrix, velocity: Matrix, acceleration: Matrix) -> Matrix:
     """Return w, (6, 1): force [N] and moment about the CoM [N m] in {G} against inertia and gravity.
 
-    Parameters
-    ----------
-    pose, velocity, acceleration
-        (6, 1) each: (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its first two time derivatives.
+    The motion is (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its two time derivatives, (6, 1) each.
     """
     return body_wrench(*body_of(robot), ca.DM(robot.gravity), pose, velocity, acceleration)
 
@@ -36,12 +33,8 @@ def inertial_wrench(robot: Robot, pose: Matrix, velocity: Matrix, acceleration: 
 def carried_wrench(robot: Robot, load: Matrix, pose: Matrix, velocity: Matrix, acceleration: Matrix) -> Matrix:
     """Return the wrench, (6, 1), that a load fixed to the platform needs, in {G}: [N], [N m] about the platform's CoM.
 
-    Parameters
-    ----------
-    load
-        (10, 1): mass [kg], CoM in the platform frame (3) [m], inertia about it (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2].
-    pose, velocity, acceleration
-        As in `inertial_wrench`.
+    The load is its mass [kg], CoM in the platform frame (3) [m] and inertia about it (Ixx, Iyy, Izz, Ixy, Ixz, Iyz)
+    [kg m^2], (10, 1); the motion is that of `inertial_wrench`.
     """
     mass, com = load[0], load[1:4]
     xx, yy, zz, xy, xz, yz = (load[i] for i in range(4, 10))

@@ -15,13 +15,7 @@ Matrix: TypeAlias = Any  # CasADi SX, MX or DM: what goes in comes out
 
 
 def rotation(angles: Matrix) -> Matrix:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
-
-    Parameters
-    ----------
-    angles
-        (roll, pitch, yaw), (3, 1), in [rad].
-    """
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3), of angles (roll, pitch, yaw), (3, 1) [rad]."""
     roll, pitch, yaw = ca.vertsplit(angles)
     sr, cr = ca.sin(roll), ca.cos(roll)
     sp, cp = ca.sin(pitch), ca.cos(pitch)

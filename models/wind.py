@@ -17,13 +17,7 @@ from .rotation import Matrix
 def aerodynamic_wrench(robot: Robot, pose: Matrix, velocity: Matrix, wind: Matrix) -> Matrix:
     """Return W_e, (6, 1): force [N] and moment about the CoM [N m] of the air on the platform, in {G}.
 
-    Parameters
-    ----------
-    pose, velocity
-        (6, 1) each: of the platform frame in {G} and its time derivative.
-    wind
-        (3, 1): velocity of the air in {G} [m/s].
-
+    Pose and velocity, (6, 1) each, are of the platform frame in {G}; wind (3, 1) is the air's velocity there [m/s].
     Raises `InputError` if the robot's file has no `platform.aero`.
     """
     aero = robot.platform.aero

@@ -58,10 +58,7 @@ class Region(Part):
 def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of a box about home and anchors, (3,) and (3,) [m]; locked coordinates stay at home.
 
-    Parameters
-    ----------
-    carriers
-        Boxes of carriers, by name; the others are at home.
+    Carriers are in the boxes of `carriers`, by name, or else at home.
     """
     corners = [robot.home_anchors, robot.home[None, :3]]
     for index, carrier in enumerate(robot.carriers):

@@ -193,10 +193,7 @@ class _Run:
     def flags(self, samples: int, points: np.ndarray | None = None) -> Iterator[np.ndarray]:
         """Count the next samples; yield which of them are accepted, (n,) of bool, chunk after chunk.
 
-        Parameters
-        ----------
-        points
-            Of the unit cube, (samples, d); default: the sampler's.
+        Their `points` are of the unit cube, (samples, d); default: the sampler's.
         """
         for counts, chunks in self._workers.map(self._counter.count, self._jobs(samples, points)):
             self._counts.add(counts)

@@ -99,11 +99,7 @@ class Parameters(Displayed):
     def calibrated(self, x: np.ndarray, covariance: np.ndarray | None = None) -> Robot:
         """Return the robot with the values `x`; an encoder is written where offset or scale differ from the file.
 
-        Parameters
-        ----------
-        covariance
-            Covariance of the free parameters, (p, p); default: the robot has no uncertainty.
-
+        Without a `covariance` (p, p) of the free parameters the robot has no uncertainty.
         Raises `InputError` if no robot can have these values.
         """
         data = self.robot.model_dump(mode="json")

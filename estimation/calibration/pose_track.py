@@ -57,10 +57,7 @@ class PoseTrack:
     def at(self, clock: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return position (N, 3) [m], rotation (N, 3, 3), velocity (N, 3) [m/s] and rate (N, 3) in {G} [rad/s].
 
-        Parameters
-        ----------
-        clock
-            Time by which the clock of the poses is ahead of the clock of the lengths [s].
+        `clock` is the time by which the clock of the poses is ahead of that of the lengths [s].
         """
         if self._last is None or self._last[0] != clock:
             self._last = clock, self._at(np.clip(self._times + clock, *self._span))
