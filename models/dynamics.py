@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -24,7 +23,7 @@ from .part import LARGEST
 from .record import fits
 from .relative_dynamics import RelativeDynamics
 from .robot import Robot
-from .world_functions import WorldFunctions
+from .world_functions import PUBLISHED, WorldFunctions
 
 
 def dynamics_of(robot: Robot) -> Dynamics:
@@ -51,11 +50,6 @@ class Dynamics(Displayed):
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
 
-    Attributes
-    ----------
-    functions
-        The CasADi Functions by name, with named inputs and outputs.
-
     Raises
     ------
     InputError
@@ -65,7 +59,11 @@ class Dynamics(Displayed):
     def __init__(self, robot: Robot | str | os.PathLike[str]):
         self.robot = as_robot(robot)
         self._functions = WorldFunctions(self.robot)
-        self.functions: Mapping[str, ca.Function] = self._functions
+
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """Return the CasADi Functions by name, with named inputs and outputs."""
+        return {name: self._functions.function(name) for name in PUBLISHED}
 
     def __reduce__(self) -> tuple[type[Dynamics], tuple[Robot]]:
         """Pickle the robot alone: its functions are built again."""

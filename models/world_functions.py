@@ -1,6 +1,6 @@
 """`WorldFunctions`: kinematics and dynamics of a robot in {G} as CasADi Functions, each built when it is first used."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from functools import cached_property
 
 import casadi as ca
@@ -15,26 +15,12 @@ from .rotation import Matrix
 PUBLISHED = ("wrench_matrix", "cable_lengths", "required_wrench", "acceleration")
 
 
-class WorldFunctions(Mapping[str, ca.Function]):
-    """Map the names of the four functions to build on to them; `function` has the others too.
-
-    Inputs have the names that arguments of `Dynamics` have.
-    """
+class WorldFunctions:
+    """The functions of a robot, whose inputs have the names that arguments of `Dynamics` have."""
 
     def __init__(self, robot: Robot):
         self._robot = robot
         self._built: dict[str, ca.Function] = {}
-
-    def __getitem__(self, name: str) -> ca.Function:
-        if name not in PUBLISHED:
-            raise KeyError(name)
-        return self.function(name)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(PUBLISHED)
-
-    def __len__(self) -> int:
-        return len(PUBLISHED)
 
     def function(self, name: str) -> ca.Function:
         """Return one of the functions in `_DEFINITIONS`."""
