@@ -54,11 +54,10 @@ def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) 
 
 def spatial_inertia(robot: Robot, pose: np.ndarray) -> np.ndarray:
     """Return blockdiag(m, I) about the CoM in {G}, (6, 6) [kg, kg m^2]."""
+    from scipy.linalg import block_diag
+
     R = rotation(ca.DM(pose)[3:6]).full()
-    M = np.zeros((6, 6))
-    M[:3, :3] = robot.platform.mass * np.eye(3)
-    M[3:, 3:] = R @ robot.inertia @ R.T
-    return M
+    return block_diag(robot.platform.mass * np.eye(3), R @ robot.inertia @ R.T)
 
 
 def frequencies(K: np.ndarray, M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -29,21 +29,14 @@ def platform_acceleration(robot: Robot, pose: Matrix, velocity: Matrix, wrench: 
     M, h = ca.jacobian(needed, acceleration), ca.substitute(needed, acceleration, ca.DM.zeros(6))
     rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]
     moving = ca.solve(M[rows, rows], (wrench - h)[rows])
-    chosen = ca.DM(6, len(rows))
-    for column, row in enumerate(rows):
-        chosen[row, column] = 1
-    return chosen @ moving
+    return ca.DM.eye(6)[:, rows] @ moving
 
 
 def pull_on_carrier(robot: Robot, index: int, run: Exit, carrier_pose: Matrix, tensions: Matrix) -> Matrix:
     """Return the pull of its cables on carrier `index`, (6, 1): force in {G} [N], moment in its own axes [N m].
 
-    Parameters
-    ----------
-    run
-        How the cables run in {G}: a cable over a pulley pulls along the line that leaves the sheave.
-    carrier_pose
-        (6, 1), of the carrier in {G}.
+    The cables run in {G} as `run` has it: over a pulley one pulls along the line that leaves the sheave. The carrier
+    is at `carrier_pose` in {G}, (6, 1).
     """
     R = rotation(carrier_pose[3:6])
     force, moment = ca.DM.zeros(3), ca.DM.zeros(3)
