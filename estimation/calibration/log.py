@@ -9,7 +9,6 @@ import io
 import os
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from ...base.declared import check_hdf5
 from ...base.errors import InputError
 from ...base.inputs import file_path, printable
 from ...base.netcdf import check_units
-from ...base.reading import check_file, read_bytes
+from ...base.reading import read_bytes
 from .measurements import Measurements, Sigma
 
 LARGEST_LOG, LARGEST_CSV = 1_000_000_000, 50_000_000  # [bytes]
@@ -60,9 +59,11 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
     """
     file = file_path("log", path, "the path of a CSV or NetCDF file")
     where = printable(str(file))
-    check_file(file, "a CSV or NetCDF file", LARGEST_LOG)
-    binary = _begins(file).startswith(BINARY)
-    content = read_bytes(file, *(("a NetCDF file", LARGEST_LOG) if binary else ("a CSV file", LARGEST_CSV)))
+    content = read_bytes(file, "a CSV or NetCDF file", LARGEST_LOG)
+    binary = content.startswith(BINARY)
+    if not binary and len(content) > LARGEST_CSV:
+        most, size = LARGEST_CSV / 1e6, len(content) / 1e6
+        raise InputError(f"{where} must be a CSV file of at most {most:g} MB, got {size:.1f} MB")
     if not content.strip():
         raise InputError(f"{where} must be a CSV or NetCDF file, got an empty file")
     try:
@@ -72,15 +73,6 @@ def read_measurements(path: str | os.PathLike[str], sigma: float | Mapping[str, 
         return Measurements(**arguments)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-
-
-def _begins(file: Path) -> bytes:
-    """Return the first bytes of a file; none if it cannot be read (`read_bytes` then reports why)."""
-    try:
-        with file.open("rb") as stream:
-            return stream.read(8)
-    except OSError:
-        return b""
 
 
 def _csv_columns(content: bytes) -> dict[str, np.ndarray]:
