@@ -59,9 +59,8 @@ def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]
     x = np.arange(len(axis.values)) if words else np.array(axis.values)
     order = np.argsort(x)
     beyond = 0.4 if words else 0.04 * float(np.ptp(x)) or 0.5
-    for row, (label, values) in enumerate(quantities.items()):
-        last = row + 1 == len(quantities)
-        ax = style.axes(canvas, axis.label if last else "", label, (len(quantities), 1, row + 1))
+    panels = style.panels_below(canvas, axis.label, list(quantities))
+    for row, (ax, values) in enumerate(zip(panels, quantities.values(), strict=True)):
         line = "" if words else "-"  # between words there is nothing
         ax.plot(x[order], values[order], f"{line}o", color=style.colour(row), markersize=4, clip_on=False)
         bottom = blended_transform_factory(ax.transData, ax.transAxes)
@@ -72,7 +71,6 @@ def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]
         ax.margins(y=0.18)
         if words:
             ax.set_xticks(x, axis.texts)
-        ax.tick_params(labelbottom=last)
     return canvas
 
 

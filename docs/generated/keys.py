@@ -114,18 +114,13 @@ class _Keys:
             return " or ".join(f"`{value}`" for value in field["enum"])
         kind = field.get("type")
         if kind == "array":
-            return self._list(field)
+            items = field.get("prefixItems")
+            return f"{len(items)} numbers{_bounds(items[0])}" if items else f"list of: {self._type(field['items'])}"
         if kind == "object":
             inner = next(iter(field.get("patternProperties", {}).values()), None) or field["additionalProperties"]
             return f"mapping of names to: {self._type(inner)}"
         names = {"string": "text", "boolean": "`true` or `false`", "null": "`null`", "integer": "whole number"}
         return names.get(kind, "number") + _bounds(field)
-
-    def _list(self, field: Schema) -> str:
-        items = field.get("prefixItems")
-        if items:
-            return f"{len(items)} numbers{_bounds(items[0])}"
-        return f"list of: {self._type(field['items'])}"
 
 
 def _referred(field: Any) -> list[str]:
