@@ -1,7 +1,7 @@
 """`AtRest`: by how much a robot at rest keeps its task's limits, for many poses in one call."""
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,16 +47,29 @@ class AtRest:
         self.scenario, self.size, self.spare, self.balance = scenario, size, spare, balance
 
     @cached_property
-    def _checked(self) -> list[tuple[int, Limit, float]]:
-        """Return the limits that rest can exceed: index, limit, and metres per unit of it."""
-        checked = []
-        for k, limit in enumerate(self.scenario.limits):
+    def _checked(self) -> list[tuple[int, Limit, slice, float]]:
+        """Return the limits that rest can exceed: index, limit, place among the values, and metres per unit of it."""
+        limits, checked = self.scenario.limits, []
+        for k, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
             if limit.soft is not None or limit.is_equation or isinstance(limit, Rate):
                 continue
             known = limit.per_metre if np.isfinite(limit.per_metre) else UNKNOWN
             unit = 1.0 / known if limit.unit == "m" else self.size / limit.scale
-            checked.append((k, limit, unit))
+            checked.append((k, limit, place, unit))
         return checked
+
+    @cached_property
+    def _evaluated(self) -> tuple[Any, Any, list[np.ndarray], np.ndarray]:
+        """Return the function of all limits with its arguments and values in place: no copies, no conversions."""
+        robot, function = self.scenario.robot, self.scenario.limits.function
+        arguments = [*(np.zeros(18) for _ in range(1 + len(robot.carriers))), np.zeros(robot.m), np.zeros(6)]
+        values = np.zeros(function.numel_out(0))
+        buffer: Any
+        buffer, evaluate = function.buffer()
+        for i, argument in enumerate(arguments):
+            buffer.set_arg(i, argument.data)
+        buffer.set_res(0, values.data)
+        return buffer, evaluate, arguments, values
 
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
@@ -117,11 +130,21 @@ class AtRest:
         n, checked = len(platform), self._checked
         if not checked:
             return np.full(n, np.inf), np.zeros(n, int)
-        moving, bases = ((pose, np.zeros_like(pose), np.zeros_like(pose)) for pose in (platform, carriers))
-        values = self.scenario.limits.along(moving, bases, tensions, off_path)
+        _, evaluate, arguments, values = self._evaluated
+        table = np.empty((n, len(values)))
+        for row in range(n):
+            arguments[0][:6] = platform[row]
+            for argument, pose in zip(arguments[1:], carriers[row], strict=False):
+                argument[:6] = pose
+            arguments[-2][:] = tensions[row]
+            if off_path is not None:
+                arguments[-1][:] = off_path[row]
+            evaluate()
+            table[row] = values
         slack = np.empty((n, len(checked)))
-        for column, (k, limit, unit) in enumerate(checked):
-            value = limit.over(np.zeros(n), values[k])
+        at = np.zeros(n)
+        for column, (_, limit, place, unit) in enumerate(checked):
+            value = table[:, place] if type(limit).over is Limit.over else limit.over(at, table[:, place])
             kept = np.minimum(value - limit.low, limit.high - value).min(axis=1) * unit
             slack[:, column] = np.where(np.isnan(kept), -np.inf, kept)
         least = slack.argmin(axis=1)

@@ -43,14 +43,14 @@ def motions(platform: Motion, carriers: Motion) -> list[np.ndarray]:
 
 
 def in_blocks(block: ca.Function, arguments: list[np.ndarray]) -> np.ndarray:
-    """Return the values (n, k) of a function of one instant, or mapped to some, for arguments (n, .) each."""
-    n, size = len(arguments[0]), block.size2_out(0)
-    whole = [np.concatenate([each, np.repeat(each[-1:], -n % size, axis=0)]) for each in arguments]
+    """Return the values (n, k) of a function of one instant, mapped to `BLOCK` of them, for arguments (n, .) each."""
+    n = len(arguments[0])
+    whole = [np.concatenate([each, np.repeat(each[-1:], -n % BLOCK, axis=0)]) for each in arguments]
     values = np.empty((len(whole[0]), block.size1_out(0)))
     buffer: Any  # in place: as DM the arguments would take longer than all that is computed
     buffer, evaluate = block.buffer()
-    for start in range(0, len(values), size):
-        rows = slice(start, start + size)
+    for start in range(0, len(values), BLOCK):
+        rows = slice(start, start + BLOCK)
         for i, each in enumerate(whole):
             buffer.set_arg(i, each[rows].data)
         buffer.set_res(0, values[rows].data)
@@ -197,7 +197,7 @@ class Limits(Displayed):
         arguments = motions(platform, carriers)
         arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
-        values = in_blocks(self._of_block if n >= BLOCK else self.function, arguments)
+        values = in_blocks(self._of_block, arguments)
         return [values[:, place] for place in self.places]
 
     def at_rest(self, platform: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
