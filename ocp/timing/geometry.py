@@ -3,7 +3,17 @@
 import numpy as np
 
 from ...base.errors import InputError
-from ..tasks.paths import AnyPath, Curve, LinePath, ReturnPath, SamplePath, SequencePath, TimedPath, WaypointPath
+from ..tasks.paths import (
+    AnyPath,
+    Curve,
+    FeedPath,
+    LinePath,
+    ReturnPath,
+    SamplePath,
+    SequencePath,
+    TimedPath,
+    WaypointPath,
+)
 
 PIECES = (400, 800, 1600)  # of a spline through points of a path, until it is near enough
 LOOKS = 20_001
@@ -14,10 +24,14 @@ def geometry(path: AnyPath, *, alone: bool) -> Curve:
     """Return the curve of a path; `alone` if no other path is followed with the same s.
 
     Raises `InputError` if a spline or samples turn so sharply that they must rest, or move nowhere, or for a
-    sequence or a return.
+    sequence, a return or a feed.
     """
     if isinstance(path, SequencePath):
         raise InputError("path.kind must be that of one path to be timed, got sequence; time its parts one by one")
+    if isinstance(path, FeedPath):
+        raise InputError(
+            "path.kind must be that of a path without its own speed to be timed, got feed; plan it instead"
+        )
     if isinstance(path, ReturnPath):
         raise InputError("path.kind must be that of a whole path to be timed, got return")
     if isinstance(path, TimedPath):

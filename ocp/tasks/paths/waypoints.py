@@ -112,9 +112,9 @@ class WaypointPath(PathBase):
         if len(self.points) > MOST + 2:
             raise ValueError(f"order must be given for more than {MOST} points between two, got {len(self.points) - 2}")
         order = shortest_order(np.array(self.points))
-        self.__dict__["points"] = tuple(self.points[index] for index in order)
+        object.__setattr__(self, "points", tuple(self.points[index] for index in order))
         if self.dwell is not None and len(self.dwell) == len(order):
-            self.__dict__["dwell"] = tuple(self.dwell[index] for index in order)
+            object.__setattr__(self, "dwell", tuple(self.dwell[index] for index in order))
 
     def _check_dwell(self, dwell: tuple[float, ...]) -> None:
         if len(dwell) != len(self.points):
