@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from ..simulation import Execution, Simulation
 
 _MANY = "With --runs: "
-CONTROLLERS = ("computed-torque", "predictive", "lengths", "open-loop")
+CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "open-loop")
 
 
 def simulate(

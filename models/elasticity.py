@@ -57,7 +57,7 @@ def spatial_inertia(robot: Robot, pose: np.ndarray) -> np.ndarray:
     from scipy.linalg import block_diag
 
     R = rotation(ca.DM(pose)[3:6]).full()
-    return block_diag(robot.platform.mass * np.eye(3), R @ robot.inertia @ R.T)
+    return np.asarray(block_diag(robot.platform.mass * np.eye(3), R @ robot.inertia @ R.T))
 
 
 def frequencies(K: np.ndarray, M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

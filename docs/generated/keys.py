@@ -112,7 +112,7 @@ class _Keys:
             return f"`{field['const']}`"
         if "enum" in field:
             return " or ".join(f"`{value}`" for value in field["enum"])
-        kind = field.get("type")
+        kind = field.get("type", "")
         if kind == "array":
             items = field.get("prefixItems")
             return f"{len(items)} numbers{_bounds(items[0])}" if items else f"list of: {self._type(field['items'])}"

@@ -207,7 +207,8 @@ def _vertical(z: np.ndarray, softness: np.ndarray) -> np.ndarray:
 
 def _misses(forces: np.ndarray, spans: np.ndarray, softness: np.ndarray) -> np.ndarray:
     """Return the distances of the ends beyond their positions, (2, k): the gradient of the energy."""
-    return np.stack(_reach(*forces, 1.0, softness)) - spans
+    h, v = forces
+    return np.stack(_reach(h, v, 1.0, softness)) - spans
 
 
 def _step(forces: np.ndarray, spans: np.ndarray, softness: np.ndarray) -> np.ndarray:
@@ -215,11 +216,12 @@ def _step(forces: np.ndarray, spans: np.ndarray, softness: np.ndarray) -> np.nda
 
     The energy is convex: while it still falls at the end of a step, the step was not too long.
     """
-    misses, compliance = _misses(forces, spans, softness), _compliance(*forces) + softness * np.eye(2)[..., None]
+    (h, v), misses = forces, _misses(forces, spans, softness)
+    compliance = _compliance(h, v) + softness * np.eye(2)[..., None]
     step = -np.linalg.solve(np.moveaxis(compliance, -1, 0), misses.T[..., None])[..., 0].T
     # The second term: rounding of the misses.
     allowed = STEEP * np.abs((misses * step).sum(axis=0)) + 1e-15 * np.abs(step).sum(axis=0)
-    (h, _), (d_h, _) = forces, step
+    d_h = step[0]
     taken = np.where(h + d_h > 0, 1.0, -0.9 * h / np.where(d_h < 0, d_h, -1.0))
     for _ in range(60):
         rising = (_misses(forces + taken * step, spans, softness) * step).sum(axis=0) > allowed
