@@ -107,3 +107,10 @@ def test_no_box_of_the_grid_is_larger(seed):
     assert np.prod(high - low) == pytest.approx(best)
     inside = [(axis >= a) & (axis <= b) for axis, a, b in zip(axes, low, high, strict=True)]
     assert able[np.ix_(*inside)].all()
+
+
+def test_a_box_without_width_has_its_whole_height():
+    able = np.zeros((3, 3, 5), dtype=bool)
+    able[1, 1, 1:4] = True
+    low, high = largest_box(able, [np.arange(3.0), np.arange(3.0), np.arange(5.0)], np.array([1.0, 1.0, 2.0]))
+    assert (low.tolist(), high.tolist()) == ([1, 1, 1], [1, 1, 3])

@@ -79,10 +79,11 @@ def largest_box(
     around
         How many nodes more to go on every side, where there are so many.
     """
-    # In order of their distance from the middle, so that of equal boxes the one with fewer nodes is found.
     middle = [int(np.argmin(abs(axis - at))) for axis, at in zip(axes, centre, strict=True)]
     firsts = [np.arange(at, -1, -1) for at in middle]
     lasts = [np.arange(at, len(axis)) for axis, at in zip(axes, middle, strict=True)]
+    # The last of all first along z: of boxes without a volume the narrowest and highest is found.
+    firsts[2], lasts[2] = firsts[2][::-1], lasts[2][::-1]
     # How many nodes are not able, in all boxes that begin at the corner of the grid, then in those about the middle.
     unable = np.pad((~able).cumsum(0).cumsum(1).cumsum(2), ((1, 0),) * 3)
     for first, last in zip(firsts, lasts, strict=True):
