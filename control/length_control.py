@@ -41,7 +41,7 @@ class LengthControl(Controller):
         stretch (also the default of a cable without a value in the file, if there are no more cables than degrees of
         freedom).
     lag
-        Time by which the winches follow their commands late [s]: lengths are commanded earlier by this time.
+        Delay with which the winches follow their commands [s]: lengths are commanded earlier by this time.
     proportional, integral
         P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 2 and 10 if
         it is current, 0.3 and 2 up to 20 ms, less beyond. A pose that is late without a time of its measurement needs

@@ -27,7 +27,7 @@ def references(
 ) -> list[Reference]:
     """Return the reference of each period of a plan, as `Predictive.follow` and a control loop take them.
 
-    The one of period k is that at the time start + k period; the last one is the first at or after the end.
+    Reference k is that of the plan at the time start + k period. The last one is the first at or after the plan's end.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def references(
     period
         Period of the controller [s].
     start
-        Time in the plan at which they begin [s].
+        Time in the plan at which the references begin [s].
 
     Raises
     ------

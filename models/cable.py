@@ -11,7 +11,7 @@ from .part import Finite, Name, NonNegative, Part, Positive, Vector3
 class Pulley(Part):
     """A swivelling pulley: the cable comes up the swivel axis at the anchor, runs over the sheave, leaves tangentially.
 
-    The sheave's plane holds the axis and turns about it so that it also holds the attachment.
+    The sheave's plane contains the axis and turns about it so that it also contains the attachment.
     """
 
     radius: Positive = Field(description="of the sheave [m]")

@@ -256,7 +256,7 @@ def test_wind_enters_both_forms():
 
 def test_wind_without_aero_is_an_error():
     robot = load("ipanema-1")
-    with pytest.raises(InputError, match=r"wind must be None for robot 'ipanema-1', which has no platform\.aero"):
+    with pytest.raises(InputError, match=r"wind must be left out for robot 'ipanema-1', which has no platform\.aero"):
         Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6), wind=[1, 0, 0])
 
 

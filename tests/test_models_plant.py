@@ -456,7 +456,7 @@ def test_wrong_input_is_one_line():
         Plant(robot, drive="forces")
     with pytest.raises(InputError, match=r"contacts must be 'located' unless all cables stretch"):
         Plant(load("cogiro"), contacts="sampled")
-    with pytest.raises(InputError, match="wind must be None for robot 'cogiro'"):
+    with pytest.raises(InputError, match="wind must be left out for robot 'cogiro'"):
         Plant(load("cogiro")).command(np.ones(8), wind=[1, 0, 0])
     with pytest.raises(InputError, match="lengths must be None if tensions are given"):
         plant.start(tensions=np.ones(6), lengths=np.ones(6))

@@ -58,8 +58,8 @@ class Phase(Part):
     path: SinglePath | None = Field(default=None, description="default: rest at the end of the previous phase")
     duration: Positive | PositiveRange | None = Field(
         default=None,
-        description="[s], at least 0.01; or a range {min, max}, of which the planner takes the shortest that is "
-        "feasible; default: the path's own",
+        description="[s], at least 0.01; or a range {min, max}, from which the planner takes the shortest "
+        "feasible duration; default: the path's own",
     )
     load: Load | None = Field(default=None, description="load fixed to the platform; default: none")
     ground: Ground | None = Field(

@@ -89,7 +89,7 @@ def check_margin(robot: Robot, task: Task) -> None:
 def _check_wind(robot: Robot, task: Task, where: str) -> None:
     """Refuse wind for a robot without `aero`, and a box of winds if the motion depends on the tensions."""
     if task.wind is not None and robot.platform.aero is None:
-        raise InputError(f"{where}: wind must be left out for a robot without platform.aero, as {robot.name!r} is")
+        raise InputError(f"{where}: wind must be left out for a robot without platform.aero, such as {robot.name!r}")
     if not isinstance(task.wind, WindBox):
         return
     for carrier in robot.carriers:
@@ -106,7 +106,7 @@ def _check_robust(robot: Robot, task: Task, where: str) -> None:
         return
     missing = "must be left out for a robot without an uncertainty in its file"
     if robot.uncertainty is None:
-        raise InputError(f"{where}: robust {missing}, as {robot.name!r} is, got {task.robust:g}")
+        raise InputError(f"{where}: robust {missing}, such as {robot.name!r}, got {task.robust:g}")
     if robot.m < len(robot.platform.dof):
         raise InputError(
             f"{where}: robust must be left out for a robot with fewer cables than degrees of freedom, because its "

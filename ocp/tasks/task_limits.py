@@ -126,7 +126,7 @@ class TaskLimits(Part):
     tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
     platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
     zone_speed: tuple[SpeedZone, ...] = Field(
-        default=(), description="places near which the platform is slow; outside, the limit rises by 10 m/s per metre"
+        default=(), description="balls inside which the platform is slow; outside, the limit rises by 10 m/s per metre"
     )
     platform_acceleration: Positive | None = Field(
         default=None, description="acceleration of the platform frame's origin [m/s^2]"

@@ -60,9 +60,9 @@ class Event(Part, ABC):
     kinds
         The registry: every defined event by its kind.
     short
-        How it is written in one line, but for "at SECONDS" and "for SECONDS"; empty if it cannot be.
+        Its form in one line, without "at SECONDS" and "for SECONDS"; empty if it has none.
     said
-        The field that the words between its kind and "at" give.
+        The field whose value is the words between its kind and "at".
     """
 
     kinds: ClassVar[dict[str, type[Event]]] = {}
@@ -84,7 +84,7 @@ class Event(Part, ABC):
 
     @classmethod
     def in_words(cls, words: list[str]) -> dict[str, Any]:
-        """Return its fields but the time from the words between its kind and "at"."""
+        """Return its fields, except the time, from the words between its kind and "at"."""
         return {cls.said: " ".join(words)} if words else {}
 
     def check(self, robot: Robot) -> None:
@@ -116,7 +116,7 @@ class Event(Part, ABC):
         return None
 
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory | None:
-        """Return the reference from its beginning on, by a time of its own; None if it remains.
+        """Return the reference from the event on, with time 0 at the event; None if the reference does not change.
 
         Parameters
         ----------

@@ -32,7 +32,7 @@ class StopReference(Event):
 
     @override
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory | None:
-        """Return the stop from the time [s] on, as a reference by a time of its own; None for a pose to hold."""
+        """Return the stop that begins at the time [s], with time 0 there; None if the reference is a pose to hold."""
         if trajectory.duration is None:
             return None  # a pose
         halt = stop_along(robot, trajectory, time)
@@ -81,7 +81,7 @@ class Follow(Event):
 
     @override
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory:
-        """Return the plan, and whether it begins elsewhere than the reference is at the time [s]."""
+        """Return the plan, with a note if its start differs from the reference at the time [s]."""
         new = self._trajectory(robot)
         (before, _), (after, _) = trajectory.at(np.array([time])), new.at(np.zeros(1))
         pose, velocity = (after[i][0] - before[i][0] for i in (0, 1))

@@ -32,7 +32,7 @@ class TimedPath(PathBase):
     """
 
     kind: Literal["timed"]
-    along: Curve = Field(description="the path; s is the fraction of its own time, of legs of their length")
+    along: Curve = Field(description="the path; s is the fraction of its own time, or for straight legs of its length")
     until: Positive | None = Field(
         default=None, description="end of the path by its own time [s]; default: its natural duration"
     )
