@@ -230,3 +230,19 @@ def test_who_has_no_box_of_winds():
         lay_out(load("wang-flying-quadrotor"), read_task({"path": CIRCLE, "wind": box}))
     with pytest.raises(InputError, match=r"without platform\.aero"):
         lay_out(load("ipanema-1"), read_task({"path": CIRCLE, "wind": box}))
+
+
+def test_the_first_line_says_what_holds_in_any_wind():
+    """It told the margin of the planned tensions, which are those of one wind; in others they may be smaller."""
+    task = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1, "wind": {"min": [-5, -5, 0], "max": [5, 5, 0]}}
+    found = plan("wang-flying", task | {"margin": 0.3})
+    assert found.feasible
+    assert found.margin > 1
+    first = found.report().splitlines()[0]
+    assert first.endswith("every tension at least 0.3 N inside its limits, in any of its winds")
+    assert (
+        plan("wang-flying", task)
+        .report()
+        .splitlines()[0]
+        .endswith("every tension inside its limits, in any of its winds")
+    )

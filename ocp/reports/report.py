@@ -137,9 +137,12 @@ def _of_the_motion(plan: PlanData) -> str:
     if plan.law is not None and plan.feasible:
         return f"shortest duration {quantity(plan.duration, 's', 6)}"
     if plan.feasible:
-        if plan.margin is None or plan.margin < WORTH_A_NUMBER:
-            return "every tension inside its limits"
-        return f"every tension at least {quantity(plan.margin, 'N')} inside its limits"
+        # The planned tensions are those of one wind; in the others of a range they exist, with the required margin.
+        ranges = plan.scenario.wind_box is not None
+        margin, where = (plan.scenario.hard_margin, ", in any of its winds") if ranges else (plan.margin, "")
+        if margin is None or margin < WORTH_A_NUMBER:
+            return f"every tension inside its limits{where}"
+        return f"every tension at least {quantity(margin, 'N')} inside its limits{where}"
     certificate, excess = plan.certificate, plan.audit.excess
     if certificate is None and excess:
         return f"{excess[0]}{_in_phase(plan, excess[0].time)}{_more(len(excess) - 1)}"

@@ -2,7 +2,7 @@
 
 from abc import ABC
 from collections.abc import Callable
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, TypeAlias
 
 import numpy as np
 from pydantic import BeforeValidator, Field
@@ -16,13 +16,15 @@ from ...models.robot import Robot
 from ...plant import Plant
 from .event import Event, Running, Seconds, number_in
 
+Change: TypeAlias = Callable[[Plant, np.ndarray, int], np.ndarray]  # of states, with the index of a cable
+
 
 class OfCable(Event, ABC):
     """A fault of one cable: what happened to it, and how it changes states of a plant."""
 
     happened: ClassVar[str]
-    change: ClassVar[Callable[[Plant, np.ndarray, int], np.ndarray]]
-    said = "cable"
+    change: ClassVar[Change]
+    said: ClassVar[str] = "cable"
     cable: Annotated[Whole, BeforeValidator(number_in)] = Field(description="number of the cable, from 1")
 
     @override
@@ -52,21 +54,26 @@ class Cut(OfCable):
     """A cable breaks."""
 
     kind: Literal["cut"] = "cut"
-    short, happened, change = "cut CABLE", "cable {} was cut", Plant.cut
+    short: ClassVar[str] = "cut CABLE"
+    happened: ClassVar[str] = "cable {} was cut"
+    change: ClassVar[Change] = Plant.cut
 
 
 class Stick(OfCable):
     """The winch of a cable holds its length."""
 
     kind: Literal["stick"] = "stick"
-    short, happened, change = "stick CABLE", "the winch of cable {} stuck", Plant.stick
+    short: ClassVar[str] = "stick CABLE"
+    happened: ClassVar[str] = "the winch of cable {} stuck"
+    change: ClassVar[Change] = Plant.stick
 
 
 class Lose(Event):
     """The actuators of a carrier stop, such as the rotors of a quadrotor."""
 
     kind: Literal["lose"] = "lose"
-    short, said = "lose CARRIER", "carrier"
+    short: ClassVar[str] = "lose CARRIER"
+    said: ClassVar[str] = "carrier"
     carrier: str = Field(description="name of the carrier")
 
     @override
@@ -101,7 +108,8 @@ class Miss(Event):
     """The controller does not respond for some time."""
 
     kind: Literal["miss"] = "miss"
-    short, said = "miss DURATION", "duration"
+    short: ClassVar[str] = "miss DURATION"
+    said: ClassVar[str] = "duration"
     duration: Seconds = Field(description="time without a response [s]")
 
     @override

@@ -2,7 +2,7 @@
 
 from abc import ABC
 from math import inf
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -30,7 +30,7 @@ class Push(Lasting):
     """A force and a moment on the platform, from one time to another."""
 
     kind: Literal["push"] = "push"
-    short = "push FX FY FZ [MX MY MZ]"
+    short: ClassVar[str] = "push FX FY FZ [MX MY MZ]"
     force: Vector3 = Field(default=(0.0, 0.0, 0.0), description="force in {G} [N]")
     moment: Vector3 = Field(default=(0.0, 0.0, 0.0), description="moment about the CoM in {G} [N m]")
 

@@ -2,7 +2,7 @@
 
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_serializer, field_validator
@@ -23,7 +23,7 @@ class StopReference(Event):
     """The reference stops on its path, as `control.stop` does."""
 
     kind: Literal["stop"] = "stop"
-    short = "stop"
+    short: ClassVar[str] = "stop"
 
     @override
     def describe(self, robot: Robot) -> str:
@@ -43,7 +43,8 @@ class Follow(Event):
     """The reference becomes another plan, which begins then."""
 
     kind: Literal["follow"] = "follow"
-    short, said = "follow PLAN.nc", "plan"
+    short: ClassVar[str] = "follow PLAN.nc"
+    said: ClassVar[str] = "plan"
     plan: Any = Field(description="a plan, or the NetCDF file of one")
 
     @field_validator("plan")
