@@ -403,7 +403,7 @@ def test_halves_with_too_few_readings_predict_nothing():
 def test_one_sample_leaves_nothing_to_confirm_the_result():
     result = calibrate("cogiro", as_built(1, 7).measurements(), free=("offsets",))
     assert result.held_out.after == np.inf
-    assert "too few samples" in result.report()
+    assert "half of the samples are too few" in result.report()
 
 
 def test_the_report_lists_the_largest_changes_of_lengths():

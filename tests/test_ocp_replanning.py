@@ -198,7 +198,7 @@ def test_a_motion_may_end_in_motion():
     ("change", "message"),
     [
         ({"state": None}, "state must be an Initial, a State"),
-        ({"state": {"pose": [0, 0, 1]}}, "state: pose must be 6 numbers"),
+        ({"state": {"pose": [0, 1]}}, "state: pose must be 3 numbers"),
         ({"state": {"pose": [0, 0, 1, 0, 0, 0], "tensions": [1.0]}}, "initial.tensions must have a number for each"),
         ({"time": -0.1}, "time must"),
         ({"time": 2.0}, "time must"),
