@@ -50,7 +50,7 @@ def test_the_cup_does_not_spill(week):
 
 def test_the_hall_is_crossed_slowly_near_the_stage(week):
     found = motion(week, "crowd")
-    near = np.linalg.norm(found.pose.values[:, :3] - [0, 0, 1.5], axis=1) < 1.5
+    near = np.linalg.norm(found.pose.values[:, :3] - [0, 0, 1.5], axis=1) < 0.8
     assert np.linalg.norm(found.velocity.values[near, :3], axis=1).max() <= 0.2501
 
 
