@@ -41,8 +41,8 @@ def flight(trajectory: xr.Dataset) -> Figure:
         thrusts = trajectory["actuation"].sel(actuator=THRUST).values
         of_carriers = partial(_draw_named, names=trajectory["carrier"].values, values=thrusts)
         draws.append(("thrust\ncommanded [N]", 1.3, of_carriers))
-    answers = _answers(trajectory)
-    draws.append(("", 0.1 + 0.18 * len(answers), _draw_answers))
+    if answers := _answers(trajectory):
+        draws.append(("", 0.1 + 0.18 * len(answers), _draw_answers))
     heights = [height for _, height, _ in draws]
     canvas = style.figure(height=0.7 + 0.85 * sum(heights))
     panels = style.panels_below(canvas, "time [s]", [label for label, _, _ in draws], heights)

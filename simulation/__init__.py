@@ -6,6 +6,7 @@ from ..base.execution import Execution
 from ..base.former_names import moved_name
 from .conditions import Conditions
 from .events import Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
+from .own_run import simulation_of
 from .sensors import Noise
 from .simulate import simulate
 from .simulation import Simulation
@@ -25,6 +26,7 @@ __all__ = [
     "StopReference",
     "Wall",
     "simulate",
+    "simulation_of",
 ]
 
 

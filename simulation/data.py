@@ -132,7 +132,8 @@ class SimulationData(Displayed):
     @property
     def answered(self) -> dict[str, int]:
         """Return the number of control steps with each status."""
-        counts = np.bincount(self.record.answered[: self._recorded], minlength=len(ANSWERS))
+        answered = self.record.answered[: self._recorded]
+        counts = np.bincount(answered[answered >= 0], minlength=len(ANSWERS))  # not of a run without a controller
         return dict(zip(ANSWERS, counts.tolist(), strict=True))
 
     @property

@@ -61,15 +61,12 @@ class Simulation(SimulationData, Filmed, Reported):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the output of `towline simulate --json`, ready for JSON."""
-        micro = 1e6 * self.seconds
-        return self.figures_of_merit() | {
-            "step_us": {
-                "median": float(np.median(micro)),
-                "p99": float(np.percentile(micro, 99)),
-                "max": float(micro.max()),
-            },
-            "real_time_factor": self.lasted * self.period / self.wall,
-        }
+        merit, micro = self.figures_of_merit(), 1e6 * self.seconds
+        if not micro.size:  # a run without a controller
+            return merit
+        times = {"median": np.median(micro), "p99": np.percentile(micro, 99), "max": micro.max()}
+        step = {name: float(value) for name, value in times.items()}
+        return merit | {"step_us": step, "real_time_factor": self.lasted * self.period / self.wall}
 
     @cached_property
     def trajectory(self) -> xr.Dataset:
@@ -182,12 +179,13 @@ class Simulation(SimulationData, Filmed, Reported):
             f"{quantity(1e3 * merit['error_max'], 'mm', digits=3)} at most",
             "tensions": f"{quantity(merit['tension_min'], 'N')} to {quantity(merit['tension_max'], 'N')}",
             "slack": quantity(merit["slack_s"], "s"),
-            "controller status": ", ".join(
-                f"{quantity(count)} {name}" for name, count in merit["answered"].items() if count
-            ),
-            "controller time": f"{np.median(1e6 * self.seconds):.0f} us per step, one step every "
-            f"{quantity(1e3 * self.period, 'ms')}",
         }
+        if self.seconds.size:
+            counts = ((name, count) for name, count in merit["answered"].items() if count)
+            rows["controller status"] = ", ".join(f"{quantity(count)} {name}" for name, count in counts)
+            rows["controller time"] = (
+                f"{np.median(1e6 * self.seconds):.0f} us per step, one step every {quantity(1e3 * self.period, 'ms')}"
+            )
         if merit["handed_over"] is not None:
             rows["not as modelled"] = self._why()
         if merit["shortfall_max"] is not None:

@@ -27,6 +27,7 @@ from towline.control import ComputedTorque, Predictive, Reference, State
 from towline.estimation.calibration import Calibration, Measurements, calibrate
 from towline.models import RelativeDynamics
 from towline.models.uncertainty import Uncertainty
+from towline.plant import Plant
 from towline.solvers import Horizon
 from towline.statics.robust import Spread
 from towline.workspace import Places, Region, StaticEquilibrium, sample
@@ -170,6 +171,12 @@ def places() -> Places:
 
 
 @cache
+def a_run():
+    plant = Plant(ROBOT, drive="tensions")
+    commands = np.tile(plant.command(np.full(plant.robot.m, 2.0)), (3, 1))
+    return plant, plant.run(plant.start(), commands, 1e-3)
+
+
 def a_plan() -> towline.Plan:
     return plan(ROBOT, TASK)
 
@@ -300,6 +307,9 @@ VALID: dict[str, Callable[[], Any]] = {
     "carriers": lambda: np.zeros((1, 1, 6)),
     "rows": lambda: slice(0, 1),
     "simulate.reference": lambda: robot().home,
+    "simulation_of.plant": lambda: a_run()[0],
+    "history": lambda: a_run()[1],
+    "simulation_of.reference": lambda: None,
     "simulate.duration": lambda: 0.01,
     "Conditions.duration": lambda: 0.01,
     "controller": lambda: None,

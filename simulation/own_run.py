@@ -1,0 +1,74 @@
+"""`simulation_of`: a run of one's own, from `Plant.run`, as a `Simulation` with its files, figures, film and report."""
+
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.inputs import number, required, shown
+from ..control import Reference
+from ..control.planned_references import references_at
+from ..control.trajectory import read_trajectory
+from ..core import sense
+from ..plant import Plant
+from ..plant.plant import History
+from .experiment import Experiment
+from .record import Record
+from .sensors import Noise
+from .simulation import Simulation
+
+UNCONTROLLED = -1  # the status of steps without a controller
+SAME = 1e-6  # of the time between two states
+
+
+def simulation_of(plant: Plant, history: History, reference: Any = None, tolerance: float = 0.05) -> Simulation:
+    """Return a run of a plant as a `Simulation`.
+
+    Parameters
+    ----------
+    plant
+        The plant.
+    history
+        What its `run` returned for one state, at equal times.
+    reference
+        What the position errors are measured against: a plan, the NetCDF file of one, a path or a pose (6,); default:
+        the motion itself.
+    tolerance
+        Largest position error allowed for a pass [m].
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong type or value, or the reference belongs to another robot.
+    """
+    robot, states = required("plant", plant, Plant).robot, required("history", history, History).states
+    if states.ndim != 2 or states.shape[-1] != plant.size or len(states) < 2:
+        raise InputError(f"history must be of one run, states (K, {plant.size}), got {shown(states)}")
+    steps = np.diff(history.times)
+    period = float(steps.mean())
+    if np.abs(steps - period).max() > SAME * period:
+        raise InputError("history must have states at equal times, got others")
+    count, error = len(states), number("tolerance", tolerance, 0.0, 1e6)
+    record, lengths = Record(robot, count), np.zeros((count, 2, robot.m))
+    sense(plant.record, np.ascontiguousarray(states), record.motions, lengths)
+    record.lengths[:], record.tensions[:], record.answered[:] = lengths[:, 0], history.tensions, UNCONTROLLED
+    doubt, keep_out = "", ()
+    if reference is None:
+        poses, velocities = record.motions[..., :6], record.motions[..., 6:]
+        parts = poses, velocities, np.gradient(velocities, period, axis=0)
+        references = [Reference(*rows[:, 0], *rows[:, 1:]) for rows in np.stack(parts, axis=1)]
+    else:
+        wanted = read_trajectory(robot, reference, float(history.times[-1]))
+        references, doubt, keep_out = references_at(robot, wanted, history.times), wanted.doubt, wanted.keep_out
+    conditions = Experiment(period, 1, references, None, np.zeros(6), Noise(), (), keep_out, doubt)
+    return Simulation(
+        robot=robot,
+        conditions=conditions,
+        seed=0,
+        record=record,
+        lasted=count,
+        tolerance=error,
+        wind=None,
+        seconds=np.zeros(0),
+        wall=np.inf,
+    )

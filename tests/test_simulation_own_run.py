@@ -1,0 +1,80 @@
+"""A run of one's own, of `Plant.run`: saved, read, reported, drawn and shown as a simulation."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib import pyplot
+
+from towline import InputError, load, plan, simulate
+from towline.plant import Plant
+from towline.simulation import simulation_of
+from towline.viewer import read
+
+SECONDS, DT = 0.4, 1e-3
+
+
+@pytest.fixture(scope="module")
+def swing():
+    """A load below a carrier, with constant lengths, pushed aside."""
+    plant = Plant("wang-flying")
+    state = plant.start(velocity=[0.1, 0, 0, 0, 0, 0], tensions=np.full(6, 2.0))
+    lengths = state[-4 * 6 : -3 * 6]
+    commands = np.tile(plant.command(lengths), (round(SECONDS / DT), 1))
+    return plant, plant.run(state, commands, DT)
+
+
+def test_it_has_the_motion_and_the_tensions_of_the_run(swing):
+    plant, history = swing
+    run = simulation_of(plant, history)
+    reading = plant.read(history.states)
+    np.testing.assert_allclose(run.trajectory.pose.values, reading.pose, atol=1e-12)
+    np.testing.assert_allclose(run.trajectory.velocity.values, reading.velocity, atol=1e-12)
+    np.testing.assert_array_equal(run.trajectory.tensions.values, history.tensions)
+    np.testing.assert_allclose(run.times, history.times, atol=1e-12)
+    assert run.error.max() == 0
+    assert "controller" not in run.report()
+    assert sum(run.answered.values()) == 0
+    json.dumps(run.to_dict())
+
+
+def test_it_is_saved_drawn_and_shown_as_simulations_are(swing, tmp_path):
+    run = simulation_of(*swing)
+    file = run.save(tmp_path / "own.nc")
+    with xr.open_dataset(file, engine="h5netcdf") as saved:
+        assert saved.attrs["title"].startswith("wang-flying, simulation")
+    for canvas in run.figures().values():
+        pyplot.close(canvas)
+    replay = read(file).replay
+    assert replay is not None
+    assert len(replay.times) == len(run.times)
+    assert simulate("wang-flying", file, duration=0.01).passed in (True, False)  # a reference like any other
+
+
+def test_errors_are_measured_against_a_reference():
+    found = plan("cogiro", {"path": {"kind": "line", "start": [0, 0, 1], "end": [0.3, 0, 1]}, "duration": 1})
+    plant = Plant("cogiro", drive="tensions")
+    times = np.linspace(0, 1, 101)
+    tensions = np.stack(
+        [np.interp(times, found.trajectory.time, each) for each in found.trajectory.tensions.values.T], 1
+    )
+    history = plant.run(plant.start([0, 0, 1, 0, 0, 0], tensions=tensions[0]), plant.command(tensions[:-1]), 0.01)
+    run = simulation_of(plant, history, found)
+    wanted = np.stack([np.interp(times, found.trajectory.time, each) for each in found.trajectory.pose.values.T], 1)
+    expected = np.linalg.norm(plant.read(history.states).pose[:, :3] - wanted[:, :3], axis=1)
+    np.testing.assert_allclose(run.error, expected, atol=2e-5)
+    assert 0 < run.error.max() < 0.05
+
+
+def test_what_is_no_run_is_one_line(swing):
+    plant, history = swing
+    with pytest.raises(InputError, match="history must be of one run"):
+        simulation_of(plant, history._replace(states=history.states[None]))
+    with pytest.raises(InputError, match="history must be of one run"):
+        simulation_of(Plant("cogiro"), history)
+    with pytest.raises(InputError, match="equal times"):
+        simulation_of(plant, history._replace(times=history.times**2))
+    with pytest.raises(InputError, match="reference must be a plan of robot"):
+        simulation_of(plant, history, plan("cogiro", {"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 1}))
+    assert load("wang-flying").m == 6
