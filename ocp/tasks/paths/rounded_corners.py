@@ -16,6 +16,7 @@ NEAR_END = 0.17  # place of the second control point, as a share of the way from
 # The third one, by the turn [rad]: with it the peak of the curvature is the least for a given miss, within 1 %.
 TURNS, NEAR_TIP = (0.0, pi / 4, pi / 2, 3 * pi / 4, pi), (0.78, 0.71, 0.61, 0.43, 0.2)
 LOOKS, BETWEEN = 8, 1.002  # in each of them, between which the curvature may be so many times as large
+BLOCK = 20_000  # places of corners that are computed together: more would take memory, not less time
 MOST = 0.5  # of the shorter line at a corner
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
@@ -88,6 +89,10 @@ class RoundedCorners:
 
     def at(self, length: np.ndarray) -> Places:
         """Return the places at lengths from 0 to the last edge, (n,) [m]."""
+        blocks = [self._at(some) for some in np.array_split(length, len(length) // BLOCK + 1)]
+        return Places(*map(np.concatenate, zip(*blocks, strict=True)))
+
+    def _at(self, length: np.ndarray) -> Places:
         piece = np.clip(np.searchsorted(self.edges, length, side="right") - 1, 0, len(self.edges) - 2)
         line, since = piece // 2, length - self.edges[piece]
         tangent, bend = self._along[line].copy(), np.zeros((len(length), 3))
@@ -103,11 +108,12 @@ class RoundedCorners:
 
     def _sizes(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the speed of all corners at parameters (k,), and the area of velocity and acceleration, (n - 2, k)."""
-        count = len(self._control)
-        _, first, second = self._bezier(np.repeat(np.arange(count), len(share)), np.tile(share, count))
-        shape = (count, len(share))
-        crossed = np.linalg.norm(np.cross(first, second), axis=1)
-        return np.linalg.norm(first, axis=1).reshape(shape), crossed.reshape(shape)
+        count, sizes = len(self._control), []
+        for some in np.array_split(np.arange(count), count * len(share) // BLOCK + 1):
+            _, first, second = self._bezier(np.repeat(some, len(share)), np.tile(share, len(some)))
+            sizes.append(np.linalg.norm([first, np.cross(first, second)], axis=2))
+        speed, crossed = np.concatenate(sizes, axis=1).reshape(2, count, len(share))
+        return speed, crossed
 
     def _share(self, corner: np.ndarray, since: np.ndarray) -> np.ndarray:
         """Return the parameter of corners at lengths from their beginnings, (n,), by Newton's method."""
