@@ -98,6 +98,11 @@ class Reading:
         return self._states[..., places + block * m : places + (block + 1) * m]
 
     @property
+    def cut(self) -> np.ndarray:
+        """Return which cables are cut, (..., m) of bool."""
+        return self._cable_block(layout.CONDITION) == layout.CUT
+
+    @property
     def pose(self) -> np.ndarray:
         """Return the pose of the platform frame in {G}, (..., 6) [m, rad]."""
         return self._platform.pose

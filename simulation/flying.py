@@ -21,6 +21,7 @@ from .record import Period
 from .sensors import Reading, Sensors
 
 BEYOND = 1e100  # [m, m/s, rad/s]: its square is finite
+ROUNDING = 1e-6  # of a period
 FEW = 1000  # numbers that BLAS adds with one thread
 # Pose and velocity of the platform, and of the carriers, in motions (..., 1 + c, 12).
 _PARTS = [(..., body, part) for body in (0, slice(1, None)) for part in (slice(0, 6), slice(6, 12))]
@@ -100,17 +101,17 @@ def fly(
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
     orders = Orders(plant, conditions, seeds)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
-    coming, pushing, command, expected = list(conditions.events), list[Event](), None, None
+    coming, pushing, command, expected = list(conditions.events), list[tuple[float, Event]](), None, None
     for k, reference in enumerate(conditions.references):
         time = k * period
         while coming and coming[0].at <= time + 1e-9 * period:
             event = coming.pop(0)
             event.begin(running)
-            pushing += [event] if type(event).wrench is not Event.wrench else []
+            pushing += [(time, event)] if type(event).wrench is not Event.wrench else []
         states = running.states
         sense(plant.record, states, motions, lengths)
         if pushing:
-            orders.push(_wrench(pushing, time + 1e-9 * period, motions))
+            orders.push(_wrench(pushing, time, period, motions))
         reported = sensors.report(k, motions, pulls)
         if command is None or time >= running.silent_until:
             command = pilot.step(time, reported, reference)
@@ -148,12 +149,16 @@ def fly(
     return np.maximum(lasted, 1), pilot.seconds
 
 
-def _wrench(events: Sequence[Event], time: float, motions: np.ndarray) -> np.ndarray:
-    """Return the sum of what events exert on the platform in the period that begins at `time`, (N, 6)."""
+def _wrench(begun: Sequence[tuple[float, Event]], time: float, period: float, motions: np.ndarray) -> np.ndarray:
+    """Return what events exert on the platform on average in the period from `time` on, (N, 6).
+
+    Each has begun with the period after its time, and lasts as long as it should, so that its impulse is right.
+    """
     total = np.zeros((len(motions), 6))
-    for event in events:
-        if event.until > time and (exerted := event.wrench(time, motions)) is not None:
-            total += check_wrench(event, exerted, total.shape, time)
+    for begins, event in begun:
+        share = min((begins + event.until - event.at - time) / period, 1.0)
+        if share > ROUNDING and (exerted := event.wrench(time, motions)) is not None:
+            total += share * check_wrench(event, exerted, total.shape, time)
     return total
 
 

@@ -12,6 +12,7 @@ from ..control.trajectory import read_trajectory
 from ..core import sense
 from ..plant import Plant
 from ..plant.plant import History
+from .events import Cut
 from .experiment import Experiment
 from .record import Record
 from .sensors import Noise
@@ -60,7 +61,11 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
     else:
         wanted = read_trajectory(robot, reference, float(history.times[-1]))
         references, doubt, keep_out = references_at(robot, wanted, history.times), wanted.doubt, wanted.keep_out
-    conditions = Experiment(period, 1, references, None, np.zeros(6), Noise(), (), keep_out, doubt)
+    gone = plant.read(states).cut  # (K, m)
+    cuts = tuple(
+        Cut(cable=int(i) + 1, at=float(history.times[np.argmax(gone[:, i])])) for i in np.flatnonzero(gone[-1])
+    )
+    conditions = Experiment(period, 1, references, None, np.zeros(6), Noise(), cuts, keep_out, doubt)
     return Simulation(
         robot=robot,
         conditions=conditions,

@@ -16,6 +16,7 @@ from towline.simulation import Cut, Event, Follow, Push, Wall
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-event.md").read_text()
 (CODE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.6, 0.2, 1.2]}
+PERIOD = 1e-3  # [s], of the controller
 ON = {"kind": "line", "start": [0.6, 0.2, 1.2], "end": [0, 0.4, 1]}
 
 
@@ -45,6 +46,14 @@ def test_a_push_gives_the_platform_its_momentum(robot):
     speed = run.record.motions[:, 0, 6:9]
     assert np.abs(speed[:101]).max() < 1e-7
     np.testing.assert_allclose(speed[120], force * lasting / robot.platform.mass, rtol=0.02)
+
+
+@pytest.mark.parametrize(("at", "lasting"), [(0.1, 0.0004), (0.1003, 0.0104), (0.1, 0.0005), (0.1007, 0.02)])
+def test_its_momentum_does_not_depend_on_the_controllers_period(robot, at, lasting):
+    push = Push(force=(3000.0, 0.0, 0.0), at=at, duration=lasting)
+    run = simulate(robot, robot.home, OpenLoop(robot), duration=0.2, events=[push])
+    end = int(np.ceil((at + lasting) / PERIOD)) + 2
+    np.testing.assert_allclose(run.record.motions[end, 0, 6], 3000.0 * lasting / robot.platform.mass, rtol=0.02)
 
 
 def test_a_push_without_an_end_is_a_constant_disturbance(robot):
@@ -191,6 +200,14 @@ def test_what_an_own_event_returns_is_checked(robot, wrench, message):
                 simulate(robot, robot.home, duration=0.01, events=[Odd(at=0)])
     finally:
         del Event.kinds["odd"]
+
+
+def test_a_file_of_events_names_no_other(robot, tmp_path):
+    """A file that named itself would be read without end."""
+    file = tmp_path / "events.yaml"
+    file.write_text(f"events: [{file}]")
+    with pytest.raises(InputError, match=r"events\[0\]: events\[0\] must be 'cut CABLE at SECONDS'"):
+        simulate(robot, robot.home, duration=0.01, events=[str(file)])
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,15 @@ def test_errors_are_measured_against_a_reference():
     assert 0 < run.error.max() < 0.05
 
 
+def test_a_cable_that_the_run_has_without_is_not_slack():
+    plant = Plant("cogiro", drive="tensions")
+    state = plant.cut(plant.start(tensions=np.full(8, 300.0)), 2)
+    run = simulation_of(plant, plant.run(state, np.tile(plant.command(np.full(8, 300.0)), (20, 1)), 1e-3))
+    assert run.slack_s == 0
+    assert run.passed
+    assert "cable 3 was cut at 0 s" in run.report()
+
+
 def test_what_is_no_run_is_one_line(swing):
     plant, history = swing
     with pytest.raises(InputError, match="history must be of one run"):

@@ -45,8 +45,9 @@ def read_events(robot: Robot, events: Sequence[Any], name: str = "events") -> li
 
 
 def _read(robot: Robot, given: Any, where: str, folder: Path | None = None) -> Iterator[tuple[str, Event]]:
-    if isinstance(given, str) and given.endswith(_FILES) and not _FORM.fullmatch(given.strip()):
-        file = Path(given) if folder is None else folder / given
+    # Only here, not in a file, which could name itself.
+    if folder is None and isinstance(given, str) and given.endswith(_FILES) and not _FORM.fullmatch(given.strip()):
+        file = Path(given)
         for number, inner in enumerate(read_yaml(file, EventFile).events):
             yield from _read(robot, inner, f"{where}: events[{number}]", file.parent)
         return
