@@ -127,6 +127,17 @@ def test_a_robot_paints_a_facade_and_its_report_says_how_steadily():
     assert plan(robot, found.scenario.task).feasible
 
 
+@pytest.mark.parametrize(("duration", "message"), [(2, "duration must be at least"), (9, "duration must be at most")])
+def test_its_duration_is_its_own(duration, message):
+    """With a shorter one it was cut off at its feed, and the plan was feasible."""
+    path = {"kind": "feed", "points": [[0, 0, 1], [1, 0, 1]], "feed": 0.2, "acceleration": 1}
+    assert plan("cogiro", {"path": path, "duration": 1 / 0.2 + 0.2}).feasible
+    with pytest.raises(InputError, match=message):
+        plan("cogiro", {"path": path, "duration": duration})
+    with pytest.raises(InputError, match="duration must be 5.2 s, where the times of path end"):
+        plan("cogiro", {"path": {"kind": "sequence", "parts": [{"path": path, "duration": duration}]}})
+
+
 def test_a_feed_has_no_fastest_law():
     path = {"kind": "feed", "points": [[0, 0, 1], [1, 0, 1]], "feed": 0.2, "acceleration": 1}
     with pytest.raises(InputError, match="path without its own speed to be timed, got feed; plan it instead"):

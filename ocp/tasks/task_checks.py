@@ -19,7 +19,7 @@ from .task import Task
 from .task_limits import OF_CARRIERS
 from .wind_set import WindBox
 
-ENDING = ("waypoints", "samples", "sequence", "return")  # kinds of paths that end at a time of their own
+ENDING = ("waypoints", "samples", "feed", "sequence", "return")  # kinds of paths that end at a time of their own
 TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on their path
 
 

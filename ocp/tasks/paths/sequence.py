@@ -111,7 +111,7 @@ def lasting(path: SinglePath, duration: float | None) -> float:
         if own is None:
             raise ValueError(f"duration must be a number > 0 [s] for a path of kind {path.kind}, got nothing")
         return own
-    if path.kind in ("waypoints", "samples") and own is not None and abs(duration - own) > 1e-9 * own:
+    if path.kind in ("waypoints", "samples", "feed") and own is not None and abs(duration - own) > 1e-9 * own:
         raise ValueError(f"duration must be {own:g} s, where the times of path end, got {duration:g} s")
     if duration <= path.resting:
         raise ValueError(f"duration must be more than the {path.resting:g} s for which path dwells, got {duration:g} s")
