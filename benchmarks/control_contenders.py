@@ -153,11 +153,11 @@ class Sparse:
     Attributes
     ----------
     controls, states :
-        Where they are in z, (N, m) and (N, n).
+        Indices of controls and states in z, (N, m) and (N, n).
     H :
-        Of the cost, with ones for x_0, whose bounds determine it.
+        Hessian of the cost, with ones for x_0, whose bounds determine it.
     mask :
-        Where the rows of `dynamics` have entries, (N n, size) of bool.
+        Entries of the rows of `dynamics` that are not zero, (N n, size) of bool.
     """
 
     def __init__(self, first: Program, fixed_start: bool):

@@ -71,7 +71,7 @@ class Stop(Displayed):
     distance
         Length of the path of the platform until it rests [m].
     certificate
-        Of the instant with the largest shortfall; None if tensions inside their limits always exist.
+        Certificate of the instant with the largest shortfall; None if tensions inside their limits always exist.
     """
 
     robot: Robot

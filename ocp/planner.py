@@ -5,12 +5,11 @@ The planner works in stages and stops at the first that decides:
 1. ends and path (`infeasible_ends`): tasks that can be ruled out before planning;
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: feasible durations;
 3. a path past obstacles (`global_path`), where the usual guess exceeds a limit at rest: the next stages start from it;
-4. easier programs to start the next one from: linear distances from obstacles (`linear`) and, for teams, more time
-   and fewer steps (`homotopy`);
+4. easier programs to start the next from: linear distances from obstacles (`linear`); for teams more time and fewer
+   steps (`homotopy`);
 5. the nonlinear program (`program`), audited; where the audit reports violations, tightened or on a finer mesh
    (`refinement`);
-6. the elastic program: the motion with the least missing wrench, from which the program starts again or which is the
-   result.
+6. the elastic program: the motion with the least missing wrench, for another start of the program or as the result.
 """
 
 import os

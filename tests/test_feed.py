@@ -134,7 +134,7 @@ def test_its_duration_is_its_own(duration, message):
     assert plan("cogiro", {"path": path, "duration": 1 / 0.2 + 0.2}).feasible
     with pytest.raises(InputError, match=message):
         plan("cogiro", {"path": path, "duration": duration})
-    with pytest.raises(InputError, match="duration must be 5.2 s, where the times of path end"):
+    with pytest.raises(InputError, match=r"duration must be 5\.2 s, where the times of path end"):
         plan("cogiro", {"path": {"kind": "sequence", "parts": [{"path": path, "duration": duration}]}})
 
 

@@ -15,9 +15,9 @@ class Columns:
     Parameters
     ----------
     unknowns
-        Of all points, (width, points), one point after the other.
+        Unknowns of all points, (width, points), one point after the other.
     scheme
-        Which selects points and groups them into intervals.
+        The scheme, which selects points and groups them into intervals.
     references
         The reference motions at all points, (18 (1 + c), points), as numbers or parameters.
     carried

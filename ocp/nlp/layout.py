@@ -31,7 +31,7 @@ class Layout(Displayed):
     soft, carried
         The names of the soft limits, and of what all nodes share.
     q, v, a
-        Where in the column the free coordinates, their rates and accelerations are.
+        Rows of the column with the free coordinates, their rates and accelerations.
     jerk, snap
         Jerk and snap of a smooth scheme, times the first and second power of an interval's length at the scenario's
         duration: so they are of the size of a. Empty for other schemes.

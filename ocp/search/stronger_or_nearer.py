@@ -89,7 +89,7 @@ def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
 def _stronger_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the smallest factor of all t_max that is feasible, as the largest t_max."""
     data, t_max = scenario.robot.model_dump(), scenario.robot.t_max
-    largest, others = float(t_max.max()), "" if np.ptp(t_max) == 0 else ", and others alike"
+    largest, others = float(t_max.max()), "" if np.ptp(t_max) == 0 else ", the others by the same factor"
 
     def with_limits(share: float) -> Variation:
         factor = 1 + (STRONGEST - 1) * (1 - share) ** 4  # fine steps near one

@@ -23,7 +23,7 @@ def chapter() -> Chapter:
 
 
 def constants(robot: Robot) -> tuple[float, float]:
-    """Return E A [N] and C [N s/m] of cable 1; all cables of the paper are alike."""
+    """Return E A [N] and C [N s/m] of cable 1; all cables of the paper have the same."""
     cable = robot.cables[0]
     assert cable.stiffness is not None
     assert cable.damping is not None
