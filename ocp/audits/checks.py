@@ -232,7 +232,7 @@ def _base_ends(audited: Instants) -> list[Excess]:
         unit, why = "m, m/s", "away from `around`"
     exceeded = []
     for end in ends:
-        worst = max(np.abs(part[end]).max() for part in off)
+        worst = np.max([np.abs(part[end]).max() for part in off])  # nan if one is
         exceeded += _missed("base.ends", "carriers", audited.times[end], worst, END_TOLERANCE, unit, why)
     return exceeded
 
