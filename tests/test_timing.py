@@ -518,3 +518,11 @@ def test_it_is_slow_near_a_place(through, planned):
     assert speed[inside].max() <= 0.4 * (1 + 1e-3)
     assert speed[inside].mean() > 0.38
     assert speed.max() > 1
+
+
+def test_a_law_is_not_cut_off_by_a_shorter_duration():
+    """It ended at its speed half of the way, and the plan was feasible; a longer one rests at the end."""
+    task = time_along("cogiro", {"path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1]}}).scenario.task
+    with pytest.raises(InputError, match=r"duration must be at least .* where the times of path end, got 0\.1 s"):
+        plan("cogiro", task.model_copy(update={"duration": 0.1}))
+    assert plan("cogiro", task.model_copy(update={"duration": 9.0})).feasible

@@ -152,7 +152,7 @@ def _check_times(task: Task, where: str) -> None:
             raise InputError(
                 f"{where}: duration must be at most {end:g} s, where the times of {name} end, got {task.seconds:g} s"
             )
-    end = task.path.natural_duration if task.path.kind in ENDING else None
+    end = task.path.natural_duration if task.path.kind in (*ENDING, "timed") else None  # which may rest after it
     if end is not None and task.seconds < end * (1 - 1e-9):
         raise InputError(
             f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"
