@@ -40,7 +40,7 @@ class Conditions(Displayed):
         Period of the controller [s].
     substeps
         Runge-Kutta steps of the plant per period (default: chosen by the stiffness and damping of the cables, see
-        `steps.steps_in`).
+        `plant.steps.steps_in`).
     drive
         Type of command of the plant, see `Plant`; default: "forces" if all cables have winches, "lengths" if all are
         elastic or of fixed length, otherwise "tensions".

@@ -22,6 +22,7 @@ from ..models.files import as_robot
 from ..models.parsing import validate
 from ..models.robot import Robot
 from ..plant import Plant
+from ..plant.steps import default_drive, steps_in
 from .command_conversion import Orders
 from .conditions import Conditions
 from .events import Event, read_events
@@ -32,7 +33,6 @@ from .record import Record
 from .runs import fly_many
 from .sensors import Noise
 from .simulation import Simulation
-from .steps import steps_in
 from .winds import read_wind
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def simulate(
     if controller is not None and not isinstance(controller, Controller):
         raise InputError(f"controller must be a Controller, got {shown(controller)}")
     pilot = ComputedTorque(the_robot) if controller is None else controller
-    meets = replace(meets, drive=meets.drive or pilot.drive or _drive(the_robot))
+    meets = replace(meets, drive=meets.drive or pilot.drive or default_drive(the_robot))
     plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
     if runs is None:
@@ -192,7 +192,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
     for where, event in named:
         if event.at >= periods * period:
             raise InputError(f"{where} must begin before the end at {periods * period:g} s, got {event.at:g} s")
-    plant = Plant(robot, drive=meets.drive or _drive(robot))
+    plant = Plant(robot, drive=meets.drive or default_drive(robot))
     return plant, Experiment(
         period=period,
         substeps=meets.substeps or steps_in(period, plant),
@@ -224,14 +224,6 @@ def _references(robot: Robot, parts: Sequence[tuple[float, Trajectory]], times: 
         for number, (begins, part) in enumerate(parts)
         for reference in references_at(robot, part, times[which == number] - begins)
     ]
-
-
-def _drive(robot: Robot) -> str:
-    if all(cable.winch is not None for cable in robot.cables):
-        return "forces"
-    if robot.fixed_lengths is not None:
-        return "lengths"
-    return "lengths" if all(cable.stiffness for cable in robot.cables) else "tensions"
 
 
 def _one(plant: Plant, controller: Controller, experiment: Experiment, seed: int, tolerance: float) -> Simulation:

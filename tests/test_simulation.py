@@ -12,9 +12,9 @@ from towline.core._core import sense, winch_lengths
 from towline.models import Dynamics, Robot
 from towline.ocp import Task
 from towline.plant import Plant, layout
+from towline.plant.steps import steps_in
 from towline.simulation import simulate
 from towline.simulation.flights import report
-from towline.simulation.steps import steps_in
 
 
 def planned(name, change, **task):

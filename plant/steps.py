@@ -1,4 +1,4 @@
-"""`steps_in`: the number of Runge-Kutta steps per period."""
+"""How a plant is driven and stepped by default: `default_drive`, and `steps_in`, Runge-Kutta steps per period."""
 
 import math
 
@@ -6,13 +6,28 @@ import numpy as np
 
 from ..models.dynamics import dynamics_of
 from ..models.part import inertia_matrix
-from ..plant import Plant
+from ..models.robot import Robot
+from .plant import Plant
 
 ANGLE = 1.0  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
 
 
+def default_drive(robot: Robot) -> str:
+    """Return the type of command of a robot's plant unless another is chosen, see `Plant`."""
+    if all(cable.winch is not None for cable in robot.cables):
+        return "forces"
+    if robot.fixed_lengths is not None:
+        return "lengths"
+    return "lengths" if all(cable.stiffness for cable in robot.cables) else "tensions"
+
+
 def steps_in(period: float, plant: Plant) -> int:
-    """Return the number of steps per period that resolves the fastest motion of elastic cables at the robot's home.
+    """Return the number of steps per period [s] that resolves the fastest motion of elastic cables."""
+    return max(1, math.ceil(period * fastest_motion(plant) / ANGLE))
+
+
+def fastest_motion(plant: Plant) -> float:
+    """Return the fastest motion of elastic cables at the robot's home [rad/s]; 0 if not all of them are elastic.
 
     With the elongations e of taut cables, d2e/dt2 = -G (K e + C de/dt), where G has the accelerations along the cables
     that unit tensions cause; the largest eigenvalues of G K and G C bound frequency and decay.
@@ -20,7 +35,7 @@ def steps_in(period: float, plant: Plant) -> int:
     cables = plant.record["cable"][: plant.robot.m]
     stiffness, damping = cables["stiffness"], cables["damping"]
     if plant.drive == "tensions" or not stiffness.all():
-        return 1
+        return 0.0
     robot = plant.robot
     A, mask = dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home), robot.dof_mask
     inverse = np.zeros((6, 6))
@@ -39,4 +54,4 @@ def steps_in(period: float, plant: Plant) -> int:
     lengths = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
     frequency = math.sqrt(float(np.abs(np.linalg.eigvals(G * (stiffness / lengths))).max()))
     decay = float(np.abs(np.linalg.eigvals(G * damping)).max())
-    return max(1, math.ceil(period * max(frequency, decay) / ANGLE))
+    return max(frequency, decay)
