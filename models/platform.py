@@ -4,6 +4,7 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from .body import AnyBody
 from .part import COORDINATES, BodyInertia, Coordinate, NonNegative, Part, Pose, Positive, Vector3
 
 # Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
@@ -51,6 +52,11 @@ class Platform(Part):
         default=COORDINATES,
         min_length=1,
         description="coordinates that can move; a point mass has x, y, z. The cables balance only these rows",
+    )
+    body: AnyBody | None = Field(
+        default=None,
+        description="convex body in the platform frame that plans keep out of regions, above the floor and in the "
+        "room; default: the CoM and the attachments",
     )
     aero: Aero | None = Field(default=None, description="aerodynamic data of the platform; required for wind")
 

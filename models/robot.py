@@ -22,7 +22,7 @@ from .cable import Cable
 from .carriers import AnyCarrier, Drive
 from .displayed_robot import DisplayedRobot
 from .drive import lengths_to_keep, usual_drive
-from .part import COORDINATES, LARGEST, Name, Vector3, inertia_matrix
+from .part import COORDINATES, LARGEST, Box, Finite, Name, Vector3, inertia_matrix
 from .platform import Platform
 from .pulleys import check_pulleys
 from .uncertainty import Uncertainty
@@ -55,6 +55,13 @@ class Robot(DisplayedRobot):
     cables: tuple[Cable, ...] = Field(min_length=1, description="in the order in which results number them")
     uncertainty: Uncertainty | None = Field(
         default=None, description="uncertainty of anchors, attachments and pulley radii; default: exact"
+    )
+
+    floor: Finite | None = Field(
+        default=None, description="height z in {G} below which no part of platform and load may be [m]; default: none"
+    )
+    workspace_box: Box | None = Field(
+        default=None, description="room in {G} in which platform and load stay with their bodies [m]; default: no walls"
     )
 
     @model_validator(mode="after")

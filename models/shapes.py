@@ -24,6 +24,11 @@ class Sphere(Part):
     radius: Positive = Field(description="[m]")
 
     @property
+    def rounding(self) -> float:
+        """Return by how much it is larger than its centre on all sides [m]."""
+        return self.radius
+
+    @property
     def thickness(self) -> float:
         """Return the least distance of two planes between which it fits [m]."""
         return 2 * self.radius
@@ -36,6 +41,11 @@ class Capsule(Part):
     start: Vector3 = Field(description="in its frame [m]")
     end: Vector3 = Field(description="in its frame [m]")
     radius: Positive = Field(description="[m]")
+
+    @property
+    def rounding(self) -> float:
+        """Return by how much it is larger than its line on all sides [m]."""
+        return self.radius
 
     @property
     def thickness(self) -> float:
@@ -58,6 +68,11 @@ class Block(Part):
         if any(low >= high for low, high in zip(self.min, self.max, strict=True)):
             raise ValueError(f"min must be smaller than max in each coordinate, got {self.min} and {self.max}")
         return self
+
+    @property
+    def rounding(self) -> float:
+        """Return by how much it is larger than its faces on all sides [m]: not at all."""
+        return 0.0
 
     @property
     def centre(self) -> np.ndarray:
@@ -89,8 +104,7 @@ class ConvexMesh(Part):
 
     kind: Literal["mesh"]
     file: str | None = Field(
-        default=None,
-        description="in a task file: an STL file, binary or text, relative to the task file, instead of vertices",
+        default=None, description="in a file: an STL file, binary or text, relative to that file, instead of vertices"
     )
     hull: bool = Field(
         default=False, description="of a file: accept a surface that is not convex, and take its convex hull"
@@ -152,6 +166,11 @@ class ConvexMesh(Part):
         return self
 
     @property
+    def rounding(self) -> float:
+        """Return by how much it is larger than the hull on all sides [m]."""
+        return 0.0
+
+    @property
     def body(self) -> Polyhedron:
         """Return its faces and edges in its frame [m]."""
         own = polyhedron(self.vertices)
@@ -167,7 +186,7 @@ class ConvexMesh(Part):
     @property
     def thickness(self) -> float:
         """Return the least distance of two planes between which it fits, one of them along a face [m]."""
-        return float(-self.body.beyond(self.body.corners).min(axis=0).max())
+        return float(-self.body.beyond(self.body.corners).min(axis=0).max()) + 2 * self.rounding
 
 
 Shape: TypeAlias = Sphere | Capsule | Block | ConvexMesh

@@ -29,29 +29,36 @@ _Least: TypeAlias = tuple[float, int, float]
 
 def came_too_near(audited: Instants) -> list[Excess]:
     """Return the limits of distances that are not kept, at the instants of the audit or between them."""
-    exceeded = list[Excess]()
+    exceeded = dict[tuple[str, str, float], Excess]()
     pairs = zip(audited.scenario.limits, audited.values, strict=True)
     chosen = [(limit, values) for limit, values in pairs if isinstance(limit, Distance)]
     moved = _moved(audited) if chosen else np.zeros(0)
     for limit, values in chosen:
+        holds = audited.scenario.in_force(limit, audited.times)
         slack = np.where(np.isnan(values), -np.inf, values - limit.low + limit.tolerance)
+        slack[~holds] = np.inf
+        if not holds.any():
+            continue
         row, which = np.unravel_index(slack.argmin(), slack.shape)
         least: _Least = (float(audited.times[row]), int(which), float(values[row, which]))
         far = np.isfinite(limit.per_metre) and (slack[:-1] + slack[1:] >= limit.per_metre * moved[:, None]).all()
-        if not far and np.isfinite(slack).all():
-            least = _least(audited, limit, values, least)
+        if not far and np.isfinite(slack[holds]).all():
+            least = _least(audited, limit, values, holds, least)
         time, which, value = least
         if not value >= limit.low - limit.tolerance:
             facts = (time, value, limit.low, limit.unit, "at least")
-            exceeded.append(Excess(limit.name, limit.about(which), *facts))
-    return exceeded
+            pair = limit.name, limit.about(which), limit.low
+            if pair not in exceeded or value < exceeded[pair].value:  # a body and a region may have two limits
+                exceeded[pair] = Excess(limit.name, limit.about(which), *facts)
+    return list(exceeded.values())
 
 
 def _moved(audited: Instants) -> np.ndarray:
     """Return how far any point of platform and carriers moves at most from one instant to the next, (n - 1,) [m]."""
     platform, carriers = audited.motion.pose, audited.carriers.pose
     com = placed(platform, np.array([audited.scenario.robot.platform.com]))
-    points = [*audited.scenario.dynamics.points(platform, carriers), com, carriers[..., :3]]
+    corners = placed(platform, audited.scenario.body_corners)
+    points = [*audited.scenario.dynamics.points(platform, carriers), com, corners, carriers[..., :3]]
     return _ways(audited.times, np.concatenate(points, axis=1)).max(axis=1)
 
 
@@ -77,16 +84,18 @@ class _Ends(NamedTuple):
         return _Ends(*(part[rows] for part in self))
 
 
-def _least(audited: Instants, limit: Distance, values: np.ndarray, found: _Least) -> _Least:
+def _least(audited: Instants, limit: Distance, values: np.ndarray, holds: np.ndarray, found: _Least) -> _Least:
     """Return the smallest distance over all time if it is too small, else one that is not; `found` is that of `values`.
 
-    Wherever the distance may be too small, and less than the smallest so far, the instant in the middle is looked at.
+    `holds` is at which instants the limit holds, (n,). Wherever the distance may be too small, and less than the
+    smallest so far, the instant in the middle is looked at.
     """
     separating, times = audited.scenario.limits.separating(limit), audited.times
     points = _points(separating, audited.motion, audited.carriers)
     ways, bends = _both(separating, _ways(times, points)), _both(separating, _bends(times, points))
     wanted = _wanted(limit, found)
-    row, which = np.nonzero((values[:-1] + values[1:] - ways < 2 * wanted) & ~is_jump(times)[:, None])
+    looked_at = ~is_jump(times) & holds[:-1] & holds[1:]
+    row, which = np.nonzero((values[:-1] + values[1:] - ways < 2 * wanted) & looked_at[:, None])
     first, last = (_ends(separating, times[at], points[at, which]) for at in (row, row + 1))
     bend, way = bends[row, which], ways[row, which]
     for _ in range(MOST_HALVES):

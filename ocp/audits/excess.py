@@ -8,6 +8,7 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.text import quantity
 from ..limits import Limit
+from ..limits.bodies import WITHIN
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,9 @@ class Excess(Displayed):
             required = f" (required distance: {quantity(self.bound, self.unit)})" if self.bound > 0 else ""
             depth = quantity(-self.value, self.unit)
             return f"{body} is {depth} inside the keep-out region {region!r}{at}{required}{why}"
+        body, _, room = self.about.partition(WITHIN)
+        if room and self.value < 0:
+            return f"{body} is {quantity(-self.value, self.unit)} beyond {room}{at}{why}"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "
         value, bound = (quantity(number, self.unit, digits=6) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value

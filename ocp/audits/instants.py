@@ -84,7 +84,9 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         tensions_unlimited=distribute.unlimited(w),
         violation=result.violation,
         supports=result.supports,
-        values=[limit.over(times, its) for limit, its in limited],
+        values=[
+            np.where(scenario.in_force(limit, times)[:, None], limit.over(times, its), np.nan) for limit, its in limited
+        ],
         certificate=certificate,
         beyond=(result.beyond, float(times[result.row or 0])),
     )

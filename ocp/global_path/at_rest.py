@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...models.points import placed
 from ...solvers import solve_batch
 from ..audits.tensions import INDEPENDENT, scaled
 from ..limits import Limit, Rate
@@ -26,7 +27,7 @@ class Kept(NamedTuple):
     slack
         (n,) [m]: by how much everything that moves may move before a limit is exceeded; negative where one is.
     points
-        (n, k, 3) [m]: what moves: attachments and carriers.
+        (n, k, 3) [m]: what moves: attachments, anchors, and corners of bodies.
     worst
         (n,) index of the limit that is kept by least; -1 where there are no tensions.
     """
@@ -74,7 +75,8 @@ class AtRest:
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
         anchors, attachments = self.scenario.dynamics.points(platform, carriers)
-        points = np.concatenate([attachments, anchors], axis=1)
+        corners = placed(platform, self.scenario.body_corners)
+        points = np.concatenate([attachments, anchors, corners], axis=1)
         A, w, tensions, exist, spans = self._balance(platform, carriers)
         tilted = with_tilts(self.scenario, A, tensions, carriers, np.zeros_like(carriers))
         slack, worst = self._slack(platform, tilted, tensions, off_path)

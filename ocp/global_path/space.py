@@ -135,14 +135,15 @@ class Space(Displayed):
     def size(self) -> float:
         """Return the largest distance of what moves from the platform's origin, or a part of that of the ends [m]."""
         robot, ends = self.scenario.robot, self.references[0][:, :3]
-        points = np.vstack([robot.attachments, robot.platform.com, *self.offsets])
+        points = np.vstack([robot.attachments, robot.platform.com, self.scenario.body_corners, *self.offsets])
         least = SMALL * float(np.linalg.norm(ends[1] - ends[0]))
         return max(float(np.linalg.norm(points, axis=1).max()), least, 1e-3)
 
     @cached_property
     def scale(self) -> np.ndarray:
         """Return how many metres a unit of each coordinate moves what it moves farthest, (count,)."""
-        arm = max(float(np.linalg.norm(self.scenario.robot.attachments, axis=1).max()), 1e-3)
+        points = np.vstack([self.scenario.robot.attachments, self.scenario.body_corners])
+        arm = max(float(np.linalg.norm(points, axis=1).max()), 1e-3)
         of_platform = [1.0 if coordinate in POSITION else arm for coordinate in self.scenario.platform_free]
         reach = float(np.linalg.norm(self._flat, axis=1).max(initial=0.0))
         return np.array([*of_platform, *[reach] * (3 * self.shaped + self.turns)])

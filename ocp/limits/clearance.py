@@ -51,7 +51,7 @@ def point_outside(place: Place, p: Point) -> Any:
         most = ca.mmax(beyond)
         return ca.if_else(most <= 0, most, ca.sqrt(ca.sumsqr(ca.fmax(beyond, 0.0)) + _TINY))
     if isinstance(place, ConvexMesh):
-        return point_outside_mesh(place, p)
+        return point_outside_mesh(place, p) - place.rounding
     raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 
@@ -65,7 +65,7 @@ def cable_outside(place: Place, p: Point, p_end: Point) -> Any:
         ends = (_before_turn(place, p), _before_turn(place, p_end))
         return segment_outside_box()(ca.DM(place.min), ca.DM(place.max), *ends)
     if isinstance(place, ConvexMesh):
-        return cable_outside_mesh(place, p, p_end)
+        return cable_outside_mesh(place, p, p_end) - place.rounding
     raise TypeError(f"{type(place).__name__} is not an obstacle")
 
 

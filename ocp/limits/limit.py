@@ -84,6 +84,8 @@ class Limit(ABC):
     thickness
         For a distance from a keep-out region, its thickness [m]. A motion may jump over a thin region between two
         nodes, so the program also constrains the distance between them. Infinite for other limits.
+    phases
+        Indices of the phases of the task in which it holds; None for all times.
     """
 
     name: str = "limit"
@@ -97,6 +99,7 @@ class Limit(ABC):
     shown: bool = True
     per_metre: float = np.inf
     thickness: float = np.inf
+    phases: frozenset[int] | None = None
 
     @abstractmethod
     def values(self, state: State) -> ca.SX:
@@ -176,6 +179,12 @@ class Limit(ABC):
         soft = copy(self)
         soft.soft = amount
         return soft
+
+    def during(self, phases: frozenset[int] | None) -> Self:
+        """Return the limit as one that holds in some phases of the task; None: at all times."""
+        some = copy(self)
+        some.phases = phases
+        return some
 
 
 class Magnitude(Limit):

@@ -16,10 +16,11 @@ from .clearance import Place, cable_outside, point_outside
 from .distance import Distance, Pair
 from .state import State
 
+ON_BODY = 1e-6  # [m], above the surface of a body: what is less outside counts as a part of it
 CORNER = 0.25  # of the thickness of a place: a motion that is deeper in it between nodes does not cut a corner
 
 
-class _Outside(Distance):
+class Outside(Distance):
     """Keep out of a region that is `called` so, by a distance of `least` [m].
 
     Its shape is in {G} or, if it is `riding` on the platform, in the platform's frame.
@@ -57,7 +58,7 @@ class _Outside(Distance):
         return outside(self._place, *ca.horzsplit(pair.points))
 
 
-class _PointsOutside(_Outside):
+class _PointsOutside(Outside):
     """Keep points, and the lines along which they move, out of a region."""
 
     @abstractmethod
@@ -75,17 +76,20 @@ class _PointsOutside(_Outside):
 
 
 class PlatformOutside(_PointsOutside):
-    """Keep the platform's CoM and its attachments out of a region that is fixed in {G}."""
+    """Keep the platform's CoM and its attachments, as far as its body leaves them outside, out of a region in {G}."""
 
     name = "keep_out"
 
     def __init__(self, robot: Robot, place: Place, called: str, least: float):
         super().__init__(place, called, False, least)
-        self.labels = ("platform",) * (1 + robot.m)
+        points, body = np.vstack([robot.platform.com, robot.attachments]), robot.platform.body
+        outside = [body is None or float(point_outside(body, ca.DM(point))) > ON_BODY for point in points]
+        self._which = np.flatnonzero(outside).tolist()
+        self.labels = ("platform",) * len(self._which)
 
     @override
     def _points_of(self, state: State) -> ca.SX:
-        return ca.horzcat(state.com, state.attachments)
+        return ca.horzcat(state.com, state.attachments)[:, self._which]
 
 
 class CarriersOutside(_PointsOutside):
@@ -102,7 +106,7 @@ class CarriersOutside(_PointsOutside):
         return self._points(state, ca.horzcat(*(state.carriers[index].position for index in self.which)))
 
 
-class CablesOutside(_Outside):
+class CablesOutside(Outside):
     """Keep the cables out of a region."""
 
     def __init__(self, robot: Robot, place: Place, called: str, riding: bool, least: float):

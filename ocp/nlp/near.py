@@ -10,21 +10,31 @@ from typing import Self
 import numpy as np
 
 from ...base.display import Displayed
+from ...models.points import placed
 from ..limits import Limit
+from ..limits.bodies import Inside
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 
 
 @dataclass(frozen=True)
 class Near(Displayed):
-    """The points at which a program keeps each limit, (limits, points): of limits that are not local all."""
+    """The points at which a program keeps each limit, (limits, points): of limits that are not local all.
+
+    Attributes
+    ----------
+    holds
+        Where each limit is in force, (limits, points); None: everywhere.
+    """
 
     chosen: np.ndarray
+    holds: np.ndarray | None = None
 
     @classmethod
     def everywhere(cls, scenario: Scenario, shares: np.ndarray) -> Self:
         """Return all points."""
-        return cls(np.ones((len(scenario.limits.all), len(shares)), dtype=bool))
+        holds = _holds(scenario, shares)
+        return cls(holds, holds)
 
     @classmethod
     def along(cls, scenario: Scenario, shares: np.ndarray, motion: Deviation, reach: float) -> Self:
@@ -37,12 +47,19 @@ class Near(Displayed):
         wide = chosen.copy()
         wide[:, 1:] |= chosen[:, :-1]
         wide[:, :-1] |= chosen[:, 1:]
-        return cls(wide | [[not is_local(limit)] for limit in scenario.limits])
+        holds = _holds(scenario, shares)
+        return cls((wide | [[not is_local(limit)] for limit in scenario.limits]) & holds, holds)
 
     @property
     def is_everywhere(self) -> bool:
         """Return whether nothing is left out."""
-        return bool(self.chosen.all())
+        return bool((self.chosen if self.holds is None else self.chosen | ~self.holds).all())
+
+    @property
+    def between(self) -> np.ndarray:
+        """Return which limits hold from each point to the next, (limits, points - 1)."""
+        holds = np.ones_like(self.chosen) if self.holds is None else self.holds
+        return holds[:, 1:] & holds[:, :-1]
 
     def suffices(self, scenario: Scenario, shares: np.ndarray, motion: Deviation) -> bool:
         """Return whether a motion can exceed no limit where it is left out, at the points or between them."""
@@ -53,13 +70,23 @@ class Near(Displayed):
 
 
 def is_local(limit: Limit) -> bool:
-    """Return whether a limit is a hard distance from a region."""
-    return bool(np.isfinite(limit.thickness)) and limit.soft is None
+    """Return whether a program has rows of a limit only at some points: of a hard distance, or one of some phases."""
+    return limit.phases is not None or (limit.soft is None and (_is_of_place(limit) or isinstance(limit, Inside)))
+
+
+def _is_of_place(limit: Limit) -> bool:
+    return bool(np.isfinite(limit.thickness))
+
+
+def _holds(scenario: Scenario, shares: np.ndarray) -> np.ndarray:
+    """Return where each limit is in force, (limits, points)."""
+    holds = [scenario.in_force(limit, shares * scenario.duration) for limit in scenario.limits]
+    return np.array(holds, dtype=bool).reshape(-1, len(shares))
 
 
 def has_places(scenario: Scenario) -> bool:
-    """Return whether any limit of a scenario is local."""
-    return any(is_local(limit) for limit in scenario.limits)
+    """Return whether any hard limit of a scenario is a distance from a region."""
+    return any(is_local(limit) and _is_of_place(limit) for limit in scenario.limits)
 
 
 def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np.ndarray, np.ndarray, float]:
@@ -70,10 +97,12 @@ def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np
     """
     lasting = scenario.lasting(float(motion.nodes[-1]))
     platform, carriers = lasting.motion(shares * lasting.duration, motion)
-    points = np.concatenate(scenario.dynamics.points(platform.pose, carriers.pose), axis=1)
+    corners = placed(platform.pose, scenario.body_corners)
+    points = np.concatenate([*scenario.dynamics.points(platform.pose, carriers.pose), corners], axis=1)
     slack = np.full((len(lasting.limits.all), len(shares)), np.inf)
     for row, limit, values in zip(slack, lasting.limits, lasting.limits.along(platform, carriers), strict=True):
         if is_local(limit):
             row[:] = np.minimum(values - limit.low, limit.high - values).min(axis=1)
+            row[~lasting.in_force(limit, shares * lasting.duration)] = np.inf
     moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1, initial=0.0)
     return slack, moved, float(np.ptp(points, axis=0).max())

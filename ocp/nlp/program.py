@@ -239,7 +239,8 @@ def _near_rows(near: Near, scheme: Scheme, node: Part, interval: Part, columns: 
     """Return the rows of local limits where they are near, at nodes and between them."""
     blocks, size = [], scheme.size
     windows: np.ndarray = np.lib.stride_tricks.sliding_window_view(near.chosen, size + 1, axis=1)
-    inside = windows[:, ::size].max(axis=2)
+    all_of: np.ndarray = np.lib.stride_tricks.sliding_window_view(near.between, size, axis=1)
+    inside = windows[:, ::size].max(axis=2) & all_of[:, ::size].all(axis=2)
     at_nodes, between = (node, columns.at_nodes, near.chosen, size), (interval, columns.between, inside, 1)
     for part, mapped_at, near_to, points_of_stage in (at_nodes, between):
         for index, function, rows in part.local:

@@ -125,7 +125,7 @@ def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray])
 def _reach(scenario: Scenario, freedom: np.ndarray) -> float:
     """Return how far a point of the platform can be from where the reference has it [m]."""
     robot, tube = scenario.robot, scenario.task.tube
-    points = np.vstack([robot.attachments, robot.platform.com])
+    points = np.vstack([robot.attachments, robot.platform.com, scenario.body_corners])
     turns = tube.turn * (freedom[0, 0, list(ATTITUDE)] == NEAR).sum()
     moves = tube.radius if (freedom[0, 0, :3] == NEAR).any() else 0.0
     return float(moves + turns * np.linalg.norm(points, axis=1).max())
@@ -144,6 +144,7 @@ def _exceeded(
         for k, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
             if limit.soft is not None or isinstance(limit, Rate) or not (found := values[k][rows]).size:
                 continue
+            found = np.where(scenario.in_force(limit, times[rows])[:, None], found, np.nan)
             excess = _excess(limit, times[rows], found, chosen[place], near[place], reach)
             if excess is not None and (k not in worst or excess[0] > worst[k][0]):
                 worst[k] = excess

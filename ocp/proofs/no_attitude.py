@@ -31,12 +31,15 @@ def no_attitude(
         Which of the values of all limits depend on the platform's pose alone, (k,).
     """
     robot, turn = scenario.robot, scenario.task.tube.turn
-    points = np.vstack([robot.attachments, robot.platform.com])
+    points = np.vstack([robot.attachments, robot.platform.com, scenario.body_corners])
     arm = float(np.linalg.norm(points, axis=1).max())
     limits = [
         (k, limit)
         for k, (limit, place) in enumerate(zip(scenario.limits, scenario.limits.places, strict=True))
-        if limit.soft is None and np.isfinite(limit.per_metre) and usable[place].all()
+        if limit.soft is None
+        and np.isfinite(limit.per_metre)
+        and usable[place].all()
+        and scenario.in_force(limit, np.array([time])).all()
     ]
     if not limits or not set(angles) <= set(ATTITUDE) or not np.isfinite(turn):
         return []

@@ -10,6 +10,7 @@ from ...models.parsing import validate
 from ...models.ranges import PositiveRange
 from ..audits.audit import Audit, other_tensions_may_pass
 from ..audits.excess import Excess
+from ..limits.bodies import LOAD, PLATFORM
 from ..nlp.rows import Mesh
 from ..nlp.solver import Outcome
 from ..plan import Plan
@@ -232,7 +233,8 @@ def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond:
         given["tube"]["position"], name = value, excess.limit
     elif excess.limit == "keep_out":
         subject, _, place = excess.about.partition(" outside ")
-        about = "platform" if subject == "platform" else "cables" if subject.startswith("cable ") else "carriers"
+        about = "cables" if subject.startswith("cable ") else "carriers"
+        about = "platform" if subject in ("platform", PLATFORM, LOAD) else about
         names = [each.name for each in scenario.task.limits.keep_out]
         if value < 0 or names.count(place) != 1:
             return None

@@ -2,10 +2,14 @@
 
 from collections.abc import Iterator
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 
 from ...models import Robot
+from ...models.body import AnyBody, skeleton
+from ...models.shapes import Shape
+from ..limits.bodies import LOAD, PLATFORM, body_outside, inside_room
 from ..limits.cables import CableAcceleration, CableClearance, CableLength, CableSpeed, WinchPower
 from ..limits.carriers import (
     CarrierAcceleration,
@@ -42,6 +46,7 @@ def limit_list(robot: Robot, task: Task) -> Limits:
         _of_platform(given),
         _of_carriers(robot, task),
         (limit for place in given.keep_out for limit in _of_place(robot, place)),
+        _of_bodies(robot, task),
         (effort for index in range(len(robot.carriers)) for effort in efforts(robot, index)),
         _of_tube(task),
         given.own,
@@ -120,16 +125,54 @@ def _tighter(*bounds: float | None) -> float | None:
 def _of_place(robot: Robot, place: AnyKeepOut) -> Iterator[Limit]:
     riding = place.frame == "platform"
     if place.platform is not None and not riding:
-        yield PlatformOutside(robot, place, place.name, place.platform)
-    if place.carriers is not None:
+        points = PlatformOutside(robot, place, place.name, place.platform)
+        yield from [points] * bool(points.labels)
+    yield from _around(robot, place, place.name, riding, place.carriers, place.cables)
+
+
+def _around(
+    robot: Robot,
+    place: Shape,
+    called: str,
+    riding: bool,
+    carriers: float | Literal["radius"] | None,
+    cables: float | None,
+) -> Iterator[Limit]:
+    """Return the limits that keep carriers and cables away from a region, or one `riding` on the platform."""
+    if carriers is not None:
         moving = [index for index, carrier in enumerate(robot.carriers) if carrier.moves]
         radii = robot.carrier_radius.tolist()
-        least = {index: radii[index] if place.carriers == "radius" else place.carriers for index in moving}
+        least = {index: radii[index] if carriers == "radius" else carriers for index in moving}
         for distance in dict.fromkeys(least.values()):
             which = [index for index in moving if least[index] == distance]
-            yield CarriersOutside(robot, which, place, place.name, riding, distance)
-    if place.cables is not None:
-        yield CablesOutside(robot, place, place.name, riding, place.cables)
+            yield CarriersOutside(robot, which, place, called, riding, distance)
+    if cables is not None:
+        yield CablesOutside(robot, place, called, riding, cables)
+
+
+def bodies(robot: Robot, task: Task) -> Iterator[tuple[AnyBody, str, frozenset[int] | None]]:
+    """Yield the bodies in the platform's frame, what texts call them, and the phases in which they are there."""
+    if robot.platform.body is not None:
+        yield robot.platform.body, PLATFORM, None
+    loads = [phase.load and phase.load.body for phase in task.phases or ()]
+    for index, body in enumerate(loads):
+        if body is not None and body not in loads[:index]:
+            yield body, LOAD, frozenset(other for other, its in enumerate(loads) if its == body)
+
+
+def _of_bodies(robot: Robot, task: Task) -> Iterator[Limit]:
+    """Return the limits of all bodies, and those of floor and room of the platform's points if it has no body."""
+    given = task.limits
+    for body, whose, phases in bodies(robot, task):
+        its = list[Limit](inside_room(skeleton(body).corners, body.rounding, whose, robot.floor, robot.workspace_box))
+        for place in given.keep_out:
+            if place.platform is not None and place.frame == "world":
+                its += body_outside(body, whose, place, place.name, place.platform)
+        its += _around(robot, body, whose, True, given.carrier_platform_clearance, given.cable_platform_clearance)
+        yield from (limit.during(phases) for limit in its)
+    if robot.platform.body is None:
+        points = np.vstack([robot.platform.com, robot.attachments])
+        yield from inside_room(points, 0.0, "platform", robot.floor, robot.workspace_box)
 
 
 def _of_tube(task: Task) -> Iterator[Limit]:

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from ...models.body import AnyBody
 from ...models.part import AT_ORIGIN, Inertia, Name, Part, Pose, Positive, Vector3, inertia_matrix
 from ...models.ranges import PositiveRange
 from .paths import RestPath, SequencePath, SinglePath
@@ -29,6 +30,11 @@ class Load(Part):
     inertia: Annotated[Inertia, AfterValidator(_check_positive_semidefinite)] = Field(
         default=AT_ORIGIN,
         description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs [kg m^2]",
+    )
+    body: AnyBody | None = Field(
+        default=None,
+        description="convex body in the platform frame that the plan keeps out of regions, above the floor and in the "
+        "room while the load is carried; default: none",
     )
 
     @property

@@ -13,10 +13,11 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...models import Dynamics, Robot, points
+from ...models.body import skeleton
 from ...models.part import Vector3
 from ...models.ranges import PositiveRange
 from ..costs.costs import Costs
-from ..limits.limit import Hull
+from ..limits.limit import Hull, Limit
 from ..limits.limits import Limits
 from .cost_list import cost_list
 from .deviation import Deviation
@@ -70,6 +71,20 @@ class Scenario(Displayed):
     def costs(self) -> Costs:
         """Return the costs of the task."""
         return cost_list(self.robot, self.task)
+
+    @cached_property
+    def body_corners(self) -> np.ndarray:
+        """Return the corners of the bodies of platform and loads in the platform's frame, (k, 3) [m]."""
+        loads = [phase.load.body for phase in self.task.phases or () if phase.load is not None]
+        parts = [skeleton(body).corners for body in (self.robot.platform.body, *loads) if body is not None]
+        return np.concatenate([np.zeros((0, 3)), *parts])
+
+    def in_force(self, limit: Limit, times: np.ndarray) -> np.ndarray:
+        """Return at which of `times` a limit holds, (n,): in its phases, their boundaries included."""
+        if limit.phases is None:
+            return np.ones(len(times), bool)
+        within = [self.phases.within(self.phases.all[index], times) for index in limit.phases]
+        return np.any(within, axis=0)
 
     @property
     def scheme(self) -> Scheme:

@@ -9,10 +9,12 @@ from ...base.errors import InputError
 from ...models import Robot
 from ...models.part import COORDINATES
 from ...models.ranges import PositiveRange
+from ...models.shapes import Shape
 from ..limits.clearance import point_outside
 from ..limits.limits import Limits
 from .ends import carrier_ends, platform_ends
 from .initial import Final, Initial, check_ends
+from .limit_list import bodies
 from .paths import WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, Scenario
 from .task import Task
@@ -192,13 +194,27 @@ def _check_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:
                 )
     for place in task.limits.keep_out:
         if place.frame == "platform" and place.cables is not None:
-            for index, attachment in enumerate(robot.attachments):
-                outside = float(point_outside(place, ca.DM(attachment)))
-                if outside < place.cables:
-                    raise InputError(
-                        f"{where}: limits.keep_out {place.name!r} must leave all attachments outside by as much as "
-                        f"cables, {place.cables:g} m, got {outside:.3g} m for cable {index + 1}"
-                    )
+            _check_attachments(robot, place, place.cables, f"{where}: limits.keep_out {place.name!r}", "cables")
+    around = [task.limits.carrier_platform_clearance, task.limits.cable_platform_clearance]
+    its = list(bodies(robot, task))
+    if not its and any(distance is not None for distance in around):
+        key = ("carrier", "cable")[around[0] is None] + "_platform_clearance"
+        missing = f"a body: robot {robot.name!r} has no platform.body, and no load one"
+        raise InputError(f"{where}: limits.{key} must be left out without {missing}")
+    if around[1] is not None:
+        for body, whose, _ in its:
+            _check_attachments(robot, body, around[1], f"{where}: {whose}", "limits.cable_platform_clearance")
+
+
+def _check_attachments(robot: Robot, body: Shape, least: float, which: str, key: str) -> None:
+    """Refuse a body in the platform's frame with an attachment inside, or nearer than its cables may be."""
+    for index, attachment in enumerate(robot.attachments):
+        outside = float(point_outside(body, ca.DM(attachment)))
+        if outside < least:
+            raise InputError(
+                f"{which} must leave all attachments outside by as much as {key}, {least:g} m, got {outside:.3g} m "
+                f"for cable {index + 1}"
+            )
 
 
 def _check_ends_of_range(scenario: Scenario, where: str) -> None:

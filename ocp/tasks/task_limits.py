@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field, SerializerFunctionWrapHandler, model_ser
 from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
+from ...models.body import THINNEST
 from ...models.part import Box, NonNegative, Part, Positive, Vector3
 from ...models.ranges import Range
 from ..limits.limit import Limit
@@ -31,8 +32,6 @@ OF_CARRIERS = (
 
 # Limits that come from places in the frame of the platform.
 OF_BODY = ("cable_platform_clearance", "carrier_platform_clearance")
-
-THINNEST = 1e-5  # [m] of a place: distances are rounded by a tenth of it where things touch
 
 
 class KeepOut(Part):
@@ -157,6 +156,14 @@ class TaskLimits(Part):
         description="least distance of the origins of carriers [m]; radius: the sum of the radii of both bodies, such "
         "as quadrotors",
     )
+    cable_platform_clearance: Distance = Field(
+        default=None, description="least distance of cables from the bodies of platform and load [m]"
+    )
+    carrier_platform_clearance: NonNegative | Literal["radius"] | None = Field(
+        default=None,
+        description="least distance of the origins of moving carriers from the bodies of platform and load [m]; "
+        "radius: the radius of each carrier's body",
+    )
     keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="keep-out regions")
     soft: dict[str, Positive] = Field(
         default={},
@@ -169,7 +176,8 @@ class TaskLimits(Part):
     @model_validator(mode="after")
     def _soft_ones_exist(self) -> Self:
         apart = ("soft", "keep_out", "own", *OF_CARRIERS)
-        given = [name for name in type(self).model_fields if name not in apart and getattr(self, name)]
+        of_task = [name for name in type(self).model_fields if name not in apart]
+        given = [name for name in of_task if getattr(self, name) not in (None, ())]
         frames = {place.frame for place in self.keep_out}
         given += ["keep_out"] * ("world" in frames) + list(OF_BODY) * ("platform" in frames)
         given += [limit.name for limit in self.own]
