@@ -1,7 +1,7 @@
 """`ClearSpace`: which configurations are clear, and how far straight pieces between them are."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import numpy as np
@@ -97,16 +97,9 @@ class ClearSpace:
         shape = space.groups[-1]
         tried = np.repeat(about[None], FORMATIONS, axis=0)
         tried[:, shape] = [space.sample_shape(rng) for _ in range(FORMATIONS)]
-        slack = self._evaluate(tried)[0]
         step = np.where(shape, 1.0, MOVED * space.size / space.scale)
-        for spread in SPREADS:
-            best = np.argsort(-slack)[: FORMATIONS // 4]
-            more = np.repeat(tried[best], 4, axis=0)
-            more += rng.normal(0.0, spread, more.shape) * step
-            new = np.where(space.is_mirrored(more), -np.inf, self._evaluate(more)[0])
-            tried, slack = np.vstack([tried[best], more]), np.concatenate([slack[best], new])
-        found = int(slack.argmax())
-        return tried[found] if slack[found] >= 0.0 else None
+        found, slack = grown(space, tried, lambda each: self._evaluate(each)[0], step, rng)
+        return found if slack >= 0.0 else None
 
     def advance(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Return the farthest configuration on the straight line from `start`, which is clear, to `end`."""
@@ -159,3 +152,21 @@ class ClearSpace:
             shares = np.insert(shares, open_ones + 1, middle)
             slack = np.insert(slack, open_ones + 1, more)
             points = np.insert(points, open_ones + 1, more_points, axis=0)
+
+
+def grown(
+    space: Space, tried: np.ndarray, score: Callable[[np.ndarray], np.ndarray], step: np.ndarray, rng: Generator
+) -> tuple[np.ndarray, float]:
+    """Return the best configuration that grows out of `tried` (n, count) by selection, and its score.
+
+    `step` is how far each coordinate changes, (count,).
+    """
+    scores = score(tried)
+    for spread in SPREADS:
+        best = np.argsort(-scores)[: FORMATIONS // 4]
+        more = np.repeat(tried[best], 4, axis=0)
+        more += rng.normal(0.0, spread, more.shape) * step
+        new = np.where(space.is_mirrored(more), -np.inf, score(more))
+        tried, scores = np.vstack([tried[best], more]), np.concatenate([scores[best], new])
+    found = int(scores.argmax())
+    return tried[found], float(scores[found])

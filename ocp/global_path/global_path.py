@@ -21,6 +21,7 @@ from ..tasks.paths.rest_to_rest import rest_to_rest
 from ..tasks.scenario import Scenario
 from .at_rest import AtRest
 from .clear_space import ClearSpace
+from .end_formations import with_clear_ends
 from .need import STILL, limit_name
 from .smoothing import rounded, shortened
 from .space import Space
@@ -85,6 +86,7 @@ def find_global_path(scenario: Scenario, seconds: float = np.inf, seed: int = 0)
     """
     space, deadline = Space(scenario), time.perf_counter() + seconds
     rest = AtRest(scenario, space.size)
+    space = with_clear_ends(space, rest, min(RESERVES[0] * space.size, MOST_RESERVE), seed)
     kept = rest(*space.poses(space.ends))
     for end, slack, worst in zip(("start", "end"), kept.slack, kept.worst, strict=True):
         if slack < -STILL:

@@ -40,6 +40,7 @@ class Space(Displayed):
     """The coordinates of a scenario's motions: (platform's free coordinates, shape of the formation)."""
 
     scenario: Scenario
+    given_ends: np.ndarray | None = None  # (2, count), other than those that follow from the task
 
     @cached_property
     def loose(self) -> list[int]:
@@ -101,6 +102,8 @@ class Space(Displayed):
     @cached_property
     def ends(self) -> np.ndarray:
         """Return start and end, (2, count)."""
+        if self.given_ends is not None:
+            return self.given_ends
         free = self.scenario.platform_free
         ends = np.stack([np.r_[pose[free], self.usual_shape] for pose in self.references[0]])
         for fixed in fixed_values(self.scenario):

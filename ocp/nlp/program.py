@@ -93,6 +93,11 @@ class Program(Displayed):
         parameters = _values(_parameters(scenario, times), scenario.duration / self.mesh.steps)
         return replace(self, scenario=scenario, parameters=parameters, lower=lower, upper=upper)
 
+    def bounded_as(self, other: Program) -> Program:
+        """Return this program with the mesh and bounds of one with the same rows."""
+        lower, upper, lower_g, upper_g = other.lower, other.upper, other.lower_g, other.upper_g
+        return replace(self, mesh=other.mesh, lower=lower, upper=upper, lower_g=lower_g, upper_g=upper_g)
+
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Return the unknowns of each point, one row per point."""
         return x.reshape(-1, self.layout.width)

@@ -39,7 +39,10 @@ def refine(search: Search, outcome: Outcome) -> str:
         if not (outcome.success and search.seconds_left > 0 and 0.0 < beyond <= little):
             break
         further, little = _tightened(scenario, audit, further, TIGHTENED), beyond / 2
-        again = search.solve("nonlinear program", Mesh(steps, further=further), outcome.deviation, clear=True)
+        mesh = Mesh(steps, further=further)
+        search.tighten(mesh)
+        guess = None if search.has_solution(mesh) else outcome.deviation
+        again = search.solve("nonlinear program", mesh, guess, clear=True)
         if not again.success:
             break
         outcome, audit = again, search.audit(again)

@@ -122,6 +122,16 @@ class Search:
                 stage.message += f", short by {quantity(outcome.slack, 'N')}"
         return outcome
 
+    def tighten(self, mesh: Mesh) -> None:
+        """Give the program that was solved last the limits of `mesh`: it has the same rows with other bounds.
+
+        Its next run starts from the last solution and its multipliers.
+        """
+        if self.mesh is not None and self.mesh in self._solvers:
+            solver = self._solvers[mesh] = self._solvers.pop(self.mesh)
+            near = solver.program.near
+            solver.program = solver.program.bounded_as(wait_for(lambda: build(self.scenario, mesh, near)))
+
     def solve_again(self, mesh: Mesh, guess: Deviation) -> Outcome:
         """Solve the program with parameters of `mesh` from a guess near its last solution, of another scenario."""
         with self.stage(f"nonlinear program, {mesh.steps} steps") as stage:
