@@ -14,6 +14,7 @@ REFINEMENTS = 4  # each with twice the nodes and a little more distance from the
 MOST_STEPS = 1600
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
+SPARE = 2.0  # times a missing wrench: the distance from the tension limits that makes up for it on the same mesh
 SHRINK = 2e-3  # of limits beside those of the tensions
 TIGHTENINGS = 3  # on the same mesh
 LITTLE = 0.05  # of a limit: what a motion exceeds between nodes where the same mesh does
@@ -34,12 +35,14 @@ def refine(search: Search, outcome: Outcome) -> str:
     audit = search.audit(outcome)
     further: Shares = ()
     little = LITTLE
+    distance = 0.0  # from the tension limits [N]
     for _ in range(TIGHTENINGS):
         beyond = _beyond(scenario, audit)
         if not (outcome.success and search.seconds_left > 0 and 0.0 < beyond <= little):
             break
         further, little = _tightened(scenario, audit, further, TIGHTENED), beyond / 2
-        mesh = Mesh(steps, further=further)
+        distance += SPARE * _missed(audit)
+        mesh = Mesh(steps, distance, further=further)
         search.tighten(mesh)
         guess = None if search.has_solution(mesh) else outcome.deviation
         again = search.solve("nonlinear program", mesh, guess, clear=True)
@@ -69,11 +72,20 @@ def refine(search: Search, outcome: Outcome) -> str:
 
 
 def _beyond(scenario: Scenario, audit: Audit) -> float:
-    """Return the largest share of a limit by which an audit reports it exceeded; inf if less of a limit is no help."""
-    if audit.violation.max() > audit.tolerance:
-        return np.inf
+    """Return the largest share of a limit by which an audit reports it exceeded; inf if less of a limit is no help.
+
+    A missing wrench is a share of the weight.
+    """
+    missed = _missed(audit) / scenario.robot.force_scale
     shares = [share for *_, share in _tightened(scenario, audit, ())]
-    return max(shares, default=0.0) if all(shares) and len(shares) == len(audit.excess) else np.inf
+    helps = missed <= RESERVE and all(shares) and len(shares) == len(audit.excess)
+    return max([missed, *shares]) if helps else np.inf
+
+
+def _missed(audit: Audit) -> float:
+    """Return the largest missing wrench that an audit reports [N]."""
+    missed = float(audit.violation.max())
+    return missed if missed > audit.tolerance else 0.0
 
 
 def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float = 1.0) -> Shares:
