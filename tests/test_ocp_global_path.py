@@ -11,6 +11,7 @@ from towline.models import load
 from towline.ocp import Planner, plan
 from towline.ocp.global_path.at_rest import AtRest
 from towline.ocp.global_path.clear_space import ClearSpace
+from towline.ocp.global_path.end_formations import with_clear_ends
 from towline.ocp.global_path.global_path import find_global_path
 from towline.ocp.global_path.need import guess_exceeds, is_open
 from towline.ocp.global_path.space import Space
@@ -184,6 +185,37 @@ def test_two_quadrotors_turn_to_fit_between_two_blocks():
     np.testing.assert_allclose(np.linalg.norm(cables, axis=2), LENGTH, atol=1e-12)
     assert np.linalg.norm(carriers[:, 0, :3] - carriers[:, 1, :3], axis=1).min() >= APART - 1e-6
     assert np.abs(cables.sum(axis=1)[:, :2]).max() < 1e-3  # equal pulls: the load hangs still
+
+
+def past_a_pillar(half=1.35, **base):
+    """Three quadrotors at home stand in the zone of a pillar at the start, and at the end; see `ZONE`."""
+    line = {"kind": "line", "start": [-half, 0, 0], "end": [half, 0, 0]}
+    pillar = {"kind": "capsule", "start": [0, 0, -5], "end": [0, 0, 7], "radius": 0.15}
+    kept = {"carriers": 0.3, "platform": 0.0, "cables": 0.0}
+    task = {"path": line, "tube": {"position": "free", "attitude": 0.4, "ends": "rest"}, "duration": 5.6}
+    task |= {"base": {"kind": "free", **base}, "limits": {"keep_out": [pillar | kept]}}
+    return lay_out(load("multi-quadrotor-3"), Task.model_validate(task))
+
+
+ZONE = 0.45  # [m]: of quadrotors, from the pillar's axis
+
+
+def test_formations_that_are_free_at_the_ends_start_clear():
+    scenario = past_a_pillar()
+    usual = load("multi-quadrotor-3").carrier_home[:, :2] + [-1.35, 0]
+    assert np.linalg.norm(usual, axis=1).min() < ZONE
+    path, message = find_global_path(scenario)
+    assert path is not None, message
+    platform, carriers = path.space.poses(path.at(np.linspace(0, 1, FINE)))
+    assert np.linalg.norm(carriers[..., :2], axis=2).min() >= ZONE - 1e-6
+    np.testing.assert_allclose(platform[[0, -1], :3], [[-1.35, 0, 0], [1.35, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(platform[[0, -1], 3:5], 0.0, atol=1e-12)  # it may turn about the vertical alone
+
+
+@pytest.mark.parametrize("ends", ["exact", "periodic"])
+def test_formations_that_are_given_at_the_ends_stay(ends):
+    space = Space(past_a_pillar(ends=ends))
+    np.testing.assert_array_equal(with_clear_ends(space, AtRest(space.scenario, space.size), 0.05, 0).ends, space.ends)
 
 
 def test_formations_keep_the_balance_of_a_load():

@@ -77,3 +77,24 @@ def test_a_platform_that_does_not_turn_keeps_true_distances_where_it_keeps_linea
         outcome = linear.solve(motion, None, np.inf)
         assert outcome.success
         assert linear.missed(outcome.deviation) <= 1e-7
+
+
+def test_a_tightened_program_has_the_bounds_of_its_mesh_and_starts_from_the_last_solution():
+    scenario, mesh = scenario_of(TASK), Mesh(40)
+    tight = Mesh(40, 2.0, further=(("keep_out", "ball", 0.02),))
+    looking = search.Search(scenario, {}, None)
+    first = looking.solve("first", mesh, None)
+    looking.tighten(tight)
+    assert looking.has_solution(tight)
+    assert not looking.knows(mesh)
+    again = looking.solve("again", tight, None)
+    fresh = search.Search(scenario, {}, None)
+    expected = fresh.solve("fresh", tight, None)
+    for outcome in (first, again, expected):
+        assert outcome.success
+    assert again.objective == pytest.approx(expected.objective, rel=1e-6)
+    assert again.objective > first.objective
+    assert again.iterations < 0.7 * expected.iterations
+    low, high = scenario.bounds()
+    assert (again.deviation.tensions >= low + 2.0 - 1e-4).all()
+    assert (again.deviation.tensions <= high - 2.0 + 1e-4).all()

@@ -19,7 +19,7 @@ AWAY = 0.02  # metres of slack that a metre away from the usual formation is wor
 
 
 def with_clear_ends(space: Space, rest: AtRest, reserve: float, seed: int) -> Space:
-    """Return the space with ends that keep all limits by the reserve [m], near the usual ones, if such ends are found."""
+    """Return the space with ends near the usual ones that keep all limits by the reserve [m], if they are found."""
     if not space.shaped or carrier_ends(space.scenario.task) == "periodic":
         return space
     rng, ends = np.random.default_rng(seed), space.ends.copy()
@@ -57,7 +57,8 @@ def _clear_end(
         away = np.linalg.norm((inside(tried) - end) * space.scale, axis=1)
         return np.minimum(slack, SPARE * reserve) - np.where(slack >= reserve, AWAY * away, AWAY * space.size)
 
+    formation = np.isinf(free)
     first = np.repeat(end[None], FORMATIONS, axis=0)
-    first[1:, np.isinf(free)] = [space.sample_shape(rng) for _ in range(FORMATIONS - 1)]
-    first[1:] += np.where(np.isinf(free), 0.0, rng.uniform(-1.0, 1.0, first[1:].shape) * np.where(np.isinf(free), 0.0, free))
+    first[1:] += rng.uniform(-1.0, 1.0, first[1:].shape) * np.where(formation, 0.0, free)
+    first[1:, formation] = [space.sample_shape(rng) for _ in range(FORMATIONS - 1)]
     return inside(grown(space, first, score, np.minimum(free, 1.0), rng)[0])
