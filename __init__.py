@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .base.errors import InputError, SolverError, TowlineError
     from .control import Controller
     from .estimation.calibration import Calibration, Measurements, calibrate, read_measurements
+    from .export.fmu import export_fmu
     from .export.step import export_step
     from .models import Dynamics, Robot, available, load
     from .ocp import Plan, Planner, Sweep, Task, plan, read_task, sweep, time_along
@@ -39,6 +40,7 @@ _HOMES = {
     "control": ("Controller",),
     "simulation": ("Simulation", "simulate"),
     "export.step": ("export_step",),
+    "export.fmu": ("export_fmu",),
     "base.errors": ("InputError", "SolverError", "TowlineError"),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
@@ -67,6 +69,7 @@ __all__ = [
     "TowlineError",
     "available",
     "calibrate",
+    "export_fmu",
     "export_step",
     "load",
     "methods",

@@ -23,6 +23,30 @@ def export(
         ),
     ] = None,
     single: Annotated[bool, typer.Option("--float", help="With --step: compute in float instead of double.")] = False,
+    fmu: Annotated[
+        Path | None,
+        typer.Option(
+            "--fmu", metavar="FILE.fmu", help="Write a unit for co-simulation (FMI 3.0), for example Simulink."
+        ),
+    ] = None,
+    part: Annotated[
+        str, typer.Option("--fmu-of", metavar="PART", help="With --fmu: plant, controller, or both in a loop.")
+    ] = "plant",
+    drive: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DRIVE",
+            help="With --fmu: what the cables of the plant are commanded, lengths, rates, forces or tensions; default: "
+            "tensions, or nothing where lengths are constant.",
+        ),
+    ] = None,
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PLAN.nc|'x y z roll pitch yaw'",
+            help="With --fmu: plan or pose where the robot begins, in {G} [m, rad]; default: its home.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -33,17 +57,24 @@ def export(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Export a robot as a MuJoCo model (--mjcf), its dynamics as C code (--c), or a control step as C code (--step)."""
+    """Export a robot: MuJoCo model, dynamics as C code, control step as C code, or functional mock-up unit (FMU)."""
     from ..base.errors import InputError
     from ..base.writing import whole_file
     from ..models import load
 
-    if mjcf + c_code + (step is not None) != 1:
-        raise InputError("export requires exactly one of --mjcf, --c and --step")
+    if mjcf + c_code + (step is not None) + (fmu is not None) != 1:
+        raise InputError("export requires exactly one of --mjcf, --c, --step and --fmu")
     if single and step is None:
         raise InputError("--float must be left out without --step")
-    if out is not None and step is not None:
-        raise InputError("--out must be left out with --step, which names the folder")
+    for option, value in (
+        ("--fmu-of", None if part == "plant" else part),
+        ("--drive", drive),
+        ("--reference", reference),
+    ):
+        if value is not None and fmu is None:
+            raise InputError(f"{option} must be left out without --fmu")
+    if out is not None and (step is not None or fmu is not None):
+        raise InputError(f"--out must be left out with {'--step, which names the folder' if step else '--fmu'}")
     loaded = load(robot)
     if step is not None:
         from ..export.step import export_step
@@ -51,6 +82,16 @@ def export(
         folder = export_step(loaded, step, "float" if single else "double")
         files = {"folder": folder, "files": sorted(folder.iterdir())}
         print_result(as_json, {"robot": loaded.name, **files}, lambda: str(folder))
+        return
+    if fmu is not None:
+        from ..export.fmu import export_fmu
+        from .options import numbers
+
+        check_outputs({"--fmu": check_ending("--fmu", fmu, ".fmu")})
+        start = reference if reference is None or reference.endswith(".nc") else numbers("--reference", reference, 6)
+        platform = export_fmu(loaded, fmu, part, drive, start)
+        with_binary = str(fmu) if platform else f"{fmu}, with sources only: there is no C compiler (cc, or CC)"
+        print_result(as_json, {"robot": loaded.name, "file": fmu, "binary": platform}, lambda: with_binary)
         return
     ending = ".xml" if mjcf else ".c"
     path = out if out is not None else Path(f"{loaded.name}{ending}")

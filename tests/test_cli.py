@@ -95,7 +95,7 @@ def test_export_writes_models_for_others(tmp_path):
         assert (tmp_path / file).stat().st_size > 1000
     done = run("export", "wang-flying")
     assert done.returncode == 2
-    assert "export requires exactly one of --mjcf, --c and --step" in done.stderr
+    assert "export requires exactly one of --mjcf, --c, --step and --fmu" in done.stderr
 
 
 def test_tension_prints_the_promised_keys():

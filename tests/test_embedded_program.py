@@ -232,7 +232,7 @@ def test_nothing_is_overwritten_and_nothing_half_written(tmp_path):
     (tmp_path / "here").mkdir()
     for arguments, message in (
         (["--step", tmp_path / "here"], "must be a new path, got one that exists"),
-        (["--step", tmp_path / "new", "--c"], "export requires exactly one of --mjcf, --c and --step"),
+        (["--step", tmp_path / "new", "--c"], "export requires exactly one of --mjcf, --c, --step and --fmu"),
         (["--step", tmp_path / "new", "--out", "x.c"], "--out must be left out with --step"),
         (["--c", "--float"], "--float must be left out without --step"),
     ):

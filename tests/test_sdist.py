@@ -56,7 +56,7 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     assert {name for name in files if name.endswith(".py")} == modules
     robots = {name for name in tracked if re.fullmatch(r"models/library/[^/]*\.(yaml|json)", name)}
     assert len(robots) > 20
-    step = {name for name in tracked if name.startswith("export/step/template/")}
+    step = {name for name in tracked if name.startswith(("export/step/template/", "export/fmu/sources/"))}
     pages = {name for name in tracked if re.fullmatch(r"(figures|viewer)/[^/]*\.(html|js)", name)}
     claims = {name for name in tracked if re.fullmatch(r"studies/\w+/claims\.yaml", name)}
     new = {name for name in tracked if re.fullmatch(r"cli/templates/[^/]*\.yaml", name)}

@@ -1,0 +1,161 @@
+"""`export_fmu`: write a robot as a functional mock-up unit."""
+
+import hashlib
+import os
+import platform
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.inputs import check_ending, file_path, one_of, printable
+from ...base.writing import check_writable, whole_file
+from ...control.planned_references import references_at
+from ...control.trajectory import read_trajectory
+from ...core import MOST_CABLES
+from ...models.files import as_robot
+from ...models.robot import Robot
+from ...plant import Plant
+from ...plant.plant import DRIVES
+from ...plant.steps import default_drive
+from .data import robot_c
+from .description import build_description, model_description
+from .start import PERIOD, data_at
+from .variables import PARTS, variables_of
+
+_CORE = Path(__file__).parents[2] / "core"
+_OWN = Path(__file__).parent / "sources"
+# The parts of the core that a unit needs, and the folders of the headers that these include.
+_COMPILED = (
+    "plant/*.c",
+    "distribution/*.c",
+    *(f"control/{n}.c" for n in ("step", "heard", "compensation", "thrusts", "turning")),
+)
+_HEADERS = ("*.h", *(f"{folder}/*.h" for folder in ("plant", "distribution", "control", "mechanics", "numbers")))
+_DEFINITIONS = {"TOWLINE_CABLES": str(MOST_CABLES)}
+_FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fvisibility=hidden")
+_SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
+_ABOUT = {"plant": "Plant", "controller": "Controller", "both": "Plant with its controller,"}
+_MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
+
+
+def export_fmu(
+    robot: Robot | str | os.PathLike[str],
+    file: str | os.PathLike[str],
+    part: str = "plant",
+    drive: str | None = None,
+    reference: Any = None,
+) -> str | None:
+    """Write a robot as a unit for co-simulation with FMI 3.0: its C sources, and the binary for this platform.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    file
+        File to write, with the ending .fmu.
+    part
+        "plant", as of `Plant`, its "controller", `ComputedTorque`, or "both" in a loop.
+    drive
+        Type of the cable commands of the plant, see `Plant` (default: tensions, which the plant realises as in
+        `simulate`, or constant lengths for robots that have these).
+    reference
+        A plan, the NetCDF file of one, a path or a pose (6,), at the beginning of which the robot is in the beginning
+        (default: its home).
+
+    Returns
+    -------
+    str or None
+        Platform of the binary, such as "x86_64-linux"; None if there is no C compiler: `cc`, or what the environment
+        variable CC names.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong, the file cannot be written, or the compiler fails.
+    """
+    loaded, path = as_robot(robot), check_ending("file", file_path("file", file), ".fmu")
+    check_writable(path)
+    contents = unit_files(loaded, part, drive, reference)
+    identifier = _identifier(loaded)
+    built = _binary(contents, identifier)
+    with whole_file(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in (contents | ({} if built is None else built[1])).items():
+            entry = zipfile.ZipInfo(name)  # of 1980: the same robot gives the same bytes
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            archive.writestr(entry, content)
+    return None if built is None else built[0]
+
+
+def unit_files(robot: Robot, part: str = "plant", drive: str | None = None, reference: Any = None) -> dict[str, bytes]:
+    """Return the files of a unit, less binaries, by their names; arguments and errors as in `export_fmu`."""
+    one_of("part", part, PARTS)
+    if drive is not None and part == "controller":
+        raise InputError(f"drive must be left out for part 'controller', which has no plant, got {drive!r}")
+    plant = Plant(robot, default_drive(robot) if drive is None else one_of("drive", drive, DRIVES))
+    is_fixed = plant.drive == "lengths" and robot.fixed_lengths is not None
+    by_lengths = plant.drive == "lengths" and not is_fixed and (part == "both" or drive is None)
+    if part == "both" and (
+        plant.drive == "rates" or (by_lengths and not plant.record["cable"]["stiffness"][: robot.m].all())
+    ):
+        raise InputError(f"drive must be one by which tensions can be commanded for part 'both', got {drive!r}")
+    winches = plant.drive if part == "plant" and (drive is not None or is_fixed) else None
+    trajectory = read_trajectory(robot, robot.home if reference is None else reference, None)
+    data = data_at(robot, plant, references_at(robot, trajectory, np.zeros(1))[0])
+    variables = variables_of(robot, part, winches, data)
+    data |= {"simulates": part != "controller", "controls": part != "plant"}
+    data["cables"] = 0 if winches or is_fixed else 2 if by_lengths else 1  # `unit_cables`
+    sources = _core()
+    sources |= {path.name: path.read_bytes() for path in sorted(_OWN.iterdir()) if path.suffix in (".c", ".h")}
+    text = robot_c(data, variables, MOST_CABLES)
+    token = hashlib.sha256(repr((robot.name, part, text, variables)).encode()).hexdigest()[:32]
+    sources["robot.c"] = robot_c({"token": token} | data, variables, MOST_CABLES).encode()
+    about = printable(f"{_ABOUT[part]} of the cable robot {robot.name}: {robot.source}", 1000)
+    model = model_description(robot.name, _identifier(robot), token, about, PERIOD, variables)
+    compiled = [name for name in sources if name.endswith(".c")]
+    built = build_description(_identifier(robot), compiled, _DEFINITIONS)
+    contents = {"modelDescription.xml": model, "sources/buildDescription.xml": built}
+    return contents | {f"sources/{name}": content for name, content in sources.items()}
+
+
+def _core() -> dict[str, bytes]:
+    """Return the files of the core that a unit needs, by their names in it."""
+    files = sorted({file for pattern in (*_COMPILED, *_HEADERS) for file in _CORE.glob(pattern)})
+    return {file.relative_to(_CORE).as_posix(): file.read_bytes() for file in files}
+
+
+def _identifier(robot: Robot) -> str:
+    """Return the name of a robot as one in C."""
+    name = re.sub(r"\W", "_", robot.name, flags=re.ASCII)
+    return name if name[0].isalpha() else f"robot_{name}"
+
+
+def _binary(contents: dict[str, bytes], identifier: str) -> tuple[str, dict[str, bytes]] | None:
+    """Return the platform and the binary for it, by its name in the unit; None if there is no compiler."""
+    command = shlex.split(os.environ.get("CC") or "cc")
+    machine = _MACHINES.get(platform.machine().lower(), platform.machine().lower())
+    if sys.platform not in _SYSTEMS or not command or shutil.which(command[0]) is None:
+        return None
+    system, ending = _SYSTEMS[sys.platform]
+    with tempfile.TemporaryDirectory() as folder:
+        sources, made = Path(folder, "sources"), Path(folder, f"{identifier}{ending}")
+        for name, content in contents.items():
+            Path(folder, name).parent.mkdir(parents=True, exist_ok=True)
+            Path(folder, name).write_bytes(content)
+        compiled = [str(file) for file in sorted(sources.rglob("*.c"))]
+        defined = [f"-D{name}={value}" for name, value in _DEFINITIONS.items()]
+        flags = [*_FLAGS, *defined, *shlex.split(os.environ.get("CFLAGS", "")), "-shared", "-fPIC", f"-I{sources}"]
+        done = subprocess.run([*command, *flags, *compiled, "-lm", "-o", str(made)], capture_output=True, text=True)
+        if done.returncode != 0:
+            said = done.stderr.splitlines()
+            reason = next((line for line in said if "error" in line), f"it ended with exit code {done.returncode}")
+            raise InputError(f"CC must be a C compiler, got {printable(shlex.join(command))}: {printable(reason)}")
+        return f"{machine}-{system}", {f"binaries/{machine}-{system}/{made.name}": made.read_bytes()}

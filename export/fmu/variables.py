@@ -1,0 +1,150 @@
+"""The variables of a unit: their names and units, and where the record of sources/unit.h has them."""
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import getitem
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...models.part import COORDINATES
+from ...models.record import FREE, RESTS, record_of
+from ...models.robot import Robot
+from ...plant import layout
+
+PARTS = ("plant", "controller", "both")
+CABLES = {"tensions": ("tension", "N"), "forces": ("force", "N"), "lengths": ("length", "m"), "rates": ("rate", "m/s")}
+_MOTION = {  # units of translations and rotations
+    "pose": ("m", "rad"),
+    "velocity": ("m/s", "rad/s"),
+    "acceleration": ("m/s2", "rad/s2"),
+}
+_JERK = {"jerk": ("m/s3", "rad/s3")}
+# Parts that have a parameter, its name and unit, its place, its least value, and what it is.
+_PARAMETERS = (
+    (("plant", "both"), "plant.mass", "kg", "mass", 1e-9, "mass of the platform"),
+    (("plant", "both"), "plant.longest_step", "s", "longest_step", 1e-9, "longest step of Runge-Kutta"),
+    (("plant", "both"), "plant.tension_lag", "s", "plant.tension_lag", 0.0, "lag of tensions, if these are commanded"),
+    (("plant", "both"), "plant.winch_bandwidth", "rad/s", "plant.winch_bandwidth", 1e-3, "bandwidth of winches"),
+    (("plant", "both"), "plant.carrier_bandwidth", "rad/s", "plant.carrier_bandwidth", 1e-3, "that of mobile carriers"),
+    (PARTS[1:], "controller.bandwidth", "rad/s", "bandwidth", 0.0, "bandwidth of the decay of errors"),
+    (PARTS[1:], "controller.damping", "", "damping", 0.0, "damping ratio of this decay"),
+    (PARTS[1:], "controller.integral", "1/s3", "integral", 0.0, "gain of the integral of errors"),
+    (PARTS[1:], "controller.observer", "rad/s", "controller.observer", 0.0, "bandwidth of estimated disturbances"),
+    (("both",), "controller.period", "s", "period", 1e-6, "period of the controller"),
+)
+
+
+class Variable(NamedTuple):
+    """A variable of type Float64.
+
+    Its causality is that of FMI, its `place` a member of `towline_unit`, and `least` the smallest value that it can be
+    set to; nan: any, also none, as from a sensor.
+    """
+
+    name: str
+    causality: str
+    unit: str
+    place: str
+    start: float
+    about: str
+    least: float = -np.inf
+
+
+def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str, Any]) -> list[Variable]:
+    """Return the variables of a unit, in the order of their value references.
+
+    Parameters
+    ----------
+    part
+        One of `PARTS`.
+    winches
+        Drive of winches that an importer commands, a key of `CABLES`; None if tensions are commanded.
+    data
+        Values of the members of `towline_unit` at the start.
+    """
+    simulates, controls = part != "controller", part != "plant"
+    sensor, sensed = ("output", -np.inf) if simulates else ("input", np.nan)
+    order, most = "output" if controls else "input", max(len(carrier.actuators) for carrier in robot.carriers)
+    bodies = record_of(robot)["body"]["motion"][1 : 1 + len(robot.carriers)]
+    moving = [(int(k), f"carrier[{k + 1}]", robot.carriers[k]) for k in np.flatnonzero(bodies != RESTS)]
+    rows = [Variable("time", "independent", "s", "time", 0.0, "simulated time")]
+
+    def add(
+        causality: str,
+        named: Sequence[tuple[str, str]],
+        member: str,
+        about: str,
+        first: int = 0,
+        least: float = -np.inf,
+    ) -> None:
+        for i, (name, unit) in enumerate(named, first):
+            place = f"{member}[{i}]"
+            rows.append(Variable(name, causality, unit, place, float(data[member][i]), about, least))
+
+    def cables(name: str, unit: str) -> list[tuple[str, str]]:
+        return [(name.format(i + 1), unit) for i in range(robot.m)]
+
+    velocity = {name: _MOTION[name] for name in ("pose", "velocity")}
+    add(sensor, _motion("platform", velocity), "measured", "motion of the platform", 0, sensed)
+    for k, name, carrier in moving:
+        about = f"motion of carrier {carrier.name}"
+        add(sensor, _motion(name, velocity), "measured", about, 12 * (1 + k), sensed)
+    about = "mean tension in the last step, as a sensor has it"
+    add(sensor, cables("cable[{}].mean_tension", "N"), "mean_tension", about, 0, sensed)
+    if simulates:
+        add("output", cables("cable[{}].tension", "N"), "tension", "tension")
+        lengths = cables("cable[{}].length", "m") + cables("cable[{}].rate", "m/s")
+        add("output", lengths, "lengths", "distance of the ends along the cable, or its rate")
+        if robot.platform.aero:
+            add("input", [(f"wind.{axis}", "m/s") for axis in "xyz"], "wind", "velocity of the air")
+        wrench = [
+            (f"wrench.{name}.{axis}", unit) for name, unit in (("force", "N"), ("moment", "N.m")) for axis in "xyz"
+        ]
+        add("input", wrench, "wrench", "force or moment about the CoM on the platform, beside cables and weight")
+    if controls:
+        add("input", _motion("reference", _MOTION), "reference", "reference of the platform", 0, np.nan)
+        add("input", cables("reference.tension[{}]", "N"), "t_ref", "tension to stay near", 0, np.nan)
+        for k, name, carrier in moving:
+            about = f"reference of carrier {carrier.name}"
+            add("input", _motion(f"reference.{name}", _MOTION), "carriers", about, 18 * k, np.nan)
+            add("input", _motion(f"reference.{name}", _JERK), "jerks", about, 6 * k)
+        rows.append(Variable("answered", "output", "", "answered", 0.0, "0: as planned, 2: soft wrench, 3: hold"))
+    what, unit = CABLES[winches or "tensions"]
+    least = 1e-3 if winches == "lengths" else -np.inf
+    add(
+        order,
+        cables(f"command.{what}[{{}}]", unit),
+        "winches" if winches else "tensions",
+        f"commanded {what}",
+        0,
+        least,
+    )
+    for k, name, carrier in moving:
+        about = f"command of carrier {carrier.name}"
+        if bodies[k] != FREE:
+            add(order, _motion(f"command.{name}", _MOTION), "ordered", about, 18 * k)
+            add(order, _motion(f"command.{name}", _JERK), "ordered_jerks", about, 6 * k)
+        for a, actuator in enumerate(carrier.actuators):
+            named = f"command.{name}.actuation[{a + 1}]", "N" if any(actuator.wrench[:3]) else "N.m"
+            add(order, [named], "actuation", f"{about}: {actuator.name}", most * k + a)
+    for parts, name, unit, place, least, about in _PARAMETERS:
+        if part in parts:
+            start = float(reduce(getitem, place.split("."), data))
+            rows.append(Variable(name, "parameter", unit, place, start, about, least))
+    cable = data["robot"]["cable"][: robot.m]
+    if simulates and data["plant"]["drive"] != layout.TENSIONS and cable["stiffness"].all():
+        for i, name in ((i, name) for i in range(robot.m) for name in ("stiffness", "damping")):
+            start, unit = float(cable[name][i]), "N" if name == "stiffness" else "N.s"
+            place = f"robot.cable[{i}].{name}"
+            rows.append(Variable(f"plant.cable[{i + 1}].{name}", "parameter", unit, place, start, name, 0.0))
+    return rows
+
+
+def _motion(name: str, orders: Mapping[str, tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return names and units of the coordinates of a motion."""
+    return [
+        (f"{name}.{order}.{coordinate}", units[i // 3])
+        for order, units in orders.items()
+        for i, coordinate in enumerate(COORDINATES)
+    ]
