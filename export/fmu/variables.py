@@ -1,8 +1,6 @@
 """The variables of a unit: their names and units, and where the record of sources/unit.h has them."""
 
 from collections.abc import Mapping, Sequence
-from functools import reduce
-from operator import getitem
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -130,8 +128,9 @@ def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str
             add(order, [named], "actuation", f"{about}: {actuator.name}", most * k + a)
     for parts, name, unit, place, least, about in _PARAMETERS:
         if part in parts:
-            start = float(reduce(getitem, place.split("."), data))
-            rows.append(Variable(name, "parameter", unit, place, start, about, least))
+            member, *of_it = place.split(".")
+            value = data[member][of_it[0]] if of_it else data[member]
+            rows.append(Variable(name, "parameter", unit, place, float(value), about, least))
     cable = data["robot"]["cable"][: robot.m]
     if simulates and data["plant"]["drive"] != layout.TENSIONS and cable["stiffness"].all():
         for i, name in ((i, name) for i in range(robot.m) for name in ("stiffness", "damping")):
