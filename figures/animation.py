@@ -59,6 +59,8 @@ class Scene:
         (m,) [N].
     cut
         Which cables have been cut, (k, m); None if none are.
+    surface
+        Points of the platform's surface, (k, n, 3), whose hull is drawn; None: the attachments.
     """
 
     title: str
@@ -76,6 +78,12 @@ class Scene:
     t_max: np.ndarray
     rotors: np.ndarray = field(default_factory=lambda: np.zeros((1, 0, 2, 3)))
     cut: np.ndarray | None = None
+    surface: np.ndarray | None = None
+
+    @property
+    def platform(self) -> np.ndarray:
+        """Return the points whose hull is drawn as the platform, (k, n, 3)."""
+        return self.attachments if self.surface is None else self.surface
 
 
 def check_film(path: Path, speed: float, fps: float) -> float:
@@ -129,7 +137,7 @@ class _Stage:
         scene = self._scene
         self._canvas.restore_region(self._still)
         self._trail.set_data_3d(*scene.path[scene.path_times <= self._when.times[k] + 1e-9].T)
-        self._platform.set_points(scene.attachments[k])
+        self._platform.set_points(scene.platform[k])
         for body, cables in zip(self._bodies, scene.bodies, strict=True):
             body.set_points(scene.anchors[k, cables])
         for label, at in zip(self._labels, scene.carriers[k], strict=True):
@@ -172,7 +180,15 @@ class _Stage:
             reach = Line3DCollection(edges, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
             named.append(ax.add_collection3d(reach))
         corners = [corner for box in scene.boxes for corner in box]
-        shown = (scene.anchors, scene.attachments, scene.path, scene.carriers, scene.rotors, np.array(corners))
+        shown = (
+            scene.anchors,
+            scene.attachments,
+            scene.platform,
+            scene.path,
+            scene.carriers,
+            scene.rotors,
+            np.array(corners),
+        )
         style.equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]), zoom=1.0)
         outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
         if outlines:
@@ -189,7 +205,7 @@ class _Stage:
 
         scene, ax = self._scene, self._axes
         (self._trail,) = ax.plot(*scene.path[:1].T, color=style.colour(0), linewidth=1.8, animated=True)
-        self._platform = _Body(ax, scene.attachments[0], style.colour(4), style.colour(0))
+        self._platform = _Body(ax, scene.platform[0], style.colour(4), style.colour(0))
         self._bodies = [_Body(ax, scene.anchors[0, cables], "#dddddd", "#000000") for cables in scene.bodies]
         circles = Line3DCollection(scene.rotors[0], colors="#000000", linewidths=0.8, animated=True)
         self._rotors: Any = ax.add_collection3d(circles, autolim=False)

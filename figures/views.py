@@ -27,7 +27,15 @@ def views(scene: Scene) -> Figure:
     robot = np.vstack(
         [
             np.reshape(part, (-1, 3))
-            for part in (scene.anchors, scene.attachments, scene.path, scene.carriers, scene.rotors, *scene.boxes)
+            for part in (
+                scene.anchors,
+                scene.attachments,
+                scene.platform,
+                scene.path,
+                scene.carriers,
+                scene.rotors,
+                *scene.boxes,
+            )
         ]
     )
     near = NEAR * np.ptp(robot, axis=0).max()  # only this part of walls much larger than the robot is drawn
@@ -53,7 +61,7 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
         for cable in range(scene.anchors.shape[1]):
             ends = np.stack([scene.anchors[k, cable], scene.attachments[k, cable]])[:, axes]
             ax.plot(*ends.T, color=shade, linewidth=0.8, label=label if cable == 0 else None)
-        _body(ax, scene.attachments[k][:, axes], shade, style.colour(0))
+        _body(ax, scene.platform[k][:, axes], shade, style.colour(0))
         for index, cables in enumerate(scene.bodies):
             _body(ax, scene.anchors[k, cables][:, axes], shade, style.colour(index + 1))
             ax.plot(*scene.carriers[k, index, axes], "s", color=style.colour(index + 1), markersize=3)

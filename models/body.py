@@ -49,6 +49,10 @@ AnyBody = Annotated[
 ]
 
 
+DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
+
+
 class Skeleton(NamedTuple):
     """A convex body as all points within a radius of the hull of its corners."""
 
@@ -61,6 +65,14 @@ class Skeleton(NamedTuple):
     def parts(self) -> list[np.ndarray]:
         """Return its edges, (2, 3) each, or a point alone, (1, 3): nothing else of two bodies apart is nearest."""
         return list(self.edges) if len(self.edges) else [self.corners]
+
+
+def surface(body: Shape) -> np.ndarray:
+    """Return points on the surface of a body, (n, 3) [m], whose hull is nearly the body: for drawings."""
+    its = skeleton(body)
+    if not its.radius:
+        return its.corners
+    return (its.corners[:, None] + its.radius * DIRECTIONS).reshape(-1, 3)
 
 
 def skeleton(shape: Shape) -> Skeleton:

@@ -9,7 +9,9 @@ import numpy as np
 from ..base.inputs import printable
 from ..figures.animation import Scene
 from ..figures.outlines import outlines_from
+from ..models.body import surface
 from ..models.dynamics import dynamics_of
+from ..models.points import placed
 from ..models.robot import Robot
 from ..models.rotor_discs import rotor_discs
 
@@ -30,6 +32,7 @@ def scene(robot: Robot, dataset: xr.Dataset, times: np.ndarray) -> Scene:
     poses, carriers = dataset["pose"].to_numpy(), dataset["carrier_pose"].to_numpy()[rows]
     anchors, attachments = dynamics_of(robot).points(poses[rows], carriers)
     trail = np.unique(np.linspace(0, len(saved) - 1, min(len(saved), TRAIL)).round().astype(int))
+    body = robot.platform.body
     shown = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.body]
     return Scene(
         title=printable(str(dataset.attrs.get("title", robot.name)), LONGEST),
@@ -46,5 +49,6 @@ def scene(robot: Robot, dataset: xr.Dataset, times: np.ndarray) -> Scene:
         t_min=robot.t_min,
         t_max=robot.t_max,
         rotors=rotor_discs(robot, carriers),
+        surface=None if body is None else placed(poses[rows], surface(body)),
         cut=dataset["cut"].to_numpy()[rows] > 0 if "cut" in dataset else None,
     )

@@ -15,6 +15,7 @@ from ..figures.cut_cables import drawn_ends
 from ..figures.hull import faces
 from ..figures.robot import box_edges
 from ..figures.tension_colours import place, rgb, shades
+from ..models.body import surface
 from . import labels
 from .geometry import Extent, Geometry
 from .shapes import posts, rotors, sheaves
@@ -278,7 +279,8 @@ class Stage:
         ]
         self._sheaves = self._segments("/pulleys", nowhere, BLACK, 2 * THIN)
         self._platform = scene.add_frame("/platform", show_axes=False)
-        self._body("/platform/body", robot.attachments, rgb(style.colour(4)))
+        corners = robot.attachments if robot.platform.body is None else surface(robot.platform.body)
+        self._body("/platform/body", corners, rgb(style.colour(4)))
         com = np.array([robot.platform.com], np.float32)
         scene.add_point_cloud("/platform/com", com, rgb(style.colour(0)), point_size=1.5 * small, point_shape="circle")
         self._carriers: dict[int, viser.FrameHandle] = {}

@@ -33,7 +33,8 @@ def outside_frame(seen: Instants) -> list[str]:
     points down and no anchor is lower. A side beyond which the platform is at home, or for a robot without `home` at
     the start of the motion, does not count: a robot whose {G} lies in the ceiling has no floor, and a robot that lifts
     its platform over its anchors has no top. Anchors in one vertical plane have no sides across it, since a platform
-    may swing there. A robot whose carriers can fly or drive anywhere has no frame.
+    may swing there. A robot whose carriers can fly or drive anywhere has no frame. Where the robot's file has a
+    floor or a room, limits keep the platform there.
     """
     size = float(np.linalg.norm(np.ptp(seen.anchors, axis=(0, 1))))
     sentences = []
@@ -54,7 +55,7 @@ def outside_frame(seen: Instants) -> list[str]:
 def _sides(seen: Instants) -> list[Side]:
     """Return the sides of the frame; none if a carrier that holds a cable can go anywhere."""
     robot = seen.robot
-    if not all(robot.carriers[index].confined for index in robot.carrier_of_cable):
+    if robot.workspace_box is not None or not all(robot.carriers[index].confined for index in robot.carrier_of_cable):
         return []
     low, high = seen.anchors.min(axis=(0, 1)), seen.anchors.max(axis=(0, 1))
     spans = high - low
@@ -65,6 +66,8 @@ def _sides(seen: Instants) -> list[Side]:
             continue
         for sign, bound, which in ((-1, low[axis], "smallest"), (1, high[axis], "largest")):
             words = f"beyond the anchor with the {which} {name} ({name} = {quantity(bound)} m)"
+            if axis == 2 and sign < 0 and robot.floor is not None:
+                continue
             if axis == 2 and sign < 0 and floor:
                 bound, words = 0.0, "below the floor (z = 0 of {G})"
             elif axis == 2:
