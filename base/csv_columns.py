@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -14,39 +14,48 @@ ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 MOST_FIELDS = 2_000_000  # some microseconds each; NetCDF may have more
 MOST_COLUMNS = 1000
+BLOCK = 20_000  # lines
 ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # of lines, for `str.splitlines`
-Rows = list[tuple[int, str]]  # lines of a file that are neither empty nor comments, with their numbers from 1
+Rows = list[tuple[int, str]]  # some lines of a file, with their numbers from 1
 
 
 def read_columns(
-    text: str, factor: Callable[[str, str], float], gaps: bool = False
+    text: str, factor: Callable[[str, str], float], gaps: bool = False, most: int = MOST_FIELDS
 ) -> tuple[dict[str, np.ndarray], list[int]]:
     """Return columns in SI units by their names, (N,), and the numbers of their lines, from 1.
 
     The header is such as `x [mm], yaw [deg]`; columns are separated by commas, semicolons or tabs. Empty lines and
     those that begin with # are left out. `factor` returns the factor to SI units for a name and a unit, see
-    `unit_factor`. With `gaps`, fields may be empty or nan.
+    `unit_factor`. With `gaps`, fields may be empty or nan, and columns that begin with text are left out.
 
     Raises `InputError` that names line and column, but not the file.
     """
-    rows = _rows(text)
-    mark = max(",;\t", key=rows[0][1].count)
-    for number, line in rows:
-        if (count := 1 + line.count(mark)) > MOST_COLUMNS:
+    lines = _lines(text, most)
+    numbers = [k for k, line in enumerate(lines, 1) if (begin := line.lstrip()[:1]) and begin != "#"] or [1]
+    lines = lines or [""]
+    mark = max(",;\t", key=lines[numbers[0] - 1].count)
+    for number in numbers:
+        if (count := 1 + lines[number - 1].count(mark)) > MOST_COLUMNS:
             raise InputError(f"line {number} must have at most {MOST_COLUMNS} columns, got {count}")
     factors: dict[str, float] = {}
     try:
-        titles = [printable(cell.strip()) for cell in _split(rows[0][1], mark)]
-        for title in titles:
-            name, _, unit = title[:-1].partition("[") if title.endswith("]") else (title, "", "")
-            if (name := name.strip()) in factors:
+        titles = [printable(cell.strip()) for cell in _split(lines[numbers[0] - 1], mark)]
+        below = numbers[1:]
+        begin = _split(lines[below[0] - 1], mark) if gaps and below else []
+        used = [k for k in range(len(titles)) if len(begin) != len(titles) or not _is_text(begin[k])]
+        for name, unit in _names_and_units([titles[k] for k in used]):
+            if name in factors:
                 raise InputError(f"must have each column once, got {name} twice")
-            factors[name] = factor(name, unit.strip())
-        table = _numbers(rows[1:], mark, titles, gaps)
+            factors[name] = factor(name, unit)
+        table = np.empty((len(below), len(used)))
+        for first in range(0, len(below), BLOCK):
+            rows = [(number, lines[number - 1]) for number in below[first : first + BLOCK]]
+            table[first : first + BLOCK] = _numbers(rows, mark, titles, used, gaps)
     except csv.Error as error:  # a field of more than 131 072 characters
         raise InputError(f"must be CSV that can be read, got {error}") from None
-    columns = {name: column * scale for (name, scale), column in zip(factors.items(), table.T, strict=True)}
-    return columns, [number for number, _ in rows[1:]]
+    for column, scale in zip(table.T, factors.values(), strict=True):
+        column *= scale
+    return dict(zip(factors, table.T, strict=True)), below
 
 
 def unit_factor(name: str, unit: str, units: Mapping[str, float] | None, names: str) -> float:
@@ -58,36 +67,58 @@ def unit_factor(name: str, unit: str, units: Mapping[str, float] | None, names: 
     return units[unit]
 
 
-def _rows(text: str) -> Rows:
+def _lines(text: str, most: int) -> list[str]:
     """Return the lines of a text, or raise InputError if there are so many fields that reading takes too long."""
     fields = sum(text.count(end) for end in ENDS) - text.count("\r\n") + max(text.count(mark) for mark in ",;\t")
-    if fields > MOST_FIELDS:
-        raise InputError(f"must have at most {MOST_FIELDS} fields, got {fields}")
-    lines = enumerate(text.splitlines(), 1)
-    return [(number, line) for number, line in lines if (begin := line.lstrip()[:1]) and begin != "#"] or [(1, "")]
+    if fields > most:
+        raise InputError(f"must have at most {most} fields, got {fields}")
+    return text.splitlines()
 
 
 def _split(line: str, mark: str) -> list[str]:
     return next(csv.reader([line], delimiter=mark, skipinitialspace=True), [])
 
 
-def _numbers(rows: Rows, mark: str, titles: list[str], gaps: bool) -> np.ndarray:
-    table = np.empty((len(rows), len(titles)))
-    try:  # a hundred times as fast
-        lines = [_filled(line, mark) if gaps else line for _, line in rows]
-        fast = np.loadtxt(lines, delimiter=mark, ndmin=2, comments=None) if rows else table
-        if fast.shape == table.shape and (gaps or np.isfinite(fast).all()):
-            return fast
+def _names_and_units(titles: Sequence[str]) -> list[tuple[str, str]]:
+    """Return names and units: "x [mm]" has a unit, "q[0]" beside "q[1]" an index."""
+    parts = [title[:-1].partition("[") if title.endswith("]") else (title, "", "") for title in titles]
+    names = [name for name, _, _ in parts]
+    return [
+        (title, "") if unit.isdigit() and names.count(name) > 1 else (name.strip(), unit.strip())
+        for title, (name, _, unit) in zip(titles, parts, strict=True)
+    ]
+
+
+def _is_text(cell: str) -> bool:
+    try:
+        float(cell or "nan")
     except ValueError:
-        pass
+        return bool(cell.strip())
+    return False
+
+
+def _numbers(rows: Rows, mark: str, titles: list[str], used: list[int], gaps: bool) -> np.ndarray:
+    """Return the columns `used` of some lines."""
+    for fill in (False, True) if gaps else (False,):
+        try:  # a hundred times as fast
+            lines = [_filled(line, mark) if fill else line for _, line in rows]
+            if len(used) < len(titles) and any(line.count(mark) != len(titles) - 1 for line in lines):
+                break
+            columns = used if len(used) < len(titles) else None
+            fast = np.loadtxt(lines, delimiter=mark, ndmin=2, comments=None, usecols=columns)
+            if fast.shape == (len(rows), len(used)) and (gaps or np.isfinite(fast).all()):
+                return fast
+        except ValueError:
+            pass
+    table = np.empty((len(rows), len(used)))
     for row, (number, line) in enumerate(rows):
         cells = _split(line, mark)
         if len(cells) != len(titles):
             raise InputError(f"line {number} must have {len(titles)} columns as the header, got {len(cells)}")
-        table[row] = [_value(cell, gaps) for cell in cells]
+        table[row] = [_value(cells[k], gaps) for k in used]
         wrong = np.flatnonzero(np.isinf(table[row]))
         if wrong.size:
-            title, cell = titles[wrong[0]], printable(cells[wrong[0]].strip())
+            title, cell = titles[used[wrong[0]]], printable(cells[used[wrong[0]]].strip())
             raise InputError(f"line {number}, column {title} must be a number, got {shown(cell)}")
     return table
 

@@ -7,6 +7,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of
+from .log import FieldsOption
 from .options import FormatOption, JsonOption, RobotArgument, print_result
 from .outputs import check_outputs
 
@@ -17,10 +18,17 @@ def calibrate(
         Path,
         typer.Argument(
             metavar="LOG",
-            help="Log of lengths and, if known, poses, tensions and times: NetCDF, or CSV with a header such as "
-            "'t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
+            help="Log of lengths and, if known, poses, tensions and times: NetCDF, MCAP, a ROS bag, or CSV with a "
+            "header such as 't [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
         ),
     ],
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG", help="Log of the poses, if it is another one; its clock is aligned by cable speeds."
+        ),
+    ] = None,
+    fields: FieldsOption = None,
     free: Annotated[
         str | None,
         typer.Option(
@@ -67,7 +75,7 @@ def calibrate(
     converge, or validation samples fit worse than with the robot's file.
     """
     from ..estimation.calibration import calibrate as find
-    from ..estimation.calibration import read_measurements
+    from ..estimation.logs import read_log
     from ..figures.style import FORMATS
     from ..models import load
 
@@ -77,14 +85,19 @@ def calibrate(
     known = None if prior is None else _by_name("--prior", prior)
     loaded = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
-    check_outputs({"--out": target, "--figures": figures and figures / f"residuals.{form}"}, {"the log": log})
+    check_outputs(
+        {"--out": target, "--figures": figures and figures / f"residuals.{form}"}, {"the log": log, "--poses": poses}
+    )
     check_ending("--out", target, ".yaml", ".yml")
-    measurements = read_measurements(log, stated)
-    result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
+    read = read_log(log, stated, poses, loaded, fields)
+    result = find(loaded, read.measurements, "auto" if names == ["auto"] else names, known, outliers)
     report = result.report()  # before anything is written
     file = None if result.refused else result.save(target)
     pictures = [] if figures is None else result.plot(figures, form)
-    data = {**result.to_dict(), "file": file, "figures": pictures}
+    data = {**result.to_dict(), "notes": read.notes, "file": file, "figures": pictures}
+    if not as_json:
+        for note in read.notes:
+            typer.echo(f"  {note}")
     print_result(as_json, data, lambda: report, [*([] if file is None else [file]), *pictures])
     if result.refused:
         typer.echo(f"towline: {target} is not written: {result.refused}", err=True)

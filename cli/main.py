@@ -32,6 +32,7 @@ COMMANDS = {
     "time": "Compute the fastest motion along a path.",
     "simulate": "Simulate a plan in closed loop, with wind, noise and events.",
     "workspace": "Sample the poses at which a condition holds.",
+    "log": "List what logs of a robot contain.",
     "calibrate": "Calibrate a robot from measured cable lengths.",
     "view": "Show robots, plans, simulations and workspaces in the browser.",
     "import": "Convert a robot of another program to a robot file.",

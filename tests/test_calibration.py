@@ -16,8 +16,8 @@ from towline.estimation.calibration.clock import begin_with_clock
 from towline.estimation.calibration.model import Model, State
 from towline.estimation.calibration.normal_equations import metric
 from towline.estimation.calibration.parameters import OF_CABLE, Parameters
-from towline.estimation.calibration.pose_track import PoseTrack
 from towline.estimation.calibration.solving import length_of, model_of
+from towline.estimation.logs.pose_track import PoseTrack
 from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points
 from towline.models.rotation import rotation

@@ -383,6 +383,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "candidates": lambda: measurements().poses,
     "measured": lambda: True,
     "read_measurements.path": lambda: measurements().save("log.nc"),
+    "read_measurements.poses": lambda: None,
+    "fields": lambda: None,
     "Measurements.save.path": lambda: "other.nc",
     "Robot.save.file": lambda: "file.yaml",
     "Calibration.save.path": lambda: "other.yaml",
@@ -402,6 +404,8 @@ ALSO = {
     "check_share.share": ("robust",),
     "load.name": ("robot",),
     "read_measurements.path": ("log",),
+    "read_measurements.poses": ("log",),
+    "fields": ("map",),
     "nonsense": ("options",),
 }
 

@@ -1,10 +1,10 @@
 """Geometric calibration: robot parameters from measured cable lengths, with their covariance."""
 
+from ..logs.measurements import Measurements, Sigma
+from ..logs.reading import read_measurements
 from .calibration import Calibration
 from .cross_validation import Compared, HeldOut
 from .design import next_poses
-from .log import read_measurements
-from .measurements import Measurements, Sigma
 from .outliers import Outlier, Slip
 from .result import Parameter
 from .run import calibrate

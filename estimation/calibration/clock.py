@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from ...models.robot import Robot
+from ..logs.measurements import Measurements, measured_poses
+from ..logs.pose_track import PoseTrack
 from .fit import held
-from .measurements import Measurements, measured_poses
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
-from .pose_track import PoseTrack
 
 CLOCK_RANGE = 1.0  # [s] to each side
 SHARE = 0.25  # of the record, to which the range is limited

@@ -12,7 +12,7 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.errors import InputError
 from ...models.robot import Robot
-from .measurements import Measurements
+from ..logs.measurements import Measurements
 from .model import Model, State
 from .parameters import Parameters
 from .solving import (

@@ -11,8 +11,8 @@ from ...base.errors import InputError
 from ...base.inputs import flag, real_array, shown, whole_number
 from ...models.files import as_robot
 from ...models.robot import Robot
+from ..logs.measurements import Measurements
 from .calibration import Calibration
-from .measurements import Measurements
 from .model import Model
 from .outliers import project, without_poses
 from .parameters import Parameters, check_free

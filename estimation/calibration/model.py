@@ -23,10 +23,10 @@ from scipy.spatial.transform import Rotation
 from ...base.display import Displayed
 from ...models import points
 from ...models.robot import Robot
+from ..logs.measurements import Measurements, measured_poses
+from ..logs.pose_track import PoseTrack
 from .geometry import runs
-from .measurements import Measurements, measured_poses
 from .parameters import OF_CABLE, Parameters, prior_sigmas
-from .pose_track import PoseTrack
 
 
 class State(NamedTuple):

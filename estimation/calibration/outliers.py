@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import points
+from ..logs.measurements import Measurements
 from .fit import fit, held
-from .measurements import Measurements
 from .model import Derivatives, Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import Parameters

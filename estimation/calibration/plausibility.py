@@ -21,8 +21,8 @@ from scipy.spatial.transform import Rotation
 from ...base.text import quantity
 from ...models import points
 from ...models.robot import Robot
+from ..logs.measurements import Measurements, measured_poses
 from .geometry import runs
-from .measurements import Measurements, measured_poses
 from .parameters import Parameters
 
 CLEARLY, VERY_CLEARLY = 1.25, 2.0  # times smaller differences

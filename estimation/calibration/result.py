@@ -15,8 +15,8 @@ from ...base.text import quantity
 from ...models import points
 from ...models.part import LARGEST
 from ...models.robot import Robot
+from ..logs.measurements import Measurements
 from .cross_validation import HeldOut, compare, poses_fitted
-from .measurements import Measurements
 from .normal_equations import metric, state_equations
 from .outliers import Outlier, Slip
 from .solving import Solved, cleaned, covariance_of, inflation_of, lengths_of, noise_of

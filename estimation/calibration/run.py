@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from ...base.inputs import flag
 from ...models.files import as_robot
 from ...models.robot import Robot
+from ..logs.measurements import Measurements, check_measurements
 from .calibration import Calibration
 from .cross_validation import select
-from .measurements import Measurements, check_measurements
 from .parameters import GROUPS, check_free, check_prior
 from .plausibility import doubt
 from .solving import check_enough, solve, usual

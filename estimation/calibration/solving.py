@@ -7,15 +7,15 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...models.robot import Robot
+from ..logs.measurements import Measurements, measured_poses
+from ..logs.pose_track import PoseTrack
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
-from .measurements import Measurements, measured_poses
 from .model import Model, State
 from .normal_equations import metric, state_equations
 from .observability import Observability, observability
 from .outliers import Outlier, Slip, alike, find_outliers, find_slip
 from .parameters import Parameters
-from .pose_track import PoseTrack
 from .starts import LARGEST_SHARE, fit_from, level_poses
 
 EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance

@@ -43,8 +43,12 @@ class PoseTrack:
 
     def at_samples(self, rows: np.ndarray) -> PoseTrack:
         """Return the same motion, evaluated at the times of some samples (k,)."""
+        return self.at_times(self._times[rows])
+
+    def at_times(self, times: np.ndarray) -> PoseTrack:
+        """Return the same motion, evaluated at other times (k,) [s]."""
         other = copy(self)
-        other._times, other._last = self._times[rows], None
+        other._times, other._last = times, None
         return other
 
     def inside(self, clock: float) -> np.ndarray:

@@ -1,0 +1,38 @@
+"""`towline log`: what logs contain, and what they can be used for."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import JsonOption, print_result
+
+FieldsOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.yaml",
+        help="Names of the log's fields, such as 'lengths: /winches/position[*] [mm]'; default: usual names.",
+    ),
+]
+
+
+def log(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="CSV, NetCDF or MCAP files, or bags of ROS 1 (.bag) or ROS 2 (folder)."),
+    ],
+    fields: FieldsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """List what logs contain: topics, rates, gaps, fields with their units, and what these are taken for.
+
+    The exit code is 1 if no lengths are found, without which a log cannot be used.
+    """
+    from ..estimation.logs import read_map, recordings
+    from ..estimation.logs.listing import listing, report
+
+    given = None if fields is None else read_map(fields)
+    data = listing(recordings(logs), given)
+    print_result(as_json, data, lambda: report(data).text())
+    if not data["fields"]["lengths"]:
+        raise typer.Exit(1)

@@ -1,0 +1,170 @@
+"""`align`: the offset and the rate between the clocks of cable lengths and of poses, from cable speeds alone.
+
+The lengths along the poses, by the robot's file, change as the readings do, whatever the offsets of the readings, their
+units and signs, and the order of the cables. The correlation of all pairs of speeds finds the offset to a sample. Then
+offset and rate are fitted to the lengths, and with them for each cable a scale, an offset and a linear effect of the
+pose, which is what wrong anchors do.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.text import quantity
+
+MOST_BINS = 65_536  # of the coarse search
+MOST_FITTED = 5000  # samples
+LEAST_SHARED = 0.2  # of the shorter record
+LEAST_LIKENESS = 0.5  # correlation of speeds that belong together
+AS_GIVEN = 0.5  # of what another order gains
+PEAKS, NEAR = 12, 5  # lags that are tried, and so many beside each are not
+STEPS = 20
+LARGEST_DRIFT = 0.01
+CORRELATED = 5.0  # by which the errors of a model exceed those of as much noise
+
+
+class Clock(NamedTuple):
+    """Time of the poses = offset + rate * time of the lengths [s], how alike the speeds are, up to 1, and sigmas."""
+
+    offset: float
+    rate: float
+    likeness: float
+    sigma: float
+
+    def __str__(self) -> str:
+        ppm = 1e6 * (self.rate - 1)
+        drift = f", {quantity(abs(ppm), 'ppm', 3)} {'fast' if ppm > 0 else 'slow'}" if ppm else ""
+        ahead = "ahead" if self.offset >= 0 else "behind"
+        return f"the clock of the poses is {quantity(abs(self.offset), 's', 8)} {ahead}{drift}"
+
+
+def align(
+    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, poses: np.ndarray
+) -> Clock:
+    """Return the clock of poses relative to that of readings.
+
+    Parameters
+    ----------
+    times, readings
+        (N,) [s], (N, m), in any unit.
+    pose_times, lengths, poses
+        (K,) [s], (K, m) [m] by the robot's file, (K, d): what the effect of wrong anchors is linear in.
+
+    Raises
+    ------
+    InputError
+        If the speeds have too little in common.
+    """
+    offset, order, likeness = _coarse(times, readings, pose_times, lengths)
+    if likeness < LEAST_LIKENESS:
+        raise InputError(
+            f"lengths and poses must be of one motion, got cable speeds with a correlation of {likeness:.2f} at best"
+        )
+    return _fine(times, readings[:, order], pose_times, lengths, poses, offset)._replace(likeness=likeness)
+
+
+def _coarse(
+    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray
+) -> tuple[float, np.ndarray, float]:
+    """Return the offset [s], the column of the readings that each cable resembles, and the correlation."""
+    from scipy.optimize import linear_sum_assignment
+
+    spans = np.ptp(times), np.ptp(pose_times)
+    apart = max(*(float(np.median(np.diff(one))) for one in (times, pose_times)), max(spans) / MOST_BINS)
+    (a, dt), (b, _) = (_speeds(of, values, apart) for of, values in ((pose_times, lengths), (times, readings)))
+    size = 1 << int(np.ceil(np.log2(a.shape[1] + b.shape[1])))
+    lags = np.arange(-b.shape[1] + 1, a.shape[1])
+    first, second = np.fft.rfft(a, size), np.conj(np.fft.rfft(b, size))
+    as_given, any_order = np.zeros(len(lags)), np.zeros(len(lags))
+    for i, spectrum in enumerate(first):
+        pairs = np.fft.irfft(spectrum * second, size)[:, lags]
+        as_given += pairs[i]
+        any_order += np.abs(pairs).max(axis=0)
+    # The energy of both where they overlap at each lag.
+    energy_a, energy_b = (np.concatenate([[0.0], np.cumsum((one**2).sum(axis=0))]) for one in (a, b))
+    begin, end = np.maximum(lags, 0), np.minimum(lags + b.shape[1], a.shape[1])
+    energies = np.sqrt((energy_a[end] - energy_a[begin]) * (energy_b[end - lags] - energy_b[begin - lags]))
+    shared = (end - begin) / min(a.shape[1], b.shape[1])
+    enough = (shared >= LEAST_SHARED) & (energies > 0.01 * energies.max(initial=0.0))
+    tried: list[tuple[float, int, np.ndarray, float]] = []
+    for number, alike in enumerate((as_given, any_order)):
+        alike = np.where(enough, alike / np.maximum(energies, 1e-300), 0.0)
+        score = _gain(alike, shared)
+        for _ in range(1 if number == 0 else PEAKS):
+            place = int(np.argmax(score))
+            order, likeness = np.arange(len(a)), float(alike[place])
+            if number:
+                lag = lags[place]
+                pairs = np.abs(a[:, begin[place] : end[place]] @ b[:, begin[place] - lag : end[place] - lag].T)
+                order = linear_sum_assignment(-pairs)[1]
+                likeness = float(np.trace(pairs[:, order]) / max(energies[place], 1e-300))
+            tried.append((float(_gain(likeness, shared[place])), place, order, likeness))
+            score[max(place - NEAR, 0) : place + NEAR + 1] = -np.inf
+    # A symmetric robot looks like itself in another order at another time: the given order comes first.
+    best = max(tried, key=lambda one: one[0])
+    _, place, order, likeness = tried[0] if tried[0][0] > AS_GIVEN * best[0] else best
+    return float(pose_times[0] - times[0] + lags[place] * dt), order, likeness
+
+
+def _gain(likeness: Any, shared: Any) -> Any:
+    """Return the gain of the log-likelihood by a correlation, for records that share more or less time."""
+    return -shared * np.log1p(-(np.minimum(likeness, 0.99999) ** 2))
+
+
+def _speeds(times: np.ndarray, values: np.ndarray, apart: float) -> tuple[np.ndarray, float]:
+    """Return the speeds (m, n) of values (N, m) at equal times, each of mean 0 and of one size; and that time."""
+    grid = times[0] + apart * np.arange(max(int(np.ptp(times) / apart), 2))
+    rates = np.array([np.diff(np.interp(grid, times, column)) for column in values.T])
+    rates -= rates.mean(axis=1, keepdims=True)
+    limit = 10 * np.median(np.abs(rates), axis=1, keepdims=True) + 3 * rates.std(axis=1, keepdims=True)
+    rates = np.clip(rates, -limit, limit)  # readings that are wrong
+    return rates / np.maximum(np.sqrt((rates**2).mean(axis=1, keepdims=True)), 1e-300), apart
+
+
+def _fine(
+    times: np.ndarray,
+    readings: np.ndarray,
+    pose_times: np.ndarray,
+    lengths: np.ndarray,
+    poses: np.ndarray,
+    offset: float,
+) -> Clock:
+    """Fit offset and rate by the Gauss-Newton method; scales, offsets and linear effects are eliminated."""
+    from scipy.interpolate import CubicSpline
+
+    low, high = pose_times[0] - offset, pose_times[-1] - offset
+    rows = np.flatnonzero((times >= low) & (times <= high))
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_FITTED)).astype(int))]
+    t, y = times[rows], readings[rows].T
+    middle, half = 0.5 * (t[0] + t[-1]), max(0.5 * float(np.ptp(t)), 1e-9)
+    curve = CubicSpline(pose_times, np.hstack([lengths, poses]))
+    m, shift, drift = len(y), 0.0, 0.0
+    sigma = np.full(2, np.inf)
+    for _ in range(STEPS):
+        at = np.clip(offset + shift + t + drift * (t - middle), pose_times[0], pose_times[-1])
+        values, slopes = curve(at), curve(at, 1)
+        normal, right, rest, count = np.zeros((2, 2)), np.zeros(2), 0.0, 0
+        for i in range(m):
+            F = np.column_stack([np.ones(len(t)), values[:, i], values[:, m:]])
+            Q, R = np.linalg.qr(F)
+            by_columns = np.linalg.lstsq(R, Q.T @ y[i], rcond=1e-9)[0]
+            slope = slopes[:, [i, *range(m, slopes.shape[1])]] @ by_columns[1:]
+            D = np.column_stack([slope, slope * (t - middle) / half])
+            D, e = D - Q @ (Q.T @ D), y[i] - F @ by_columns
+            size = max(1.4826 * float(np.median(np.abs(e))), 1e-12)
+            weight = np.minimum(1.0, 3 * size / np.maximum(np.abs(e), 1e-300)) / size**2  # Huber's
+            normal += D.T @ (weight[:, None] * D)
+            right += D.T @ (weight * e)
+            rest, count = rest + float((weight * e**2).sum()), count + len(t)
+        if np.linalg.cond(normal) > 1e12:
+            break
+        step = np.linalg.solve(normal, right)
+        sigma = CORRELATED * np.sqrt(rest / count * np.diag(np.linalg.inv(normal)))
+        step *= min(1.0, 0.2 / max(float(np.abs(step).max()), 1e-300))
+        shift, drift = shift + step[0], float(np.clip(drift + step[1] / half, -LARGEST_DRIFT, LARGEST_DRIFT))
+        if np.abs(step).max() < 1e-7:
+            break
+    if abs(drift) * half < 3 * sigma[1]:
+        drift = 0.0
+    return Clock(float(offset + shift - drift * middle), 1 + float(drift), 0.0, float(sigma[0]))

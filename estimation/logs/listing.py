@@ -1,0 +1,114 @@
+"""`listing`: what logs contain, and what can be done with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...base.text import quantity
+from ...figures.report import Part, Report, Section, Table
+from .mapping import Fields, LogMap, fields_of
+from .names import UNITS, epoch_unit
+from .recording import GAP, Recording, Topic, plain
+
+MOST_NAMED = 8  # fields of a topic
+ROLES = ("lengths", "position", "orientation", "tensions")
+
+
+def listing(recordings: Sequence[Recording], given: LogMap | None = None) -> dict[str, Any]:
+    """Return the contents of logs as plain data: files with topics, fields by their roles, and uses.
+
+    What keeps roles from being found is the value of `problem`, in one line.
+    """
+    try:
+        found, problem = fields_of(recordings, given), None
+    except InputError as error:
+        found, problem = Fields(), str(error)
+    return {
+        "files": [
+            {
+                "file": one.where,
+                "kind": one.kind,
+                "notes": list(one.notes),
+                "topics": [_topic(topic, found) for topic in one.topics.values()],
+            }
+            for one in recordings
+        ],
+        "fields": {name: [f"{one.full} [{one.unit}]" for one in getattr(found, name)] for name in ROLES},
+        "uses": _uses(found),
+        "problem": problem,
+    }
+
+
+def _topic(topic: Topic, found: Fields) -> dict[str, Any]:
+    times, clock = topic.times, next((one for one in found.time if one.topic is topic), None)
+    if times is None and clock is not None:
+        values = topic.read([clock.name]).values[:, 0]
+        times = values * UNITS["time"][clock.unit or epoch_unit(float(np.nanmax(np.abs(values), initial=0.0)))]
+    apart = np.array([]) if times is None else np.diff(times)
+    median = float(np.median(apart)) if apart.size else 0.0
+    wide = apart[apart > GAP * median] if median > 0 else apart[:0]
+    return {
+        "topic": topic.name,
+        "type": topic.kind,
+        "count": topic.count,
+        "rate": 1 / median if median > 0 else None,
+        "duration": float(times[-1] - times[0]) if times is not None and len(times) else None,
+        "gaps": len(wide),
+        "longest_gap": float(wide.max(initial=0.0)),
+        "fields": {plain(name): unit for name, unit in topic.fields.items()},
+    }
+
+
+def _uses(found: Fields) -> dict[str, str | None]:
+    """Return what logs can be used for, and None, or what is missing."""
+    timed = bool(found.lengths) and (
+        found.lengths[0].topic.times is not None or any(one.topic is found.lengths[0].topic for one in found.time)
+    )
+    no_lengths = None if found.lengths else "lengths"
+    poses = bool(found.position or found.orientation)
+    return {
+        "calibration with poses": no_lengths or (None if poses else "poses (maybe in another file: --poses)"),
+        "calibration without poses": no_lengths,
+        "pose from lengths": no_lengths,
+        "replay": no_lengths or (None if timed else "times"),
+    }
+
+
+def report(data: dict[str, Any]) -> Report:
+    """Return the report of a `listing`."""
+    parts: list[Part] = []
+    for one in data["files"]:
+        rows = [
+            (
+                topic["topic"] or "columns",
+                topic["type"],
+                quantity(topic["count"]),
+                quantity(topic["rate"], "Hz", 4),
+                quantity(topic["duration"], "s", 5),
+                f"{topic['gaps']}, up to {quantity(topic['longest_gap'], 's', 3)}" if topic["gaps"] else "none",
+            )
+            for topic in one["topics"]
+        ]
+        columns = ("topic", "type", "samples", "rate", "duration", "gaps")
+        parts += [Table(f"{one['file']}: {one['kind']}", columns, rows, (2, 3, 4)), *one["notes"]]
+        parts.append(Section("Fields", [(topic["topic"] or "columns", _names(topic)) for topic in one["topics"]]))
+    if data["problem"]:
+        parts.append(data["problem"])
+    fields = [(name, _briefly(names) or "not found") for name, names in data["fields"].items()]
+    uses = [(name, f"no: without {missing}" if missing else "yes") for name, missing in data["uses"].items()]
+    parts += [Section("What the fields are taken for", fields), Section("What the log can be used for", uses)]
+    count = len(data["files"])
+    return Report("log", "", f"{count} files" if count > 1 else data["files"][0]["kind"], parts)
+
+
+def _names(topic: dict[str, Any]) -> str:
+    names = [f"{name} [{unit}]" if unit else name for name, unit in topic["fields"].items()]
+    return _briefly(names) or "no numbers, or an encoding that is not known"
+
+
+def _briefly(names: list[str]) -> str:
+    return ", ".join(names if len(names) <= MOST_NAMED else [*names[: MOST_NAMED - 2], "...", names[-1]])

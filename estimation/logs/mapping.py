@@ -1,0 +1,213 @@
+"""`Fields`: which fields of a log are lengths, pose, tensions and time, as a map says or as their names suggest."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from pydantic import Field as Key
+
+from ...base.errors import InputError
+from ...base.inputs import file_path
+from ...models.parsing import read_yaml
+from ...models.part import Part
+from .names import UNITS, Role, role
+from .recording import Recording, Topic, plain
+
+AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
+TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
+COORDINATES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
+MOST_LISTED = 12
+
+
+class Field(NamedTuple):
+    """A field of a recording, and its unit."""
+
+    recording: Recording
+    topic: Topic
+    name: str
+    unit: str
+
+    @property
+    def full(self) -> str:
+        """Return the name with that of its topic, as a message names it."""
+        return plain(self.topic.full(self.name))
+
+
+class Fields(NamedTuple):
+    """The fields of each role; an empty one was not recorded."""
+
+    lengths: tuple[Field, ...] = ()
+    tensions: tuple[Field, ...] = ()
+    position: tuple[Field, ...] = ()
+    orientation: tuple[Field, ...] = ()
+    time: tuple[Field, ...] = ()
+
+
+class LogMap(Part):
+    """Names of the fields of a log, each with a unit in brackets if it is not SI: `/winches/position[*] [mm]`."""
+
+    lengths: str | list[str] = Key([], description="readings of the lengths, one name or one for each cable")
+    tensions: str | list[str] = Key([], description="tensions, as `lengths`")
+    pose: str | None = Key(None, description="topic or structure with a position and an orientation")
+    position: str | list[str] = Key([], description="x, y, z")
+    orientation: str | list[str] = Key([], description="quaternion x, y, z, w, or roll, pitch, yaw")
+    time: str | None = Key(None, description="time of the columns of a table")
+
+
+def read_map(path: str | os.PathLike[str]) -> LogMap:
+    """Read the YAML file of a map; raise InputError if it is none."""
+    return read_yaml(file_path("map", path), LogMap)
+
+
+def fields_of(recordings: Sequence[Recording], given: LogMap | None = None, m: int | None = None) -> Fields:
+    """Return the fields of logs: those that a map names, and of all others those of the usual names.
+
+    Parameters
+    ----------
+    recordings
+        The logs.
+    given
+        Names of the fields; default: the usual ones.
+    m
+        Number of cables, which decides among several candidates.
+
+    Raises
+    ------
+    InputError
+        If a name of the map is not there, part of a position or an orientation is missing, or there are several
+        candidates.
+    """
+    found = {name: _named(recordings, name, given) for name in Fields._fields} if given else {}
+    if given and given.pose:
+        parts = _below(recordings, given.pose)
+        for name in ("position", "orientation"):
+            found[name] = found[name] or _usual(parts, name, m, ())
+    everything = [(one, topic, name) for one in recordings for topic in one.topics.values() for name in topic.fields]
+    for name in ("lengths", "tensions", "position", "orientation", "time"):
+        if not found.get(name) and not (given and given.pose and name in ("position", "orientation")):
+            found[name] = _usual(everything, name, m, found.get("position", ()))
+    return Fields(**found)
+
+
+def _usual(
+    everything: Sequence[tuple[Recording, Topic, str]], what: str, m: int | None, position: Sequence[Field]
+) -> tuple[Field, ...]:
+    """Return the fields of a role by their usual names, in order."""
+    roles = ("quaternion", "angles") if what == "orientation" else (what,)
+    groups: dict[tuple[int, str, str, str], list[tuple[Role, Field]]] = {}
+    for recording, topic, name in everything:
+        found = role(topic.full(name))
+        if found is None or found.role not in roles:
+            continue
+        key = (id(recording), topic.name if what == "time" else "", found.role, found.group)
+        unit = topic.fields[name] or found.unit
+        groups.setdefault(key, []).append((found, Field(recording, topic, name, unit)))
+    for key, members in groups.items():
+        stated = any(one.unit for _, one in members)
+        groups[key] = [(found, _in_units(one, found.role, stated)) for found, one in members]
+    if what == "time":
+        return tuple(members[0][1] for members in groups.values())
+    complete: list[tuple[Field, ...]] = []
+    for (_, _, kind, _), members in groups.items():
+        by_name = {found.which: one for found, one in members}
+        if kind in AXES:
+            missing = set(AXES[kind]) - set(by_name)
+            if missing and not members[0][1].topic.name:
+                names = ", ".join(one.full for _, one in members)
+                wanted = ", ".join(_like(members[0], axis) for axis in AXES[kind])
+                raise InputError(f"must have all columns {wanted} or none of them, got {names}")
+            complete += [] if missing else [tuple(by_name[axis] for axis in AXES[kind])]
+        else:
+            order = sorted(by_name, key=int)
+            first, count = int(order[0]), len(order)
+            wanted = [str(i) for i in range(min(first, 1), min(first, 1) + count)]
+            if order != wanted and not members[0][1].topic.name:
+                names = [_like(members[0], i) for i in (wanted[0], wanted[-1])]
+                lost = _like(members[0], next(i for i in wanted if i not in order))
+                raise InputError(f"must have columns {names[0]} to {names[1]} without a gap, got no {lost}")
+            complete.append(tuple(by_name[i] for i in order))
+    if len(complete) > 1 and m is not None and what in ("lengths", "tensions"):
+        complete = [one for one in complete if len(one) == m] or complete
+    if len(complete) > 1 and position:
+        complete = [one for one in complete if one[0].topic is position[0].topic] or complete
+    if len(complete) > 1 and what == "orientation" and {len(one) for one in complete} == {3, 4} and len(complete) == 2:
+        raise InputError("must have an orientation as roll, pitch, yaw or as qx, qy, qz, qw, got both")
+    if len(complete) > 1:
+        names = "; ".join(f"{one[0].full} ..." for one in complete[:MOST_LISTED])
+        raise InputError(f"must have one candidate for {what}, got {names}: name them in a map")
+    return complete[0] if complete else ()
+
+
+def _like(member: tuple[Role, Field], which: str) -> str:
+    """Return the name of another field of the same group."""
+    return member[0].group.replace("#", which)
+
+
+def _in_units(one: Field, kind: str, stated: bool) -> Field:
+    """Return a field with its unit, SI where none is stated; raise InputError for another one, or if others are."""
+    if not one.unit and not stated:  # of times by their size, when they are read
+        return one if kind == "time" else one._replace(unit=next(iter(UNITS[kind])))
+    if one.unit not in UNITS[kind]:
+        raise InputError(f"the unit of {one.full} must be one of {', '.join(UNITS[kind])}, got {one.unit!r}")
+    return one
+
+
+def _named(recordings: Sequence[Recording], what: str, given: LogMap) -> tuple[Field, ...]:
+    """Return the fields that a map names for a role."""
+    texts = getattr(given, what)
+    texts = [texts] if isinstance(texts, str) else texts or []
+    result: list[Field] = []
+    for text in texts:
+        match = TITLE.fullmatch(text.strip())
+        assert match is not None
+        name, unit = match[1], match[2] or ""
+        found = list(_matching(recordings, name))
+        if not found:
+            there = ", ".join(plain(topic.name or "the table") for one in recordings for topic in one.topics.values())
+            raise InputError(f"map: {what} must name fields of the log, got {plain(name)}; it has {there}")
+        for recording, topic, field in found:
+            result.append(Field(recording, topic, field, unit or topic.fields[field]))
+    sizes = {"position": (0, 3), "orientation": (0, 3, 4)}.get(what)
+    if sizes and len(result) not in sizes:
+        raise InputError(f"map: {what} must name {' or '.join(map(str, sizes[1:]))} fields, got {len(result)}")
+    kind = "quaternion" if len(result) == 4 and what == "orientation" else "angles" if what == "orientation" else what
+    return tuple(_in_units(one, kind, any(other.unit for other in result)) for one in result)
+
+
+def _matching(recordings: Sequence[Recording], name: str) -> Iterator[tuple[Recording, Topic, str]]:
+    """Yield the fields of a name; [*] stands for all elements, and a structure for its coordinates, in order."""
+    pattern = re.escape(name.replace(".", "/")).replace(r"\[\*\]", r"\[([^\]]*)\]").replace(r"\*", r"(\d+)")
+    for recording in recordings:
+        for topic in recording.topics.values():
+            hits: list[tuple[tuple, str]] = []
+            for field in topic.fields:
+                full = topic.full(field).replace(".", "/")
+                if found := re.fullmatch(pattern, full):
+                    numbers = re.findall(r"\d+", "".join(found.groups()))
+                    hits.append(((int(numbers[-1]) if numbers else 0,), field))
+                elif (found := re.fullmatch(rf"{pattern}/({'|'.join(COORDINATES)})", full)) is not None:
+                    hits.append(
+                        ((["x", "y", "z", "w", "roll", "pitch", "yaw"].index(found[found.lastindex or 0]),), field)
+                    )
+            if "*" in name and len({key for key, _ in hits}) < len(hits):
+                hits = [((place,), field) for place, (_, field) in enumerate(hits)]  # names without numbers
+            yield from ((recording, topic, field) for _, field in sorted(hits))
+
+
+def _below(recordings: Sequence[Recording], prefix: str) -> list[tuple[Recording, Topic, str]]:
+    """Return the fields below a topic or a structure."""
+    start = prefix.replace(".", "/").rstrip("/") + "/"
+    found = [
+        (one, topic, name)
+        for one in recordings
+        for topic in one.topics.values()
+        for name in topic.fields
+        if topic.full(name).replace(".", "/").startswith(start)
+    ]
+    if not found:
+        there = ", ".join(plain(topic.name or "the table") for one in recordings for topic in one.topics.values())
+        raise InputError(f"map: pose must name a topic or a structure of the log, got {plain(prefix)}; it has {there}")
+    return found

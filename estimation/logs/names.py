@@ -1,0 +1,67 @@
+"""The usual names of what robots record: `role` of a field, and the units of each role."""
+
+import re
+from typing import NamedTuple
+
+from ...base.csv_columns import ANGLES, LENGTHS, TIMES
+
+FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3, "kgf": 9.80665}
+NUMBERS = {"1": 1.0, "-": 1.0}
+UNITS = {
+    "lengths": LENGTHS,
+    "tensions": FORCES,
+    "position": LENGTHS,
+    "angles": ANGLES,
+    "quaternion": NUMBERS,
+    "time": TIMES,
+}
+_BEFORE = r"(?:.*[./_ ])?"
+_AFTER = r"(?:[./_ ](?:length|position|pos|data|value))*"
+_OF = r"(?:(?:cable|rope|wire|winch)[_ ]?)?"
+# The group is what tells the fields of a role apart: the cable's number or name, or the axis.
+PATTERNS = {
+    "lengths": (
+        rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|encoders?|enc)[_ ]?\[?(\d+)\]?{_AFTER}",
+        rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)\[(\d+)\]",
+        r".*/position\[[^\]]*?(\d+)\]",
+        r".*/joints\[[^\]]*?(\d+)\]\.position",
+    ),
+    "tensions": (
+        rf"{_BEFORE}{_OF}(?:tensions?|forces?|load[_ ]?cells?|f|t)[_ ]?\[?(\d+)\]?(?:[./_ ](?:data|value))*",
+        rf"{_BEFORE}{_OF}(?:tensions?|forces?)[./_ ](?:data|values?|effort)\[(\d+)\]",
+        r".*(?:cable|rope|wire|winch)[_ ]?(\d+)[./_ ](?:tension|force)(?:[./_ ](?:data|value))*",
+    ),
+    "position": (rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])", r"/?[pt]?[_ ]?([xyz])"),
+    "quaternion": (rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",),
+    "angles": (rf"{_BEFORE}(roll|pitch|yaw)",),
+    "time": (rf"%?(t|times?|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds|elapsed(?:[_ ]time)?)",),
+}
+_SUFFIX = re.compile(r"(.+?)\s*(?:[_ ]|\()(mm|cm|m|rad|deg|ms|us|ns|s|n|kn)\)?")
+_EXACT = {unit.lower(): unit for units in UNITS.values() for unit in units}
+
+
+class Role(NamedTuple):
+    """Role of a field, which of its fields it is, the name with "#" in place of that, and a unit in the name."""
+
+    role: str
+    which: str
+    group: str
+    unit: str = ""
+
+
+def role(name: str) -> Role | None:
+    """Return the role of a field, with its topic's name before it, or None if the name is not a usual one."""
+    low = name.lower().lstrip(". ")
+    for text, unit in ((low, ""), *([(found[1], _EXACT[found[2]])] if (found := _SUFFIX.fullmatch(low)) else [])):
+        for which, patterns in PATTERNS.items():
+            for pattern in patterns:
+                match = re.fullmatch(pattern, text)
+                if match and (not unit or unit in UNITS[which]):
+                    group = f"{text[: match.start(1)]}#{text[match.end(1) :]}"
+                    return Role(which, match[1], group, unit)
+    return None
+
+
+def epoch_unit(largest: float) -> str:
+    """Return the unit of a time without one, by its size if it counts from 1970, otherwise seconds."""
+    return next((unit for unit, least in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)) if largest > least), "s")

@@ -1,0 +1,65 @@
+"""`recordings`: open logs of any kind; which one it is, is decided by how the file begins."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...base.errors import InputError
+from ...base.inputs import file_path, printable
+from ...base.reading import check_file, read_bytes
+from .messages import from_bag, from_mcap
+from .recording import Recording
+from .tables import from_csv, from_netcdf
+
+LARGEST_LOG, LARGEST_CSV, LARGEST_BAG = 1_000_000_000, 500_000_000, 100_000_000_000  # [bytes]
+WHAT = "a CSV, NetCDF or MCAP file or a ROS bag"
+BEGINS = {
+    b"\x89HDF\r\n\x1a\n": "NetCDF",
+    b"CDF": "NetCDF",
+    b"\x89MCAP0\r\n": "MCAP",
+    b"#ROSBAG V": "a bag of ROS 1",
+    b"SQLite format 3\0": "a bag of ROS 2",
+}
+PARTS = (".mcap", ".db3")  # of a folder that is a bag of ROS 2
+
+
+def recordings(paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[Recording]:
+    """Open one log or several; a folder is a bag of ROS 2.
+
+    Raises `InputError`, one line that names the file, if one cannot be read.
+    """
+    several = isinstance(paths, Sequence) and not isinstance(paths, str | bytes)
+    files: list[Path] = []
+    for given in paths if several else [paths]:  # pyright: ignore
+        path = file_path("log", given, f"the path of {WHAT}")
+        parts = sorted(part for part in path.iterdir() if part.suffix in PARTS) if path.is_dir() else [path]
+        if not parts:
+            packed = any(part.suffix == ".zstd" for part in path.iterdir())
+            got = "compressed ones; `zstd -d` unpacks them" if packed else "none"
+            raise InputError(f"{printable(str(path))} must be {WHAT}, a folder with .mcap or .db3 files, got {got}")
+        files += parts
+    if not files:
+        raise InputError(f"log must be the path of {WHAT}, or several, got none")
+    return [_recording(file) for file in files]
+
+
+def _recording(file: Path) -> Recording:
+    where = printable(str(file))
+    check_file(file, WHAT, LARGEST_BAG)
+    try:
+        with file.open("rb") as stream:
+            begin = stream.read(16)
+        kind = next((kind for magic, kind in BEGINS.items() if begin.startswith(magic)), "CSV")
+        if kind == "MCAP":
+            return from_mcap(file, where)
+        if kind.startswith("a bag"):
+            return from_bag(file, where, kind)
+        content = read_bytes(file, WHAT, LARGEST_LOG if kind == "NetCDF" else LARGEST_CSV)
+        if not content.strip():
+            raise InputError(f"must be {WHAT}, got an empty file")
+        return from_netcdf(content, where) if kind == "NetCDF" else from_csv(content, where)
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
+    except OSError as error:
+        raise InputError(f"{where}: cannot be read ({error.strerror})") from None

@@ -1,0 +1,347 @@
+"""`read_log`: the measurements of a robot from one log or several, with one clock."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...base.errors import InputError
+from ...base.text import quantity
+from ...models import points
+from ...models.dynamics import Dynamics
+from ...models.files import as_robot
+from ...models.robot import Robot
+from .alignment import Clock, align
+from .mapping import Field, Fields, LogMap, fields_of, read_map
+from .measurements import Measurements
+from .names import UNITS, epoch_unit
+from .opening import recordings
+from .pose_track import PoseTrack
+from .recording import GAP, Recording, Samples
+
+Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
+COUNTED = 1e8  # [s]: times beyond count from 1970, and are read from the first one
+MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
+MOST_ALIGNED = 200_000  # poses
+
+
+class Log(NamedTuple):
+    """Measurements with their origin.
+
+    Attributes
+    ----------
+    measurements
+        The measurements.
+    fields
+        The fields that they are from.
+    notes
+        Remarks on files and clocks, one line each.
+    begin
+        Reading of the lengths' clock at time 0 of the measurements [s].
+    """
+
+    measurements: Measurements
+    fields: Fields
+    notes: list[str]
+    begin: float = 0.0
+
+
+def read_measurements(
+    path: Paths,
+    sigma: float | Mapping[str, float] | None = None,
+    poses: Paths | None = None,
+    robot: Robot | str | os.PathLike[str] | None = None,
+    fields: str | os.PathLike[str] | None = None,
+) -> Measurements:
+    """Read measurements from a log: CSV, NetCDF, MCAP, or a bag of ROS 1 or ROS 2.
+
+    Parameters
+    ----------
+    path
+        File, or several. CSV has a header such as `t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], ...,
+        tension0 [N]`; NetCDF is from `Measurements.save` or a simulation, or has variables named like these columns.
+        Empty fields or nan mark poses that were not measured. Of messages, those of usual types are known.
+    sigma
+        Standard deviations as for `Measurements`; default: those of the file if `Measurements.save` wrote it, otherwise
+        the defaults of `Measurements`.
+    poses
+        Log of the poses, if it is another one; its clock is aligned by cable speeds.
+    robot
+        Robot of the log, to align clocks; not used otherwise.
+    fields
+        YAML file with the names of the fields, such as `lengths: /winches/position[*] [m]`; default: usual names.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, a field has an unknown unit, a length, tension or time is missing, times do not
+        increase, or clocks cannot be aligned.
+    """
+    return read_log(path, sigma, poses, robot, fields).measurements
+
+
+def read_log(
+    path: Paths,
+    sigma: float | Mapping[str, float] | None = None,
+    poses: Paths | None = None,
+    robot: Robot | str | os.PathLike[str] | None = None,
+    fields: str | os.PathLike[str] | None = None,
+) -> Log:
+    """Read measurements as `read_measurements`, with the fields that they are from and notes."""
+    known = None if robot is None else as_robot(robot)
+    given = None if fields is None else read_map(fields)
+    first = recordings(path)
+    try:
+        others = [] if poses is None else recordings(poses)
+    except InputError as error:
+        raise InputError(f"poses: {error}") from None
+    where = "; ".join(one.where for one in [*first, *others])
+    try:
+        found = _fields([*first, *others] if given else first, others, given, known)
+        return measurements_of(found, [*first, *others], sigma, known)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _fields(
+    all_: Sequence[Recording], others: Sequence[Recording], given: LogMap | None, robot: Robot | None
+) -> Fields:
+    m = None if robot is None else robot.m
+    found = fields_of(all_, given, m)
+    if others and not given:
+        of_poses = fields_of(others, None, m)
+        times = found.time + of_poses.time
+        found = found._replace(position=of_poses.position, orientation=of_poses.orientation, time=times)
+    if not found.lengths:
+        names = [topic.full(name) for one in all_ for topic in one.topics.values() for name in topic.fields]
+        listed = ", ".join(names[:12]) + (" ..." if len(names) > 12 else "")
+        raise InputError(f"must have columns l0, l1, ... of lengths, got {listed or 'none'}")
+    return found
+
+
+def measurements_of(
+    found: Fields, from_: Sequence[Recording], sigma: float | Mapping[str, float] | None, robot: Robot | None
+) -> Log:
+    """Return the measurements of some fields, at the times of whichever of lengths and poses has fewer samples."""
+    notes = [note for one in from_ for note in one.notes]
+    stated = found.lengths[0].recording.sigma
+    sigmas: dict[str, Any] = {"sigma": sigma} if sigma is not None else {"sigma": dict(stated)} if stated else {}
+    read = _Reader(found)
+    lengths = read.stream(found.lengths)
+    tensions = read.stream(found.tensions) if found.tensions else None
+    position = read.stream(found.position) if found.position else None
+    orientation = read.stream(found.orientation) if found.orientation else None
+    times = lengths.times
+    begin = float(times[0]) if times is not None and times[0] > COUNTED else 0.0
+    if position is not None and orientation is not None:
+        orientation = _at(position.times, orientation, found.orientation[0])
+    pose = position or orientation
+    source = (found.position or found.orientation or found.lengths)[0]
+    together = source.topic is found.lengths[0].topic
+    if pose is not None and not together:
+        if times is None or pose.times is None:
+            raise InputError("lengths and poses of several files or topics must have times, got none")
+        quaternions = None if orientation is None else _quaternions(orientation.values)
+        places = np.full((len(pose.values), 3), np.nan) if position is None else position.values
+        lengths, tensions, places, quaternions = _merged(
+            lengths, tensions, Samples(pose.times, places), quaternions, source, found.lengths[0], robot, notes
+        )
+        position = None if position is None else Samples(lengths.times, places)
+        orientation = None if quaternions is None else Samples(lengths.times, quaternions)
+    elif tensions is not None:
+        tensions = _at(lengths.times, tensions, found.tensions[0])
+    _check_finite(lengths.values, found.lengths)
+    arguments: dict[str, Any] = {"times": None if lengths.times is None else lengths.times - begin}
+    if tensions is not None:
+        _check_finite(tensions.values, found.tensions)
+        arguments["tensions"] = tensions.values
+    if position is not None:
+        arguments["poses"] = position.values
+    if orientation is not None:
+        arguments["orientations"] = orientation.values
+    return Log(Measurements(lengths.values, **arguments, **sigmas), found, notes, begin)
+
+
+class _Reader:
+    """Read each topic once."""
+
+    def __init__(self, found: Fields):
+        self._of: dict[int, list[str]] = {}
+        self._times: dict[int, Field] = {id(one.topic): one for one in found.time}
+        self._done: dict[int, Samples] = {}
+        for one in {one for of in found for one in of}:
+            self._of.setdefault(id(one.topic), []).append(one.name)
+
+    def stream(self, fields: Sequence[Field]) -> Samples:
+        """Return fields in SI units, those of other topics at the times of the first one's."""
+        parts: list[Samples] = []
+        for one in fields:
+            whole, names = self._topic(one), self._of[id(one.topic)]
+            factor = next(units[one.unit] for units in UNITS.values() if one.unit in units)
+            column = factor * whole.values[:, names.index(one.name)]
+            parts.append(Samples(whole.times, column[:, None]))
+        if all(one.topic is fields[0].topic for one in fields):
+            return Samples(parts[0].times, np.hstack([part.values for part in parts]))
+        several = [parts[0], *(_at(parts[0].times, part, one) for part, one in zip(parts[1:], fields[1:], strict=True))]
+        whole = np.hstack([part.values for part in several])
+        kept = np.isfinite(whole).all(axis=1)
+        return Samples(None if parts[0].times is None else parts[0].times[kept], whole[kept])
+
+    def _topic(self, one: Field) -> Samples:
+        key = id(one.topic)
+        if key not in self._done:
+            times, values = one.topic.read(self._of[key])
+            clock = self._times.get(key)
+            if clock is not None and one.topic.times is None:
+                column = values[:, self._of[key].index(clock.name)]
+                times = column * UNITS["time"][clock.unit or epoch_unit(float(np.nanmax(np.abs(column), initial=0.0)))]
+            elif times is not None:  # of messages, which may be recorded twice, or late
+                times, rows = np.unique(times, return_index=True)
+                kept = np.isfinite(values[rows]).any(axis=1)
+                times, values = times[kept], values[rows[kept]]
+            self._done[key] = Samples(times, values)
+        return self._done[key]
+
+
+def _at(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:
+    """Return samples at other times, nan inside gaps and beyond the ends."""
+    if samples.times is None or times is None:
+        if len(samples.values) == (0 if times is None else len(times)) or times is samples.times:
+            return samples
+        raise InputError(f"{one.full} must have times, as it has other samples than the others, got none")
+    if times is samples.times or np.array_equal(times, samples.times):
+        return Samples(times, samples.values)
+    return Samples(times, _interpolated(times, samples))
+
+
+def _interpolated(times: np.ndarray, samples: Samples) -> np.ndarray:
+    """Return values (N, k) at other times: by cubic splines, or by lines where samples are much denser."""
+    own, values = samples.times, samples.values
+    assert own is not None
+    good = np.isfinite(values).all(axis=1)
+    near = np.searchsorted(own[good], times[[0, -1]]) + np.array([-8, 8]) if len(times) else (0, 0)
+    own, values = (one[good][max(near[0], 0) : near[1]] for one in (own, values))
+    if len(own) < 2:
+        return np.full((len(times), values.shape[1]), np.nan)
+    _check_rising(own)
+    apart = float(np.median(np.diff(own)))
+    if len(own) >= 4 and len(times) > 1 and MUCH_FASTER * apart > float(np.median(np.diff(times))):
+        from scipy.interpolate import CubicSpline
+
+        result = CubicSpline(own, values)(times)
+    else:
+        result = np.column_stack([np.interp(times, own, column) for column in values.T])
+    after = np.clip(np.searchsorted(own, times), 1, len(own) - 1)
+    outside = (own[after] - own[after - 1] > GAP * apart) | (times < own[0]) | (times > own[-1])
+    result[outside] = np.nan
+    return result
+
+
+def _merged(
+    lengths: Samples,
+    tensions: Samples | None,
+    position: Samples,
+    quaternions: np.ndarray | None,
+    source: Field,
+    first: Field,
+    robot: Robot | None,
+    notes: list[str],
+) -> tuple[Samples, Samples | None, np.ndarray, np.ndarray | None]:
+    """Return lengths, tensions, positions (N, 3) and quaternions (N, 4) at the same times."""
+    times, pose_times = lengths.times, position.times
+    assert times is not None
+    assert pose_times is not None
+    for one in (times, pose_times):
+        _check_rising(one)
+    shared = min(times[-1], pose_times[-1]) - max(times[0], pose_times[0])
+    if source.recording is not first.recording or shared < 0.5 * min(np.ptp(times), np.ptp(pose_times)):
+        if robot is None:
+            raise InputError("robot must be given to align the clocks of lengths and poses, got None")
+        clock = _aligned(lengths, position, quaternions, robot)
+        pose_times = (pose_times - clock.offset) / clock.rate
+        notes.append(f"{clock} (by cable speeds, whose correlation is {clock.likeness:.2f})")
+    known = np.isfinite(position.values).all(axis=1) | np.isnan(position.values).all()
+    if quaternions is not None:
+        known &= np.isfinite(quaternions).all(axis=1)
+    pose_times, places = pose_times[known], position.values[known]
+    quaternions = None if quaternions is None else quaternions[known]
+    if len(pose_times) < 4:
+        raise InputError(f"poses must be measured at four times or more, got {len(pose_times)}")
+    if np.median(np.diff(pose_times)) >= 0.7 * np.median(np.diff(times)):
+        at, inside = pose_times, (pose_times >= times[0]) & (pose_times <= times[-1])
+    else:
+        at = times
+        turned = np.tile(np.eye(3), (len(places), 1, 1))
+        if quaternions is not None:
+            turned = Rotation.from_quat(quaternions).as_matrix()
+        track = PoseTrack(pose_times, np.nan_to_num(places), turned, np.ones(len(places), dtype=bool)).at_times(times)
+        inside = track.inside(0.0)
+        nowhere = np.isnan(places).all()
+        places, matrices = track.at(0.0)[:2]
+        places = np.where(nowhere, np.nan, places)
+        quaternions = None if quaternions is None else Rotation.from_matrix(matrices).as_quat()
+    moved = _interpolated(at, lengths) if at is not times else lengths.values
+    forces = None if tensions is None else _at(at, tensions, first).values
+    kept = np.isfinite(moved).all(axis=1) & inside
+    kept &= True if forces is None else np.isfinite(forces).all(axis=1)
+    if not kept.any():
+        raise InputError("lengths and poses must be recorded at the same time, got none that are")
+    if not kept.all():
+        notes.append(f"{quantity(int((~kept).sum()))} samples are left out, which not all sensors have")
+    forces = None if forces is None else Samples(at[kept], forces[kept])
+    turned = None if quaternions is None else quaternions[kept]
+    return Samples(at[kept], moved[kept]), forces, places[kept], turned
+
+
+def _aligned(lengths: Samples, position: Samples, quaternions: np.ndarray | None, robot: Robot) -> Clock:
+    known = np.isfinite(position.values).all(axis=1)
+    if quaternions is not None:
+        known &= np.isfinite(quaternions).all(axis=1)
+    rows = np.flatnonzero(known)
+    if len(rows) < 4 or lengths.times is None or position.times is None:
+        raise InputError("poses with positions must be measured to align the clocks, got none")
+    rows = rows[:: max(1, len(rows) // MOST_ALIGNED)]
+    if lengths.values.shape[1] != robot.m:
+        raise InputError(f"lengths must have a column for each of the {robot.m} cables, got {lengths.values.shape[1]}")
+    poses = np.tile(robot.home, (len(rows), 1))
+    poses[:, :3] = position.values[rows]
+    effects = [poses[:, :3]]
+    if quaternions is not None:
+        rotation = Rotation.from_quat(quaternions[rows])
+        poses[:, 3:] = points.angles(rotation.as_matrix())
+        effects.append((rotation * rotation[0].inv()).as_rotvec())
+    effects = np.hstack(effects)
+    effects = effects[:, np.ptp(effects, axis=0) > 1e-6]
+    along = np.asarray(Dynamics(robot).cable_lengths(poses))
+    return align(lengths.times, lengths.values, position.times[rows], along, effects)
+
+
+def _quaternions(values: np.ndarray) -> np.ndarray:
+    """Return quaternions (N, 4) of unit length, of quaternions or of angles (N, 3) [rad]; nan where not measured."""
+    known = np.isfinite(values).all(axis=1)
+    result = np.full((len(values), 4), np.nan)
+    given = values[known]
+    result[known] = given if values.shape[1] == 4 else Rotation.from_matrix(points.rotations(given)).as_quat()
+    size = np.linalg.norm(result, axis=1, keepdims=True)
+    return np.where(np.abs(size - 1) < 0.1, result / np.where(size > 0, size, 1.0), np.nan)
+
+
+def _check_finite(values: np.ndarray, fields: Sequence[Field]) -> None:
+    wrong = np.argwhere(~np.isfinite(values))
+    if wrong.size:
+        row, column = (int(i) for i in wrong[0])
+        raise InputError(f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}")
+
+
+def _check_rising(times: np.ndarray) -> None:
+    falling = np.flatnonzero(~(np.diff(times) > 0))
+    if falling.size:
+        row = int(falling[0])
+        raise InputError(
+            f"times must increase from sample to sample, got {times[row]:.9g} s and then {times[row + 1]:.9g} s at "
+            f"sample {row + 1}"
+        )

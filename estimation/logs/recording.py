@@ -1,0 +1,78 @@
+"""`Recording`: the topics of a log, each with times and fields of numbers, from whichever kind of file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.inputs import printable
+
+GAP = 5.0  # median times between samples
+
+
+class Samples(NamedTuple):
+    """Values (N, k) of some fields at times (N,) [s], which a topic without a clock of its own does not have."""
+
+    times: np.ndarray | None
+    values: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Topic:
+    """Fields of numbers that are recorded together: the messages of a topic, or the columns of a table.
+
+    Attributes
+    ----------
+    name, kind
+        Name, "" of a table, and type of the messages.
+    count
+        Number of messages or lines.
+    times
+        When they were recorded [s], (N,), or None if no clock is known; a table has one among its fields.
+    fields
+        Names of the fields and their units as they are stated, "" if they are not.
+    read
+        Function that returns the values of some fields as they are recorded.
+    """
+
+    name: str
+    kind: str
+    count: int
+    times: np.ndarray | None
+    fields: Mapping[str, str]
+    read: Callable[[Sequence[str]], Samples]
+
+    def full(self, name: str) -> str:
+        """Return the name of a field with that of its topic."""
+        return f"{self.name}/{name}" if self.name else name
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A log and its topics.
+
+    Attributes
+    ----------
+    where, kind
+        Path and kind of the file, such as "MCAP".
+    topics
+        Its topics by their names.
+    sigma
+        Standard deviations that the file states, by the names of `Sigma`.
+    notes
+        Remarks about the file, such as that its end is missing.
+    """
+
+    where: str
+    kind: str
+    topics: Mapping[str, Topic]
+    sigma: Mapping[str, float] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+
+
+def plain(name: object) -> str:
+    """Return a name of a file as a terminal shows it."""
+    return printable(str(name), 120)

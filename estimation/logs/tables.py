@@ -1,0 +1,131 @@
+"""Tables: CSV with a header of names and units, and NetCDF with variables of one dimension."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...base.csv_columns import LENGTHS, TIMES, read_columns
+from ...base.declared import check_hdf5
+from ...base.errors import InputError
+from ...base.inputs import printable
+from ...base.netcdf import check_units
+from .measurements import Sigma
+from .names import FORCES, role
+from .recording import Recording, Samples, Topic
+
+MOST_FIELDS = 40_000_000  # of a CSV file
+ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
+POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+WRITTEN = {"cable_lengths": ("l", LENGTHS), "tensions": ("tension", FORCES), "time": ("t", TIMES)}  # by towline
+
+
+def from_csv(content: bytes, where: str) -> Recording:
+    """Return the columns of a CSV file."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"must be a CSV file in UTF-8, or NetCDF, got other bytes (byte {error.start})") from None
+    if "\0" in text:
+        raise InputError("must be a CSV file in UTF-8, or NetCDF, got binary data")
+    del content
+    units: dict[str, str] = {}
+
+    def note(name: str, unit: str) -> float:
+        units[name] = unit
+        return 1.0
+
+    columns, lines = read_columns(text, note, gaps=True, most=MOST_FIELDS)
+    if not lines:
+        raise InputError("must have a line for each sample below its header, got none")
+    return Recording(where, "CSV", {"": _table(columns, units)})
+
+
+def from_netcdf(content: bytes, where: str) -> Recording:
+    """Return the variables of one dimension of a NetCDF file, or what towline has written."""
+    import h5py
+
+    try:
+        # NetCDF 4 is HDF5. Of a damaged file, h5netcdf would complain once more on standard error when it is forgotten.
+        with h5py.File(io.BytesIO(content), "r") as file:
+            arrays = {
+                name: (np.asarray(variable[...]), _attributes(variable))
+                for name, variable in check_hdf5(file, len(content), _is_read, ALWAYS_ACCEPTED).items()
+                if variable.dtype.kind in "fiu"
+            }
+            known = _attributes(file)
+    except InputError:
+        raise
+    except Exception as error:  # h5py raises of any kind for damaged files
+        raise InputError(
+            f"must be a NetCDF 4 file, got one that cannot be read ({printable(str(error), 80)})"
+        ) from None
+    stated = {name: known[f"sigma_{name}"] for name in Sigma._fields if f"sigma_{name}" in known}
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    for name, (values, attributes) in arrays.items():
+        if name == "pose":
+            check_units(name, attributes)
+            _add(columns, units, POSE, values, ["m"] * 3 + ["rad"] * 3)
+        elif "cable_lengths" in arrays and name in WRITTEN:
+            # Lengths of a simulation are those under tension, so its tensions are left out.
+            if name == "tensions" and not stated:
+                continue
+            prefix, accepted = WRITTEN[name]
+            unit = str(attributes.get("units", ""))
+            if unit not in accepted:
+                raise InputError(f"the unit of {name} must be one of {', '.join(accepted)}, got {unit!r}")
+            one = values.ndim < 2
+            names = [prefix] if one else [f"{prefix}{i}" for i in range(values.shape[1])]
+            _add(columns, units, names, values[:, None] if one else values, [unit] * len(names))
+        elif values.ndim == 1:
+            if role(name) and "units" not in attributes:
+                raise InputError(f"variable {name} must have the attribute units, got none")
+            _add(columns, units, [name], values[:, None], [str(attributes.get("units", ""))])
+    longest: dict[int, int] = {}
+    for column in columns.values():
+        longest[len(column)] = longest.get(len(column), 0) + 1
+    rows = max(longest, key=lambda size: longest[size], default=0)
+    wrong = [name for name, column in columns.items() if len(column) != rows and role(name)]
+    if wrong:
+        sizes = ", ".join(str(size) for size in sorted(longest))
+        raise InputError(f"variables must have one size, got {sizes} ({wrong[0]})")
+    columns = {name: column for name, column in columns.items() if len(column) == rows}
+    return Recording(where, "NetCDF", {"": _table(columns, units)}, stated)
+
+
+def _table(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> Topic:
+    def read(names: Sequence[str]) -> Samples:
+        return Samples(None, np.column_stack([columns[name] for name in names]))
+
+    count = len(next(iter(columns.values()))) if columns else 0
+    return Topic("", "columns", count, None, {name: units[name] for name in columns}, read)
+
+
+def _add(columns: dict, units: dict, names: Sequence[str], values: np.ndarray, stated: Sequence[str]) -> None:
+    """Add the columns of a table (N, k), safe to compute with: a damaged file may contain signalling nan."""
+    if values.ndim != 2 or values.shape[1] != len(names):
+        raise InputError(f"{names[0]} must be a table of {len(names)} columns, got the shape {values.shape}")
+    with np.errstate(invalid="ignore"):
+        numbers = values.astype(float, copy=False)
+        numbers = np.add(numbers, 0.0, out=numbers)
+    for name, unit, column in zip(names, stated, numbers.T, strict=True):
+        columns[name], units[name] = column, unit
+
+
+def _is_read(name: str) -> bool:
+    return bool(role(name)) or name in WRITTEN or name == "pose"
+
+
+def _attributes(of: Any) -> dict[str, Any]:
+    """Return the texts and single numbers among the attributes of a file or a variable."""
+    result: dict[str, Any] = {}
+    for name in of.attrs:
+        if name == "units" or name.startswith("sigma_"):
+            value = np.asarray(of.attrs[name]).ravel()
+            text = value[0] if value.size == 1 else ""
+            result[name] = text.decode("utf-8") if isinstance(text, bytes) else text
+    return result
