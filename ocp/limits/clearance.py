@@ -17,6 +17,7 @@ Point: TypeAlias = Any  # (3, 1), SX or DM
 Place: TypeAlias = Shape
 
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
+_SHORT = 1e-18  # [m^2], of a segment that is a point
 
 
 def between_points(p: Point, q: Point) -> Any:
@@ -30,12 +31,15 @@ def between_cables(p: Point, p_end: Point, q: Point, q_end: Point) -> Any:
     Source: Ericson, Real-Time Collision Detection, 5.1.9.
     """
     along, across, between = p_end - p, q_end - q, p - q
-    a, e, f = ca.sumsqr(along), ca.sumsqr(across), ca.dot(across, between)
-    b, c = ca.dot(along, across), ca.dot(along, between)
+    f, b, c = ca.dot(across, between), ca.dot(along, across), ca.dot(along, between)
+    # Of a segment without length, such as the way of a platform at rest, any point will do.
+    points = [ca.sumsqr(each) < _SHORT for each in (along, across)]
+    a, e = (ca.if_else(point, 1.0, ca.sumsqr(each)) for point, each in zip(points, (along, across), strict=True))
     # On parallel lines every s will do; what is added to the denominator picks one.
     s = within_segment((b * f - c * e) / (a * e - b * b + 1e-9 * a * e))
     t = (b * s + f) / e
     s = ca.if_else(t < 0, within_segment(-c / a), ca.if_else(t > 1, within_segment((b - c) / a), s))
+    s, t = (ca.if_else(point, 0.5, share) for point, share in zip(points, (s, t), strict=True))
     return between_points(p + s * along, q + within_segment(t) * across)
 
 
