@@ -1,0 +1,70 @@
+"""Functional mock-up units for tests: written once, and run by FMPy."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from towline import export_fmu
+
+from .c_programs import require
+from .once import made_once
+
+
+def written(factory: pytest.TempPathFactory, robot: str, part: str, drive: str | None = None) -> Path:
+    """Write a unit of a robot once for all tests, at home, without optimisation, which changes no bit."""
+    require("cc")
+
+    def make(folder: Path) -> None:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("CFLAGS", "-O0")
+            export_fmu(robot, folder / "unit.fmu", part, drive)
+
+    return made_once(factory, f"fmu-{robot}-{part}-{drive}", make) / "unit.fmu"
+
+
+class Unit:
+    """A unit in step mode, with its variables by their names."""
+
+    def __init__(self, file, folder):
+        from fmpy import extract, read_model_description
+        from fmpy.fmi3 import FMU3Slave
+
+        self.description = read_model_description(file)
+        self.variables = {each.name: each for each in self.description.modelVariables}
+        self.slave = FMU3Slave(
+            guid=self.description.guid,
+            unzipDirectory=extract(file, unzipdir=folder),
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName="unit",
+        )
+        self.slave.instantiate()
+        self.begin()
+
+    def begin(self):
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
+
+    def names(self, causality):
+        return [name for name, each in self.variables.items() if each.causality == causality]
+
+    def set(self, names, values):
+        references = [self.variables[name].valueReference for name in names]
+        self.slave.setFloat64(references, [float(value) for value in np.ravel(values)])
+
+    def get(self, names):
+        return np.array(self.slave.getFloat64([self.variables[name].valueReference for name in names]))
+
+    def step(self, time, step):
+        self.slave.doStep(time, step)
+
+
+def motion(name, *orders):
+    """Return the names of the coordinates of a motion."""
+    coordinates = ("x", "y", "z", "roll", "pitch", "yaw")
+    return [f"{name}.{order}.{coordinate}" for order in orders for coordinate in coordinates]
+
+
+def each(name, count):
+    """Return the names of the numbers of a list."""
+    return [name.format(i + 1) for i in range(count)]
