@@ -39,7 +39,8 @@ def plan(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="NetCDF file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of both files, and "
+            help="NetCDF (.nc) or MCAP (.mcap) file to write; default: ROBOT-TASK.nc in this folder, from the `name` "
+            "keys of both files, and "
             "ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing file is "
             "overwritten."
         ),
@@ -118,7 +119,7 @@ def plan(
 
     loaded, read = load(robot), read_task(task)
     usual = f"{loaded.name}-{read.name}"
-    target = check_ending("--out", out or Path(f"{usual}.nc"), ".nc")
+    target = check_ending("--out", out or Path(f"{usual}.nc"), ".nc", ".mcap")
     if report is not None:
         check_ending("--report", report, ".html", ".htm")
     drawn = figures and figures / f"path.{form}"

@@ -102,8 +102,8 @@ def simulate(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="NetCDF file to write; default: PLAN-flight.nc in this folder, with --runs PLAN-flights.nc. An "
-            "existing file is overwritten."
+            help="NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default: PLAN-flight.nc in this folder, "
+            "with --runs PLAN-flights.nc. An existing file is overwritten."
         ),
     ] = None,
     figures: Annotated[
@@ -148,7 +148,9 @@ def simulate(
         if not os.path.isfile(plan):  # `Path.is_file` raises where the name is too long
             raise InputError(f"{printable(str(plan))}: no such file")
         end = "" if runs is None else "s"
-        target = check_ending("--out", out or Path(f"{plan.stem}-flight{end}.nc"), ".nc")
+        target = check_ending(
+            "--out", out or Path(f"{plan.stem}-flight{end}.nc"), *((".nc",) if runs else (".nc", ".mcap"))
+        )
         outputs = {"the checkpoint": stored, "--out": target, "--animate": animate}
         outputs["--figures"] = figures and figures / f"error{end}.{form}"
         check_outputs(outputs, {"the plan": plan, "--noise": noise})

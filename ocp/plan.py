@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.display import Fact
-from ..base.inputs import check_ending, file_path
-from ..base.netcdf import save_netcdf
 from ..figures.drawn import Filmed
 from ..figures.report import Report, Reported
+from ..models.motion_file import save_motion
 from .reports.report import facts_at_once, headline, report
 from .result import PlanData
 
@@ -47,7 +46,7 @@ class Plan(PlanData, Filmed, Reported):
         return trajectory(self).dataset()
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the trajectory as NetCDF atomically; `xarray.load_dataset` reads it.
+        """Save the trajectory atomically: as NetCDF (.nc), which `xarray.load_dataset` reads, or as MCAP (.mcap).
 
         Raises
         ------
@@ -56,7 +55,7 @@ class Plan(PlanData, Filmed, Reported):
         """
         from .reports.trajectory import trajectory
 
-        return save_netcdf(trajectory(self), check_ending("file", file_path("file", file), ".nc"))
+        return save_motion(self.scenario.robot, trajectory(self), file)
 
     def figures(self) -> dict[str, Figure]:
         """Draw the figures of `plot` by name: `path`, `views`, `tensions`, ...; to show in a notebook.

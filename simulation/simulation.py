@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.display import Fact, tensions_over_time
-from ..base.inputs import check_ending, file_path
-from ..base.netcdf import Contents, Variable, save_netcdf
+from ..base.netcdf import Contents, Variable
 from ..base.text import at_most, quantity
 from ..control import ANSWERS
 from ..figures.drawn import Filmed
 from ..figures.outlines import outline_variables
 from ..figures.report import Report, Reported, Section
 from ..models.dimensions import dimensions, motion_variables, over
+from ..models.motion_file import save_motion
 from ..models.parsing import to_yaml
 from .data import SimulationData
 from .occurrences import occurrences, sentence
@@ -132,14 +132,14 @@ class Simulation(SimulationData, Filmed, Reported):
         return Contents(variables, coordinates, attributes)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the motion as NetCDF atomically; the same seed gives the same bytes.
+        """Save the motion atomically, as NetCDF (.nc) or MCAP (.mcap); the same seed gives the same bytes.
 
         Raises
         ------
         InputError
             If the file cannot be written.
         """
-        return save_netcdf(self._contents(), check_ending("file", file_path("file", file), ".nc"))
+        return save_motion(self.robot, self._contents(), file)
 
     def figures(self) -> dict[str, Figure]:
         """Draw "flight" (error, controller status, wind and carriers over time) and "tensions", by file names."""

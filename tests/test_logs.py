@@ -322,3 +322,41 @@ def test_angles_and_orientations_alone(tmp_path):
     measured = read_measurements(tmp_path / "log.csv")
     assert np.isnan(measured.poses[:, :3]).all()
     np.testing.assert_allclose(points.rotations(measured.poses[:, 3:]), points.rotations(poses[:, 3:]), atol=1e-9)
+
+
+def test_plans_and_simulations_are_written_as_mcap(tmp_path):
+    """What is written is read back: poses and lengths of the robot; cables end where the robot's do."""
+    from mcap.reader import make_reader
+
+    (tmp_path / "lift.yaml").write_text(
+        "name: lift\npath: {kind: line, start: [0, 0, 1], end: [0.3, 0.2, 1.3]}\nduration: 1\n"
+    )
+    done = towline("plan", "ipanema-1", "lift.yaml", "--out", "lift.mcap", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    towline("plan", "ipanema-1", "lift.yaml", "--out", "lift.nc", cwd=tmp_path)
+    done = towline("simulate", "ipanema-1", "lift.nc", "--out", "run.mcap", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    robot = load("ipanema-1")
+    (tmp_path / "map.yaml").write_text("lengths: /cables/joints[*].position\npose: /pose\n")
+    for name, rate in (("lift.mcap", 100), ("run.mcap", 1000)):
+        read = read_measurements(tmp_path / name, fields=tmp_path / "map.yaml")
+        assert np.median(np.diff(read.times)) == pytest.approx(1 / rate, rel=1e-3)
+        np.testing.assert_allclose(read.poses[0], [0, 0, 1, 0, 0, 0], atol=1e-3)
+        np.testing.assert_allclose(read.poses[-1, :3], [0.3, 0.2, 1.3], atol=5e-3)
+        np.testing.assert_allclose(read.lengths, Dynamics(robot).cable_lengths(read.poses), atol=1e-3)
+        with (tmp_path / name).open("rb") as file:
+            messages = [
+                (schema.name, json.loads(message.data)) for schema, _, message in make_reader(file).iter_messages()
+            ]
+        kinds = {kind for kind, _ in messages}
+        assert kinds == {
+            f"foxglove.{kind}" for kind in ("FrameTransforms", "PoseInFrame", "JointStates", "SceneUpdate")
+        }
+        scene = next(message for kind, message in messages if kind == "foxglove.SceneUpdate")
+        (lines,) = scene["entities"][0]["lines"]
+        ends = np.array([[point[axis] for axis in "xyz"] for point in lines["points"]]).reshape(-1, 2, 3)
+        np.testing.assert_allclose(ends[:, 0], robot.home_anchors)
+        np.testing.assert_allclose(ends[:, 1], points.attachments(robot, read.poses[0]), atol=1e-6)
+    done = towline("plan", "ipanema-1", "lift.yaml", "--out", "lift.bag", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "--out must end in .nc or .mcap" in done.stderr
