@@ -23,7 +23,7 @@ setup: .venv/dev.stamp
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/clang-format --dry-run -Werror core/*.h core/*/*.[ch]
+	$(BIN)/clang-format --dry-run -Werror --style=file:core/.clang-format core/*.h core/*/*.[ch] export/fmu/sources/*.[ch]
 
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
