@@ -60,7 +60,7 @@ class Scene:
     cut
         Which cables have been cut, (k, m); None if none are.
     surface
-        Points of the platform's surface, (k, n, 3), whose hull is drawn; None: the attachments.
+        Points of the platform's surface, (k, n, 3), whose hull is drawn; default: the attachments.
     """
 
     title: str

@@ -181,7 +181,7 @@ class Limit(ABC):
         return soft
 
     def during(self, phases: frozenset[int] | None) -> Self:
-        """Return the limit as one that holds in some phases of the task; None: at all times."""
+        """Return the limit as one that holds in some phases of the task, or, for None, at all times."""
         some = copy(self)
         some.phases = phases
         return some

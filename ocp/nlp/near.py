@@ -24,7 +24,7 @@ class Near(Displayed):
     Attributes
     ----------
     holds
-        Where each limit is in force, (limits, points); None: everywhere.
+        Where each limit is in force, (limits, points); default: everywhere.
     """
 
     chosen: np.ndarray
