@@ -1,12 +1,12 @@
 """Paths past obstacles before any program is solved: through holes, round walls; checked by distances of our own."""
 
 from functools import partial
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
 
-from towline.benchmarks.scenes import APART, GATE, LENGTH, QUADROTOR, window
+from towline.benchmarks.scenes import APART, GATE, LENGTH, LOAD, QUADROTOR, TREES, forest, window
 from towline.models import load
 from towline.ocp import Planner, plan
 from towline.ocp.global_path.at_rest import AtRest
@@ -170,21 +170,26 @@ def test_the_same_task_is_planned_again_from_the_last_result():
     np.testing.assert_allclose(second.deviation.q, first.deviation.at(second.deviation.nodes).q, atol=0.01)
 
 
-def test_two_quadrotors_turn_to_fit_between_two_blocks():
-    robot, task = window(2)
-    scenario = lay_out(robot, Task.model_validate(task))
-    path, message = find_global_path(scenario)
+@pytest.mark.parametrize(
+    ("scene", "posts"), [(window(2), GATE), (window(6), GATE), (forest(3), TREES)], ids=["gate-2", "gate-6", "trees-3"]
+)
+def test_teams_squeeze_turn_and_slide_between_posts(scene, posts):
+    robot, task = scene
+    path, message = find_global_path(lay_out(robot, Task.model_validate(task)))
     assert path is not None, message
     platform, carriers = path.space.poses(path.at(np.linspace(0, 1, FINE)))
     blocks = [
-        {"min": [x - size / 2, y - size / 2, -1.5], "max": [x + size / 2, y + size / 2, 1.5]} for x, y, size in GATE
+        {"min": [x - size / 2, y - size / 2, -1.5], "max": [x + size / 2, y + size / 2, 1.5]} for x, y, size in posts
     ]
     for place in blocks:
         assert outside(place, carriers[..., :3]).min() >= QUADROTOR - 1e-6
+        assert outside(place, platform[:, :3]).min() >= LOAD - 1e-6
     cables = carriers[..., :3] - platform[:, None, :3]
     np.testing.assert_allclose(np.linalg.norm(cables, axis=2), LENGTH, atol=1e-12)
-    assert np.linalg.norm(carriers[:, 0, :3] - carriers[:, 1, :3], axis=1).min() >= APART - 1e-6
-    assert np.abs(cables.sum(axis=1)[:, :2]).max() < 1e-3  # equal pulls: the load hangs still
+    for i, j in combinations(range(len(robot.carriers)), 2):
+        assert np.linalg.norm(carriers[:, i, :3] - carriers[:, j, :3], axis=1).min() >= APART - 1e-6
+    if len(robot.carriers) == 2:
+        assert np.abs(cables.sum(axis=1)[:, :2]).max() < 1e-3  # equal pulls: the load hangs still
 
 
 def past_a_pillar(half=1.35, **base):

@@ -143,14 +143,25 @@ class AtRest:
                 arguments[-1][:] = off_path[row]
             evaluate()
             table[row] = values
-        slack = np.empty((n, len(checked)))
         at = np.zeros(n)
-        for column, (_, limit, place, unit) in enumerate(checked):
-            value = table[:, place] if type(limit).over is Limit.over else limit.over(at, table[:, place])
-            kept = np.minimum(value - limit.low, limit.high - value).min(axis=1) * unit
-            slack[:, column] = np.where(np.isnan(kept), -np.inf, kept)
+        for _, limit, place, _ in checked:
+            if type(limit).over is not Limit.over:
+                table[:, place] = limit.over(at, table[:, place])
+        columns, owner, low, high, unit = self._columns
+        table = table[:, columns]
+        slack = np.minimum(table - low, high - table) * unit
+        slack[np.isnan(slack)] = -np.inf
         least = slack.argmin(axis=1)
-        return slack[np.arange(n), least], np.array([checked[k][0] for k in least])
+        return slack[np.arange(n), least], owner[least]
+
+    @cached_property
+    def _columns(self) -> tuple[np.ndarray, ...]:
+        """Return which values are checked, the limit of each, its bounds, and metres per unit of it, (k,) each."""
+        columns = [np.arange(place.start, place.stop) for _, _, place, _ in self._checked]
+        each = [(k, limit.low, limit.high, unit) for k, limit, _, unit in self._checked]
+        counts = [len(its) for its in columns]
+        owner, low, high, unit = (np.repeat(part, counts) for part in zip(*each, strict=True))
+        return np.concatenate(columns), owner, low, high, unit
 
 
 def unsure(slack: np.ndarray, points: np.ndarray, slope: float = 1.0) -> np.ndarray:

@@ -20,6 +20,7 @@ ANYWHERE = 0.3  # share of the formations that are to fit elsewhere than in its 
 FORMATIONS = 32  # in each generation of a formation that fits
 SPREADS = (0.4, 0.28, 0.2, 0.14, 0.1, 0.07, 0.05, 0.03)  # of their changes, a generation each
 MOVED = 0.2  # of the robot's size: how far the platform moves for a change of one
+AHEAD = 0.1  # of the robot's size: a step past an obstacle
 NARROW = 0.03  # of the robot's size: gaps much narrower do not count for more
 
 
@@ -100,6 +101,35 @@ class ClearSpace:
         step = np.where(shape, 1.0, MOVED * space.size / space.scale)
         found, slack = grown(space, tried, lambda each: self._evaluate(each)[0], step, rng)
         return found if slack >= 0.0 else None
+
+    def fitting(self, rng: Generator) -> np.ndarray | None:
+        """Return a configuration in the way of the direct motion, or near it, whose formation is clear; or None."""
+        about = rng.choice(self._in_the_way) if len(self._in_the_way) else self.space.sample(rng)
+        return self._fitting(about, rng)
+
+    def beside(self, at: np.ndarray, target: np.ndarray, rng: Generator) -> np.ndarray | None:
+        """Return a clear configuration near `at` from which a step to `target` has the most space; None if none has."""
+        space = self.space
+        way = (target - at) * space.scale
+        length = float(np.linalg.norm(way))
+        if length == 0.0:
+            return None
+        ahead = (target - at) * min(1.0, AHEAD * space.size / length)
+        step = np.where(space.groups[-1], 1.0, MOVED * space.size / space.scale)
+        spreads = rng.choice(SPREADS, FORMATIONS)[:, None]
+        tried = at + rng.normal(0.0, 1.0, (FORMATIONS, len(at))) * spreads * step
+        tried[0] = at
+        slack = np.where(space.is_mirrored(tried), -np.inf, self._evaluate(tried)[0])
+        clear = np.flatnonzero(slack >= 0.0)
+        if not clear.size:
+            return None
+        space_ahead = self._evaluate(tried[clear] + ahead)[0]
+        best = int(space_ahead.argmax())
+        return tried[clear[best]] if space_ahead[best] >= 0.0 else None
+
+    def are_clear(self, configurations: np.ndarray) -> bool:
+        """Return whether all configurations (n, count) are clear."""
+        return bool((self._evaluate(configurations)[0] >= 0.0).all())
 
     def advance(self, start: np.ndarray, end: np.ndarray) -> np.ndarray:
         """Return the farthest configuration on the straight line from `start`, which is clear, to `end`."""

@@ -22,6 +22,7 @@ from ..tasks.scenario import Scenario
 from .at_rest import AtRest
 from .clear_space import ClearSpace
 from .end_formations import with_clear_ends
+from .one_formation import in_one_formation
 from .need import STILL, limit_name
 from .smoothing import rounded, shortened
 from .space import Space
@@ -29,7 +30,8 @@ from .tree import connect
 
 RESERVES = (0.02, 0.004)  # of the robot's size, in the order in which they are tried
 MOST_RESERVE = 0.05  # [m]
-MOST = (20_000, 30_000)  # configurations that are evaluated with each reserve
+MOST, MOST_OF_TEAM = (20_000, 30_000), (5_000, 60_000)  # configurations that are evaluated with each reserve
+IN_ONE_FORMATION = 0.2  # of the configurations
 AGAIN = 1.0  # of what the first path took: what is spent on a shorter one, past other sides of obstacles
 PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a unit of length in a unit of time
 
@@ -91,23 +93,29 @@ def find_global_path(scenario: Scenario, seconds: float = np.inf, seed: int = 0)
     for end, slack, worst in zip(("start", "end"), kept.slack, kept.worst, strict=True):
         if slack < -STILL:
             return None, f"no path, since the {end} exceeds {limit_name(scenario, int(worst))} too"
-    for part, most in zip(RESERVES, MOST, strict=True):
+    budgets = MOST_OF_TEAM if space.shaped else MOST
+    for part, most in zip(RESERVES, budgets, strict=True):
         rng = np.random.default_rng(seed)
         clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE), most, deadline)
         found = _connected(clear, rng)
-        if found is not None:
+        if found is not None and not space.shaped:
             clear.most = clear.evaluated + min(AGAIN * clear.evaluated, most)
             shorter = _connected(clear, rng, found.length)
             if shorter is not None and shorter.length < found.length:
                 found = shorter
+        if found is not None:
             inside = f"all limits kept by {quantity(1e3 * clear.reserve, 'mm', 3)}"
             return found, f"a path of {quantity(found.length, 'm', 3)}, {inside}"
         if not clear.in_time:
             return None, "no path found in its share of the time limit"
-    return None, f"no path found among {sum(MOST)} configurations"
+    return None, f"no path found among {sum(budgets)} configurations"
 
 
 def _connected(clear: ClearSpace, rng: np.random.Generator, longest: float = np.inf) -> GlobalPath | None:
-    """Return a path that is made shorter and smoother, from configurations which one of this length may pass."""
-    path = connect(clear, clear.targets(rng, longest))
+    """Return a path, made shorter and smoother, from configurations which one of this length may pass."""
+    path, (start, end) = None, clear.space.ends
+    if clear.space.shaped:
+        path = in_one_formation(clear, rng, IN_ONE_FORMATION * (clear.most - clear.evaluated))
+    if path is None:
+        path = connect(clear, start, end, clear.targets(rng, longest), slides=rng if clear.space.shaped else None)
     return None if path is None else GlobalPath(clear.space, rounded(shortened(path, clear, rng), clear))

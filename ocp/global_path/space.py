@@ -129,6 +129,12 @@ class Space(Displayed):
         return self.offsets[:, :2]
 
     @cached_property
+    def _shares(self) -> np.ndarray:
+        """Return the share of each attachment in the middle of those of a loose carrier, (k, m)."""
+        own = self.scenario.robot.carrier_of_cable == np.array(self.loose)[:, None]
+        return own / own.sum(axis=1, keepdims=True)
+
+    @cached_property
     def largest_shape(self) -> float:
         """Return the largest factor of the formation's horizontal size that its distances permit."""
         flat, long = np.linalg.norm(self._flat, axis=1), np.linalg.norm(self.offsets, axis=1)
@@ -225,7 +231,7 @@ class Space(Displayed):
         """Return where the loose carriers are, (n, k, 3) [m]."""
         robot = self.scenario.robot
         _, attachments = self.scenario.dynamics.points(platform, self.references[1][0])
-        middles = np.stack([attachments[:, robot.carrier_of_cable == i].mean(axis=1) for i in self.loose], axis=1)
+        middles = np.einsum("km,nmi->nki", self._shares, attachments)
         turn = platform[:, 5] - self.references[0][0, 5]
         if self.turns:
             turn = turn + shape[:, 3]

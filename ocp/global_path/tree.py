@@ -9,6 +9,7 @@ import numpy as np
 
 from .clear_space import ClearSpace
 
+SLIDES = 6  # past obstacles on the way to one target
 LONGEST = 0.4  # of the distance of both ends: steps of the trees
 
 
@@ -17,6 +18,26 @@ class _Tree:
 
     def __init__(self, root: np.ndarray, clear: ClearSpace):
         self._clear, self.nodes, self.parents = clear, root[None].copy(), [-1]
+
+    def slide(self, index: int, target: np.ndarray, rng: np.random.Generator) -> int:
+        """Return the node that is reached from node `index` towards the position of `target`, past what is in the way.
+
+        Formation and position give way to each obstacle by a little.
+        """
+        formation = self._clear.space.groups[-1]
+        for _ in range(SLIDES):
+            at = self.nodes[index]
+            beside = self._clear.beside(at, np.where(formation, at, target), rng)
+            if beside is None or not np.array_equal(self._clear.advance(at, beside), beside):
+                break
+            index = self.add(beside, index)
+            ahead = np.where(formation, beside, target)
+            reached = self._clear.advance(beside, ahead)
+            if not np.array_equal(reached, beside):
+                index = self.add(reached, index)
+            if np.array_equal(reached, ahead):
+                break
+        return index
 
     def nearest(self, target: np.ndarray) -> int:
         return int((((self.nodes - target) * self._clear.space.scale) ** 2).sum(axis=1).argmin())
@@ -52,22 +73,34 @@ class _Tree:
         return path
 
 
-def connect(clear: ClearSpace, targets: Iterator[np.ndarray]) -> np.ndarray | None:
+def connect(
+    clear: ClearSpace,
+    start: np.ndarray,
+    end: np.ndarray,
+    targets: Iterator[np.ndarray],
+    most: float = np.inf,
+    slides: np.random.Generator | None = None,
+) -> np.ndarray | None:
     """Return clear configurations (k, count), each reached straight from the one before; None if none are found.
 
-    The trees grow from start and end to `targets`.
+    The trees grow from start and end to `targets`, until at `most` so many configurations have been evaluated. With
+    `slides`, a source of random numbers, they go past what is in the way of a target too.
     """
-    (start, end), scale = clear.space.ends, clear.space.scale
+    scale, most = clear.space.scale, min(clear.evaluated + most, clear.most)
     if np.array_equal(clear.advance(start, end), end):
         return np.stack([start, end])
     near, far, swapped = _Tree(start, clear), _Tree(end, clear), False
     longest = LONGEST * float(np.linalg.norm((end - start) * scale))
-    while clear.evaluated < clear.most and clear.in_time:
+    formation = clear.space.groups[-1] & clear.space.shaped
+    while clear.evaluated < most and clear.in_time:
         target = next(targets)
         parent = near.nearest(target)
         apart = float(np.linalg.norm((target - near.nodes[parent]) * scale))
-        target = near.nodes[parent] + (target - near.nodes[parent]) * min(1.0, longest / max(apart, 1e-12))
+        part = np.where(formation, 1.0, min(1.0, longest / max(apart, 1e-12)))  # of a way; a formation is good or not
+        target = near.nodes[parent] + (target - near.nodes[parent]) * part
         new = near.grow(parent, target)
+        if slides is not None and not np.array_equal(near.nodes[new], target):
+            new = near.slide(new, target, slides)
         if new != parent:
             reached = near.nodes[new]
             other = far.grow(far.nearest(reached), reached)

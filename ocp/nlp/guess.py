@@ -111,8 +111,9 @@ def with_tilts(
 ) -> np.ndarray:
     """Return the poses of carriers (n, c, 6), tilted as their efforts balance motion, weight and cables if they may."""
     robot, carriers = scenario.robot, carriers.copy()
+    owners = robot.carrier_of_cable
     for i in {owner for owner, coordinate in scenario.carrier_free if coordinate == 3}:
-        cables = robot.carrier_of_cable == i
+        cables = owners == i
         pull = -np.einsum("nij,nj->ni", A[:, :3, cables], tensions[:, cables])
         tilt = robot.carriers[i].balanced_tilt(carriers[:, i], acceleration[:, i], pull, np.array(robot.gravity))
         if tilt is not None:
