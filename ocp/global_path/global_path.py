@@ -22,8 +22,8 @@ from ..tasks.scenario import Scenario
 from .at_rest import AtRest
 from .clear_space import ClearSpace
 from .end_formations import with_clear_ends
-from .one_formation import in_one_formation
 from .need import STILL, limit_name
+from .one_formation import in_one_formation
 from .smoothing import rounded, shortened
 from .space import Space
 from .tree import connect

@@ -229,7 +229,6 @@ class Space(Displayed):
 
     def _formation(self, platform: np.ndarray, shape: np.ndarray) -> np.ndarray:
         """Return where the loose carriers are, (n, k, 3) [m]."""
-        robot = self.scenario.robot
         _, attachments = self.scenario.dynamics.points(platform, self.references[1][0])
         middles = np.einsum("km,nmi->nki", self._shares, attachments)
         turn = platform[:, 5] - self.references[0][0, 5]
