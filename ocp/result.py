@@ -20,6 +20,7 @@ from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
+from .warnings.between_points import between_points
 from .warnings.inside_bodies import into_each_other, into_places
 from .warnings.instants import Instants
 from .warnings.leaves_its_points import leaves_its_points
@@ -187,7 +188,9 @@ class PlanData(Displayed):
         audit, scenario = self.audit, self.scenario
         some = slice(None, None, max(len(audit.times) // MOST_WARNED, 1))
         seen = Instants(scenario.dynamics, audit.times[some], audit.motion.pose[some], audit.carriers.pose[some])
-        inside = into_places(seen, scenario.limits.all, [values[some] for values in audit.limited])
+        limited = [values[some] for values in audit.limited]
+        inside = into_places(seen, scenario.limits.all, limited)
+        inside += between_points(seen, scenario.limits.all, limited)
         others = (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))
         return (*leaves_its_points(scenario.task.path), *inside, *others)
 

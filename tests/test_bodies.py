@@ -216,7 +216,12 @@ def test_a_post_between_the_attachments_is_seen_and_avoided():
         "steps": 40,
         "limits": {"keep_out": [{"kind": "capsule", "name": "post", **POST, "radius": 0.02, "cables": None}]},
     }
-    assert plan("cogiro", task).feasible
+    points = plan("cogiro", task)
+    assert points.feasible
+    [warning] = points.warnings
+    assert warning.startswith("'post' passes between the points of the platform: it is 0.22 m inside the hull of")
+    beside = task | {"path": {"kind": "line", "start": [-3, 0.55, 2], "end": [3, 0.55, 2]}}
+    assert not plan("cogiro", beside).warnings
     robot = with_body(BOX)
     seen = plan(robot, task)
     assert seen.status == "infeasible"

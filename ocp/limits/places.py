@@ -29,7 +29,7 @@ class Outside(Distance):
     per_metre = 1.0
 
     def __init__(self, place: Place, called: str, riding: bool, least: float):
-        self._place, self.called, self._riding, self.low = place, called, riding, least
+        self.place, self.called, self._riding, self.low = place, called, riding, least
         self.thickness = place.thickness
         if riding:  # what is far from the platform moves farther in its frame than its points in {G}
             self.per_metre = np.inf
@@ -55,7 +55,7 @@ class Outside(Distance):
     @override
     def apart(self, pair: Pair) -> ca.SX:
         outside = point_outside if pair.points.shape[1] == 1 else cable_outside
-        return outside(self._place, *ca.horzsplit(pair.points))
+        return outside(self.place, *ca.horzsplit(pair.points))
 
 
 class _PointsOutside(Outside):
@@ -72,7 +72,7 @@ class _PointsOutside(Outside):
     @override
     def on_the_way(self, first: State, second: State) -> ca.SX:
         ways = zip(ca.horzsplit(self._points_of(first)), ca.horzsplit(self._points_of(second)), strict=True)
-        return ca.vertcat(*(cable_outside(self._place, *way) for way in ways))
+        return ca.vertcat(*(cable_outside(self.place, *way) for way in ways))
 
 
 class PlatformOutside(_PointsOutside):
