@@ -37,8 +37,8 @@ OF_BODY = ("cable_platform_clearance", "carrier_platform_clearance")
 class KeepOut(Part):
     """The base of all keep-out regions: the clearances of platform, carriers and cables.
 
-    The platform is represented by its CoM and its attachments, a cable by the line between its ends, and a moving
-    carrier by its origin. The default clearance of a carrier is the radius of its body, so that the rotors of a
+    The platform is its body, or without one its CoM and its attachments, a cable is the line between its ends, and a
+    moving carrier its origin. The default clearance of a carrier is the radius of its body, so that the rotors of a
     quadrotor do not touch the region; a number replaces the radius. A region in the frame of the platform moves with it
     and keeps the platform's body clear of cables and carriers, by the limits cable_platform_clearance and
     carrier_platform_clearance. Cables end at their attachments, so such a body must not contain these.
