@@ -20,6 +20,11 @@ void towline_facets(const towline_matrices *matrices, const double *low, const d
     BEST_FORM(facets_of_rows, matrices, low, high, normals, least, most);
 }
 
+void towline_margins(const towline_matrices *matrices, const double *w, ptrdiff_t w_per, const double *low,
+                     const double *high, double *margins, double *reserves) {
+    BEST_FORM(margins_of_rows, matrices, w, w_per, low, high, margins, reserves);
+}
+
 static double dot(const double *x, const double *y, int n) {
     double total = 0;
     for (int i = 0; i < n; i++) {

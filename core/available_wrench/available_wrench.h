@@ -24,6 +24,18 @@ ptrdiff_t towline_facets_of(int n, int m);
 void towline_facets(const towline_matrices *matrices, const double *low, const double *high, double *normals,
                     double *least, double *most);
 
+/* Most cables of `towline_margins`: it keeps a number for each set of them. */
+enum { TOWLINE_MARGIN_CABLES = 10 };
+
+/*
+ * Compute the capacity margin of wrenches, count x n, or of one for all if `w_per` is 0 instead of n: the least of the
+ * reserves along all normals, negative outside the set; m >= n. It is nan near a matrix without n independent columns,
+ * and where a facet decides whose columns nearly depend on each other: `towline_facets` is exact there. The reserves,
+ * count x facets in the order of `towline_facets`, may be NULL; they are infinite where the columns are dependent.
+ */
+void towline_margins(const towline_matrices *matrices, const double *w, ptrdiff_t w_per, const double *low,
+                     const double *high, double *margins, double *reserves);
+
 /*
  * Find whether each matrix has n independent columns, by QR with column pivoting, 1 or 0: a column counts as dependent
  * if less than `tolerance` of the longest one is left of it.

@@ -1,8 +1,10 @@
-/* Facets of rows for processors with AVX2. */
+/* Facets and margins of rows for processors with AVX2. */
 #include "numbers/avx2.h"
 
 #ifdef TOWLINE_X86
 #include "numbers/lanes.h"
-/* This needs `num`. */
+/* These need `num`. */
 #include "available_wrench/facets_in_lanes.h"
+
+#include "available_wrench/margins_in_lanes.h"
 #endif

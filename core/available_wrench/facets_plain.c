@@ -1,4 +1,4 @@
-/* Facets of rows for every processor of its kind; without vectors one matrix after another. */
+/* Facets and margins of rows for every processor of its kind; without vectors one matrix after another. */
 #include "numbers/plain.h"
 
 #ifdef TOWLINE_NO_LANES
@@ -6,5 +6,7 @@
 #else
 #include "numbers/lanes.h"
 #endif
-/* This needs `num`. */
+/* These need `num`. */
 #include "available_wrench/facets_in_lanes.h"
+
+#include "available_wrench/margins_in_lanes.h"

@@ -46,6 +46,31 @@ PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssi
     return none_or_refusal(&given, fits);
 }
 
+PyObject *towline_py_margins(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { A, W, LOW, HIGH, MARGINS, RESERVES, ALL };
+    arrays given;
+    towline_matrices matrices;
+    if (!take(&given, arguments, count, ALL, MARGINS)) {
+        return NULL;
+    }
+    const Py_ssize_t m = given.size[LOW], rows = given.size[MARGINS];
+    const Py_ssize_t n = rows > 0 && m > 0 ? given.size[A] / (rows * m) : 0;
+    int fits = matrices_of(&given, A, n, m, &matrices) && matrices.count == rows && m >= n && given.of[W] &&
+               given.of[HIGH] && m <= TOWLINE_MARGIN_CABLES && given.size[HIGH] == m &&
+               (given.size[W] == n || given.size[W] == n * rows);
+    if (fits && given.of[RESERVES]) {
+        fits = given.size[RESERVES] == rows * towline_facets_of((int)n, (int)m);
+    }
+    if (fits) {
+        Py_BEGIN_ALLOW_THREADS;
+        towline_margins(&matrices, given.of[W], given.size[W] == n ? 0 : n, given.of[LOW], given.of[HIGH],
+                        given.of[MARGINS], given.of[RESERVES]);
+        Py_END_ALLOW_THREADS;
+    }
+    return none_or_refusal(&given, fits);
+}
+
 PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     enum { N, TOLERANCE, BEFORE };

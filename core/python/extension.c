@@ -4,6 +4,7 @@
  */
 #include "python/extension.h"
 
+#include "available_wrench/available_wrench.h"
 #include "distribution/towline_core.h"
 #include "numbers/processor.h"
 #include "robot.h"
@@ -20,6 +21,9 @@ static PyMethodDef functions[] = {
     {"facets", (PyCFunction)(void (*)(void))towline_py_facets, METH_FASTCALL,
      "facets(A, low, high, normals, least, most)\n--\n\n"
      "Compute normals orthogonal to n - 1 columns, and the least and the most that tensions give along them."},
+    {"margins", (PyCFunction)(void (*)(void))towline_py_margins, METH_FASTCALL,
+     "margins(A, w, low, high, margins, reserves)\n--\n\n"
+     "Compute capacity margins, and the reserves along all normals unless None; w has as many rows, or one."},
     {"full_rank", (PyCFunction)(void (*)(void))towline_py_full_rank, METH_FASTCALL,
      "full_rank(n, tolerance, A, full)\n--\n\n"
      "Find whether matrices of n rows have n independent columns, 1 or 0."},
@@ -107,6 +111,7 @@ PyMODINIT_FUNC PyInit__core(void) {
     if (module && (PyModule_AddIntConstant(module, "CABLES", TOWLINE_CABLES) < 0 ||
                    PyModule_AddIntConstant(module, "ROWS", TOWLINE_ROWS) < 0 ||
                    PyModule_AddIntConstant(module, "ROBOT_BYTES", (long)sizeof(towline_robot)) < 0 ||
+                   PyModule_AddIntConstant(module, "MARGIN_CABLES", TOWLINE_MARGIN_CABLES) < 0 ||
                    PyModule_AddIntConstant(module, "MOST_CABLES", TOWLINE_MOST_CABLES) < 0 ||
                    PyModule_AddIntConstant(module, "PROCESSOR", towline_processor()) < 0 ||
                    PyModule_AddIntConstant(module, "MOST_CARRIERS", TOWLINE_MOST_CARRIERS) < 0)) {

@@ -12,6 +12,7 @@ PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py
 PyObject *towline_py_finite(PyObject *module, PyObject *array);
 
 /* available_wrench.c */
+PyObject *towline_py_margins(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 

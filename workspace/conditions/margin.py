@@ -7,7 +7,7 @@ from pydantic import Field
 
 from ...models import Robot
 from ...models.part import Finite
-from ...solvers.available_wrench import facets
+from ...solvers.margins import margins
 from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
 from ..places import Places, check_places
@@ -37,22 +37,7 @@ class Margin(Condition):
         check_places(robot, places)
         rows = wrench_rows(robot)
         w = scaled(robot, rest_wrench(robot), rows)
-        margins = np.empty(len(places))
+        found = np.empty(len(places))
         for part, A in wrench_matrices(robot, places, rows):
-            margins[part] = _margins(A, w, robot.t_min, robot.t_max)
-        return margins
-
-
-def _margins(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:
-    margins = np.full(len(A), -np.inf)
-    real = np.isfinite(A).all(axis=(1, 2))
-    if not real.all():
-        margins[real] = _margins(A[real], w, t_min, t_max)
-        return margins
-    walls = facets(A, t_min, t_max)
-    along = walls.normals @ w
-    inside = np.minimum(walls.high - along, along - walls.low).min(axis=1)
-    beside = np.linalg.norm((walls.outside @ (w - walls.offset)[..., None])[..., 0], axis=1)
-    return np.where(
-        beside > 1e-9 * max(float(np.linalg.norm(w)), 1e-9), -np.hypot(beside, np.minimum(inside, 0.0)), inside
-    )
+            found[part] = margins(A, w, robot.t_min, robot.t_max)
+        return found
