@@ -6,7 +6,7 @@ import pytest
 from towline import load, plan
 from towline.ocp.nlp.guess import initial_guess, usual_guess
 from towline.ocp.nlp.linear import LinearDistances
-from towline.ocp.nlp.near import Near, is_local
+from towline.ocp.nlp.near import Near, is_local, parts
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.planner import Planner
@@ -33,7 +33,12 @@ def test_rows_of_far_places_are_left_out():
     whole = build(scenario, mesh)
     guess = initial_guess(scenario, whole.shares * scenario.duration)
     near = Near.along(scenario, whole.shares, guess, 0.05)
-    ball, far = (near.chosen[k] for k, limit in enumerate(scenario.limits) if is_local(limit))
+    its = [part for part in parts(scenario.limits) if is_local(scenario.limits.all[part[0]])]
+    points = 1 + scenario.robot.m  # of the platform, each with its own rows: CoM and attachments
+    assert len(its) == 2 * points
+    rows = near.chosen[[parts(scenario.limits).index(part) for part in its]]
+    ball, far = rows[:points].any(axis=0), rows[points:]
+    assert rows[:points].sum() < points * ball.sum()
     assert not far.any()
     assert ball.any()
     assert not ball[0]
@@ -59,7 +64,7 @@ def test_a_jump_over_a_place_between_two_points_is_noticed():
     scenario = scenario_of({**TASK, "limits": {"keep_out": [small]}})
     shares = np.array([0.0, 0.4, 0.6, 1.0])  # the ball is halfway
     guess = initial_guess(scenario, np.linspace(0.0, 1.0, 41) * scenario.duration)
-    nothing = np.array([[not is_local(limit)] * 4 for limit in scenario.limits])
+    nothing = np.array([[not is_local(scenario.limits.all[index])] * 4 for index, _ in parts(scenario.limits)])
     assert not Near(nothing).suffices(scenario, shares, guess)
     assert Near(nothing | (shares == 0.4)).suffices(scenario, shares, guess)  # that interval has rows
     assert Near(nothing[:, :2]).suffices(scenario, shares[:2] / 2, guess)

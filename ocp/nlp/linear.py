@@ -38,9 +38,9 @@ class LinearDistances:
         x, blocks = program.problem["x"], program.blocks
         local, others = blocks[: program.local], blocks[program.local :]
         mapped = [block.mapped for block in local if block.mapped is not None]
-        values = ca.vertcat(*(ca.vec(block.values) for block in local))
+        values = ca.vertcat(ca.MX(0, 1), *(ca.vec(block.values) for block in local))
         self._count = values.numel()
-        slopes = ca.vertcat(*(each.slopes(x.numel()) for each in mapped))
+        slopes = ca.vertcat(ca.MX(0, x.numel()), *(each.slopes(x.numel()) for each in mapped))
         self._expressions = ca.Function("distances", [x], [values, slopes.nz[:]])
         p = ca.MX.sym("p", slopes.nnz() + self._count)
         slopes = ca.MX(slopes.sparsity(), p[: slopes.nnz()])

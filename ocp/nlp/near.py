@@ -4,7 +4,7 @@ Most of a motion is far from most obstacles, and distances cost more than all el
 it leaves out are evaluated once for its solution; if one is exceeded there, the program is solved again with more.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -13,18 +13,21 @@ from ...base.display import Displayed
 from ...models.points import placed
 from ..limits import Limit
 from ..limits.bodies import Inside
+from ..limits.limits import Limits
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 
 
 @dataclass(frozen=True)
 class Near(Displayed):
-    """The points at which a program keeps each limit, (limits, points): of limits that are not local all.
+    """The points at which a program keeps each limit, or each distance of one: of limits that are not local all.
 
     Attributes
     ----------
+    chosen
+        (parts, points), see `parts`.
     holds
-        Where each limit is in force, (limits, points); default: everywhere.
+        Where each is in force, (parts, points); default: everywhere.
     """
 
     chosen: np.ndarray
@@ -48,7 +51,12 @@ class Near(Displayed):
         wide[:, 1:] |= chosen[:, :-1]
         wide[:, :-1] |= chosen[:, 1:]
         holds = _holds(scenario, shares)
-        return cls((wide | [[not is_local(limit)] for limit in scenario.limits]) & holds, holds)
+        of_limits = [[not is_local(scenario.limits.all[index])] for index, _ in parts(scenario.limits)]
+        return cls((wide | of_limits) & holds, holds)
+
+    def __or__(self, other: Self) -> Self:
+        """Return the points of both."""
+        return replace(self, chosen=self.chosen | other.chosen)
 
     @property
     def is_everywhere(self) -> bool:
@@ -57,7 +65,7 @@ class Near(Displayed):
 
     @property
     def between(self) -> np.ndarray:
-        """Return which limits hold from each point to the next, (limits, points - 1)."""
+        """Return what holds from each point to the next, (parts, points - 1)."""
         holds = np.ones_like(self.chosen) if self.holds is None else self.holds
         return holds[:, 1:] & holds[:, :-1]
 
@@ -67,6 +75,15 @@ class Near(Displayed):
         left_out = ~self.chosen
         between = left_out[:, 1:] & left_out[:, :-1] & (slack[:, 1:] + slack[:, :-1] < moved)
         return not ((slack < 0.0) & left_out).any() and not between.any()
+
+
+def parts(limits: Limits) -> list[tuple[int, slice]]:
+    """Return, for each row of `Near.chosen`, the index of its limit, and which values of it the row is about.
+
+    Of distances from a region each has a row of its own: where one cable is near, most others are not.
+    """
+    counts = [len(limit.labels) if is_local(limit) and _is_of_place(limit) else 1 for limit in limits]
+    return [(index, slice(i, None, count)) for index, count in enumerate(counts) for i in range(count)]
 
 
 def is_local(limit: Limit) -> bool:
@@ -79,9 +96,9 @@ def _is_of_place(limit: Limit) -> bool:
 
 
 def _holds(scenario: Scenario, shares: np.ndarray) -> np.ndarray:
-    """Return where each limit is in force, (limits, points)."""
+    """Return where each part of a limit is in force, (parts, points)."""
     holds = [scenario.in_force(limit, shares * scenario.duration) for limit in scenario.limits]
-    return np.array(holds, dtype=bool).reshape(-1, len(shares))
+    return np.array([holds[index] for index, _ in parts(scenario.limits)], dtype=bool).reshape(-1, len(shares))
 
 
 def has_places(scenario: Scenario) -> bool:
@@ -90,7 +107,7 @@ def has_places(scenario: Scenario) -> bool:
 
 
 def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return how local limits are kept at shares of a motion, (limits, points) [m]: infinite slack for all others.
+    """Return how local limits are kept at shares of a motion, (parts, points) [m]: infinite slack for all others.
 
     Then what any point of platform or carriers moves from one share to the next, (points - 1,) [m], and the largest
     distance of two places of the same point [m], at least; at most sqrt(3) times less.
@@ -99,10 +116,13 @@ def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np
     platform, carriers = lasting.motion(shares * lasting.duration, motion)
     corners = placed(platform.pose, scenario.body_corners)
     points = np.concatenate([*scenario.dynamics.points(platform.pose, carriers.pose), corners], axis=1)
-    slack = np.full((len(lasting.limits.all), len(shares)), np.inf)
-    for row, limit, values in zip(slack, lasting.limits, lasting.limits.along(platform, carriers), strict=True):
+    slack, values = [], lasting.limits.along(platform, carriers)
+    for index, picked in parts(lasting.limits):
+        limit, its = lasting.limits.all[index], values[index][:, picked]
+        row = np.full(len(shares), np.inf)
         if is_local(limit):
-            row[:] = np.minimum(values - limit.low, limit.high - values).min(axis=1)
+            row = np.minimum(its - limit.low, limit.high - its).min(axis=1)
             row[~lasting.in_force(limit, shares * lasting.duration)] = np.inf
+        slack.append(row)
     moved = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1, initial=0.0)
-    return slack, moved, float(np.ptp(points, axis=0).max())
+    return np.array(slack).reshape(-1, len(shares)), moved, float(np.ptp(points, axis=0).max())

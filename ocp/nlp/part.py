@@ -1,6 +1,7 @@
 """`Part`: a node or an interval of a program as functions of its columns, which `part_of` makes of expressions."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import chain
 from typing import NamedTuple, TypeAlias
 
@@ -25,13 +26,13 @@ class Part(NamedTuple):
     rows
         Names and bounds of these.
     local
-        Index of each local limit, the function of its values, and its rows.
+        Index of each local limit, what returns the function of some of its values, and its rows.
     """
 
     cost: ca.Function
     function: ca.Function
     rows: list[Row]
-    local: list[tuple[int, ca.Function, list[Row]]]
+    local: list[tuple[int, Callable[[list[int]], ca.Function], list[Row]]]
 
 
 def part_of(
@@ -50,12 +51,18 @@ def part_of(
     local = []
     for index, (values, rows) in of_limits:
         if is_local(limits.all[index]):
-            local.append((index, function_of("near", unknowns, parameters, ca.vertcat(*values)), rows))
+            local.append((index, partial(_function_of_some, unknowns, parameters, ca.vertcat(*values)), rows))
         else:
             constraints.append((values, rows))
     values, rows = ([*chain(*parts)] for parts in zip(*constraints, strict=True))
     function = function_of(name, unknowns, parameters, ca.vertcat(*values))
     return Part(function_of(f"{name}_cost", unknowns, parameters, cost), function, rows, local)
+
+
+def _function_of_some(
+    unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], values: ca.SX, picked: list[int]
+) -> ca.Function:
+    return function_of("near", unknowns, parameters, values[picked])
 
 
 def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> ca.Function:

@@ -32,7 +32,6 @@ from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths import RestPath, WaypointPath
 from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
-from ..tasks.scheme import Scheme
 from .columns import Columns
 from .derivatives import Block, Mapped, derivatives
 from .grid import Grid
@@ -40,7 +39,7 @@ from .held import eased, held_wrench
 from .interval import interval_of, points
 from .layout import DURATION, MARGIN, Layout
 from .leaving import leaving_rows
-from .near import Near
+from .near import Near, parts
 from .node import node_of
 from .part import Part
 from .rows import Mesh, Row, stretch
@@ -189,7 +188,7 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         objective += ca.dot(cost.values, ca.DM(weights).T)
 
     everywhere, between = columns.at_nodes(node.function), columns.between(interval.function)
-    local = _near_rows(near, scheme, node, interval, columns)
+    local = _near_rows(scenario, near, node, interval, columns)
     blocks = [
         *local,
         Block(everywhere.values, node.rows, np.arange(len(times)) // scheme.size, everywhere),
@@ -240,19 +239,24 @@ def _made_to_vary(scenario: Scenario, references: np.ndarray) -> np.ndarray:
     return np.hstack([references, references + varies.reshape(-1, 1)])
 
 
-def _near_rows(near: Near, scheme: Scheme, node: Part, interval: Part, columns: Columns) -> list[Block]:
+def _near_rows(scenario: Scenario, near: Near, node: Part, interval: Part, columns: Columns) -> list[Block]:
     """Return the rows of local limits where they are near, at nodes and between them."""
-    blocks, size = [], scheme.size
+    blocks, size = [], scenario.scheme.size
     windows: np.ndarray = np.lib.stride_tricks.sliding_window_view(near.chosen, size + 1, axis=1)
     all_of: np.ndarray = np.lib.stride_tricks.sliding_window_view(near.between, size, axis=1)
     inside = windows[:, ::size].max(axis=2) & all_of[:, ::size].all(axis=2)
     at_nodes, between = (node, columns.at_nodes, near.chosen, size), (interval, columns.between, inside, 1)
+    its_parts = parts(scenario.limits)
     for part, mapped_at, near_to, points_of_stage in (at_nodes, between):
         for index, function, rows in part.local:
-            chosen = np.flatnonzero(near_to[index])
-            if len(chosen):
-                mapped = mapped_at(function, chosen)
-                blocks.append(Block(mapped.values, rows, chosen // points_of_stage, mapped))
+            together: dict[bytes, list[int]] = {}  # values that are near at the same points have one function
+            for i, (of_limit, picked) in enumerate(its_parts):
+                if of_limit == index and near_to[i].any():
+                    together.setdefault(near_to[i].tobytes(), []).extend(range(len(rows))[picked])
+            for where, picked in together.items():
+                chosen = np.flatnonzero(np.frombuffer(where, dtype=bool))
+                mapped = mapped_at(function(picked), chosen)
+                blocks.append(Block(mapped.values, [rows[i] for i in picked], chosen // points_of_stage, mapped))
     return blocks
 
 

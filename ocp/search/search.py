@@ -25,7 +25,8 @@ from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 
-NEAR = 0.3  # of a motion's extent: where a place is, of which a program has rows the first time
+NEAR = 0.08  # of a motion's extent: where a place is, of which a program has rows the first time
+ROUNDS = 4  # of rows that are added where a solution exceeds what the program leaves out; then it has all
 PASSES = 3
 MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
 APPROACHED = 1e-3  # of a distance's scale: what true distances may miss at the end
@@ -109,13 +110,14 @@ class Search:
             if self.seconds_left <= 0:
                 stage.message = f"{ENDS[TIME_LIMIT]} before it began"
                 return self._unsolved(mesh, guess)
-            outcome = self._run(mesh, guess, coarser, NEAR if coarser or clear else np.inf)
-            if (
-                outcome.success
-                and self.seconds_left > 0
-                and not self._solvers[mesh].program.suffices(outcome.deviation)
-            ):
-                outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf)
+            outcome = self._run(mesh, guess, coarser, NEAR if coarser or clear else 2 * NEAR)
+            for added in range(ROUNDS + 1):
+                program = self._solvers[mesh].program
+                if not outcome.success or self.seconds_left <= 0 or program.suffices(outcome.deviation):
+                    break
+                more = program.near | Near.along(self.scenario, program.shares, outcome.deviation, NEAR)
+                # From the guess again: a solution through a region would come out of it on any side.
+                outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf, more if added < ROUNDS else None)
             how = ended(outcome.message)
             stage.message = f"{how} {'in' if how == 'solved' else 'after'} {outcome.iterations} iterations"
             if mesh.elastic:
@@ -163,12 +165,15 @@ class Search:
             return None
         with self.stage(f"program with linear distances, {mesh.steps} steps{slower}") as stage:
             start = time.perf_counter()
-            linear = wait_for(lambda: LinearDistances(build(scenario, mesh)))
-            self.build_s += time.perf_counter() - start
-            motion = initial_guess(scenario, linear.shares * scenario.duration) if guess is None else guess
-            motion = motion.at(linear.shares * motion.nodes[-1])
+            shares = Grid.of(scenario, mesh.steps).shares
+            motion = initial_guess(scenario, shares * scenario.duration) if guess is None else guess
+            motion = motion.at(shares * motion.nodes[-1])
+            near, linear = Near.along(scenario, shares, motion, 2 * NEAR), None
             objective, iterations, missed = np.inf, 0, np.inf
-            for passed in range(PASSES):
+            for passed in range(PASSES + ROUNDS):
+                if linear is None:
+                    linear = wait_for(lambda near=near: LinearDistances(build(scenario, mesh, near)))
+                self.build_s += time.perf_counter() - start
                 start = time.perf_counter()
                 outcome = linear.solve(motion, self._iteration, self.seconds_left)
                 self.solve_s += time.perf_counter() - start
@@ -176,8 +181,13 @@ class Search:
                 stage.message = f"{ended(outcome.message)} after {iterations} iterations in pass {passed + 1}"
                 if not outcome.success:
                     break
+                start = time.perf_counter()
+                if not near.suffices(scenario, shares, outcome.deviation):
+                    near, linear, missed = near | Near.along(scenario, shares, outcome.deviation, NEAR), None, np.inf
+                    continue
                 motion, missed = outcome.deviation, linear.missed(outcome.deviation)
-                if missed <= APPROACHED and outcome.objective > objective - GAIN * abs(objective):
+                settled = missed <= APPROACHED and outcome.objective > objective - GAIN * abs(objective)
+                if settled or passed + 1 >= PASSES:
                     break
                 objective = outcome.objective
         return motion if missed <= USABLE else None
@@ -189,12 +199,19 @@ class Search:
         slack = np.inf if mesh.elastic else 0.0
         return Outcome(motion, float(motion.nodes[-1]), False, TIME_LIMIT, 0, slack, np.nan)
 
-    def _run(self, mesh: Mesh, guess: Deviation | None, coarser: bool, reach: float) -> Outcome:
-        """Run the solver of `mesh`; one that does not exist yet has the regions within `reach`."""
+    def _run(
+        self, mesh: Mesh, guess: Deviation | None, coarser: bool, reach: float, near: Near | None = None
+    ) -> Outcome:
+        """Run the solver of `mesh`; one that does not exist yet has the regions within `reach`.
+
+        With `near` it is made again, with those rows.
+        """
         start, self.mesh = time.perf_counter(), mesh
         known = self._solvers.get(mesh)
         again = known is not None and guess is None and known.has_solution  # continues from there, with its own rows
-        if known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
+        if near is not None:
+            self._solvers[mesh] = wait_for(lambda: Solver(build(self.scenario, mesh, near)))
+        elif known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
             self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach)))
         solver = self._solvers[mesh]
         solver.prepare(guess, coarser)
