@@ -57,6 +57,13 @@ def calibrate(
     outliers: Annotated[
         bool, typer.Option("--outliers/--no-outliers", help="Detect outliers and slipped winches.")
     ] = True,
+    fix: Annotated[
+        bool,
+        typer.Option(
+            "--fix",
+            help="Mend the input error that the log probably has (order of cables, units, conventions, frames).",
+        ),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE.yaml", help="Robot file to write; default: ROBOT-calibrated.yaml in this folder."),
@@ -71,10 +78,11 @@ def calibrate(
     """Estimate anchors, offsets and more from measured cable lengths, and write a calibrated robot file.
 
     The file includes the covariance of its new parameters. Carriers are at home. Nothing is written, and the exit code
-    is 1, if the log probably has an input error (order of cables, units, conventions of angles), the fit did not
-    converge, or validation samples fit worse than with the robot's file.
+    is 1, if the log probably has an input error (order of cables, units, conventions of angles, frames), which --fix
+    mends, if the fit did not converge, or if validation samples fit worse than with the robot's file.
     """
     from ..estimation.calibration import calibrate as find
+    from ..estimation.calibration import mended
     from ..estimation.logs import read_log
     from ..figures.style import FORMATS
     from ..models import load
@@ -90,7 +98,11 @@ def calibrate(
     )
     check_ending("--out", target, ".yaml", ".yml")
     read = read_log(log, stated, poses, loaded, fields)
-    result = find(loaded, read.measurements, "auto" if names == ["auto"] else names, known, outliers)
+    measurements = read.measurements
+    if fix:
+        measurements, texts = mended(loaded, measurements)
+        read.notes.extend(f"mended: {text}" for text in texts)
+    result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     report = result.report()  # before anything is written
     file = None if result.refused else result.save(target)
     pictures = [] if figures is None else result.plot(figures, form)
@@ -100,7 +112,8 @@ def calibrate(
             typer.echo(f"  {note}")
     print_result(as_json, data, lambda: report, [*([] if file is None else [file]), *pictures])
     if result.refused:
-        typer.echo(f"towline: {target} is not written: {result.refused}", err=True)
+        hint = "; --fix mends it" if result.doubt and result.mistake and result.mistake.mended else ""
+        typer.echo(f"towline: {target} is not written: {result.refused}{hint}", err=True)
         raise typer.Exit(1)
 
 

@@ -6,6 +6,7 @@ from .calibration import Calibration
 from .cross_validation import Compared, HeldOut
 from .design import next_poses
 from .outliers import Outlier, Slip
+from .plausibility import Mistake, mended, mistake
 from .result import Parameter
 from .run import calibrate
 
@@ -14,11 +15,14 @@ __all__ = [
     "Compared",
     "HeldOut",
     "Measurements",
+    "Mistake",
     "Outlier",
     "Parameter",
     "Sigma",
     "Slip",
     "calibrate",
+    "mended",
+    "mistake",
     "next_poses",
     "read_measurements",
 ]

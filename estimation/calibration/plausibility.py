@@ -1,4 +1,4 @@
-"""`doubt`: detect input errors of a log before the fit, which would hide them in wrong parameters.
+"""`mistake`: detect input errors of a log before the fit, which would hide them in wrong parameters, and mend them.
 
 With the right order of cables, units and convention of angles, the difference between a cable's length at the measured
 poses and its reading hardly changes: it is the offset plus the effect of a displaced anchor. So other interpretations
@@ -9,20 +9,23 @@ nothing is tried.
 Conventions of angles differ little if the platform turns little. With e the differences of the given log and e' those
 of another convention, of variance s^2, the sum of e^2 - e'^2 is |e - e'|^2 if the other is right, and has the standard
 deviation 2 s |e - e'| (a likelihood ratio). Conventions that cannot be distinguished are named together.
+
+If nothing explains the differences, poses may have been measured in another frame, or of another body (`frames`). Such
+a frame near the file's is named, but not refused, if it explains most of the differences up to an offset.
 """
 
-from collections.abc import Iterator
-from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from ...base.errors import InputError
 from ...base.text import quantity
 from ...models import points
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, measured_poses
+from ..logs.measurements import Measurements, check_measurements, measured_poses
+from .frames import displaced_frames, fitted_frames
 from .geometry import runs
+from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
 
 CLEARLY, VERY_CLEARLY = 1.25, 2.0  # times smaller differences
@@ -33,65 +36,203 @@ EXPLAINED = 0.1  # of the change of the readings, which differences are below if
 MOST_SAMPLES = 400
 FEWEST = 12, 24  # samples of which anchors, and attachments, are taken into account
 LARGEST = 10.0  # times the cables' mean length, of a change of readings
-FACTORS = {1e-3: "millimetres", 1e-2: "centimetres"}
-ANGLES = ("roll", "pitch", "yaw")
+MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
+DISPLACED = 3.0  # times smaller differences, by a frame near the file's
+MOST_MISTAKES = 3
+FAR = 3.0  # times the noise, of differences that are not explained yet
+PLAUSIBLE = 0.03  # of a cable's length, by which its ends may be displaced
+OTHER_FACTOR = 0.1  # from 1 and the usual ones
 
 
-class _Reading(NamedTuple):
-    """An interpretation of the log: the error that it corrects, the poses, and the factor of the readings."""
+class Mistake(NamedTuple):
+    """A probable input error of a log.
 
-    slip: str
+    Attributes
+    ----------
+    text
+        The error, in one line.
+    mended
+        Measurements without it, or None if several errors are equally probable.
+    severe
+        True if a calibration would be wrong, False if it would only mean another frame than the file's.
+    """
+
+    text: str
+    mended: Measurements | None
+    severe: bool = True
+
+
+class _Log(NamedTuple):
+    """Samples with measured poses: the parameters' table, positions, rotations, angles as logged, and readings."""
+
+    robot: Robot
+    table: np.ndarray
     position: np.ndarray
     rotation: np.ndarray
-    factor: float = 1.0
-    turns: bool = False
+    angles: np.ndarray
+    y: np.ndarray
+    sigma: float
+
+    def at(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions and rotations as another way means them."""
+        turned = self.rotation if way.turned is None else way.turned(self.rotation, self.angles)
+        return way.placed(self.position), turned
 
 
-def doubt(robot: Robot, measurements: Measurements) -> str | None:
-    """Return the probable input error of the log, in one line, or None."""
+class _Way(NamedTuple):
+    """An explanation: its size with a penalty for complexity, its size, and what it corrects."""
+
+    weighted: float
+    size: float
+    text: str
+    way: Interpretation
+    columns: np.ndarray
+    signs: np.ndarray
+    several: bool = False
+
+
+def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
+    """Detect the probable input error of a log by the robot's file, before any fit; None if there is none.
+
+    Raises
+    ------
+    InputError
+        If the measurements have another number of cables.
+    """
+    given = check_measurements(robot, measurements)
     parameters = Parameters(robot, ())
     table = parameters.table(parameters.first)
-    position, rotation, known = measured_poses(robot, measurements)
+    position, rotation, known = measured_poses(robot, given)
     rows = np.flatnonzero(known[:, robot.dof_mask > 0].all(axis=1))
     if len(rows) > MOST_SAMPLES:
         rows = rows[np.linspace(0, len(rows) - 1, MOST_SAMPLES).astype(int)]
-    readings = measurements.lengths * table[:, 7]
+    readings = given.lengths * table[:, 7]
     if len(rows) < 4:
-        return _too_large(robot, readings)
-    y, order, sigma = readings[rows], np.arange(robot.m), measurements.sigma.lengths
-    first = _Reading("", position[rows], rotation[rows])
-    e = _left(robot, parameters, first, y, order[:, None])[:, 0]
+        return _too_large(robot, given, readings)
+    angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
+    sigma = given.sigma.lengths
+    log = _Log(robot, table, position[rows], rotation[rows], angles[rows], readings[rows], sigma)
+    order = np.arange(robot.m)
+    lengths, y = _parts(log, Interpretation(""))
+    e = (lengths - y[order, order])[:, : len(rows)]
     noise = sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
-    if _root_mean_square(e) <= noise:
+    if max(map(_root_mean_square, e)) <= sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / len(rows))):
+        return _displaced(log, given, noise)
+    ways, as_given = _explanations(log, e, noise)
+    best = min((way for way in ways if way.text), key=lambda way: way[:2])
+    change = float(np.median(np.abs(log.y - np.median(log.y, axis=0))))
+    named = best.weighted < as_given and best.size < EXPLAINED * change
+    far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
+    if far and len(rows) >= FEWEST[1]:
+        frames = fitted_frames(robot, table, log.position, log.rotation, log.y)
+        moved = frames.of(position, rotation)
+        lengths, y = _parts(log._replace(position=moved[0][rows], rotation=moved[1][rows]), Interpretation(""))
+        size = _rms(_medians(lengths - y[order, order], len(rows)))
+        if VERY_CLEARLY * size < min(as_given, best.size) and size < EXPLAINED * change:
+            return Mistake(_better(str(frames), as_given, size), _mended(given, *moved, order, 1.0))
+    if named:
+        whole = log._replace(position=position, rotation=rotation, angles=angles)
+        mended = (
+            None if best.several else _mended(given, *whole.at(best.way), best.columns, best.signs * best.way.factor)
+        )
+        return Mistake(_better(best.text, as_given, best.size), mended)
+    return None if far else _displaced(log, given, noise)
+
+
+def mended(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
+    """Return measurements without their probable input errors, and these, one line each.
+
+    Raises
+    ------
+    InputError
+        If the measurements have another number of cables, or several errors are equally probable.
+    """
+    texts: list[str] = []
+    for _ in range(MOST_MISTAKES):
+        found = mistake(robot, measurements)
+        if found is None:
+            break
+        if found.mended is None:
+            raise InputError(f"measurements must have one probable error to be mended, got several: {found.text}")
+        texts.append(found.text)
+        measurements = found.mended
+    return measurements, texts
+
+
+def _better(text: str, before: float, after: float) -> str:
+    times = quantity(before / max(after, 1e-12), digits=2)
+    return f"{text}: lengths and poses of the log then agree {times} times better"
+
+
+def _mended(
+    given: Measurements, position: np.ndarray, rotation: np.ndarray, columns: np.ndarray, factors: np.ndarray | float
+) -> Measurements:
+    poses = given.poses
+    if poses is not None:
+        poses = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
+    tensions = None if given.tensions is None else given.tensions[:, columns]
+    return Measurements(given.lengths[:, columns] * factors, poses, None, tensions, given.times, given.sigma._asdict())
+
+
+def _displaced(log: _Log, given: Measurements, noise: float) -> Mistake | None:
+    """Return a frame near the file's in which the poses agree much better with the readings up to offsets, or None."""
+    if log.robot.m < MANY_CABLES or len(log.y) < FEWEST[1] or log.robot.dof_mask.sum() < 6:
         return None
-    given = np.inf
-    ways: list[tuple[float, float, str]] = []
-    turns: list[tuple[np.ndarray, float, str]] = []
-    angles = None if measurements.poses is None else measurements.poses[rows, 3:]
-    for reading in _ways(first, angles):
-        left = _left(robot, parameters, reading, y, np.tile(order, (robot.m, 1))) / abs(reading.factor)
-        as_given, assigned, columns = _sizes(np.median(np.abs(left), axis=2))
-        if not reading.slip:
-            given = as_given
-        elif reading.turns:
-            turns.append((left[order, order], as_given, reading.slip))
+    least = DISPLACED if log.robot.m > MANY_CABLES else 3 * DISPLACED
+    found = displaced_frames(log.robot, log.table, log.position, log.rotation, log.y, least, noise)
+    if found is None:
+        return None
+    frames, before = found
+    position, rotation, _ = measured_poses(log.robot, given)
+    mended = _mended(given, *frames.of(position, rotation), np.arange(log.robot.m), 1.0)
+    return Mistake(_better(str(frames), before, frames.size), mended, severe=False)
+
+
+def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], float]:
+    """Return explanations of differences e (m, N), and the size of these as they are."""
+    from scipy.optimize import linear_sum_assignment
+
+    order, as_given = np.arange(log.robot.m), np.inf
+    ways: list[_Way] = []
+    turns: list[tuple[np.ndarray, _Way]] = []
+    tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
+    base = _parts(log, tried[0])
+    own = base[1][order, order]
+    factor = float((base[0] * own).sum() / max(float((own**2).sum()), 1e-300))
+    if factor > 0 and all(abs(factor / usual - 1) > OTHER_FACTOR for usual in (1.0, *FACTORS)):
+        unit = quantity(factor, "m", 3)
+        tried.append(
+            Interpretation(f"the lengths look like multiples of {unit}, such as a drum's angles", factor=factor)
+        )
+    for way in tried:
+        lengths, y = _parts(log, way) if way.placed is not tried[0].placed or way.turned else base
+        both = np.stack([lengths[:, None] - sign * way.factor * y for sign in (1, -1)]) / way.factor
+        apart = _medians(both, len(log.y))  # (2, m, m): of both signs, of cable i and column j
+        plain, best = np.diag(apart[0]), apart.min(axis=0)
+        columns = linear_sum_assignment(best**2)[1] if np.isfinite(best).all() else order
+        signs = np.where(apart[1, order, columns] < apart[0, order, columns], -1.0, 1.0)
+        same, one = np.ones(len(order)), _rms(plain)
+        if not way.text:
+            as_given = one
+        elif way.turned:
+            other = (lengths - way.factor * y[order, order])[:, : len(log.y)]
+            turns.append((other, _Way(one, one, way.text, way, order, same)))
         else:
-            ways.append((VERY_CLEARLY * as_given, as_given, reading.slip))
-        # Two slips at once are less likely than one.
-        least = 1.0 if not reading.slip else CLEARLY if reading.turns else VERY_CLEARLY
-        ways.append((VERY_CLEARLY * least * assigned, assigned, _and(reading.slip, columns, order)))
+            ways.append(_Way(VERY_CLEARLY * one, one, way.text, way, order, same))
+        if text := _and(way.text, columns, signs):
+            # Two errors at once are less likely than one. What counts are the cables that are read in another way.
+            least = 1.0 if not way.text else CLEARLY if way.turned else VERY_CLEARLY
+            moved = (columns != order) | (signs < 0)
+            gain = _rms(best[order, columns][moved]) / max(_rms(plain[moved]), 1e-300) if moved.any() else 1.0
+            size = _rms(best[order, columns])
+            weighted = VERY_CLEARLY * least * (min(size, gain * as_given) if not way.text else size)
+            ways.append(_Way(weighted, size, text, way, columns, signs))
     likeliest = _likeliest(e, turns)
     if likeliest is not None:
-        other, size, slip = likeliest
         # Errors that are no noise may seem smaller in another convention by chance.
-        ways.append(((1.0 if _root_mean_square(other) <= noise else CLEARLY) * size, size, slip))
-    weighted, size, slip = min(way for way in ways if way[2])
-    change = float(np.median(np.abs(y - np.median(y, axis=0))))
-    if not (weighted < given and size < EXPLAINED * change):
-        return None
-    return (
-        f"{slip}: lengths and poses of the log then agree {quantity(given / max(size, 1e-12), digits=2)} times better"
-    )
+        sure = _root_mean_square(likeliest[0]) <= noise
+        ways.append(likeliest[1]._replace(weighted=(1.0 if sure else CLEARLY) * likeliest[1].size))
+    return ways, as_given
 
 
 def _root_mean_square(e: np.ndarray) -> float:
@@ -110,105 +251,85 @@ def _likelier(e: np.ndarray, other: np.ndarray) -> float:
     return float((one**2).sum() - (two**2).sum()) / max(spread, 1e-300)
 
 
-def _likeliest(e: np.ndarray, turns: list[tuple[np.ndarray, float, str]]) -> tuple[np.ndarray, float, str] | None:
+def _likeliest(e: np.ndarray, turns: list[tuple[np.ndarray, _Way]]) -> tuple[np.ndarray, _Way] | None:
     """Return the convention of angles that is much more likely than the given one, with its equivalents."""
-    best: tuple[np.ndarray, float, str] | None = None
+    best: tuple[np.ndarray, _Way] | None = None
     for turn in turns:
         if _likelier(e if best is None else best[0], turn[0]) > (SIGNIFICANT if best is None else 0.0):
             best = turn
     if best is None:
         return None
-    equals = [text for other, _, text in turns if text != best[2] and _likelier(other, best[0]) < TOLD_APART]
+    other, way = best
+    equals = [one.text for left, one in turns if one.text != way.text and _likelier(left, other) < TOLD_APART]
     if len(equals) > 1:
-        return (*best[:2], "the angles seem to have another convention, which cannot be determined")
-    return (*best[:2], best[2] + "".join(f", or {text.removeprefix('the angles look ')}" for text in equals))
+        unknown = "the angles seem to have another convention, which cannot be determined"
+        return other, way._replace(text=unknown, several=True)
+    also = "".join(f", or {text.removeprefix('the angles look ')}" for text in equals)
+    return other, way._replace(text=way.text + also, several=bool(equals))
 
 
-def _too_large(robot: Robot, readings: np.ndarray) -> str | None:
+def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mistake | None:
     """Return the error if readings (N, m) change more than any cable of the robot can, or None."""
     length = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
     change = float(np.median(np.ptp(readings, axis=0)))
     if change <= LARGEST * length:
         return None
-    return (
-        f"the lengths look like {FACTORS[1e-3]} read as metres: they change by {quantity(change, 'm', digits=3)}, "
-        f"and a cable of {robot.name} is about {quantity(length, 'm', digits=3)} long"
+    text = (
+        f"the lengths look like {FACTORS[1e-3]}: they change by {quantity(change, 'm', digits=3)}, and a cable of "
+        f"{robot.name} is about {quantity(length, 'm', digits=3)} long"
     )
+    position, rotation, _ = measured_poses(robot, given)
+    return Mistake(text, _mended(given, position, rotation, np.arange(robot.m), 1e-3))
 
 
-def _ways(first: _Reading, angles: np.ndarray | None) -> Iterator[_Reading]:
-    """Yield interpretations of the log, the given one first."""
-    yield first
-    position, rotation = first.position, first.rotation
-    for factor, unit in FACTORS.items():
-        yield _Reading(f"the lengths look like {unit} read as metres", position, rotation, factor)
-        yield _Reading(f"the positions look like {unit} read as metres", factor * position, rotation)
-        both = f"lengths and positions look like {unit} read as metres"
-        yield _Reading(both, factor * position, rotation, factor)
-    yield _Reading(
-        "the lengths seem to have the wrong sign, as if their scales were negative", position, rotation, -1.0
-    )
-    if angles is None or not np.ptp(angles, axis=0).any():
-        return
-    whole = Rotation.from_matrix(rotation)
-    x, y, z, w = whole.as_quat().T
-    scalar_first, scalar_last = (
-        Rotation.from_quat(np.column_stack(parts)).as_matrix() for parts in ([y, z, w, x], [w, x, y, z])
-    )
-    turns = {
-        "the angles look like degrees read as radians": points.rotations(np.radians(angles)),
-        "the angles look like radians read as degrees": points.rotations(np.degrees(angles)),
-        "the orientations look inverted, from {G} to the platform": np.swapaxes(rotation, 1, 2),
-        "the quaternions look like (w, x, y, z) read as (x, y, z, w)": scalar_first,
-        "the quaternions look like (x, y, z, w) read as (w, x, y, z)": scalar_last,
-        "the angles look like a rotation vector": Rotation.from_rotvec(angles).as_matrix(),
-    }
-    for axes in permutations("xyz"):
-        for text, columns in ((", ".join(ANGLES), [0, 1, 2]), (", ".join(ANGLES[::-1]), [2, 1, 0])):
-            if "".join(axes) + text == "xyz" + ", ".join(ANGLES):
-                continue  # as they are read
-            about = angles[:, columns]
-            matrices = Rotation.from_euler("".join(axes), about[:, ["xyz".index(axis) for axis in axes]]).as_matrix()
-            turns[f"the angles look like {text} about {', '.join(axes)} of {{G}}, one after the other"] = matrices
-    for slip, matrices in turns.items():
-        yield _Reading(slip, position, matrices, turns=True)
+def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
+    """Return what an offset and displaced ends of cable i explain neither of its lengths nor of the reading of cable j.
 
-
-def _left(robot: Robot, parameters: Parameters, reading: _Reading, y: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Return the differences between the length of cable i and column j, for the columns (m, k), (m, k, N) [m].
-
-    An offset is subtracted and, with enough samples, displacements of anchor and attachment.
+    (m, N + c) and (m, m, N + c) [m]; displaced anchors and attachments are taken into account with enough samples, and
+    the last c columns are what they cost.
     """
-    run = runs(robot, parameters.table(parameters.first), reading.position, reading.rotation)
+    run = runs(log.robot, log.table, *log.at(way))
     explained = [np.ones((*run.lengths.shape, 1))]
-    if len(y) >= FEWEST[0]:
+    if len(log.y) >= FEWEST[0]:
         explained.append(run.directions)
-    if len(y) >= FEWEST[1]:
+    if len(log.y) >= FEWEST[1]:
         explained.append(run.by_geometry[..., 3:6])
-    Q = np.linalg.qr(np.concatenate(explained, axis=2))[0]  # (m, N, c)
-    differences = run.lengths[:, None] - reading.factor * y.T[columns]
-    left = differences - np.matmul(np.matmul(differences, Q), np.swapaxes(Q, 1, 2))
-    return left * np.sqrt(len(y) / (len(y) - Q.shape[2]))
+    D = np.concatenate(explained, axis=2)  # (m, N, c)
+    count, c = D.shape[1:]
+    # A displacement by PLAUSIBLE costs as much as differences of the stated size.
+    length = float(np.nanmedian(run.lengths))
+    prior = np.sqrt(count) * log.sigma / (PLAUSIBLE * length) * np.eye(c)[1:]
+    Q = np.linalg.qr(np.concatenate([D, np.tile(prior, (len(D), 1, 1))], axis=1))[0]
+    both = np.concatenate([run.lengths[:, None], np.tile(log.y.T, (len(D), 1, 1))], axis=1)  # (m, 1 + m, N)
+    both = np.concatenate([both, np.zeros((*both.shape[:2], c - 1))], axis=2)
+    left = both - np.matmul(np.matmul(both, Q), np.swapaxes(Q, 1, 2))
+    left[..., :count] *= np.sqrt(count / (count - c))
+    left[..., count:] /= np.sqrt(count)
+    return left[:, 0], left[:, 1:]
 
 
-def _sizes(apart: np.ndarray) -> tuple[float, float, np.ndarray]:
-    """Return the root mean square of differences in the given order and in the best one, and this order (m,)."""
-    from scipy.optimize import linear_sum_assignment
-
-    if not np.isfinite(apart).all():
-        return np.inf, np.inf, np.arange(len(apart))
-    columns = linear_sum_assignment(apart**2)[1]
-    rows = np.arange(len(apart))
-    return float(np.sqrt((np.diag(apart) ** 2).mean())), float(np.sqrt((apart[rows, columns] ** 2).mean())), columns
+def _medians(left: np.ndarray, count: int) -> np.ndarray:
+    """Return sizes of what is left (..., N + c): the medians over N samples, and the penalties for displacements."""
+    return np.hypot(np.median(np.abs(left[..., :count]), axis=-1), np.linalg.norm(left[..., count:], axis=-1))
 
 
-def _and(slip: str, columns: np.ndarray, order: np.ndarray) -> str:
-    """Return an input error, and the columns of the log that belong to the cables."""
-    moved = np.flatnonzero(columns != order)
-    if not moved.size:
-        return slip
+def _rms(sizes: np.ndarray) -> float:
+    return float(np.sqrt((sizes**2).mean()))
+
+
+def _and(text: str, columns: np.ndarray, signs: np.ndarray) -> str:
+    """Return an input error, with the columns of the log that belong to the cables and their signs."""
+    texts = [text] if text else []
+    moved = np.flatnonzero(columns != np.arange(len(columns)))
     if moved.size == 2:
-        text = f"l{moved[0]} and l{moved[1]} look exchanged"
-    else:
-        text = f"the cables look like columns {', '.join(f'l{column}' for column in columns)} of the log, in this order"
-    return f"{slip}, and {text}" if slip else text
+        texts.append(f"l{moved[0]} and l{moved[1]} look exchanged")
+    elif moved.size:
+        order = ", ".join(f"l{column}" for column in columns)
+        texts.append(f"the cables look like columns {order} of the log, in this order")
+    wrong = np.flatnonzero(signs < 0)
+    if wrong.size == len(signs):
+        texts.append("the lengths seem to have the wrong sign, as if their scales were negative")
+    elif wrong.size:
+        names = ", ".join(f"l{columns[i]}" for i in wrong)
+        texts.append(f"{names} {'seems' if wrong.size == 1 else 'seem'} to have the wrong sign")
+    return ", and ".join(texts)

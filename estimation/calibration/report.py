@@ -24,6 +24,7 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
     parts: list[Part] = [
         f"residual of the lengths {residual}",
         *([] if result.refused is None else [f"DO NOT USE THIS RESULT: {result.refused}"]),
+        *([f"CHECK THE LOG: {result.mistake.text}"] if result.mistake and not result.mistake.severe else []),
         *_of_held_out(result),
         *_of_noise(result),
         *_of_parameters(result),

@@ -19,6 +19,7 @@ from ..logs.measurements import Measurements
 from .cross_validation import HeldOut, compare, poses_fitted
 from .normal_equations import metric, state_equations
 from .outliers import Outlier, Slip
+from .plausibility import Mistake
 from .solving import Solved, cleaned, covariance_of, inflation_of, lengths_of, noise_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
@@ -48,14 +49,14 @@ class CalibrationData(Displayed):
         Groups of estimated parameters.
     prior
         Standard deviations about the file's values, if given.
-    doubt
+    mistake
         A probable input error of the log, such as cables in another order or degrees read as radians, or None.
     """
 
     _solved: Solved
     free: tuple[str, ...]
     prior: Mapping[str, float]
-    doubt: str | None = None
+    mistake: Mistake | None = None
 
     def _picture(self) -> str:
         samples = np.arange(len(self.residuals))
@@ -69,6 +70,11 @@ class CalibrationData(Displayed):
     def converged(self) -> bool:
         """Return whether the fit is a local minimum."""
         return self._solved.fit.converged
+
+    @property
+    def doubt(self) -> str | None:
+        """Return the input error of the log that makes the result useless, in one line, or None."""
+        return self.mistake.text if self.mistake and self.mistake.severe else None
 
     @cached_property
     def refused(self) -> str | None:
@@ -259,6 +265,7 @@ class CalibrationData(Displayed):
             "converged": self.converged,
             "refused": self.refused,
             "doubt": self.doubt,
+            "hint": None if self.mistake is None or self.mistake.severe else self.mistake.text,
             "beyond_prior": [{"name": name, "sigmas": sigmas} for name, sigmas in self.beyond_prior],
             "free": list(self.free),
             "samples": len(self._solved.model.measurements),

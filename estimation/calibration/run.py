@@ -10,7 +10,7 @@ from ..logs.measurements import Measurements, check_measurements
 from .calibration import Calibration
 from .cross_validation import select
 from .parameters import GROUPS, check_free, check_prior
-from .plausibility import doubt
+from .plausibility import mistake
 from .solving import check_enough, solve, usual
 
 
@@ -51,8 +51,8 @@ def calibrate(
     chosen = as_robot(robot)
     given = check_measurements(chosen, measurements)
     flag("outliers", outliers)
-    slip = doubt(chosen, given)
-    outliers = outliers and slip is None  # nearly all readings would be
+    found = mistake(chosen, given)
+    outliers = outliers and not (found and found.severe)  # nearly all readings would be
     if isinstance(free, str) and free == "auto":
         check_prior(prior, GROUPS)
         groups = select(chosen, given, outliers)
@@ -63,4 +63,4 @@ def calibrate(
     if groups:
         check_enough(chosen, given, groups, priors)
     solved = solve(chosen, given, groups, priors, outliers)
-    return Calibration(solved, groups, priors, slip)
+    return Calibration(solved, groups, priors, found)

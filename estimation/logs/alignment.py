@@ -6,6 +6,7 @@ offset and rate are fitted to the lengths, and with them for each cable a scale,
 pose, which is what wrong anchors do.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,11 +17,13 @@ from ...base.text import quantity
 MOST_BINS = 65_536  # of the coarse search
 MOST_FITTED = 5000  # samples
 LEAST_SHARED = 0.2  # of the shorter record
-LEAST_LIKENESS = 0.5  # correlation of speeds that belong together
+MOST_LEFT = 0.3  # of the changes of the lengths, that the poses do not explain
 AS_GIVEN = 0.5  # of what another order gains
 PEAKS, NEAR = 12, 5  # lags that are tried, and so many beside each are not
+COARSER, SURE, LONGEST_STEP = (4, 16), 0.9, 0.5  # times the finest step, the correlation that suffices, [s]
 STEPS = 20
-LARGEST_DRIFT = 0.01
+Signals = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+LARGEST_DRIFT, USUAL_DRIFT = 0.01, 1e-4
 CORRELATED = 5.0  # by which the errors of a model exceed those of as much noise
 
 
@@ -56,23 +59,44 @@ def align(
     InputError
         If the speeds have too little in common.
     """
-    offset, order, likeness = _coarse(times, readings, pose_times, lengths)
-    if likeness < LEAST_LIKENESS:
-        raise InputError(
-            f"lengths and poses must be of one motion, got cable speeds with a correlation of {likeness:.2f} at best"
-        )
-    return _fine(times, readings[:, order], pose_times, lengths, poses, offset)._replace(likeness=likeness)
+    found = [_coarse(times, readings, pose_times, lengths, _speeds)]
+    if found[0][2] < SURE:  # poses in another frame still tell how fast the platform is
+        offset, _, likeness = _coarse(times, readings, pose_times, poses[:, :3], _whole_speed)
+        found.append((offset, np.arange(lengths.shape[1]), likeness))
+    fitted = [
+        (*_fine(times, readings[:, order], pose_times, lengths, poses, offset), likeness)
+        for offset, order, likeness in found
+    ]
+    clock, left, likeness = min(fitted, key=lambda one: one[1])
+    if left > MOST_LEFT:
+        share = quantity(100 * left, "%", 2)
+        raise InputError(f"lengths and poses must be of one motion, got poses that leave {share} of it unexplained")
+    return clock._replace(likeness=likeness)
 
 
 def _coarse(
-    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray
+    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, signals: Signals
 ) -> tuple[float, np.ndarray, float]:
-    """Return the offset [s], the column of the readings that each cable resembles, and the correlation."""
+    """Return the offset [s], the column of the readings that each cable resembles, and the correlation.
+
+    Speeds over longer times, which have less noise, are tried as well.
+    """
+    finest = max(*(float(np.median(np.diff(one))) for one in (times, pose_times)), 0.0)
+    found = [_correlated(times, readings, pose_times, lengths, signals, finest)]
+    for coarser in COARSER:
+        if found[-1][2] < SURE and coarser * finest < LONGEST_STEP:
+            found.append(_correlated(times, readings, pose_times, lengths, signals, coarser * finest))
+    return max(found, key=lambda one: one[2])
+
+
+def _correlated(
+    times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, signals: Signals, apart: float
+) -> tuple[float, np.ndarray, float]:
     from scipy.optimize import linear_sum_assignment
 
     spans = np.ptp(times), np.ptp(pose_times)
-    apart = max(*(float(np.median(np.diff(one))) for one in (times, pose_times)), max(spans) / MOST_BINS)
-    (a, dt), (b, _) = (_speeds(of, values, apart) for of, values in ((pose_times, lengths), (times, readings)))
+    dt = max(apart, max(spans) / MOST_BINS)
+    a, b = (signals(of, values, dt) for of, values in ((pose_times, lengths), (times, readings)))
     size = 1 << int(np.ceil(np.log2(a.shape[1] + b.shape[1])))
     lags = np.arange(-b.shape[1] + 1, a.shape[1])
     first, second = np.fft.rfft(a, size), np.conj(np.fft.rfft(b, size))
@@ -112,14 +136,22 @@ def _gain(likeness: Any, shared: Any) -> Any:
     return -shared * np.log1p(-(np.minimum(likeness, 0.99999) ** 2))
 
 
-def _speeds(times: np.ndarray, values: np.ndarray, apart: float) -> tuple[np.ndarray, float]:
-    """Return the speeds (m, n) of values (N, m) at equal times, each of mean 0 and of one size; and that time."""
+def _whole_speed(times: np.ndarray, values: np.ndarray, apart: float) -> np.ndarray:
+    """Return the size of all speeds together, as `_speeds`, (1, n)."""
+    grid = times[0] + apart * np.arange(max(int(np.ptp(times) / apart), 2))
+    rates = np.array([np.diff(np.interp(grid, times, column)) for column in values.T])
+    whole = np.cumsum(np.sqrt((rates**2).sum(axis=0)))
+    return _speeds(grid[1:], whole[:, None], apart)
+
+
+def _speeds(times: np.ndarray, values: np.ndarray, apart: float) -> np.ndarray:
+    """Return the speeds (m, n) of values (N, m) at equal times, each of mean 0 and of one size."""
     grid = times[0] + apart * np.arange(max(int(np.ptp(times) / apart), 2))
     rates = np.array([np.diff(np.interp(grid, times, column)) for column in values.T])
     rates -= rates.mean(axis=1, keepdims=True)
     limit = 10 * np.median(np.abs(rates), axis=1, keepdims=True) + 3 * rates.std(axis=1, keepdims=True)
     rates = np.clip(rates, -limit, limit)  # readings that are wrong
-    return rates / np.maximum(np.sqrt((rates**2).mean(axis=1, keepdims=True)), 1e-300), apart
+    return rates / np.maximum(np.sqrt((rates**2).mean(axis=1, keepdims=True)), 1e-300)
 
 
 def _fine(
@@ -129,8 +161,11 @@ def _fine(
     lengths: np.ndarray,
     poses: np.ndarray,
     offset: float,
-) -> Clock:
-    """Fit offset and rate by the Gauss-Newton method; scales, offsets and linear effects are eliminated."""
+) -> tuple[Clock, float]:
+    """Fit offset and rate by the Gauss-Newton method, and return what is left of the lengths' changes, up to 1.
+
+    Scales, offsets and linear effects are eliminated.
+    """
     from scipy.interpolate import CubicSpline
 
     low, high = pose_times[0] - offset, pose_times[-1] - offset
@@ -139,12 +174,13 @@ def _fine(
     t, y = times[rows], readings[rows].T
     middle, half = 0.5 * (t[0] + t[-1]), max(0.5 * float(np.ptp(t)), 1e-9)
     curve = CubicSpline(pose_times, np.hstack([lengths, poses]))
-    m, shift, drift = len(y), 0.0, 0.0
+    m, shift, drift, left = len(y), 0.0, 0.0, 1.0
     sigma = np.full(2, np.inf)
     for _ in range(STEPS):
         at = np.clip(offset + shift + t + drift * (t - middle), pose_times[0], pose_times[-1])
         values, slopes = curve(at), curve(at, 1)
         normal, right, rest, count = np.zeros((2, 2)), np.zeros(2), 0.0, 0
+        sizes = np.empty(m)
         for i in range(m):
             F = np.column_stack([np.ones(len(t)), values[:, i], values[:, m:]])
             Q, R = np.linalg.qr(F)
@@ -153,18 +189,23 @@ def _fine(
             D = np.column_stack([slope, slope * (t - middle) / half])
             D, e = D - Q @ (Q.T @ D), y[i] - F @ by_columns
             size = max(1.4826 * float(np.median(np.abs(e))), 1e-12)
+            sizes[i] = size / max(float(y[i].std()), 1e-12)
             weight = np.minimum(1.0, 3 * size / np.maximum(np.abs(e), 1e-300)) / size**2  # Huber's
             normal += D.T @ (weight[:, None] * D)
             right += D.T @ (weight * e)
             rest, count = rest + float((weight * e**2).sum()), count + len(t)
+        left = float(sizes.mean())
+        rests = rest / count  # errors of the model are alike from sample to sample
+        normal[1, 1] += CORRELATED**2 * rests / (USUAL_DRIFT * half) ** 2
+        right[1] -= CORRELATED**2 * rests * drift * half / (USUAL_DRIFT * half) ** 2
         if np.linalg.cond(normal) > 1e12:
             break
         step = np.linalg.solve(normal, right)
-        sigma = CORRELATED * np.sqrt(rest / count * np.diag(np.linalg.inv(normal)))
+        sigma = CORRELATED * np.sqrt(rests * np.diag(np.linalg.inv(normal)))
         step *= min(1.0, 0.2 / max(float(np.abs(step).max()), 1e-300))
         shift, drift = shift + step[0], float(np.clip(drift + step[1] / half, -LARGEST_DRIFT, LARGEST_DRIFT))
         if np.abs(step).max() < 1e-7:
             break
     if abs(drift) * half < 3 * sigma[1]:
         drift = 0.0
-    return Clock(float(offset + shift - drift * middle), 1 + float(drift), 0.0, float(sigma[0]))
+    return Clock(float(offset + shift - drift * middle), 1 + float(drift), 0.0, float(sigma[0])), left

@@ -1,0 +1,193 @@
+"""Mistakes of users: each is named by the file's robot and mended; a sound log draws no remark."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from towline.base.errors import InputError
+from towline.estimation.calibration import Measurements, calibrate, mended, mistake
+from towline.models import Dynamics, load, points
+
+from .recorded import motion, quaternions
+from .robots_as_built import moved_anchors, random_poses
+from .warm import towline
+
+ROBOTS = ("cogiro", "ipanema-1", "caroca-pulleys", "nist-robocrane", "wang-flying", "the-cable-robot-simulator")
+NONE = ([0, 0, 0], Rotation.identity())
+
+
+def a_log(name, seed=0, count=80, share=0.25, turn=0.4):
+    """Robot, poses and readings of a robot whose anchors are 2 cm or 0.5 % off."""
+    robot, draw = load(name), np.random.default_rng(seed)
+    room = share * np.ptp(robot.home_anchors, axis=0)
+    length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
+    poses = random_poses(robot, count, draw, (*np.maximum(room, 0.3 * room.max()), turn, turn, turn))
+    lengths = Dynamics(moved_anchors(robot, draw, min(0.02, 0.005 * length))).cable_lengths(poses)
+    noise = draw.normal(0, min(1e-3, 2e-4 * length), lengths.shape)
+    return robot, poses, lengths + noise - draw.normal(0, 0.05, robot.m)
+
+
+def seen(poses, frame=NONE, body=NONE):
+    """Poses as a motion capture sees them, whose frame has the pose `frame` in {G}, of a body B with X = T seen B."""
+    (t, T), (b, B) = frame, body
+    turned = T.inv() * Rotation.from_euler("xyz", poses[:, 3:]) * B.inv()
+    place = T.inv().apply(poses[:, :3] - t) - turned.apply(np.asarray(b, dtype=float))
+    return np.hstack([place, points.angles(turned.as_matrix())])
+
+
+def mistakes(robot, poses, y):
+    """26 wrong logs by name: poses and readings."""
+    whole, scale = Rotation.from_euler("xyz", poses[:, 3:]), np.array([1e3] * 3 + [1] * 3)
+    of, degrees = (
+        (lambda R: np.hstack([poses[:, :3], points.angles(R.as_matrix())])),
+        np.array([1] * 3 + [180 / np.pi] * 3),
+    )
+    exchanged, one = y.copy(), y.copy()
+    exchanged[:, [0, 1]] = y[:, [1, 0]]
+    one[:, 1] *= -1
+    axes = {"z": Rotation.from_euler("z", 90, degrees=True), "x": Rotation.from_euler("x", 90, degrees=True)}
+    any_turn = Rotation.from_euler("zyx", [133, 5, 3], degrees=True)
+    body = Rotation.from_euler("zyx", [70, 20, -30], degrees=True)
+    size = robot.length
+    return {
+        "two cables exchanged": (poses, exchanged),
+        "cables shifted": (poses, np.roll(y, 1, axis=1)),
+        "cables reversed": (poses, y[:, ::-1]),
+        "sign of a cable": (poses, one),
+        "sign of all cables": (poses, -y),
+        "lengths in millimetres": (poses, 1e3 * y),
+        "lengths in centimetres": (poses, 100 * y),
+        "lengths in inches": (poses, y / 0.0254),
+        "angles of a drum": (poses, y / 0.06),
+        "metres said to be millimetres": (poses, 1e-3 * y),
+        "positions in millimetres": (scale * poses, y),
+        "positions in centimetres": (scale ** (2 / 3) * poses, y),
+        "all in millimetres": (scale * poses, 1e3 * y),
+        "degrees as radians": (degrees * poses, y),
+        "radians as degrees": (poses / degrees, y),
+        "inverse orientation": (of(whole.inv()), y),
+        "quaternion w first": (of(Rotation.from_quat(whole.as_quat()[:, [3, 0, 1, 2]])), y),
+        "intrinsic angles": (np.hstack([poses[:, :3], whole.as_euler("XYZ")]), y),
+        "yaw first": (poses[:, [0, 1, 2, 5, 4, 3]], y),
+        "rotation vector": (np.hstack([poses[:, :3], whole.as_rotvec()]), y),
+        "frame turned": (seen(poses, ([1, 2, -0.5], axes["z"])), y),
+        "frame anywhere": (seen(poses, ([1, 2, -0.5], any_turn)), y),
+        "y upwards": (seen(poses, ([0, 0, 0], axes["x"]), ([0, 0, 0], axes["x"].inv())), y),
+        "markers off": (seen(poses, body=([0.5 * size, 0.3 * size, 0.4 * size], NONE[1])), y),
+        "markers turned": (seen(poses, body=([0.1, 0.05, 0.2], body)), y),
+        "sign of x": (poses * [-1, 1, 1, 1, 1, 1], y),
+        "y and z exchanged": (poses[:, [0, 2, 1, 3, 4, 5]], y),
+    }
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_mistakes_are_named_and_mended(name):
+    robot, poses, y = a_log(name)
+    length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
+    for what, (given, lengths) in mistakes(robot, poses, y).items():
+        found = mistake(robot, Measurements(lengths, given))
+        assert found is not None, what
+        assert found.text.isprintable()
+        assert found.severe or what.startswith("markers"), what
+        assert found.mended is not None, (what, found.text)
+        assert np.abs(found.mended.poses - poses)[:, :3].max() < 0.03 * length, (what, found.text)
+        apart = points.rotations(found.mended.poses[:, 3:]) - points.rotations(poses[:, 3:])
+        assert np.abs(apart).max() < 0.15, (what, found.text)
+        # The factor of a drum is estimated, from anchors of the file.
+        np.testing.assert_allclose(found.mended.lengths, y, rtol=0.02 if "drum" in what else 1e-9, err_msg=what)
+        assert mistake(robot, found.mended) is None, what
+
+
+def test_sound_logs_draw_no_remark():
+    """Anchors, scales and offsets off, outliers, a slip, motions and single poses: 100 logs of eight robots."""
+    names = (*ROBOTS, "acrobot", "planar-4")
+    for k in range(100):
+        robot, draw = load(names[k % len(names)]), np.random.default_rng(k)
+        length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
+        share, turn = draw.uniform(0.08, 0.3), draw.uniform(0.02, 0.4)
+        size = share * np.ptp(robot.home_anchors, axis=0)
+        size = (*np.maximum(size, 0.3 * size.max()), turn, turn, turn)
+        smooth = k % 3 == 0
+        poses = motion(robot, np.linspace(0, 40, 300), size) if smooth else random_poses(robot, 60, draw, size)
+        built = moved_anchors(robot, draw, draw.uniform(0, 0.02) * length)
+        y = Dynamics(built).cable_lengths(poses) * (1 + draw.normal(0, 0.003, robot.m)) - draw.normal(0, 0.1, robot.m)
+        y += draw.normal(0, 1e-3, y.shape)
+        if k % 4 == 1:
+            y[draw.random(y.shape) < 0.02] += 0.2
+        if k % 5 == 2:
+            y[len(y) // 2 :, 0] += 0.05
+        found = mistake(robot, Measurements(y, poses + draw.normal(0, 5e-4, poses.shape) * robot.dof_mask))
+        assert found is None, (k, robot.name, found)
+
+
+def test_two_mistakes_at_once():
+    robot, poses, y = a_log("cogiro", 1)
+    given = poses * [1e3, 1e3, 1e3, 1, 1, 1]
+    measurements, texts = mended(robot, Measurements(1e3 * y[:, ::-1], given))
+    assert len(texts) in (1, 2)
+    np.testing.assert_allclose(measurements.poses, poses, atol=1e-9)
+    np.testing.assert_allclose(measurements.lengths, y, atol=1e-9)
+
+
+def test_equally_probable_errors_are_not_mended():
+    robot, poses, y = a_log("cogiro", turn=0.15)
+    turned = Rotation.from_euler("xyz", poses[:, 3:])
+    log = Measurements(y, np.hstack([poses[:, :3], points.angles(turned.inv().as_matrix())]))
+    found = mistake(robot, log)
+    if found is not None and found.mended is None:
+        with pytest.raises(InputError, match="must have one probable error to be mended, got several"):
+            mended(robot, log)
+
+
+def test_a_body_off_is_a_hint_in_the_report():
+    robot, poses, y = a_log("cogiro")
+    result = calibrate(robot, Measurements(y, mistakes(robot, poses, y)["markers off"][0]), outliers=False)
+    assert result.doubt is None
+    assert "CHECK THE LOG: the poses look like those of a body" in result.report()
+    assert result.to_dict()["hint"].startswith("the poses look like those of a body")
+
+
+def test_the_command_mends(tmp_path):
+    robot, poses, y = a_log("cogiro", 2)
+    for what, text in (
+        ("frame anywhere", "the poses look measured in a frame"),
+        ("sign of a cable", "l1 seems to have"),
+    ):
+        given, lengths = mistakes(robot, poses, y)[what]
+        Measurements(lengths, given).save(tmp_path / "log.nc")
+        done = towline("calibrate", "cogiro", "log.nc", cwd=tmp_path)
+        assert done.returncode == 1
+        assert text in done.stderr
+        assert done.stderr.endswith("; --fix mends it\n")
+        done = towline("calibrate", "cogiro", "log.nc", "--fix", "--json", "--out", "mine.yaml", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        told = json.loads(done.stdout)
+        assert told["notes"][0].startswith(f"mended: {text}")
+        assert told["residual_after"] < 1.2e-3
+        (tmp_path / "mine.yaml").unlink()
+
+
+@pytest.mark.parametrize("what", ["frame turned", "cables reversed", "yaw first"])
+def test_mistakes_in_two_files_with_two_clocks(what, tmp_path):
+    robot, times = load("cogiro"), np.arange(0, 40, 0.01)
+    pose_times = np.arange(2, 36, 0.02)
+    size = (2, 1.6, 0.8, 0.2, 0.2, 0.2)
+    readings = Dynamics(robot).cable_lengths(motion(robot, times, size))
+    readings += np.random.default_rng(0).normal(0, 1e-3, readings.shape) + 0.05
+    poses = motion(robot, pose_times, size)
+    given = mistakes(robot, poses, np.zeros((len(poses), 8)))[what][0]
+    lengths = mistakes(robot, motion(robot, times, size), readings)[what][1]
+    names = ",".join(["t", *(f"l{i}" for i in range(8))])
+    np.savetxt(tmp_path / "l.csv", np.column_stack([times, lengths]), "%.12g", ",", header=names, comments="")
+    columns = np.column_stack([7200 + (1 + 4e-5) * pose_times, given[:, :3], quaternions(given)])
+    np.savetxt(tmp_path / "p.csv", columns, "%.12g", ",", header="t,x,y,z,qx,qy,qz,qw", comments="")
+    files = ("calibrate", "cogiro", "l.csv", "--poses", "p.csv", "--free", "offsets,clock")
+    assert towline(*files, cwd=tmp_path).returncode == 1
+    done = towline(*files, "--fix", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr + done.stdout
+    told = json.loads(done.stdout)
+    assert float(told["notes"][0].split()[6]) == pytest.approx(7200, abs=1e-2)
+    assert any(note.startswith("mended: ") for note in told["notes"])
+    assert told["residual_after"] < 3e-3
