@@ -5,8 +5,8 @@ ground up: `towline.base` (what all others use), `towline.models` (robots and th
 (tension distribution on plain arrays), `towline.figures` (matplotlib), `towline.statics` (one instant of a robot),
 `towline.plant` (motion in time), `towline.workspace` (poses at which a condition holds), `towline.estimation` (the pose
 from lengths, the calibrated robot), `towline.control` (one step of a controller), `towline.ocp` (planning),
-`towline.simulation` (closed loops), `towline.export` (a control step as C), `towline.studies` (the papers),
-`towline.benchmarks`, `towline.viewer`, `towline.cli`.
+`towline.simulation` (closed loops), `towline.layout` (where anchors should be), `towline.export` (a control step as C),
+`towline.studies` (the papers), `towline.benchmarks`, `towline.viewer`, `towline.cli`.
 """
 
 from importlib import import_module
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .estimation.calibration import Calibration, Measurements, calibrate, read_measurements
     from .export.fmu import export_fmu
     from .export.step import export_step
+    from .layout import Design, Requirements, design, read_requirements
     from .models import Dynamics, Robot, available, load
     from .ocp import Plan, Planner, Sweep, Task, plan, read_task, sweep, time_along
     from .simulation import Simulation, simulate
@@ -39,6 +40,7 @@ _HOMES = {
     "estimation.calibration": ("Calibration", "Measurements", "calibrate", "read_measurements"),
     "control": ("Controller",),
     "simulation": ("Simulation", "simulate"),
+    "layout": ("Design", "Requirements", "design", "read_requirements"),
     "export.step": ("export_step",),
     "export.fmu": ("export_fmu",),
     "base.errors": ("InputError", "SolverError", "TowlineError"),
@@ -46,7 +48,20 @@ _HOMES = {
 _HOME = {name: home for home, names in _HOMES.items() for name in names}
 # Reached as attributes. The last two are short names that stay.
 _PACKAGES = {
-    *("base", "control", "core", "estimation", "export", "figures", "models", "ocp", "plant", "simulation", "solvers"),
+    *(
+        "base",
+        "control",
+        "core",
+        "estimation",
+        "export",
+        "figures",
+        "layout",
+        "models",
+        "ocp",
+        "plant",
+        "simulation",
+        "solvers",
+    ),
     *("benchmarks", "cli", "statics", "studies", "viewer", "workspace", "calibration", "errors"),
 }
 
@@ -54,11 +69,13 @@ __all__ = [
     "Calibration",
     "Certificate",
     "Controller",
+    "Design",
     "Dynamics",
     "InputError",
     "Measurements",
     "Plan",
     "Planner",
+    "Requirements",
     "Robot",
     "Simulation",
     "SolverError",
@@ -69,12 +86,14 @@ __all__ = [
     "TowlineError",
     "available",
     "calibrate",
+    "design",
     "export_fmu",
     "export_step",
     "load",
     "methods",
     "plan",
     "read_measurements",
+    "read_requirements",
     "read_task",
     "sample",
     "simulate",

@@ -33,6 +33,7 @@ COMMANDS = {
     "simulate": "Simulate a plan in closed loop, with wind, noise and events.",
     "workspace": "Sample the poses at which a condition holds.",
     "log": "List what logs of a robot contain.",
+    "design": "Find anchors, attachments and limits that meet requirements.",
     "calibrate": "Calibrate a robot from measured cable lengths.",
     "view": "Show robots, plans, simulations and workspaces in the browser.",
     "import": "Convert a robot of another program to a robot file.",

@@ -134,4 +134,4 @@ def _by_facets(
     beside = np.linalg.norm(np.einsum("nij,nj->ni", walls.outside, w - walls.offset), axis=1)
     outside = beside > _BESIDE * np.maximum(np.linalg.norm(w, axis=1), _BESIDE)
     margin = np.where(outside, -np.hypot(beside, np.minimum(inside, 0.0)), inside)
-    return margin, along, ~walls.outside.any(axis=(1, 2))
+    return margin, along, np.logical_not(walls.outside.any(axis=(1, 2)))

@@ -14,7 +14,7 @@ FLOORS = [
     {"models", "solvers", "figures"},
     {"statics", "plant"},
     {"workspace", "estimation", "control", "ocp"},
-    {"simulation", "export"},
+    {"simulation", "export", "layout"},
     {"studies"},
     {"benchmarks", "viewer"},
     {"cli"},

@@ -66,7 +66,15 @@ class Interference(Condition):
 
 
 def segment_distance(p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.ndarray) -> np.ndarray:
-    """Return the distance of the segments p to p_end and q to q_end, (n, 3) each, (n,) [m]."""
+    """Return the distance of the segments p to p_end and q to q_end, (..., 3) each, (...) [m]."""
+    gap, _, _ = nearest_points(p, p_end, q, q_end)
+    return np.sqrt(_dot(gap, gap))
+
+
+def nearest_points(
+    p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the vector from the nearest point of segment q to that of p, (..., 3) [m], and their shares of p and q."""
     along, across, between = p_end - p, q_end - q, p - q
     a, e, f = _dot(along, along), _dot(across, across), _dot(across, between)
     b, c = _dot(along, across), _dot(along, between)
@@ -76,8 +84,7 @@ def segment_distance(p: np.ndarray, p_end: np.ndarray, q: np.ndarray, q_end: np.
     s = np.where(beside > 1e-14 * a * e, np.clip((b * f - c * e) / np.maximum(beside, tiny), 0.0, 1.0), 0.0)
     t = np.clip((b * s + f) / np.maximum(e, tiny), 0.0, 1.0)
     s = np.clip((b * t - c) / np.maximum(a, tiny), 0.0, 1.0)
-    gap = between + s[:, None] * along - t[:, None] * across
-    return np.sqrt(_dot(gap, gap))
+    return between + s[..., None] * along - t[..., None] * across, s, t
 
 
 def _separate(robot: Robot) -> list[tuple[int, int]]:
@@ -154,4 +161,4 @@ def _enters(low: np.ndarray, high: np.ndarray, attachment: np.ndarray, anchor: n
 
 
 def _dot(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return np.einsum("ni,ni->n", x, y)
+    return np.einsum("...i,...i->...", x, y)

@@ -1,0 +1,81 @@
+"""`towline design`: anchors, attachments and tension limits that meet requirements."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..base.inputs import check_ending
+from .options import JsonOption, RobotArgument, print_json, print_result
+from .outputs import check_outputs
+from .stopping import requested, unlisten
+from .watching import progress_bar
+
+
+def _print_schema(wanted: bool) -> None:
+    if wanted:
+        from ..layout import Requirements
+
+        print_json(Requirements.model_json_schema())
+        raise typer.Exit
+
+
+def design(
+    robot: RobotArgument,
+    requirements: Annotated[
+        Path,
+        typer.Argument(metavar="REQUIREMENTS", help="A requirement file (YAML): what is free, and what it must do."),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.yaml",
+            help="Robot file to write, if the requirements are met; default: ROBOT-REQUIREMENTS.yaml in this folder, "
+            "from the `name` keys of both files. An existing file is overwritten.",
+        ),
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Time of the search [s]; default: `time_limit` of the requirements, or 10.")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed of the random numbers; default: `seed` of the requirements, or 0.")
+    ] = None,
+    as_json: JsonOption = False,
+    schema: Annotated[
+        bool,
+        typer.Option(
+            "--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of requirement files."
+        ),
+    ] = False,
+) -> None:
+    """Find anchors, attachments and tension limits with the largest capacity margin, and report what limits it.
+
+    Exit code 1 if no layout that meets the requirements was found, or if it is proven that none exists. Ctrl-C ends the
+    search with the best layout so far.
+    """
+    from ..layout import Requirements, read_requirements
+    from ..layout import design as find
+    from ..models import load
+    from ..models.parsing import validate
+
+    loaded, read = load(robot), read_requirements(requirements)
+    given = {"time_limit": seconds, "seed": seed}
+    changed = {key: value for key, value in given.items() if value is not None}
+    if changed:
+        read = validate(read.model_dump() | changed, Requirements, "--seconds or --seed")
+    target = out if out is not None else Path(f"{loaded.name}-{read.name}.yaml")
+    check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml")})
+    unlisten()  # an interrupt ends the search, not the command
+    with progress_bar(f"design of {read.name}", quiet=as_json) as move:
+
+        def progress(what: str, share: float, best: float) -> None:
+            known = f"best margin {best:.4g} N" if best > -1e30 else ""
+            move(what, round(100 * share), 100, known)
+
+        found = find(loaded, requirements=read, progress=progress)
+    if requested():  # SIGTERM, which ends the command
+        raise KeyboardInterrupt
+    file = found.robot.save(target) if found.feasible else None
+    print_result(as_json, {**found.to_dict(), "file": file}, found.report, [] if file is None else [file])
+    if not found.feasible:
+        raise typer.Exit(1)

@@ -1,0 +1,191 @@
+"""`Evaluation`: margins and distances of cables of many layouts of a robot at given poses, with their derivatives.
+
+The characteristic length stays that of the robot's file, whatever the attachments become: a design would otherwise
+change the unit in which it is measured.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import core
+from ..models import Robot
+from ..models.dynamics import dynamics_of
+from ..models.points import rotations
+from ..models.record import record_of
+from ..solvers.margins import Reserves, all_reserves, margins, reserves
+from ..workspace.conditions.interference import nearest_points
+from .requirements import Requirement
+from .variables import Variables, parts
+
+_STEEP = 1e7  # times the length: slopes of a facet whose columns nearly depend on each other say nothing
+
+
+class Rows(NamedTuple):
+    """Poses, and for each of some rows its pose, the required wrench and the acceleration at which it is required."""
+
+    poses: np.ndarray  # (N, 6)
+    pose_of: np.ndarray  # (K,), into the poses
+    wrenches: np.ndarray  # (K, 6), about the CoM in {G} [N, N m]
+    accelerations: np.ndarray  # (K, 6)
+
+    def joined(self, other: "Rows") -> "Rows":
+        """Return these rows followed by others."""
+        pose_of = np.concatenate([self.pose_of, other.pose_of + len(self.poses)])
+        return Rows(
+            np.concatenate([self.poses, other.poses]),
+            pose_of,
+            np.concatenate([self.wrenches, other.wrenches]),
+            np.concatenate([self.accelerations, other.accelerations]),
+        )
+
+    def only(self, chosen: np.ndarray) -> "Rows":
+        """Return some of the rows, by index."""
+        poses, pose_of = np.unique(self.pose_of[chosen], return_inverse=True)
+        return Rows(self.poses[poses], pose_of, self.wrenches[chosen], self.accelerations[chosen])
+
+
+def rows_of(robot: Robot, requirements: tuple[Requirement, ...], poses: list[np.ndarray]) -> Rows:
+    """Return the rows of some requirements at the given poses of each, (N, 6) each."""
+    dynamics, blocks, start = dynamics_of(robot), [], 0
+    for requirement, places in zip(requirements, poses, strict=True):
+        still = np.zeros_like(places)
+        for wrench, acceleration, wind in requirement.demands:
+            wanted = dynamics.required_wrench(places, still, np.broadcast_to(acceleration, places.shape), wind=wind)
+            indices = start + np.arange(len(places))
+            # A guide takes the wrench along a coordinate that cannot move.
+            blocks.append((indices, wanted - wrench * robot.dof_mask, np.tile(acceleration, (len(places), 1))))
+        start += len(places)
+    pose_of, wrenches, accelerations = (np.concatenate(part) for part in zip(*blocks, strict=True))
+    return Rows(np.concatenate(poses), pose_of, wrenches, accelerations)
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Values of some rows and their derivatives by the variables."""
+
+    value: np.ndarray  # (k,)
+    by_variables: np.ndarray  # (k, p)
+
+
+class Evaluation:
+    """Evaluate layouts at the rows of requirements.
+
+    Parameters
+    ----------
+    variables
+        Those of the design.
+    rows
+        Poses and wrenches.
+    """
+
+    def __init__(self, variables: Variables, rows: Rows):
+        robot = variables.robot
+        self.variables, self.rows = variables, rows
+        self._record = record_of(robot).copy()
+        self._m, self._home = robot.m, np.ascontiguousarray(robot.carrier_home)
+        self._kept = np.flatnonzero(robot.dof_mask)
+        self._scale = robot.wrench_scale[self._kept]
+        self._w = np.ascontiguousarray(rows.wrenches[:, self._kept] * self._scale)
+        self._poses = np.ascontiguousarray(rows.poses, dtype=float)
+        self._each = len(rows.pose_of) == len(rows.poses) and (rows.pose_of == np.arange(len(rows.poses))).all()
+        self._steep = _STEEP * max(1.0, float(np.abs(robot.t_max).max()))
+        self._turn = rotations(self._poses[:, 3:])  # (N, 3, 3)
+        self._carried = rotations(self._home[robot.carrier_of_cable, 3:])  # (m, 3, 3)
+        self.pairs = np.array(list(combinations(range(robot.m), 2)), dtype=int).reshape(-1, 2)
+        self.pairs = self.pairs[~self._always_together()]
+
+    def margins(self, y: np.ndarray) -> np.ndarray:
+        """Return the margins of all rows, (K,) [N]."""
+        return margins(*self._problem(y))
+
+    def all_reserves(self, y: np.ndarray) -> np.ndarray:
+        """Return the reserves of all rows along all normals, (K, F) [N]."""
+        return all_reserves(*self._problem(y))
+
+    def reserves(self, y: np.ndarray, rows: np.ndarray, normals: np.ndarray) -> tuple[Reserves, np.ndarray]:
+        """Return the reserves of some rows along one normal each, and their derivatives by the variables, (k, p)."""
+        A, w, t_min, t_max = self._problem(y, rows)
+        found = reserves(A, w, t_min, t_max, normals)
+        m, poses = self._m, np.ascontiguousarray(self._poses[self.rows.pose_of[rows]])
+        S = np.empty((len(rows), m, 6, 7))
+        core.columns_by_geometry(self._record, poses, self._home, S)
+        direction = found.direction * self._scale
+        by_points = np.einsum("ki,kmij->kmj", direction, S[:, :, self._kept, :6]) * found.tensions[:, :, None]
+        by_layout = np.concatenate(
+            [
+                by_points[:, :, :3].reshape(len(rows), 3 * m),
+                by_points[:, :, 3:].reshape(len(rows), 3 * m),
+                np.minimum(found.pull, 0.0),
+                np.maximum(found.pull, 0.0),
+            ],
+            axis=1,
+        )
+        return found, by_layout @ self.variables.S
+
+    def usable(self, slopes: np.ndarray) -> np.ndarray:
+        """Return which rows of slopes (k, p) can be linearised."""
+        return np.isfinite(slopes).all(axis=1) & (np.abs(slopes).max(axis=1, initial=0.0) < self._steep)
+
+    def distances(self, y: np.ndarray) -> np.ndarray:
+        """Return the distance of each pair of cables at each pose, (N, pairs) [m]."""
+        return np.sqrt((self._gaps(y)[0] ** 2).sum(axis=2))
+
+    def distance_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
+        """Return up to `most` of the smallest distances `below` a value, with their derivatives."""
+        gap, s, t = self._gaps(y)
+        distance = np.sqrt((gap**2).sum(axis=2)).ravel()
+        chosen = np.argpartition(distance, most)[:most] if distance.size > most else np.arange(distance.size)
+        chosen = chosen[distance[chosen] < below]
+        poses, pairs = np.unravel_index(chosen, s.shape)
+        u = gap[poses, pairs] / np.maximum(distance[chosen], 1e-9)[:, None]
+        m, k = self._m, np.arange(len(chosen))
+        by_layout = np.zeros((len(chosen), 8 * m))
+        for cables, share, sign in ((self.pairs[pairs, 0], s, 1.0), (self.pairs[pairs, 1], t, -1.0)):
+            # The nearest point is (1 - share) of the attachment and `share` of the anchor.
+            part = share[poses, pairs][:, None]
+            by_anchor = sign * part * np.einsum("kij,ki->kj", self._carried[cables], u)
+            by_attachment = sign * (1.0 - part) * np.einsum("kij,ki->kj", self._turn[poses], u)
+            for offset, slope in ((0, by_anchor), (3 * m, by_attachment)):
+                for axis in range(3):
+                    by_layout[k, offset + 3 * cables + axis] += slope[:, axis]
+        return Slopes(distance[chosen], by_layout @ self.variables.S)
+
+    def _place(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Put a layout into the record; return the tension limits."""
+        anchors, attachments, t_min, t_max = parts(self.variables.layout(y), self._m)
+        cables = self._record["cable"]
+        cables["anchor"][: self._m], cables["attachment"][: self._m] = anchors, attachments
+        return np.ascontiguousarray(t_min), np.ascontiguousarray(t_max)
+
+    def _problem(self, y: np.ndarray, rows: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
+        """Return A, w, t_min and t_max of some rows, default: of all."""
+        t_min, t_max = self._place(y)
+        poses = self._poses if rows is None else np.ascontiguousarray(self._poses[self.rows.pose_of[rows]])
+        A = np.empty((len(poses), 6, self._m))
+        core.lines(self._record, poses, self._home, None, A, None, None, None)
+        if self._kept.size < 6:
+            A = A[:, self._kept]
+        A *= self._scale[:, None]
+        if rows is None and not self._each:
+            A = A[self.rows.pose_of]
+        return A, self._w if rows is None else self._w[rows], t_min, t_max
+
+    def _gaps(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return vectors between the nearest points of pairs of cables, and these as shares of the cables."""
+        self._place(y)
+        anchors, attachments = (np.empty((len(self._poses), self._m, 3)) for _ in range(2))
+        core.ends(self._record, self._poses, self._home, anchors, attachments)
+        i, j = self.pairs.T
+        return nearest_points(attachments[:, i], anchors[:, i], attachments[:, j], anchors[:, j])
+
+    def _always_together(self) -> np.ndarray:
+        """Return which pairs of cables have a common end in every layout, as equal points make them."""
+        low, high, m = self.variables.low, self.variables.high, self._m
+        layouts = [self.variables.layout(np.random.default_rng(k).uniform(low, high)) for k in range(2)]
+        points = [part for layout in layouts for part in parts(layout, m)[:2]]
+        i, j = self.pairs.T
+        apart = [np.linalg.norm(part[i] - part[j], axis=1) > 1e-9 for part in points]
+        return ~(apart[0] & apart[1]) & ~(apart[2] & apart[3])

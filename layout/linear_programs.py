@@ -1,0 +1,144 @@
+"""Sequential linear programs: maximise the smallest margin of all rows, inside bounds and with a clearance."""
+
+import time
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+
+from .evaluation import Evaluation
+from .variables import Variables
+
+MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
+_PER_METRE = 40.0  # force scales that a metre of missing clearance costs
+_LARGEST = 1e7  # of the objective [N]
+_FOUND = 1e-5  # of the margin, or of 1 N: a smaller improvement ends the search
+
+
+class Multipliers(NamedTuple):
+    """What binds at the optimum: weights of the rows' reserves, summing to one, and the value of wider bounds."""
+
+    rows: np.ndarray  # (k,), into the rows of the evaluation
+    weights: np.ndarray  # (k,)
+    pull: np.ndarray  # (k, m), of the cables along the normals
+    direction: np.ndarray  # (k, n)
+    by_high: np.ndarray  # (p,), margin gained per unit by which an upper bound rises
+    by_low: np.ndarray  # (p,), margin gained per unit by which a lower bound falls
+    left: float  # improvement of the margin that the linear program still sees within its steps [N]
+
+
+class _Program:
+    """The linear program about a point, and its solution."""
+
+    def __init__(self, evaluation: Evaluation, y: np.ndarray, clearance: float, delta: float, every: np.ndarray):
+        variables = evaluation.variables
+        span = variables.high - variables.low
+        self.scale = np.where(span > 0.0, span, 1.0)
+        count = min(MOST_RESERVES, every.size)
+        chosen = np.argpartition(every.ravel(), count - 1)[:count]
+        chosen = chosen[np.isfinite(every.ravel()[chosen])]
+        rows, normals = np.unravel_index(chosen, every.shape)
+        self.found, slopes = evaluation.reserves(y, rows, normals)
+        good = evaluation.usable(slopes)
+        self.rows, self.good = rows[good], good
+        # Variables: steps as shares of the ranges, the margin, the missing clearance.
+        A = np.hstack([-slopes[good] * self.scale, np.ones((good.sum(), 1)), np.zeros((good.sum(), 1))])
+        b = every.ravel()[chosen][good]
+        if clearance > 0.0 and evaluation.pairs.size:
+            near = evaluation.distance_slopes(y, MOST_DISTANCES, clearance + 4.0 * delta * float(self.scale.max()))
+            by = np.hstack(
+                [-near.by_variables * self.scale, np.zeros((len(near.value), 1)), -np.ones((len(near.value), 1))]
+            )
+            A, b = np.vstack([A, by]), np.r_[b, near.value - clearance]
+        cost = np.r_[np.zeros(variables.size), -1.0, _PER_METRE * variables.robot.force_scale]
+        below, above = (variables.low - y) / self.scale, (variables.high - y) / self.scale
+        self.low, self.high = np.maximum(below, -delta), np.minimum(above, delta)
+        self.at_low, self.at_high = below >= -delta, above <= delta
+        bounds = np.vstack([np.c_[self.low, self.high], [-_LARGEST, _LARGEST], [0.0, _LARGEST]])
+        options = {"presolve": False}  # of which such small dense programs have nothing
+        self.solution = linprog(cost, A_ub=A, b_ub=b, bounds=bounds, method="highs", options=options)
+        self.value = -self.solution.fun if self.solution.success else -np.inf
+
+    def moved(self, y: np.ndarray, variables: Variables) -> np.ndarray:
+        return np.clip(y + self.solution.x[: y.size] * self.scale, variables.low, variables.high)
+
+
+def missing(evaluation: Evaluation, y: np.ndarray, clearance: float) -> float:
+    """Return how much of a clearance is missing at some pose [m]."""
+    if clearance <= 0.0 or not evaluation.pairs.size:
+        return 0.0
+    return max(0.0, clearance - float(evaluation.distances(y).min()))
+
+
+def maximise(
+    evaluation: Evaluation, y: np.ndarray, clearance: float, until: float, delta: float = 0.1, most: int = 60
+) -> None:
+    """Move the variables to a local maximum of the smallest margin, in place: an interrupt keeps what is reached.
+
+    Parameters
+    ----------
+    evaluation
+        Of all rows that count.
+    y
+        Where to start, (p,); it is moved.
+    clearance
+        Smallest distance between cables [m].
+    until
+        Time of `time.perf_counter` at which it ends early [s].
+    delta
+        Longest step of the first program, of the range of each variable.
+    most
+        Number of linear programs.
+    """
+    price = _PER_METRE * evaluation.variables.robot.force_scale
+
+    def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
+        every = evaluation.all_reserves(z)
+        return float(every.min()) - price * missing(evaluation, z, clearance), every
+
+    value, every = merit(y)
+    for _ in range(most):
+        if delta < 1e-6 or time.perf_counter() > until or not np.isfinite(value):
+            break
+        program = _Program(evaluation, y, clearance, delta, every)
+        predicted = program.value - value
+        if not predicted > _FOUND * max(1.0, abs(value)):
+            break
+        candidate = program.moved(y, evaluation.variables)
+        candidate_value, candidate_every = merit(candidate)
+        actual = candidate_value - value
+        if actual > 1e-4 * predicted:
+            largest = float(np.abs(program.solution.x[: y.size]).max())
+            y[:], value, every = candidate, candidate_value, candidate_every
+            if actual > 0.7 * predicted and largest > 0.9 * delta:
+                delta = min(2.0 * delta, 0.5)
+            elif actual < 0.25 * predicted:
+                delta *= 0.5
+        else:
+            delta *= 0.35
+
+
+def multipliers(evaluation: Evaluation, y: np.ndarray, clearance: float, delta: float = 1e-3) -> Multipliers:
+    """Return the multipliers of the linear program at a point, within small steps."""
+    every = evaluation.all_reserves(y)
+    program = _Program(evaluation, y, clearance, delta, every)
+    solution, p = program.solution, y.size
+    if not solution.success:
+        none = np.zeros(0)
+        rows = np.zeros(0, dtype=int)
+        return Multipliers(rows, none, np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(p), np.zeros(p), np.inf)
+    weights = np.abs(solution.ineqlin.marginals[: program.rows.size])
+    upper, lower = (
+        np.abs(solution.upper.marginals[:p]) / program.scale,
+        np.abs(solution.lower.marginals[:p]) / program.scale,
+    )
+    keep = weights > 1e-9
+    return Multipliers(
+        program.rows[keep],
+        weights[keep],
+        program.found.pull[program.good][keep],
+        program.found.direction[program.good][keep],
+        np.where(program.at_high, upper, 0.0),
+        np.where(program.at_low, lower, 0.0),
+        float(solution.x[p] - every.min()),
+    )

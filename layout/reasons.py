@@ -1,0 +1,113 @@
+"""`reasons`: what binds at the optimum of a design, and what a change of the requirements would gain."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..models import Robot
+from .evaluation import Evaluation
+from .linear_programs import multipliers
+from .variables import Variables
+
+_CONVERGED = 1e-3  # of the margin, or of 1 N: what the linear program still gains at a local optimum
+_SMALL = 1e-6
+
+
+class Binding(NamedTuple):
+    """A required wrench that limits the margin.
+
+    Its weight is its share of the multipliers, which sum to one. The direction, outward and of length one in newtons,
+    is where the reserve is least, and the cables, counted from 0, are at t_max or t_min there.
+    """
+
+    pose: np.ndarray  # (6,)
+    wrench: np.ndarray  # (6,), about the CoM in {G} [N, N m]
+    weight: float
+    direction: np.ndarray  # (6,), as in `Certificate`
+    at_max: tuple[int, ...]
+    at_min: tuple[int, ...]
+
+
+class Advice(NamedTuple):
+    """The margin gained per unit of a change, to first order [N per unit]."""
+
+    change: str
+    gain: float
+    unit: str
+
+
+class Reasons(NamedTuple):
+    """What binds, what would help, and whether the layout is a local optimum."""
+
+    binding: tuple[Binding, ...]
+    advice: tuple[Advice, ...]
+    local_optimum: bool
+    at_bounds: int
+
+
+def reasons(evaluation: Evaluation, y: np.ndarray, clearance: float) -> Reasons:
+    """Return the reasons why the smallest margin of a layout is not larger."""
+    variables, rows = evaluation.variables, evaluation.rows
+    robot, found = variables.robot, multipliers(evaluation, y, clearance)
+    kept = np.flatnonzero(robot.dof_mask)
+    direction = np.zeros((found.rows.size, 6))
+    if found.rows.size:
+        direction[:, kept] = found.direction * robot.wrench_scale[kept]
+    binding = [
+        Binding(
+            rows.poses[rows.pose_of[row]],
+            rows.wrenches[row],
+            float(weight),
+            d,
+            tuple(np.flatnonzero(pull > _SMALL).tolist()),
+            tuple(np.flatnonzero(pull < -_SMALL).tolist()),
+        )
+        for row, weight, d, pull in zip(found.rows, found.weights, direction, found.pull, strict=True)
+    ]
+    binding.sort(key=lambda one: -one.weight)
+    margin = float(evaluation.margins(y).min())
+    span = variables.high - variables.low
+    bound = (span > 0.0) & (np.minimum(y - variables.low, variables.high - y) <= 1e-9 * np.maximum(span, 1.0))
+    return Reasons(
+        tuple(binding),
+        tuple(_advice(robot, variables, found.weights, found.pull, direction, rows.accelerations[found.rows]))
+        + tuple(_of_boxes(variables, found.by_high, found.by_low)),
+        bool(found.left <= _CONVERGED * max(1.0, abs(margin))),
+        int(bound.sum()),
+    )
+
+
+def _advice(
+    robot: Robot,
+    variables: Variables,
+    weights: np.ndarray,
+    pull: np.ndarray,
+    direction: np.ndarray,
+    accelerations: np.ndarray,
+) -> list[Advice]:
+    """Return what stronger cables, a lower smallest tension and a lighter platform would gain."""
+    if not weights.size:
+        return []
+    stronger = float(weights @ np.maximum(pull, 0.0).sum(axis=1))
+    slacker = -float(weights @ np.minimum(pull, 0.0).sum(axis=1))
+    free_to_fall = (accelerations[:, :3] - np.array(robot.gravity)) * robot.dof_mask[:3]
+    heavier = -float(weights @ (direction[:, :3] * free_to_fall).sum(axis=1))
+    return [
+        Advice("t_max of every cable higher by 1 N", stronger, "N/N"),
+        Advice("t_min of every cable lower by 1 N", slacker, "N/N"),
+        Advice("platform heavier by 1 kg" if heavier > 0.0 else "platform lighter by 1 kg", abs(heavier), "N/kg"),
+    ]
+
+
+def _of_boxes(variables: Variables, by_high: np.ndarray, by_low: np.ndarray) -> list[Advice]:
+    """Return what larger boxes of points would gain, by part and axis."""
+    sums: dict[tuple[str, str], float] = {}
+    for name, up, down in zip(variables.names, by_high, by_low, strict=True):
+        _, part, *axis = name.split(".")
+        if axis:
+            sums[part, axis[0]] = sums.get((part, axis[0]), 0.0) + float(up + down)
+    return [
+        Advice(f"boxes of {part}s longer by 1 m at both ends along {axis}", gain, "N/m")
+        for (part, axis), gain in sums.items()
+        if gain > _SMALL
+    ]

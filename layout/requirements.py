@@ -1,0 +1,199 @@
+"""`Requirements`: what a design may change, and what it must be able to do."""
+
+import os
+from itertools import product
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..base.errors import InputError
+from ..base.inputs import file_path
+from ..models import Robot
+from ..models.parsing import read_yaml, validate
+from ..models.part import Box, Name, NonNegative, Part, Pose, Positive, Rows, Vector3, Whole
+from ..models.ranges import Range
+
+Wrench = Pose  # six finite numbers
+NO_WRENCH: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+Axis = Literal["x", "y", "z"]
+Count = Annotated[Whole, Field(ge=1, le=100)]
+CableNumber = Annotated[Whole, Field(ge=0)]
+MOST_ROWS = 20_000  # poses times wrenches of all requirements, of each of which the search computes a margin
+LEAST_MARGIN = 1.0  # [N]: a flat available wrench set has the margin 0, and a rounding error makes that positive
+POINTS = ("anchor", "attachment")
+
+
+class Free(Part):
+    """Numbers of some cables that a design chooses: points in a box, or tension limits in a range."""
+
+    part: Literal["anchor", "attachment", "t_min", "t_max"] = Field(description="which number of the cables")
+    cables: tuple[CableNumber, ...] | None = Field(
+        default=None, min_length=1, description="cables, counted from 0; default: all"
+    )
+    box: Box | None = Field(
+        default=None,
+        description="for anchor and attachment: where, in the frame of carrier or platform; without thickness a face, "
+        "a line or a point [m]",
+    )
+    range: Range | None = Field(default=None, description="for t_min and t_max: smallest and largest value [N]")
+    equal: bool = Field(default=False, description="true: the cables have one point or value in common")
+    copy_of: tuple[CableNumber, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="instead of box and range: the cables, as many, whose points or values these cables have",
+    )
+    mirrored: Axis | None = Field(
+        default=None, description="with copy_of: the coordinate of the points that changes its sign; default: none"
+    )
+
+    @model_validator(mode="after")
+    def _where(self) -> Self:
+        points = self.part in POINTS
+        wanted, other = ("box", "range") if points else ("range", "box")
+        if getattr(self, other) is not None:
+            raise ValueError(f"{other} must be left out for {self.part}, which has a {wanted}")
+        if (self.copy_of is None) == (getattr(self, wanted) is None):
+            got = "neither" if self.copy_of is None else "both"
+            raise ValueError(f"{wanted} or copy_of must be given for {self.part}, and not both, got {got}")
+        if self.range is not None and self.range.min < 0.0:
+            raise ValueError(f"range must not have negative tensions, got {self.range.min:g}")
+        if self.mirrored is not None and (self.copy_of is None or not points):
+            raise ValueError("mirrored must be left out without copy_of, and for tensions")
+        if self.copy_of is not None and self.equal:
+            raise ValueError("equal must be left out with copy_of")
+        if self.copy_of is not None and (self.cables is None or len(self.cables) != len(self.copy_of)):
+            count = "all" if self.cables is None else len(self.cables)
+            raise ValueError(f"copy_of must name as many cables as `cables`, {count}, got {len(self.copy_of)}")
+        for name, cables in (("cables", self.cables), ("copy_of", self.copy_of)):
+            if cables is not None and len(set(cables)) < len(cables):
+                raise ValueError(f"{name} must name each cable once, got {list(cables)}")
+        return self
+
+
+class Requirement(Part):
+    """Poses at which the cables must balance wrenches; every combination counts."""
+
+    box: Box | None = Field(default=None, description="box of positions of the platform in {G} [m]")
+    grid: tuple[Count, Count, Count] = Field(default=(7, 7, 5), description="with a box: positions along x, y and z")
+    attitudes: Rows[Vector3] = Field(
+        default=((0.0, 0.0, 0.0),), description="with a box: roll, pitch, yaw of the platform [rad]; default: level"
+    )
+    poses: Rows[Pose] | None = Field(default=None, description="instead of a box: poses of the platform [m, rad]")
+    wrenches: Rows[Wrench] = Field(
+        default=(NO_WRENCH,),
+        description="wrenches (fx, fy, fz, mx, my, mz) on the platform in addition to its weight, about its CoM "
+        "[N, N m]; default: none",
+    )
+    accelerations: Rows[Wrench] = Field(
+        default=(NO_WRENCH,),
+        description="accelerations of the platform: second derivatives of its pose [m/s^2, rad/s^2]; default: rest",
+    )
+    winds: Rows[Vector3] | None = Field(
+        default=None, description="velocities of the air in {G} [m/s]; default: no aerodynamic forces"
+    )
+
+    @model_validator(mode="after")
+    def _where(self) -> Self:
+        if (self.box is None) == (self.poses is None):
+            got = "neither" if self.box is None else "both"
+            raise ValueError(f"box or poses must be given, and not both, got {got}")
+        return self
+
+    def places(self, grid: tuple[int, ...] | None = None) -> np.ndarray:
+        """Return the poses, of the box with another number of positions along each axis if given, (N, 6) [m, rad]."""
+        if self.box is None:
+            return np.array(self.poses)
+        axes = [
+            np.linspace(low, high, count) if count > 1 and low < high else np.array([(low + high) / 2])
+            for low, high, count in zip(self.box.min, self.box.max, grid or self.grid, strict=True)
+        ]
+        return np.array([(*position, *attitude) for attitude in self.attitudes for position in product(*axes)])
+
+    def sampled(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Return random poses of the box with its attitudes, (count, 6); of a list all poses."""
+        if self.box is None:
+            return np.array(self.poses)
+        poses = np.empty((count, 6))
+        poses[:, :3] = rng.uniform(self.box.min, self.box.max, (count, 3))
+        poses[:, 3:] = np.array(self.attitudes)[rng.integers(len(self.attitudes), size=count)]
+        return poses
+
+    @property
+    def demands(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray | None]]:
+        """Return every combination of wrench, acceleration and wind."""
+        winds = [None] if self.winds is None else [np.array(wind) for wind in self.winds]
+        return [(np.array(w), np.array(a), wind) for w, a, wind in product(self.wrenches, self.accelerations, winds)]
+
+    @property
+    def size(self) -> int:
+        """Return the number of poses times wrenches."""
+        poses = len(self.attitudes) * int(np.prod(self.grid)) if self.poses is None else len(self.poses)
+        return poses * len(self.wrenches) * len(self.accelerations) * len(self.winds or (0,))
+
+
+class Requirements(Part):
+    """What a design may change and what it must be able to do. In a file: YAML with these keys."""
+
+    name: Name = Field(default="design", description="of the requirements, in reports and names of files")
+    free: Annotated[tuple[Free, ...], Field(min_length=1, max_length=200)] = Field(
+        description="numbers of the robot that the design chooses; all others keep the values of its file"
+    )
+    require: Annotated[tuple[Requirement, ...], Field(min_length=1, max_length=200)] = Field(
+        description="poses and the wrenches to balance there"
+    )
+    margin: Positive = Field(
+        default=LEAST_MARGIN,
+        ge=LEAST_MARGIN,
+        description="smallest capacity margin, with moments divided by the `length` of the robot's file [N]",
+    )
+    clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: any")
+    maximise: Literal["margin"] = Field(default="margin", description="objective: the smallest capacity margin")
+    start: Literal["robot", "random"] = Field(
+        default="robot", description="first layout: the robot's own, moved into the boxes, or a random one"
+    )
+    time_limit: Positive = Field(default=10.0, description="time of the search [s]; the last audit is finished first")
+    seed: Annotated[Whole, Field(ge=0, le=2**32 - 1)] = Field(default=0, description="seed of the random numbers")
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Self:
+        size = sum(each.size for each in self.require)
+        if size > MOST_ROWS:
+            raise ValueError(f"require must have at most {MOST_ROWS} poses times wrenches, got {size}")
+        return self
+
+    def check(self, robot: Robot) -> None:
+        """Raise InputError if the requirements do not fit a robot: its cables, or a number that is free twice."""
+        taken: dict[tuple[str, int], int] = {}
+        for number, free in enumerate(self.free):
+            where = f"free[{number}]"
+            for name in ("cables", "copy_of"):
+                for cable in getattr(free, name) or ():
+                    if cable >= robot.m:
+                        raise InputError(f"{where}.{name} must be cables of the robot, 0 to {robot.m - 1}, got {cable}")
+            for cable in free.cables or range(robot.m):
+                if (free.part, cable) in taken:
+                    first = taken[free.part, cable]
+                    raise InputError(f"{where} must not free {free.part} {cable}, which free[{first}] has, again")
+                taken[free.part, cable] = number
+        for number, free in enumerate(self.free):
+            for cable in free.copy_of or ():
+                source = taken.get((free.part, cable))
+                if source is not None and self.free[source].copy_of is not None:
+                    raise InputError(f"free[{number}].copy_of must name cables that are no copies, got {cable}")
+
+
+def read_requirements(requirements: Requirements | dict[str, Any] | str | os.PathLike[str]) -> Requirements:
+    """Return `Requirements` from requirements, a mapping or a YAML file.
+
+    Raises
+    ------
+    InputError
+        If they are invalid; the message names the field, the accepted values and the value.
+    """
+    if isinstance(requirements, Requirements):
+        return requirements
+    if isinstance(requirements, dict):
+        return validate(requirements, Requirements, "requirements")
+    accepted = "Requirements, a mapping or the path of a YAML file"
+    return read_yaml(file_path("requirements", requirements, accepted), Requirements)

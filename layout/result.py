@@ -1,0 +1,176 @@
+"""`Design`: the robot that a design found, how good it is, and why it is not better."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from ..base.display import Displayed, Fact
+from ..base.text import quantity, quantity_row
+from ..figures.report import Part, Report, Reported, Section, Table
+from ..models import Robot
+from ..models.parsing import to_yaml
+from ..solvers import Certificate, TensionProblem, capacity_margin
+from .impossibility import Impossibility
+from .reasons import Binding, Reasons
+from .requirements import Requirements
+
+Status = Literal["feasible", "infeasible", "not-found"]
+MOST_LISTED = 8
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(Reported, Displayed):
+    """The result of `design`.
+
+    Attributes
+    ----------
+    robot
+        The best robot found; the robot of the file if the requirements are impossible.
+    before
+        The robot that was changed.
+    requirements
+        What it should do.
+    status
+        feasible: its margin, by `capacity_margin` at the worst poses of the grid and of an audit, and its clearance are
+        as required; infeasible: no layout inside the boxes meets the requirements, by `impossibility`; not-found: none
+        was found, which proves nothing.
+    margin, margin_before
+        Smallest capacity margin of both at the same poses, with moments divided by `before.length` [N].
+    clearance
+        Smallest distance between two cables [m]; infinite for one cable.
+    reasons
+        What binds and what would help; None if the requirements are impossible.
+    poses, audited
+        Number of poses times wrenches of the requirements, and of random ones in the last audit.
+    starts
+        Number of layouts from which it searched.
+    stopped
+        Whether the search was interrupted.
+    """
+
+    robot: Robot
+    before: Robot
+    requirements: Requirements
+    status: Status
+    margin: float
+    margin_before: float
+    clearance: float
+    reasons: Reasons | None
+    impossibility: Impossibility | None
+    poses: int
+    audited: int
+    starts: int
+    stopped: bool
+
+    @property
+    def feasible(self) -> bool:
+        """Return whether the robot meets the requirements."""
+        return self.status == "feasible"
+
+    @property
+    def certificate(self) -> Certificate | None:
+        """Return the certificate that no layout meets the requirements, or None."""
+        return None if self.impossibility is None else self.impossibility.certificate
+
+    def _summary(self) -> str:
+        if self.impossibility is not None:
+            return self.impossibility.describe(self._up())
+        text = f"capacity margin {quantity(self.margin, 'N')} (before {quantity(self.margin_before, 'N')})"
+        if self.requirements.clearance > 0.0:
+            text += f", cables {quantity(self.clearance, 'm')} apart"
+        return text
+
+    def _headline(self) -> str:
+        return self._report().headline
+
+    def _facts(self) -> list[Fact]:
+        return [("poses", quantity(self.poses)), ("audited", quantity(self.audited)), ("starts", str(self.starts))]
+
+    def _up(self) -> np.ndarray:
+        return -np.array(self.before.gravity)
+
+    def _report(self) -> Report:
+        about = f"{self.before.name}, {self.requirements.name}"
+        parts: list[Part] = []
+        if self.impossibility is not None:
+            parts.append(f"proof for one pose and wrench: {self.impossibility.certificate.describe(self._up())}")
+            return Report(about, self.status, self._summary(), parts)
+        searched = f"{self.starts} start{'s' * (self.starts != 1)}, {self.poses} poses times wrenches"
+        facts = [("searched", f"{searched}, audited at {quantity(self.audited)} random ones")]
+        if self.stopped:
+            facts.append(("", "INTERRUPTED: the best so far"))
+        if self.status == "not-found":
+            wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
+            wanted += [f"clearance of {quantity(self.requirements.clearance, 'm')}"] * (self.requirements.clearance > 0)
+            facts.append(("wanted", f"{' and a '.join(wanted)}; this is no proof that no layout has it"))
+        parts.append(Section("", facts))
+        if self.reasons is not None:
+            parts += self._why(self.reasons)
+        return Report(about, self.status, self._summary(), parts, files=[("The robot's file", to_yaml(self.robot))])
+
+    def _why(self, found: Reasons) -> list[Part]:
+        state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
+        bounds = f"{found.at_bounds} free numbers are at a bound of their box"
+        facts = [("layout", f"{state}; {bounds}")]
+        facts += [
+            (one.change, f"margin {quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
+            for one in found.advice
+        ]
+        rows = [self._binding_row(one) for one in found.binding[:MOST_LISTED]]
+        columns = ("share", "pose [m, rad]", "wrench [N, N m]", "least reserve along", "limits")
+        more = len(found.binding) - len(rows)
+        table = Table("What binds", columns, rows, (0,))
+        return [Section("", facts), table, *([f"and {more} more"] if more > 0 else [])]
+
+    def _binding_row(self, one: Binding) -> list[str]:
+        limits = [
+            f"{name} of {', '.join(str(i + 1) for i in cables)}"
+            for name, cables in (("t_max", one.at_max), ("t_min", one.at_min))
+            if cables
+        ]
+        along = _direction(one, self.before)
+        return [f"{one.weight:.2f}", quantity_row(one.pose), quantity_row(one.wrench), along, "; ".join(limits)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain lists and numbers, ready for JSON."""
+        found = self.reasons
+        return {
+            "status": self.status,
+            "feasible": self.feasible,
+            "margin": self.margin,
+            "margin_before": self.margin_before,
+            "clearance": self.clearance,
+            "length": self.before.length,
+            "poses": self.poses,
+            "audited": self.audited,
+            "starts": self.starts,
+            "stopped": self.stopped,
+            "local_optimum": None if found is None else found.local_optimum,
+            "binding": []
+            if found is None
+            else [{name: np.asarray(value).tolist() for name, value in one._asdict().items()} for one in found.binding],
+            "advice": [] if found is None else [one._asdict() for one in found.advice],
+            "certificate": None
+            if self.impossibility is None
+            else {
+                "pose": self.impossibility.pose.tolist(),
+                "wrench": self.impossibility.wrench.tolist(),
+                **self.impossibility.certificate.to_dict(),
+            },
+        }
+
+
+def _direction(one: Binding, robot: Robot) -> str:
+    """Return the direction of a binding wrench, as certificates describe theirs."""
+    none = np.zeros(0, dtype=int)
+    certificate = Certificate(one.direction, 0.0, 0.0, 0.0, none, none, np.zeros(robot.m), robot.length)
+    return certificate.text(-np.array(robot.gravity)).along.partition(";")[0]
+
+
+def judged_margin(robot: Robot, A: np.ndarray, wrenches: np.ndarray) -> float:
+    """Return the smallest `capacity_margin` of wrenches (k, n) with their matrices (k, n, m), rows in newtons [N]."""
+    return min(
+        capacity_margin(TensionProblem(each, w, robot.t_min, robot.t_max)).value
+        for each, w in zip(A, wrenches, strict=True)
+    )

@@ -1,0 +1,151 @@
+"""`design`: the layout of a robot that meets requirements with the largest margin."""
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..models import Robot
+from ..models.dynamics import dynamics_of
+from ..models.files import as_robot
+from ..solvers.margins import margins
+from .evaluation import Evaluation, Rows, rows_of
+from .impossibility import find_impossibility
+from .reasons import reasons
+from .requirements import Free, Requirement, Requirements, read_requirements
+from .result import Design, judged_margin
+from .search import AUDITED, Progress, search
+from .variables import Variables, variables_of
+
+_JUDGED = 100  # worst poses, by `capacity_margin`
+
+
+def design(
+    robot: Robot | str | os.PathLike[str],
+    free: Sequence[Free | dict[str, Any]] | None = None,
+    require: Sequence[Requirement | dict[str, Any]] | None = None,
+    maximise: str = "margin",
+    *,
+    requirements: Requirements | dict[str, Any] | str | os.PathLike[str] | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Design:
+    """Find anchors, attachments and tension limits with the largest smallest capacity margin.
+
+    Layouts from simulated annealing on few poses are improved by sequential linear programs on all of them, and audits
+    at 100 000 random poses add the worst. The result is judged by `capacity_margin`. It is a local optimum. Carriers
+    are at home.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    free
+        Numbers to choose: `Free`, or mappings with its keys.
+    require
+        Poses and wrenches: `Requirement`, or mappings with its keys.
+    maximise
+        Objective: "margin".
+    requirements
+        Instead of all of these: `Requirements`, a mapping, or the path of a file.
+    progress
+        Called with what is being done, the share of the time that has passed, and the best margin so far [N].
+    **options
+        Other keys of `Requirements`: name, margin, clearance, start, time_limit, seed.
+
+    Returns
+    -------
+    :
+        The result; if the requirements are impossible with a certificate, and after an interrupt the best so far.
+
+    Raises
+    ------
+    InputError
+        If an argument is wrong, or the requirements do not fit the robot.
+    """
+    chosen = as_robot(robot)
+    if requirements is not None:
+        given = {"free": free, "require": require, **options}
+        for name, value in given.items():
+            if value is not None:
+                raise InputError(f"{name} must be left out with requirements, which have it")
+        wanted = read_requirements(requirements)
+    else:
+        parts = {"free": free, "require": require}
+        lists = {name: _list(name, value) for name, value in parts.items() if value is not None}
+        wanted = read_requirements({**lists, "maximise": maximise, **options})
+    count = int(chosen.dof_mask.sum())
+    if chosen.m < count:
+        raise InputError(f"robot {chosen.name!r} must have at least {count} cables for {count} coordinates, "
+                         f"got {chosen.m}")  # fmt: skip
+    if chosen.drive == "fixed-length":
+        raise InputError(f"robot {chosen.name!r} must have winches, got cables of fixed length")
+    variables = variables_of(chosen, wanted)
+    grid = rows_of(chosen, wanted.require, [each.places() for each in wanted.require])
+    impossible = find_impossibility(variables, grid)
+    if impossible is not None:
+        before = _judged(chosen, chosen.length, grid)
+        return Design(
+            chosen, chosen, wanted, "infeasible", before, before, _nearest(Evaluation(variables, grid), None), None,
+            impossible, len(grid.pose_of), 0, 0, False,
+        )  # fmt: skip
+    found = search(variables, wanted, progress or (lambda what, share, best: None))
+    return _designed(variables, wanted, found.y, found.rows, len(grid.pose_of), found.starts, found.stopped)
+
+
+def _designed(
+    variables: Variables, wanted: Requirements, y: np.ndarray, rows: Rows, count: int, starts: int, stopped: bool
+) -> Design:
+    """Judge the layout at the rows and at new random poses, and find the reasons."""
+    before, robot = variables.robot, variables.robot_at(y)
+    random = np.random.default_rng([wanted.seed, 1])
+    per_demand = max(1000, AUDITED // sum(len(each.demands) for each in wanted.require))
+    audited = rows_of(before, wanted.require, [each.sampled(per_demand, random) for each in wanted.require])
+    every = rows.joined(audited)
+    worst = np.argsort(Evaluation(variables, every).margins(y))[:_JUDGED]
+    margin = _judged(robot, before.length, every.only(worst))
+    evaluation = Evaluation(variables, rows)
+    nearest = _nearest(evaluation, y)
+    if wanted.clearance > 0.0:
+        some = np.unique(audited.pose_of, return_index=True)[1][:: max(1, len(audited.poses) // 10_000)]
+        nearest = min(nearest, _nearest(Evaluation(variables, audited.only(some)), y))
+    feasible = margin >= wanted.margin and nearest >= wanted.clearance
+    return Design(
+        robot, before, wanted, "feasible" if feasible else "not-found", margin,
+        _least(before, before.length, every), nearest, reasons(evaluation, y, wanted.clearance), None, count,
+        len(audited.pose_of), starts, stopped,
+    )  # fmt: skip
+
+
+def _problems(robot: Robot, length: float, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+    """Return matrices (k, n, m) and wrenches (k, n), with moments divided by the length."""
+    kept = np.flatnonzero(robot.dof_mask)
+    scale = np.repeat([1.0, 1.0 / length], 3)[kept]
+    A = dynamics_of(robot).wrench_matrix(rows.poses)[:, kept] * scale[:, None]
+    return A[rows.pose_of], rows.wrenches[:, kept] * scale
+
+
+def _least(robot: Robot, length: float, rows: Rows) -> float:
+    return float(margins(*_problems(robot, length, rows), robot.t_min, robot.t_max).min())
+
+
+def _judged(robot: Robot, length: float, rows: Rows) -> float:
+    """Return the smallest margin, by `capacity_margin` at the worst rows."""
+    A, w = _problems(robot, length, rows)
+    worst = np.argsort(margins(A, w, robot.t_min, robot.t_max))[:_JUDGED]
+    return judged_margin(robot, A[worst], w[worst])
+
+
+def _nearest(evaluation: Evaluation, y: np.ndarray | None) -> float:
+    """Return the smallest distance between two cables [m]; default: those of the robot moved inside the boxes."""
+    if not evaluation.pairs.size:
+        return np.inf
+    return float(evaluation.distances(evaluation.variables.of_robot() if y is None else y).min())
+
+
+def _list(name: str, value: Any) -> list[Any]:
+    if isinstance(value, str | dict) or not isinstance(value, Sequence):
+        raise InputError(f"{name} must be a list of mappings, got {value!r}"[:200])
+    return list(value)

@@ -1,0 +1,146 @@
+"""`Variables`: the free numbers of a robot as one vector inside bounds, and the robots that vectors stand for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..models import Robot
+from .requirements import POINTS, Free, Requirements
+
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Variables:
+    """Maps variables y to the layout: z = fixed + S y, the anchors (3 m), attachments (3 m), t_min (m) and t_max (m).
+
+    Attributes
+    ----------
+    S
+        (8 m, p), 1, -1 or 0.
+    fixed
+        What does not change, (8 m).
+    low, high
+        Bounds of the variables, (p,).
+    names
+        Of the variables, such as "cables[2].anchor.x".
+    points
+        Variables that are one point or one tension limit, and move together.
+    """
+
+    robot: Robot
+    S: np.ndarray  # (8 m, p)
+    fixed: np.ndarray  # (8 m,)
+    low: np.ndarray  # (p,)
+    high: np.ndarray  # (p,)
+    names: tuple[str, ...]
+    points: tuple[np.ndarray, ...]
+
+    @property
+    def size(self) -> int:
+        """Return the number of variables."""
+        return self.low.size
+
+    def layout(self, y: np.ndarray) -> np.ndarray:
+        """Return the layout, (8 m,)."""
+        return self.fixed + self.S @ y
+
+    def of_robot(self) -> np.ndarray:
+        """Return the variables of the robot itself, moved inside the bounds, (p,)."""
+        first = self.S.argmax(axis=0)  # a row with the value of the variable itself
+        return np.clip(_layout_of(self.robot)[first], self.low, self.high)
+
+    def robot_at(self, y: np.ndarray) -> Robot:
+        """Return the robot with the numbers of a vector.
+
+        Raises `InputError` if no such robot exists.
+        """
+        anchors, attachments, t_min, t_max = parts(self.layout(y), self.robot.m)
+        data = self.robot.model_dump()
+        cables = []
+        for i, cable in enumerate(data["cables"]):
+            cables.append(
+                {**cable, "anchor": anchors[i].tolist(), "attachment": attachments[i].tolist()}
+                | {"t_min": float(t_min[i]), "t_max": float(t_max[i])}
+            )
+        return Robot.model_validate({**data, "cables": cables})
+
+
+def parts(layout: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return anchors (m, 3), attachments (m, 3), t_min (m,) and t_max (m,) of a layout."""
+    return layout[: 3 * m].reshape(m, 3), layout[3 * m : 6 * m].reshape(m, 3), layout[6 * m : 7 * m], layout[7 * m :]
+
+
+def variables_of(robot: Robot, requirements: Requirements) -> Variables:
+    """Return the variables of the free numbers of a robot.
+
+    Raises
+    ------
+    InputError
+        If the requirements do not fit the robot.
+    """
+    requirements.check(robot)
+    fixed, column_of = _layout_of(robot), {}
+    low: list[float] = []
+    high: list[float] = []
+    names: list[str] = []
+    points: list[np.ndarray] = []
+    for free in requirements.free:
+        if free.copy_of is not None:
+            continue
+        bounds = _bounds(free)
+        for number, cable in enumerate(free.cables or range(robot.m)):
+            rows = _rows(free.part, cable, robot.m)
+            if number == 0 or not free.equal:
+                start = len(low)
+                low += [bound[0] for bound in bounds]
+                high += [bound[1] for bound in bounds]
+                names += [f"cables[{cable}].{free.part}{suffix}" for suffix in _suffixes(free)]
+                points.append(np.arange(start, len(low)))
+            column_of |= {row: (column, 1.0) for row, column in zip(rows, points[-1], strict=True)}
+    for free in requirements.free:
+        for cable, source in zip(free.cables or (), free.copy_of or (), strict=True) if free.copy_of else ():
+            signs = [-1.0 if suffix == f".{free.mirrored}" else 1.0 for suffix in _suffixes(free)]
+            pairs = zip(_rows(free.part, cable, robot.m), _rows(free.part, source, robot.m), signs, strict=True)
+            for row, original, sign in pairs:
+                if original in column_of:
+                    column_of[row] = (column_of[original][0], sign)
+                else:
+                    fixed[row] = sign * fixed[original]
+    S = np.zeros((fixed.size, len(low)))
+    for row, (column, sign) in column_of.items():
+        S[row, column], fixed[row] = sign, 0.0
+    found = Variables(robot, S, fixed, np.array(low), np.array(high), tuple(names), tuple(points))
+    t_min = parts(found.fixed + np.maximum(S, 0) @ found.high, robot.m)[2]
+    lowest = parts(found.layout(found.low), robot.m)[3]
+    if not (t_min < lowest).all():
+        cable = int(np.argmin(lowest - t_min))
+        raise InputError(
+            f"free must keep t_min of cable {cable} below its t_max, got up to {t_min[cable]:g} and from "
+            f"{lowest[cable]:g} [N]"
+        )
+    return found
+
+
+def _layout_of(robot: Robot) -> np.ndarray:
+    return np.concatenate([robot.anchors.ravel(), robot.attachments.ravel(), robot.t_min, robot.t_max])
+
+
+def _bounds(free: Free) -> list[tuple[float, float]]:
+    if free.box is not None:
+        return list(zip(free.box.min, free.box.max, strict=True))
+    assert free.range is not None
+    return [(free.range.min, free.range.max)]
+
+
+def _suffixes(free: Free) -> list[str]:
+    return [f".{axis}" for axis in _AXES] if free.part in POINTS else [""]
+
+
+def _rows(part: str, cable: int, m: int) -> list[int]:
+    """Return the rows of a layout that a number of a cable has."""
+    if part in POINTS:
+        start = 3 * (m * POINTS.index(part) + cable)
+        return [start, start + 1, start + 2]
+    return [(6 if part == "t_min" else 7) * m + cable]
