@@ -26,6 +26,7 @@ from .warnings.instants import Instants
 from .warnings.leaves_its_points import leaves_its_points
 from .warnings.outside_frame import outside_frame
 from .warnings.short_cables import short_cables
+from .warnings.slipped_units import slipped_units
 
 if TYPE_CHECKING:
     from .audits.robust_margin import RobustMargin
@@ -192,7 +193,8 @@ class PlanData(Displayed):
         inside = into_places(seen, scenario.limits.all, limited)
         inside += between_points(seen, scenario.limits.all, limited)
         others = (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))
-        return (*leaves_its_points(scenario.task.path), *inside, *others)
+        units = slipped_units(scenario.robot, scenario.task)
+        return (*units, *leaves_its_points(scenario.task.path), *inside, *others)
 
     @cached_property
     def infeasible_spans(self) -> tuple[Certificate, ...]:

@@ -2,12 +2,16 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline import Robot, available, load, plan, time_along
+from towline import Robot, Task, available, load, plan, time_along
+from towline.errors import InputError
+from towline.ocp.tasks.task import read_task
+from towline.ocp.warnings.slipped_units import slipped_units
 
 from .warm import towline as run
 
@@ -122,3 +126,57 @@ def test_no_frame_is_left_where_there_is_none(robot, task):
 def test_a_robot_at_home_is_inside_its_frame(name):
     robot = load(name)
     assert plan(robot, {"path": {"kind": "rest", "pose": robot.home.tolist()}, "duration": 1}).warnings == ()
+
+
+LINE = {"kind": "line", "start": [-2, 0, 1.5], "end": [2, 1, 2]}
+SLIPPED = {
+    "millimetres": [
+        {"path": LINE | {"start": [-2000, 0, 1500], "end": [2000, 1000, 2000]}},
+        {"path": {"kind": "circle", "centre": [0, 0, 1.5], "radius": 800, "rate": 0.5}},
+        {"limits": {"keep_out": [{"kind": "sphere", "centre": [0, 500, 1700], "radius": 300}]}},
+        {"limits": {"keep_out": [{"kind": "box", "min": [500, 500, 300], "max": [900, 700, 600]}]}},
+        {"final": {"pose": [2000, 1000, 2000]}, "tube": {"position": "free"}},
+    ],
+    "centimetres": [{"path": LINE | {"start": [-200, 0, 150], "end": [200, 100, 200]}}],
+    "degrees": [
+        {"path": LINE | {"end": [2, 1, 2, 0, 0, 45]}},
+        {"tube": {"position": "free", "attitude": 20}},
+        {"path": {"kind": "waypoints", "points": [[0, 0, 1, 0, 0, 0], [1, 0, 1, 0, 0, 90], [1, 1, 1, 0, 0, 180]]}},
+    ],
+    "degrees per second": [{"path": {"kind": "circle", "centre": [0, 0, 1.5], "radius": 0.8, "rate": 60}}],
+    "millimetres per second": [{"limits": {"platform_speed": 1500}}],
+    "millimetres per second squared": [{"limits": {"platform_acceleration": 2000}}],
+    "grams": [
+        {"path": None, "duration": None, "phases": [{"name": "a", "path": LINE, "duration": 6, "load": {"mass": 5e4}}]}
+    ],
+}
+
+
+@pytest.mark.parametrize(("unit", "changes"), [(unit, each) for unit, all_of in SLIPPED.items() for each in all_of])
+def test_units_that_slipped_are_named(unit, changes):
+    task = {"path": LINE, "duration": 6} | changes
+    task = Task.model_validate({key: value for key, value in task.items() if value is not None})
+    said = slipped_units(COGIRO, task)
+    assert len(said) == 1
+    assert f"are these {unit}?" in said[0]
+
+
+WEEK = sorted((Path(__file__).parents[1] / "examples/week").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("file", WEEK, ids=lambda file: file.stem)
+def test_units_of_ordinary_tasks_are_not_doubted(file):
+    try:
+        task = read_task(file)
+    except InputError:
+        pytest.skip("a robot or a list of events")
+    assert not slipped_units(COGIRO, task)
+
+
+def test_a_wind_in_kilometres_per_hour_is_named_in_the_report():
+    task = Task.model_validate(
+        {"path": {"kind": "line", "start": [0, 0, -1], "end": [0.1, 0, -1]}, "duration": 2, "wind": [90, 0, 0]}
+    )
+    assert "are these kilometres per hour?" in " ".join(slipped_units(load("wang-flying"), task))
+    found = plan("cogiro", {"path": SLIPPED["millimetres"][0]["path"], "duration": 6})
+    assert "are these millimetres? towline reads metres" in found.report()
