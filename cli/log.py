@@ -11,7 +11,7 @@ FieldsOption = Annotated[
     Path | None,
     typer.Option(
         metavar="FILE.yaml",
-        help="Names of the log's fields, such as 'lengths: /winches/position[*] [mm]'; default: usual names.",
+        help="Names of the log's fields, such as 'lengths: /winches/position[*]'; default: usual names.",
     ),
 ]
 

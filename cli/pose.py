@@ -2,24 +2,58 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import CarrierPoseOption, JsonOption, RobotArgument, numbers, print_json, print_table
+from ..base.errors import InputError
+from ..base.inputs import check_ending, one_of
+from .log import FieldsOption
+from .options import (
+    CarrierPoseOption,
+    FormatOption,
+    JsonOption,
+    RobotArgument,
+    numbers,
+    print_json,
+    print_table,
+    print_written,
+)
+from .outputs import check_outputs
 
 if TYPE_CHECKING:
     from ..estimation import PoseEstimate
     from ..models import Robot
 
 SIX = "x y z roll pitch yaw"
+FEWEST_FIT = 0.95  # of the samples of a log
 
 
 def pose(
     robot: RobotArgument,
     lengths: Annotated[
-        str, typer.Option(metavar="'one number for each cable'", help="Measured lengths of the cables [m].")
-    ],
+        str | None, typer.Option(metavar="'one number for each cable'", help="Measured lengths of the cables [m].")
+    ] = None,
+    log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG",
+            help="Log of readings of the winches, instead of --lengths: CSV, NetCDF, MCAP or a ROS bag. The encoders "
+            "of the robot file convert them to lengths.",
+        ),
+    ] = None,
+    fields: FieldsOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv", help="With --log: file of poses and covariances; default: LOG-poses.csv here."
+        ),
+    ] = None,
+    figures: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="With --log: folder for a figure of the residuals over time.")
+    ] = None,
+    form: FormatOption = "png",
     start: Annotated[
         str | None,
         typer.Option(metavar=f"'{SIX}'", help="Pose to start from [m, rad]; default: search without a start."),
@@ -33,12 +67,28 @@ def pose(
     """Estimate the pose of the platform from its cable lengths, and list other poses that fit them.
 
     If the lengths do not determine the pose, the result is the equilibrium pose. The exit code is 1 if no pose fits the
-    lengths.
+    lengths. With --log, the poses of all samples are written, and samples that no pose fits are listed; the exit code
+    is 1 if these are more than one in twenty.
     """
     from ..estimation import branches, pose_from_lengths
     from ..models import load
 
     loaded = load(robot)
+    if (lengths is None) == (log is None):
+        raise InputError("one of --lengths and --log must be given, got " + ("none" if log is None else "both"))
+    for name, value, wrong in (
+        ("--start", start, log),
+        ("--carrier-pose", carrier_pose, log),
+        ("--out", out, lengths),
+        ("--figures", figures, lengths),
+        ("--fields", fields, lengths),
+    ):
+        if value is not None and wrong is not None:
+            raise InputError(f"{name} must be left out with {'--log' if wrong is log else '--lengths'}, got {value}")
+    if log is not None:
+        _of_log(loaded, log, fields, sigma, out or Path(f"{log.stem}-poses.csv"), figures, form, as_json)
+        return
+    assert lengths is not None
     measured = numbers("--lengths", lengths, loaded.m)
     near = None if start is None else numbers("--start", start, 6)
     carriers = None if carrier_pose is None else numbers("--carrier-pose", carrier_pose, 6, rows=len(loaded.carriers))
@@ -52,6 +102,45 @@ def pose(
     else:
         _show(loaded, estimate, others)
     if not estimate.consistent:
+        raise typer.Exit(1)
+
+
+def _of_log(
+    robot: Robot, log: Path, fields: Path | None, sigma: str, out: Path, figures: Path | None, form: str, as_json: bool
+) -> None:
+    """Write the poses of a log."""
+    import numpy as np
+
+    from ..base.text import quantity
+    from ..estimation.logs import read_log
+    from ..estimation.pose.from_log import poses_from_log
+    from ..figures import calibration, style
+
+    one_of("--format", form, style.FORMATS)
+    check_ending("--out", out, ".csv")
+    picture = figures and figures / f"consistency.{form}"
+    check_outputs({"--out": out, "--figures": picture}, {"the log": log})
+    deviations = numbers("--sigma", sigma, robot.m if len(sigma.replace(",", " ").split()) > 1 else 1)
+    read = read_log(log, None, None, robot, fields)
+    found = poses_from_log(robot, read.measurements, deviations if len(deviations) > 1 else deviations[0], read.begin)
+    files = [found.save(out)]
+    if picture is not None:
+        drawn = calibration.consistency(found.estimate.residuals, found.cost, found.largest, found.times)
+        files.append(style.save(drawn, picture))
+    data = {"robot": robot.name, **found.to_dict(), "notes": read.notes, "files": files}
+    if as_json:
+        print_json(data)
+    else:
+        sigmas = np.sqrt(np.diagonal(found.estimate.covariance, axis1=-2, axis2=-1))
+        size = quantity(1e3 * data["residual"], "mm", 3)
+        typer.echo(f"{robot.name}: {quantity(data['samples'])} poses, residuals of {size} (rms)")
+        for i, name in enumerate(SIX.split()):
+            middle = float(np.median(sigmas[:, i])) * (1e3 if i < 3 else 180 / np.pi)
+            typer.echo(f"  median sigma of {name}: {quantity(middle, 'mm' if i < 3 else 'deg', 3)}")
+        for line in (*read.notes, *found.lines()):
+            typer.echo(f"  {line}")
+        print_written(files)
+    if data["consistent"] < FEWEST_FIT:
         raise typer.Exit(1)
 
 

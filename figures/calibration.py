@@ -10,6 +10,7 @@ import numpy as np
 from . import style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WITHIN_95 = 2.795  # standard deviations: the root of the 95 % quantile of chi-square with three degrees of freedom
@@ -29,25 +30,60 @@ def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = 
     canvas = style.figure(height=3.4)
     along = "sample" if times is None else "time [s]"
     top, bottom = style.panels_below(canvas, along, ("residual, file [mm]", "calibrated [mm]"))
-    at = np.arange(len(before)) if times is None else times
-    step = -(-len(before) // MOST_SAMPLES)
     for ax, values in ((top, before), (bottom, after)):
-        for cable in range(values.shape[1]):
-            ax.plot(
-                at[::step],
-                1e3 * values[::step, cable],
-                linestyle="none",
-                marker=style.marker(cable),
-                markersize=2.0,
-                markeredgewidth=0.0,
-                color=style.colour(cable),
-                label=f"cable {cable + 1}",
-                rasterized=True,
-            )
-        rms = 1e3 * float(np.sqrt(np.nanmean(values**2)))
-        style.heading(ax, f"root mean square {rms:.3g} mm")
+        _of_cables(ax, values, times)
     style.legend_below(canvas, top, scale=2.0)
     return canvas
+
+
+def consistency(residuals: np.ndarray, cost: np.ndarray, largest: float, times: np.ndarray | None = None) -> Figure:
+    """Draw how well poses fit their lengths: the residual of each cable, and their sums of squares with a limit.
+
+    Parameters
+    ----------
+    residuals
+        Of the lengths, (N, m) [m].
+    cost
+        Sum of squares in standard deviations, (N,).
+    largest
+        Limit that sound samples rarely exceed, or nan.
+    times
+        Of the samples, (N,) [s]; default: they are counted.
+    """
+    canvas = style.figure(height=3.4)
+    along = "sample" if times is None else "time [s]"
+    top, bottom = style.panels_below(canvas, along, ("residual [mm]", "sum of squares [-]"))
+    _of_cables(top, residuals, times)
+    at = np.arange(len(cost)) if times is None else times
+    fits = ~(cost > largest)
+    few = slice(None, None, -(-len(cost) // MOST_SAMPLES))
+    bottom.plot(at[fits][few], cost[fits][few], ".", markersize=2.0, color=style.colour(0), rasterized=True)
+    bottom.plot(at[~fits], cost[~fits], ".", markersize=3.0, color=style.colour(1), rasterized=True)
+    bottom.set_yscale("symlog", linthresh=1.0)
+    if np.isfinite(largest):
+        style.limit_line(bottom, largest, "1 % of sound logs exceed this")
+    style.legend_below(canvas, top, scale=2.0)
+    return canvas
+
+
+def _of_cables(ax: Axes, values: np.ndarray, times: np.ndarray | None) -> None:
+    """Draw values (N, m) [m] of the cables in a panel."""
+    at = np.arange(len(values)) if times is None else times
+    step = -(-len(values) // MOST_SAMPLES)
+    for cable in range(values.shape[1]):
+        ax.plot(
+            at[::step],
+            1e3 * values[::step, cable],
+            linestyle="none",
+            marker=style.marker(cable),
+            markersize=2.0,
+            markeredgewidth=0.0,
+            color=style.colour(cable),
+            label=f"cable {cable + 1}",
+            rasterized=True,
+        )
+    rms = 1e3 * float(np.sqrt(np.nanmean(values**2)))
+    style.heading(ax, f"root mean square {rms:.3g} mm")
 
 
 def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> Figure:

@@ -64,7 +64,7 @@ def test_three_cables_hang_and_too_short_ones_do_not():
         (["--lengths", text([8] * 8), "--sigma", "0"], "sigma must be"),
         (["--lengths", text([8] * 8), "--sigma", "1 2"], "--sigma must be 8 finite numbers"),
         (["--lengths", text([8] * 8), "--start", "1 2"], "--start must be 6 finite numbers"),
-        ([], "missing option '--lengths'"),
+        ([], "one of --lengths and --log must be given"),
     ],
 )
 def test_wrong_input_is_one_line(arguments, message):

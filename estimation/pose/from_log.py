@@ -1,0 +1,161 @@
+"""`poses_from_log`: the poses of a platform over a log of readings of its winches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.display import Displayed
+from ...base.text import quantity
+from ...base.writing import whole_file
+from ...models.part import COORDINATES
+from ...models.robot import Robot
+from ..logs.measurements import Measurements, check_measurements
+from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
+from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
+from .tracker import PoseTracker
+
+MOST_TRACKED = 2000  # samples that are followed one by one; all others begin between them
+MOST_NAMED = 12
+TOLD_APART = 4.0  # standard deviations by which one cable is more likely wrong than another
+
+
+class Wrong(NamedTuple):
+    """Successive samples that no pose fits, from `first` to `last`, and the cables one of which is wrong, from 0."""
+
+    first: int
+    last: int
+    cables: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class LogPoses(Displayed):
+    """The poses of a platform over a log.
+
+    Attributes
+    ----------
+    estimate
+        The poses with their covariances, of N samples.
+    times
+        When they were, by the clock of the lengths [s], (N,), or None.
+    """
+
+    estimate: PoseEstimate
+    times: np.ndarray | None
+
+    @property
+    def cost(self) -> np.ndarray:
+        """Return the sum of squared residuals of each sample, in standard deviations, (N,)."""
+        return np.sum(np.square(self.estimate.residuals / self.estimate.sigma), axis=-1)
+
+    @property
+    def largest(self) -> float:
+        """Return the sum of squares that one sound log in a hundred exceeds; nan without redundant cables."""
+        redundancy = self.estimate.robot.m - int(self.estimate.robot.dof_mask.sum())
+        return largest_cost(redundancy, FALSE_ALARM / len(self.estimate.pose)) if redundancy > 0 else np.nan
+
+    @property
+    def fits(self) -> np.ndarray:
+        """Return which samples a pose fits, (N,) of bool; without redundant cables, which descents converged."""
+        return np.asarray(self.estimate.converged & (~(self.cost > self.largest) | self.estimate.by_gravity))
+
+    @cached_property
+    def wrong(self) -> tuple[Wrong, ...]:
+        """Return the samples that no pose fits, those together that follow each other."""
+        rows = np.flatnonzero(~self.fits)
+        if not rows.size:
+            return ()
+        every = np.square(self.estimate.suspects()[rows])  # (k, m)
+        wrong: list[Wrong] = []
+        for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) > 1) + 1):
+            together = every[run].sum(axis=0)
+            cables = np.flatnonzero(together >= together.max() - TOLD_APART**2)
+            wrong.append(Wrong(int(rows[run[0]]), int(rows[run[-1]]), tuple(cables.tolist())))
+        return tuple(wrong)
+
+    def lines(self) -> Iterator[str]:
+        """Yield the wrong samples, one line for each run of them."""
+        for one in self.wrong[:MOST_NAMED]:
+            which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
+            at = "" if self.times is None else f" (from {quantity(float(self.times[one.first]), 's', 6)})"
+            names = " or ".join(str(cable + 1) for cable in one.cables)
+            yield f"{which}{at}: no pose fits, most likely the length of cable {names} is wrong"
+        if len(self.wrong) > MOST_NAMED:
+            yield f"and {quantity(len(self.wrong) - MOST_NAMED)} more"
+
+    def save(self, path: Path) -> Path:
+        """Save as CSV atomically: times, poses, covariances (x, y, z and a small rotation in {G}), residual, fit."""
+        upper = np.triu_indices(6)
+        names = ("x", "y", "z", "rx", "ry", "rz")
+        units = ("m", "m rad", "rad^2")
+        header = [f"{name} [{'m' if i < 3 else 'rad'}]" for i, name in enumerate(COORDINATES)]
+        for i, j in zip(*upper, strict=True):
+            unit = "m^2" if j < 3 else units[1] if i < 3 else units[2]
+            header.append(f"cov_{names[i]}_{names[j]} [{unit}]")
+        covariance = self.estimate.covariance[:, upper[0], upper[1]]
+        columns = [self.estimate.pose, covariance, self.estimate.residual[:, None], self.fits[:, None]]
+        header += ["residual [m]", "fits [1]"]
+        if self.times is not None:
+            columns, header = [self.times[:, None], *columns], ["t [s]", *header]
+        with whole_file(path) as temporary:
+            np.savetxt(temporary, np.hstack(columns), "%.10g", ",", header=",".join(header), comments="")
+        return path
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what is known of all samples together, for JSON."""
+        return {
+            "samples": len(self.estimate.pose),
+            "residual": float(np.sqrt(np.mean(np.square(self.estimate.residuals)))),
+            "consistent": float(np.mean(self.fits)),
+            "determined": float(np.mean(self.estimate.determined)),
+            "wrong": [one._asdict() for one in self.wrong],
+        }
+
+
+def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None = None) -> np.ndarray:
+    """Return cable lengths (..., m) [m] of readings, by the encoders of the file, under tensions [N] where measured."""
+    encoders = [cable.encoder for cable in robot.cables]
+    offset = np.array([one.offset if one else 0.0 for one in encoders])
+    scale = np.array([one.scale if one else 1.0 for one in encoders])
+    by = np.array([1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables])
+    stretch = 1.0 if tensions is None else 1 + np.maximum(tensions, 0.0) * by
+    return (offset + scale * readings) * stretch
+
+
+def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = SIGMA, begin: float = 0.0) -> LogPoses:
+    """Estimate the pose of the platform at each sample of a log, from its readings by the encoders of the file.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    measurements
+        Readings; measured tensions stretch cables with a stiffness, measured poses are not used.
+    sigma
+        Standard deviations of the lengths [m], one number or (m,).
+    begin
+        Time of the clock at time 0 of the measurements [s].
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong value, or a length is not above zero.
+    """
+    given, deviations = check_measurements(robot, measurements), checked_sigma(sigma, robot.m)
+    lengths = lengths_of(robot, given.lengths, given.tensions)
+    rows = np.unique(np.linspace(0, len(lengths) - 1, min(len(lengths), MOST_TRACKED)).astype(int))
+    tracker = PoseTracker(robot, sigma=deviations)
+    some = [tracker.update(lengths[row]) for row in rows]
+    known = np.array([one.pose for one in some])
+    known[:, 3:] = np.unwrap(known[:, 3:], axis=0)
+    good = np.array([bool(one.consistent) for one in some])
+    good |= ~good.any()
+    starts = np.column_stack([np.interp(np.arange(len(lengths)), rows[good], column[good]) for column in known.T])
+    estimate = pose_from_lengths(robot, lengths, starts, sigma=deviations)
+    return LogPoses(estimate, None if given.times is None else given.times + begin)
