@@ -7,9 +7,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..base.errors import InputError
 from ..base.inputs import file_path
-from ..models import Robot
 from ..models.parsing import read_yaml, validate
 from ..models.part import Box, Name, NonNegative, Part, Pose, Positive, Rows, Vector3, Whole
 from ..models.ranges import Range
@@ -161,26 +159,6 @@ class Requirements(Part):
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} poses times wrenches, got {size}")
         return self
-
-    def check(self, robot: Robot) -> None:
-        """Raise InputError if the requirements do not fit a robot: its cables, or a number that is free twice."""
-        taken: dict[tuple[str, int], int] = {}
-        for number, free in enumerate(self.free):
-            where = f"free[{number}]"
-            for name in ("cables", "copy_of"):
-                for cable in getattr(free, name) or ():
-                    if cable >= robot.m:
-                        raise InputError(f"{where}.{name} must be cables of the robot, 0 to {robot.m - 1}, got {cable}")
-            for cable in free.cables or range(robot.m):
-                if (free.part, cable) in taken:
-                    first = taken[free.part, cable]
-                    raise InputError(f"{where} must not free {free.part} {cable}, which free[{first}] has, again")
-                taken[free.part, cable] = number
-        for number, free in enumerate(self.free):
-            for cable in free.copy_of or ():
-                source = taken.get((free.part, cable))
-                if source is not None and self.free[source].copy_of is not None:
-                    raise InputError(f"free[{number}].copy_of must name cables that are no copies, got {cable}")
 
 
 def read_requirements(requirements: Requirements | dict[str, Any] | str | os.PathLike[str]) -> Requirements:

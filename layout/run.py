@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.inputs import shown
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
@@ -71,17 +72,18 @@ def design(
         for name, value in given.items():
             if value is not None:
                 raise InputError(f"{name} must be left out with requirements, which have it")
+        if maximise != "margin":
+            raise InputError(f"maximise must be left out with requirements, which have it, got {shown(maximise)}")
         wanted = read_requirements(requirements)
     else:
         parts = {"free": free, "require": require}
         lists = {name: _list(name, value) for name, value in parts.items() if value is not None}
         wanted = read_requirements({**lists, "maximise": maximise, **options})
-    count = int(chosen.dof_mask.sum())
-    if chosen.m < count:
-        raise InputError(f"robot {chosen.name!r} must have at least {count} cables for {count} coordinates, "
-                         f"got {chosen.m}")  # fmt: skip
     if chosen.drive == "fixed-length":
         raise InputError(f"robot {chosen.name!r} must have winches, got cables of fixed length")
+    if chosen.m < (count := int(chosen.dof_mask.sum())):
+        wanted_cables = f"at least {count} cables for its {count} coordinates"
+        raise InputError(f"robot {chosen.name!r} must have {wanted_cables}, got {chosen.m}")
     variables = variables_of(chosen, wanted)
     grid = rows_of(chosen, wanted.require, [each.places() for each in wanted.require])
     impossible = find_impossibility(variables, grid)
@@ -147,5 +149,5 @@ def _nearest(evaluation: Evaluation, y: np.ndarray | None) -> float:
 
 def _list(name: str, value: Any) -> list[Any]:
     if isinstance(value, str | dict) or not isinstance(value, Sequence):
-        raise InputError(f"{name} must be a list of mappings, got {value!r}"[:200])
+        raise InputError(f"{name} must be a list of mappings, got {shown(value)}")
     return list(value)

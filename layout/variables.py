@@ -80,7 +80,7 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
     InputError
         If the requirements do not fit the robot.
     """
-    requirements.check(robot)
+    _check(robot, requirements)
     fixed, column_of = _layout_of(robot), {}
     low: list[float] = []
     high: list[float] = []
@@ -121,6 +121,27 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
             f"{lowest[cable]:g} [N]"
         )
     return found
+
+
+def _check(robot: Robot, requirements: Requirements) -> None:
+    """Raise InputError if the requirements do not fit a robot: its cables, or a number that is free twice."""
+    taken: dict[tuple[str, int], int] = {}
+    for number, free in enumerate(requirements.free):
+        where = f"free[{number}]"
+        for name in ("cables", "copy_of"):
+            for cable in getattr(free, name) or ():
+                if cable >= robot.m:
+                    raise InputError(f"{where}.{name} must be cables of the robot, 0 to {robot.m - 1}, got {cable}")
+        for cable in free.cables or range(robot.m):
+            if (free.part, cable) in taken:
+                first = taken[free.part, cable]
+                raise InputError(f"{where} must not free {free.part} {cable}, which free[{first}] has, again")
+            taken[free.part, cable] = number
+    for number, free in enumerate(requirements.free):
+        for cable in free.copy_of or ():
+            source = taken.get((free.part, cable))
+            if source is not None and requirements.free[source].copy_of is not None:
+                raise InputError(f"free[{number}].copy_of must name cables that are no copies, got {cable}")
 
 
 def _layout_of(robot: Robot) -> np.ndarray:

@@ -70,6 +70,7 @@ NOT_CALLED = {
     "Simulation",
     "Calibration",
     "Compared",
+    "Design",
     "HeldOut",
     "Outlier",
     "Parameter",
@@ -141,6 +142,11 @@ WRONG: dict[str, Any] = {
 NOT_TRIED = {("scheduler", "text"), ("progress", "class")}
 
 TASK = {"name": "short", "path": {"kind": "rest", "pose": [0, 0, -1, 0, 0, 0]}, "duration": 0.2, "output_rate": 20}
+REQUIREMENTS = {
+    "free": [{"part": "t_max", "range": {"min": 50, "max": 60}, "equal": True}],
+    "require": [{"poses": [[0, 0, 1, 0, 0, 0]]}],
+    "time_limit": 0.05,
+}
 LINE = {"kind": "line", "start": [0, 0, -1, 0, 0, 0], "end": [0.1, 0, -1, 0, 0, 0]}
 
 
@@ -380,6 +386,11 @@ VALID: dict[str, Callable[[], Any]] = {
     "free": lambda: ("offsets",),
     "prior": lambda: None,
     "outliers": lambda: True,
+    "design.robot": lambda: "ipanema-1",
+    "design.free": lambda: None,
+    "require": lambda: None,
+    "maximise": lambda: "margin",
+    "requirements": lambda: REQUIREMENTS,
     "candidates": lambda: measurements().poses,
     "measured": lambda: True,
     "read_measurements.path": lambda: measurements().save("log.nc"),

@@ -1,0 +1,356 @@
+"""Designs of robots: better than published ones, inside their boxes, honest about what is impossible and what binds."""
+
+import json
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from towline import Dynamics, InputError, Requirements, TensionProblem, design, load, read_requirements
+from towline.layout import Free
+from towline.layout.evaluation import Evaluation, rows_of
+from towline.layout.impossibility import find_impossibility
+from towline.layout.linear_programs import maximise
+from towline.layout.reasons import reasons
+from towline.layout.variables import variables_of
+from towline.models.points import rotations
+from towline.solvers import capacity_margin
+from towline.workspace import Interference, Places
+
+from .warm import towline
+
+BOXES = {"cogiro": ([-4, -3, 0.5], [4, 3, 3]), "ipanema-2": ([-2, -1.5, 2], [2, 1.5, 3.5])}
+
+
+def around(points):
+    return {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
+
+
+def wanted(robot, **changes):
+    """Free anchors and attachments in the boxes of the published ones, a box of poses."""
+    low, high = BOXES[robot.name]
+    free = [{"part": "anchor", "box": around(robot.anchors)}, {"part": "attachment", "box": around(robot.attachments)}]
+    require = [{"box": {"min": low, "max": high}, "grid": [5, 5, 3]}]
+    return {"free": free, "require": require, **changes}
+
+
+def evaluation_of(robot, requirements):
+    read = read_requirements(requirements)
+    variables = variables_of(robot, read)
+    return Evaluation(variables, rows_of(robot, read.require, [each.places() for each in read.require]))
+
+
+@pytest.fixture(scope="module")
+def found():
+    robot = load("ipanema-2")
+    return design(robot, requirements=wanted(robot, clearance=0.04, time_limit=1.5))
+
+
+def test_a_published_layout_is_improved_and_judged_from_its_file(found, tmp_path):
+    """By the mechanics, the projection and the interference of the saved robot alone, also at the box's corners."""
+    before = load("ipanema-2")
+    robot = load(found.robot.save(tmp_path / "robot.yaml"))
+    assert found.feasible
+    assert found.status == "feasible"
+    low, high = (np.array(side) for side in BOXES["ipanema-2"])
+    poses = np.zeros((400, 6))
+    poses[:, :3] = np.random.default_rng(5).uniform(low, high, (400, 3))
+    poses[:8, :3] = list(product(*np.transpose([low, high])))
+    w = Dynamics(robot).required_wrench(before.home, np.zeros(6), np.zeros(6))
+    A = Dynamics(robot).wrench_matrix(poses)
+    # In the unit of the robot's own file, though the attachments have moved.
+    problems = [TensionProblem(each, w, robot.t_min, robot.t_max, length=before.length) for each in A]
+    margin = min(capacity_margin(problem).value for problem in problems)
+    assert margin >= found.margin - 1e-9
+    assert found.margin > 2.5 * found.margin_before > 0
+    for points, own in ((robot.anchors, before.anchors), (robot.attachments, before.attachments)):
+        assert (points >= own.min(axis=0) - 1e-9).all()
+        assert (points <= own.max(axis=0) + 1e-9).all()
+    apart = Interference(between_cables=0.04)
+    assert apart.evaluate(robot, Places.at_home(robot, poses)).all()
+    assert found.clearance >= 0.04
+
+
+def test_the_report_names_what_binds(found):
+    report, data = found.report(), found.to_dict()
+    assert report.startswith("ipanema-2, design: FEASIBLE, capacity margin")
+    assert "local optimum" in report
+    assert "t_max of every cable higher by 1 N" in report
+    assert sum(one["weight"] for one in data["binding"]) == pytest.approx(1.0, abs=1e-6)
+    assert json.loads(json.dumps(data))["margin"] == found.margin
+    assert len(repr(found).splitlines()) <= 5
+    robot = load("ipanema-2")
+    for one in found.reasons.binding[:5]:  # the reserve along its direction is the margin
+        A = Dynamics(found.robot).wrench_matrix(one.pose)
+        pull = one.direction @ A
+        reserve = np.maximum(pull * robot.t_max, pull * robot.t_min).sum() - one.direction @ one.wrench
+        assert np.linalg.norm(one.direction * np.repeat([1, robot.length], 3)) == pytest.approx(1.0)
+        assert reserve == pytest.approx(found.margin, rel=0.01)
+
+
+@pytest.mark.parametrize(("name", "seed"), [("cogiro", 0), ("ipanema-2", 1), ("caroca-pulleys", 2), ("planar-4", 3)])
+def test_derivatives_are_those_of_differences(name, seed):
+    """Of margins by anchors, attachments and limits, with attitudes, accelerations, equal and mirrored numbers."""
+    robot, rng = load(name), np.random.default_rng(seed)
+    spread = 0.2 * (1.0 if name == "planar-4" else 3.0)
+
+    def box(points):
+        return {"min": (points.min(axis=0) - 0.1).tolist(), "max": (points.max(axis=0) + 0.1).tolist()}
+
+    m, moves = robot.m, np.flatnonzero(robot.dof_mask[:3])
+    low = robot.home[:3].copy()
+    high = low.copy()
+    low[moves], high[moves] = low[moves] - spread, high[moves] + spread
+    tilted = [[0.1, -0.2, 0.3]] if robot.dof_mask.all() else [[0, 0, 0]]
+    requirements = {
+        "free": [
+            {"part": "anchor", "cables": list(range(m - 1)), "box": box(robot.anchors)},
+            {"part": "anchor", "cables": [m - 1], "copy_of": [0], "mirrored": "x"},
+            {"part": "attachment", "box": box(robot.attachments)},
+            {"part": "t_max", "range": {"min": 300, "max": 900}, "equal": True},
+            {"part": "t_min", "cables": [0, 1], "range": {"min": 1, "max": 9}},
+        ],
+        "require": [
+            {"box": {"min": low.tolist(), "max": high.tolist()}, "grid": [2, 2, 2], "attitudes": tilted,
+             "accelerations": [[0] * 6, [0.5, 0, 0, 0, 0, 0]], "wrenches": [[1, 0, 2, 0, 0.1, 0]]}
+        ],
+    }  # fmt: skip
+    evaluation = evaluation_of(robot, requirements)
+    variables = evaluation.variables
+    y = np.clip(variables.of_robot() + 0.03 * rng.normal(size=variables.size), variables.low, variables.high)
+    every = evaluation.all_reserves(y)
+    rows, normals = np.arange(len(every)), every.argmin(axis=1)
+    values, slopes = evaluation.reserves(y, rows, normals)
+    np.testing.assert_allclose(values.value, evaluation.margins(y), rtol=1e-9, atol=1e-8)
+    step = 1e-6
+    differences = np.array(
+        [(evaluation.margins(y + step * e) - evaluation.margins(y - step * e)) / (2 * step) for e in np.eye(y.size)]
+    ).T
+    smooth = np.partition(every, 1, axis=1)[:, 1] - every.min(axis=1) > 1e-2
+    assert smooth.any()
+    error = np.abs(differences - slopes)[smooth].max(axis=1) / np.abs(slopes)[smooth].max(axis=1)
+    assert error.max() < 2e-8
+    near = evaluation.distance_slopes(y, 6, np.inf)
+    distances = evaluation.distances(y)
+    where = [int(np.abs(distances.ravel() - value).argmin()) for value in near.value]
+    slopes = np.array(
+        [
+            (evaluation.distances(y + step * e) - evaluation.distances(y - step * e)).ravel()[where]
+            for e in np.eye(y.size)
+        ]
+    ).T / (2 * step)
+    np.testing.assert_allclose(near.by_variables, slopes, atol=1e-6)
+
+
+def test_advice_is_the_slope_of_optima_solved_again():
+    robot = load("planar-4")
+    reach = np.array([0.15, 0, 0.15])
+    low, high = robot.home[:3] - reach, robot.home[:3] + reach
+
+    def optimum(longer=0.0, stronger=0.0, slacker=0.0):
+        cables = [
+            {**cable.model_dump(), "t_max": cable.t_max + stronger, "t_min": cable.t_min - slacker}
+            for cable in robot.cables
+        ]
+        changed = robot.model_validate({**robot.model_dump(), "cables": cables})
+        wider, own = np.array([longer, 0, 0]), robot.anchors
+        box = {"min": (own.min(axis=0) - wider).tolist(), "max": (own.max(axis=0) + wider).tolist()}
+        require = [{"box": {"min": low.tolist(), "max": high.tolist()}, "grid": [3, 1, 3]}]
+        evaluation = evaluation_of(changed, {"free": [{"part": "anchor", "box": box}], "require": require})
+        y = evaluation.variables.of_robot()
+        for delta in (0.1, 0.02, 0.004):
+            maximise(evaluation, y, 0.0, np.inf, delta)
+        return evaluation, y, float(evaluation.margins(y).min())
+
+    evaluation, y, best = optimum()
+    assert best > 1.0
+    found = reasons(evaluation, y, 0.0)
+    assert found.local_optimum
+    gains = {one.change: one.gain for one in found.advice}
+    for change, step, name in (("stronger", 0.1, "t_max of every cable higher by 1 N"),
+                               ("slacker", 0.1, "t_min of every cable lower by 1 N"),
+                               ("longer", 1e-3, "boxes of anchors longer by 1 m at both ends along x")):  # fmt: skip
+        ahead, behind = (optimum(**{change: s * step})[2] for s in (1, -1))
+        assert gains.get(name, 0.0) == pytest.approx((ahead - behind) / (2 * step), rel=1e-3, abs=1e-3), name
+
+
+def impossible(robot):
+    """Requirements beyond any layout in the boxes: families that can be proven."""
+    force, top = robot.m * robot.t_max[0], robot.anchors[:, 2].max()
+    out = robot.anchors[:, 0].max() + 2.0
+    down = 2.1 * robot.weight
+    yield {"poses": [robot.home.tolist()], "wrenches": [[0, 0, -1.05 * force, 0, 0, 0]]}  # too heavy
+    yield {"poses": [[0, 0, top + 1.5, 0, 0, 0]]}  # above the anchors
+    yield {"poses": [[out, 0, robot.home[2], 0, 0, 0]]}  # outside the frame
+    yield {"poses": [robot.home.tolist()], "wrenches": [[-force, 0, 0, 0, 0, 0]]}  # sideways
+    yield {"poses": [robot.home.tolist()], "wrenches": [[0, 0, 0, 0, 0, 1.2 * force * robot.length]]}  # beyond levers
+    if robot.name == "cogiro":  # suspended: nothing pulls down
+        yield {"poses": [robot.home.tolist()], "wrenches": [[0, 0, down, 0, 0, 0]]}
+
+
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-2"])
+def test_the_impossible_is_refused_with_a_certificate_that_no_layout_breaks(name):
+    robot, rng = load(name), np.random.default_rng(8)
+    for number, require in enumerate(impossible(robot)):
+        requirements = wanted(robot) | {"require": [require]}
+        result = design(robot, requirements=requirements)
+        assert result.status == "infeasible", number
+        assert result.robot == robot
+        assert "no layout inside the boxes" in result.report()
+        proof = result.impossibility
+        variables = variables_of(robot, read_requirements(requirements))
+        assert proof.verify(variables)
+        d, certificate = result.certificate.direction, result.certificate
+        assert np.linalg.norm(d * np.repeat([1, robot.length], 3)) == pytest.approx(1.0)
+        assert d @ proof.wrench == pytest.approx(certificate.demand)
+        assert certificate.shortfall > 0
+        # No anchors, attachments and tensions that are drawn give as much along the direction.
+        anchors, attachments = (
+            rng.uniform(points.min(axis=0), points.max(axis=0), (3000, 3))
+            for points in (robot.anchors, robot.attachments)
+        )
+        arms = (attachments - robot.platform.com) @ rotations(proof.pose[None, 3:])[0].T
+        u = anchors - proof.pose[:3] - attachments
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+        pull = np.hstack([u, np.cross(arms, u)]) @ d
+        most = np.where(pull > 0, robot.t_max[0], robot.t_min[0]) * pull
+        assert robot.m * most.max() <= certificate.support + 1e-6 * abs(certificate.support)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.sampled_from(["cogiro", "ipanema-2"]), st.floats(0.0, 1.0), st.integers(0, 10_000))
+def test_what_a_layout_can_do_is_never_called_impossible(name, share, seed):
+    """Wrenches that the published layout gives, up to its boundary, at random poses and attitudes."""
+    robot, rng = load(name), np.random.default_rng(seed)
+    pose = np.r_[rng.uniform(*BOXES[name]), rng.uniform(-0.2, 0.2, 3)]
+    given_wrench = Dynamics(robot).wrench_matrix(pose) @ (
+        robot.t_min + share * rng.random(robot.m) * (robot.t_max - robot.t_min)
+    )
+    rest = Dynamics(robot).required_wrench(pose, np.zeros(6), np.zeros(6))
+    require = [{"poses": [pose.tolist()], "wrenches": [(rest - given_wrench).tolist()]}]
+    read = read_requirements(wanted(robot) | {"require": require})
+    variables = variables_of(robot, read)
+    assert find_impossibility(variables, rows_of(robot, read.require, [pose[None]])) is None
+
+
+def test_an_interrupt_keeps_the_best_so_far():
+    robot, calls = load("ipanema-2"), []
+
+    def progress(what, share, best):
+        calls.append((what, share, best))
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+
+    result = design(robot, requirements=wanted(robot, time_limit=60.0), progress=progress)
+    assert result.stopped
+    assert result.feasible
+    assert result.margin > 1.5 * result.margin_before
+    assert "INTERRUPTED" in result.report()
+    assert calls[1][1] < 0.5
+
+
+def test_from_random_layouts_and_for_equal_and_mirrored_points():
+    """A start that knows nothing of the published layout; a symmetric robot stays symmetric."""
+    robot = load("ipanema-2")
+    result = design(robot, requirements=wanted(robot, start="random", time_limit=2.0, seed=3))
+    assert result.margin > result.margin_before
+    box = around(robot.anchors)
+    box["min"][0] = 0.5
+    right = [i for i in range(8) if robot.anchors[i, 0] > 0]
+    left = [i for i in range(8) if robot.anchors[i, 0] <= 0]
+    free = [
+        {"part": "anchor", "cables": right, "box": box},
+        {"part": "anchor", "cables": left, "copy_of": right, "mirrored": "x"},
+        {"part": "t_max", "range": {"min": 100, "max": 210}, "equal": True},
+    ]
+    mirrored = design(robot, requirements=wanted(robot, time_limit=0.5) | {"free": free})
+    anchors = mirrored.robot.anchors
+    np.testing.assert_allclose(anchors[left], anchors[right] * [-1, 1, 1], atol=1e-12)
+    assert np.ptp(mirrored.robot.t_max) == 0
+    np.testing.assert_array_equal(mirrored.robot.attachments, robot.attachments)
+
+
+HOSTILE = [
+    ({"free": []}, "free"),
+    ({"require": []}, "require"),
+    ({"free": [{"part": "anchors", "box": {"min": [0, 0, 0], "max": [1, 1, 1]}}]}, "part"),
+    ({"free": [{"part": "anchor"}]}, "box or copy_of must be given"),
+    ({"free": [{"part": "anchor", "range": {"min": 0, "max": 1}}]}, "range must be left out"),
+    ({"free": [{"part": "t_max", "range": {"min": -3, "max": 1}}]}, "negative"),
+    ({"free": [{"part": "t_max", "range": {"min": 3, "max": 1}}]}, "min must be at most max"),
+    ({"free": [{"part": "t_min", "range": {"min": 100, "max": 900}}]}, "t_min of cable 0 below its t_max"),
+    ({"free": [{"part": "t_max", "cables": [9], "range": {"min": 50, "max": 60}}]}, "cables must be cables"),
+    ({"free": [{"part": "t_max", "cables": [0, 0], "range": {"min": 50, "max": 60}}]}, "each cable once"),
+    ({"free": 2 * [{"part": "t_max", "range": {"min": 50, "max": 60}}]}, "again"),
+    ({"free": [{"part": "anchor", "cables": [1], "copy_of": [0, 2]}]}, "as many cables"),
+    ({"free": [{"part": "anchor", "cables": [1], "copy_of": [0]}, {"part": "anchor", "cables": [2], "copy_of": [1]}]},
+     "no copies"),
+    ({"free": [{"part": "anchor", "box": {"min": [0, 0, 0], "max": [-1, 1, 1]}}]}, "min must not exceed max"),
+    ({"free": [{"part": "anchor", "box": {"min": [0, 0, 0], "max": [float("nan"), 1, 1]}}]}, "box.max"),
+    ({"require": [{}]}, "box or poses must be given"),
+    ({"require": [{"poses": [[0, 0]]}]}, "poses"),
+    ({"require": [{"poses": [[0, 0, 0, 0, 0, float("inf")]]}]}, "poses"),
+    ({"require": [{"box": {"min": [0, 0, 0], "max": [1, 1, 1]}, "grid": [100, 100, 100]}]}, "at most 20000"),
+    ({"require": [{"box": {"min": [0, 0, 0], "max": [1, 1, 1]}, "grid": [0, 1, 1]}]}, "grid"),
+    ({"margin": 0.5}, "margin"),
+    ({"clearance": -1}, "clearance"),
+    ({"maximise": "stiffness"}, "maximise"),
+    ({"time_limit": 0}, "time_limit"),
+    ({"seed": 1.5}, "seed"),
+    ({"sed": 1}, "did you mean 'seed'"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "names"), HOSTILE)
+def test_wrong_requirements_are_refused_in_one_line(change, names):
+    robot = load("ipanema-2")
+    with pytest.raises(InputError, match=names) as error:
+        design(robot, requirements=wanted(robot) | change)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_wrong_arguments_are_refused():
+    robot = load("ipanema-2")
+    parts = {name: value for name, value in wanted(robot).items() if name in ("free", "require")}
+    for arguments, names in (
+        ({"free": "anchor", "require": parts["require"]}, "free must be a list"),
+        ({**parts, "requirements": wanted(robot)}, "free must be left out"),
+        ({**parts, "seeds": 3}, "did you mean 'seed'"),
+        ({**parts, "maximise": "volume"}, "maximise"),
+        ({}, "free is missing"),
+    ):
+        with pytest.raises(InputError, match=names):
+            design(robot, **arguments)
+    for name, names in (("flycrane", "must have winches"), ("wang-ctmrts", "at least 6 cables")):
+        with pytest.raises(InputError, match=names):
+            design(name, **parts)
+    assert Free(part="anchor", box={"min": [0, 0, 0], "max": [1, 1, 1]}).cables is None
+    assert Requirements(**parts).margin == 1.0
+
+
+def test_the_command_writes_a_robot_and_says_no(tmp_path):
+    robot = load("ipanema-2")
+    file, out = tmp_path / "wanted.yaml", tmp_path / "better.yaml"
+    file.write_text(json.dumps(wanted(robot, name="box", time_limit=0.5)))
+    done = towline("design", "ipanema-2", str(file), "--out", str(out), "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    data = json.loads(done.stdout)
+    assert data["feasible"]
+    assert data["margin"] > data["margin_before"]
+    assert data["file"] == str(out)
+    assert load(out).m == 8
+    heavy = {"poses": [robot.home.tolist()], "wrenches": [[0, 0, -1e4, 0, 0, 0]]}
+    file.write_text(json.dumps(wanted(robot) | {"require": [heavy]}))
+    done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
+    assert done.returncode == 1
+    assert "INFEASIBLE" in done.stdout
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["better.yaml", "wanted.yaml"]
+    for text in ("", "free: [", "free: 3", "\x00", "free: [{part: anchor}]"):
+        file.write_text(text)
+        with pytest.raises(InputError, match=r"wanted\.yaml") as error:
+            read_requirements(file)
+        assert len(str(error.value).splitlines()) == 1
+    done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
