@@ -95,7 +95,9 @@ class Evaluation:
         self._turn = rotations(self._poses[:, 3:])  # (N, 3, 3)
         self._carried = rotations(self._home[robot.carrier_of_cable, 3:])  # (m, 3, 3)
         self.pairs = np.array(list(combinations(range(robot.m), 2)), dtype=int).reshape(-1, 2)
-        self.pairs = self.pairs[~self._always_together()]
+        self._apart = np.flatnonzero(~self._always_together())
+        self._all_pairs = self._apart.size == len(self.pairs)
+        self.pairs = self.pairs[self._apart]
 
     def margins(self, y: np.ndarray) -> np.ndarray:
         """Return the margins of all rows, (K,) [N]."""
@@ -131,7 +133,10 @@ class Evaluation:
 
     def distances(self, y: np.ndarray) -> np.ndarray:
         """Return the distance of each pair of cables at each pose, (N, pairs) [m]."""
-        return np.sqrt((self._gaps(y)[0] ** 2).sum(axis=2))
+        self._place(y)
+        distances = np.empty((len(self._poses), self._m * (self._m - 1) // 2))
+        core.cable_distances(self._record, self._poses, self._home, distances)
+        return distances if self._all_pairs else distances[:, self._apart]
 
     def distance_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
         """Return up to `most` of the smallest distances `below` a value, with their derivatives."""

@@ -8,24 +8,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline import Dynamics, InputError, Requirements, TensionProblem, design, load, read_requirements
+from towline import Dynamics, InputError, Requirements, TensionProblem, core, design, load, read_requirements
 from towline.layout import Free
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.impossibility import find_impossibility
 from towline.layout.linear_programs import maximise
 from towline.layout.reasons import reasons
 from towline.layout.variables import variables_of
-from towline.models.points import rotations
+from towline.models.points import placed, rotations
+from towline.models.record import record_of
 from towline.solvers import capacity_margin
 from towline.workspace import Interference, Places
+from towline.workspace.conditions.interference import nearest_points
 
 from .warm import towline
 
 BOXES = {"cogiro": ([-4, -3, 0.5], [4, 3, 3]), "ipanema-2": ([-2, -1.5, 2], [2, 1.5, 3.5])}
 
 
-def around(points):
-    return {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
+def around(own):
+    return {"min": own.min(axis=0).tolist(), "max": own.max(axis=0).tolist()}
 
 
 def wanted(robot, **changes):
@@ -354,3 +356,29 @@ def test_the_command_writes_a_robot_and_says_no(tmp_path):
         assert len(str(error.value).splitlines()) == 1
     done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+
+
+def test_distances_of_the_core_are_those_of_interference():
+    """Also of parallel cables, and of cables of no length."""
+    rng = np.random.default_rng(11)
+    for name in ("cogiro", "planar-4", "multi-quadrotor-3"):
+        robot = load(name)
+        poses = robot.home + rng.normal(scale=0.3, size=(11, 6))
+        poses[0] = robot.home
+        record = record_of(robot).copy()
+        record["cable"]["attachment"][1] = record["cable"]["attachment"][0]
+        if name == "planar-4":
+            record["cable"]["anchor"][2] = placed(poses[0], record["cable"]["attachment"][2][None])[0]
+        distances = np.empty((11, robot.m * (robot.m - 1) // 2))
+        core.cable_distances(record, poses, robot.carrier_home, distances)
+        anchors, attachments = np.empty((11, robot.m, 3)), np.empty((11, robot.m, 3))
+        core.ends(record, poses, robot.carrier_home, anchors, attachments)
+        i, j = np.triu_indices(robot.m, 1)
+        gaps = nearest_points(attachments[:, i], anchors[:, i], attachments[:, j], anchors[:, j])[0]
+        np.testing.assert_allclose(distances, np.linalg.norm(gaps, axis=2), atol=1e-9)
+        alone = np.empty((1, distances.shape[1]))
+        core.cable_distances(record, poses[3:4], robot.carrier_home, alone)
+        np.testing.assert_array_equal(alone[0], distances[3])
+        for wrong in (distances[:, 1:].copy(), distances[1:], None):
+            with pytest.raises(ValueError, match="rows of the sizes"):
+                core.cable_distances(record, poses, robot.carrier_home, wrong)

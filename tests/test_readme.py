@@ -20,7 +20,7 @@ from scipy.optimize import lsq_linear
 from typer.testing import CliRunner
 
 import towline
-from towline import Robot, Task
+from towline import Requirements, Robot, Task
 from towline.cli.main import app
 from towline.models.parsing import parse_yaml
 from towline.studies.accounts.claim import Verdict
@@ -66,7 +66,7 @@ def run(block, namespace):
     if block.language == "python":
         exec(compile(block.text, "example", "exec"), namespace)
     elif block.language == "yaml":
-        model = Robot if "\nplatform:" in block.text else Task
+        model = Robot if "\nplatform:" in block.text else Requirements if "\nrequire:" in block.text else Task
         parse_yaml(block.text, model, block.title or "block")
     elif block.language == "sh":
         for line in block.lines:
@@ -193,7 +193,7 @@ def test_errata_are_current(study):
     "package",
     [
         *("models", "solvers", "workspace", "estimation", "estimation.calibration", "ocp", "control", "plant"),
-        *("simulation", "viewer", "base.errors"),
+        *("simulation", "layout", "viewer", "base.errors"),
     ],
 )
 def test_every_public_name_is_in_the_reference(package):

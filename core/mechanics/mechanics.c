@@ -33,6 +33,14 @@ void towline_ends(const towline_robot *robot, towline_places at, double *anchors
     BEST_FORM(ends_of_rows, robot, at, anchors, attachments);
 }
 
+void towline_cable_distances(const towline_robot *robot, towline_places at, double *distances) {
+    if (at.rows == 1) {
+        cable_distances_of_rows_one(robot, at, distances);
+        return;
+    }
+    BEST_FORM(cable_distances_of_rows, robot, at, distances);
+}
+
 void towline_columns_by_geometry(const towline_robot *robot, towline_places at, double *S) {
     if (at.rows == 1) {
         columns_by_geometry_of_rows_one(robot, at, S);

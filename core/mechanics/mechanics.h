@@ -40,6 +40,9 @@ void towline_required_wrench(const towline_robot *robot, ptrdiff_t rows, towline
 /* Anchors and attachments of the cables in {G}, (m, 3) each [m]. */
 void towline_ends(const towline_robot *robot, towline_places at, double *anchors, double *attachments);
 
+/* Distances of all pairs of cables, (m (m - 1) / 2) from the first and second to the last two [m]. */
+void towline_cable_distances(const towline_robot *robot, towline_places at, double *distances);
+
 /* S (m, 6, 7): the column of A of each cable with respect to its anchor (3), attachment (3) and radius. */
 void towline_columns_by_geometry(const towline_robot *robot, towline_places at, double *S);
 

@@ -10,6 +10,7 @@
     void required_wrench_of_rows_##form(const towline_robot *robot, ptrdiff_t rows, towline_motion_of_platform motion, \
                                         ptrdiff_t wind_per, double *w);                                                \
     void ends_of_rows_##form(const towline_robot *robot, towline_places at, double *anchors, double *attachments);     \
+    void cable_distances_of_rows_##form(const towline_robot *robot, towline_places at, double *distances);             \
     void columns_by_geometry_of_rows_##form(const towline_robot *robot, towline_places at, double *S);                 \
     void wrench_by_pose_of_rows_##form(const towline_robot *robot, towline_places at, const double *tensions,          \
                                        int by_axes, double *D);

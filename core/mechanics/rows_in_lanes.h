@@ -1,5 +1,7 @@
 /* The mechanics of many rows, some at a time; included by rows_plain.c and its like after `num`. */
 #include "mechanics/lines.h"
+/* These need `dot`. */
+#include "mechanics/distances.h"
 #include "mechanics/rigid_body.h"
 #include "mechanics/rows.h"
 #include "mechanics/turning.h"
@@ -56,6 +58,21 @@ void FORM(ends_of_rows)(const towline_robot *robot, towline_places at, double *a
         ends_at(robot, pose, carrier, starts, ends);
         scatter(anchors, starts, first, at.rows, 3 * m);
         scatter(attachments, ends, first, at.rows, 3 * m);
+    }
+}
+
+void FORM(cable_distances_of_rows)(const towline_robot *robot, towline_places at, double *distances) {
+    const int m = robot->cables, pairs = m * (m - 1) / 2;
+    num pose[6], carrier[6 * CARRIERS], starts[3 * CABLES], ends[3 * CABLES], distance[CABLES * (CABLES - 1) / 2 + 1];
+    for (ptrdiff_t first = 0; first < at.rows; first += LANES) {
+        gather_places(robot, at, first, pose, carrier);
+        ends_at(robot, pose, carrier, starts, ends);
+        for (int i = 0, pair = 0; i < m; i++) {
+            for (int j = i + 1; j < m; j++) {
+                distance[pair++] = segment_distance(ends + 3 * i, starts + 3 * i, ends + 3 * j, starts + 3 * j);
+            }
+        }
+        scatter(distances, distance, first, at.rows, pairs);
     }
 }
 

@@ -42,6 +42,9 @@ static PyMethodDef functions[] = {
      "Compute how the noise of the lengths spreads each pose; carriers has as many rows or one."},
     {"ends", (PyCFunction)(void (*)(void))towline_py_ends, METH_FASTCALL,
      "ends(robot, poses, carriers, anchors, attachments)\n--\n\nCompute where the cables end at each pose."},
+    {"cable_distances", (PyCFunction)(void (*)(void))towline_py_cable_distances, METH_FASTCALL,
+     "cable_distances(robot, poses, carriers, distances)\n--\n\n"
+     "Compute the distances of all pairs of cables at each pose."},
     {"columns_by_geometry", (PyCFunction)(void (*)(void))towline_py_columns_by_geometry, METH_FASTCALL,
      "columns_by_geometry(robot, poses, carriers, S)\n--\n\n"
      "Compute the columns of the wrench matrix with respect to anchors, attachments and radii, (m, 6, 7) a row."},

@@ -20,6 +20,7 @@ PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_
 PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_ends(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
+PyObject *towline_py_cable_distances(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_columns_by_geometry(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_wrench_by_pose(PyObject *module, PyObject *const *arguments, Py_ssize_t count);
 PyObject *towline_py_wrench_by_axes(PyObject *module, PyObject *const *arguments, Py_ssize_t count);

@@ -63,6 +63,25 @@ PyObject *towline_py_ends(PyObject *module, PyObject *const *arguments, Py_ssize
     return done(&given, fits);
 }
 
+PyObject *towline_py_cable_distances(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
+    (void)module;
+    enum { ROBOT, POSES, CARRIERS, DISTANCES, ALL };
+    arrays given;
+    const towline_robot *robot;
+    towline_places at;
+    if (!take(&given, arguments, count, ALL, DISTANCES)) {
+        return NULL;
+    }
+    const int fits = places_of(&given, &robot, &at) && given.of[DISTANCES] &&
+                     given.size[DISTANCES] == at.rows * (robot->cables * (robot->cables - 1) / 2);
+    if (fits) {
+        Py_BEGIN_ALLOW_THREADS;
+        towline_cable_distances(robot, at, given.of[DISTANCES]);
+        Py_END_ALLOW_THREADS;
+    }
+    return done(&given, fits);
+}
+
 PyObject *towline_py_columns_by_geometry(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
     (void)module;
     enum { ROBOT, POSES, CARRIERS, S, ALL };
