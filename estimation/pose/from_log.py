@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.display import Displayed
+from ...base.inputs import check_ending, file_path
 from ...base.text import quantity
 from ...base.writing import whole_file
 from ...models.part import COORDINATES
@@ -89,8 +91,13 @@ class LogPoses(Displayed):
         if len(self.wrong) > MOST_NAMED:
             yield f"and {quantity(len(self.wrong) - MOST_NAMED)} more"
 
-    def save(self, path: Path) -> Path:
-        """Save as CSV atomically: times, poses, covariances (x, y, z and a small rotation in {G}), residual, fit."""
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Save as CSV atomically, and return the path.
+
+        Columns: times, poses, covariances of x, y, z and a small rotation in {G}, residuals, and whether a pose fits.
+        Raises `InputError` if the file cannot be written.
+        """
+        file = check_ending("path", file_path("path", path), ".csv")
         upper = np.triu_indices(6)
         names = ("x", "y", "z", "rx", "ry", "rz")
         units = ("m", "m rad", "rad^2")
@@ -103,9 +110,9 @@ class LogPoses(Displayed):
         header += ["residual [m]", "fits [1]"]
         if self.times is not None:
             columns, header = [self.times[:, None], *columns], ["t [s]", *header]
-        with whole_file(path) as temporary:
+        with whole_file(file) as temporary:
             np.savetxt(temporary, np.hstack(columns), "%.10g", ",", header=",".join(header), comments="")
-        return path
+        return file
 
     def to_dict(self) -> dict[str, Any]:
         """Return what is known of all samples together, for JSON."""
