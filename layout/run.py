@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.inputs import shown
+from ..base.inputs import one_of, shown
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
@@ -72,8 +72,7 @@ def design(
         for name, value in given.items():
             if value is not None:
                 raise InputError(f"{name} must be left out with requirements, which have it")
-        if maximise != "margin":
-            raise InputError(f"maximise must be left out with requirements, which have it, got {shown(maximise)}")
+        one_of("maximise", maximise, ("margin",))
         wanted = read_requirements(requirements)
     else:
         parts = {"free": free, "require": require}

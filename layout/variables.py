@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.inputs import shown
 from ..models import Robot
 from .requirements import POINTS, Free, Requirements
 
@@ -131,7 +132,9 @@ def _check(robot: Robot, requirements: Requirements) -> None:
         for name in ("cables", "copy_of"):
             for cable in getattr(free, name) or ():
                 if cable >= robot.m:
-                    raise InputError(f"{where}.{name} must be cables of the robot, 0 to {robot.m - 1}, got {cable}")
+                    raise InputError(
+                        f"{where}.{name} must be cables of the robot, 0 to {robot.m - 1}, got {shown(cable)}"
+                    )
         for cable in free.cables or range(robot.m):
             if (free.part, cable) in taken:
                 first = taken[free.part, cable]

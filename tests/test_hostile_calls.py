@@ -418,6 +418,7 @@ ALSO = {
     "read_measurements.poses": ("log",),
     "fields": ("map",),
     "nonsense": ("options",),
+    "Requirements.model_validate.obj": ("requirements",),
 }
 
 EVENTS: dict[str, dict[str, Any]] = {
@@ -435,6 +436,7 @@ REST = {"kind": "static-equilibrium"}
 MODELS: dict[str, dict[str, Any]] = {
     "Robot": robot().model_dump(mode="json"),
     "Task": TASK,
+    "Requirements": REQUIREMENTS,
     "Region": {},
     "Uncertainty": {"parameters": ["cables[0].anchor.x"], "covariance": [[1e-4]]},
     "AllOf": {"conditions": [REST]},
@@ -475,6 +477,7 @@ OBJECTS: dict[str, Callable[[], Any]] = {
     "Robot": robot,
     "Spread": lambda: Spread(robot(), robot().home[None], np.zeros((1, 1, 6))),
     "Task": lambda: towline.read_task(TASK),
+    "Requirements": lambda: towline.read_requirements(REQUIREMENTS),
     "Region": Region,
 }
 
