@@ -16,11 +16,13 @@ _NEGATIVE = 0.05  # weight of the mean of negative margins
 _SPARE = 1.3  # times the clearance, since there are few poses
 _AT_BOUND = 0.5  # probability that a redrawn coordinate is at one of its bounds
 _SMALL = 0.1  # standard deviation of a small move, of the range of a coordinate
-_HOT = 0.1  # first temperature, of the force scale
+_HOT, _WARM = 0.1, 0.03  # first temperature, of the force scale, from a random layout and near a good one
 _CLEARANCE_COSTS = 5.0  # force scales per metre of missing clearance
 
 
-def anneal(evaluation: Evaluation, clearance: float, rng: np.random.Generator, until: float) -> np.ndarray:
+def anneal(
+    evaluation: Evaluation, clearance: float, rng: np.random.Generator, until: float, near: np.ndarray | None = None
+) -> np.ndarray:
     """Return the variables of a good layout for the rows of an evaluation, (p,).
 
     Parameters
@@ -31,6 +33,8 @@ def anneal(evaluation: Evaluation, clearance: float, rng: np.random.Generator, u
         Smallest distance between cables [m].
     until
         Time of `time.perf_counter` at which it ends early [s].
+    near
+        Where to start, at a lower temperature; default: at random.
     """
     variables = evaluation.variables
     low, high, points = variables.low, variables.high, variables.points
@@ -44,11 +48,12 @@ def anneal(evaluation: Evaluation, clearance: float, rng: np.random.Generator, u
             value -= _CLEARANCE_COSTS * force * max(0.0, wanted - float(evaluation.distances(y).min()))
         return value
 
-    y = rng.uniform(low, high)
+    y = rng.uniform(low, high) if near is None else near
+    hot = force * (_HOT if near is None else _WARM)
     value = score(y, -np.inf)
     best, best_value = y, value
     for number in range(MOVES):
-        temperature = _HOT * force * (1.0 - number / MOVES) ** 2 + 1e-9
+        temperature = hot * (1.0 - number / MOVES) ** 2 + 1e-9
         least = value + temperature * float(np.log(rng.random() + 1e-300))  # by Metropolis
         candidate = _moved(y, low, high, points, alike, rng)
         candidate_value = score(candidate, least)

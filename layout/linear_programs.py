@@ -16,7 +16,7 @@ _FOUND = 1e-5  # of the margin, or of 1 N: a smaller improvement ends the search
 
 
 class Multipliers(NamedTuple):
-    """What binds at the optimum: weights of the rows' reserves, summing to one, and the value of wider bounds."""
+    """Weights of the rows' reserves at the optimum, which sum to one, and the value of wider bounds."""
 
     rows: np.ndarray  # (k,), into the rows of the evaluation
     weights: np.ndarray  # (k,)

@@ -37,7 +37,7 @@ class Advice(NamedTuple):
 
 
 class Reasons(NamedTuple):
-    """What binds, what would help, and whether the layout is a local optimum."""
+    """Binding wrenches, changes that would help, and whether the layout is a local optimum."""
 
     binding: tuple[Binding, ...]
     advice: tuple[Advice, ...]

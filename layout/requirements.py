@@ -131,7 +131,7 @@ class Requirement(Part):
 
 
 class Requirements(Part):
-    """What a design may change and what it must be able to do. In a file: YAML with these keys."""
+    """Requirements of a design: free numbers, poses and wrenches. In a file: YAML with these keys."""
 
     name: Name = Field(default="design", description="of the requirements, in reports and names of files")
     free: Annotated[tuple[Free, ...], Field(min_length=1, max_length=200)] = Field(

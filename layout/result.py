@@ -32,9 +32,9 @@ class Design(Reported, Displayed):
     requirements
         What it should do.
     status
-        feasible: its margin, by `capacity_margin` at the worst poses of the grid and of an audit, and its clearance are
-        as required; infeasible: no layout inside the boxes meets the requirements, by `impossibility`; not-found: none
-        was found, which proves nothing.
+        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, and its clearance
+        are as required; infeasible if no layout inside the boxes meets the requirements, by `impossibility`; otherwise
+        not-found, which proves nothing.
     margin, margin_before
         Smallest capacity margin of both at the same poses, with moments divided by `before.length` [N].
     clearance

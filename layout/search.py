@@ -19,7 +19,7 @@ CLEARANCE_AUDITED = 10_000
 FEW = 32  # rows for annealing
 _ADDED, _APART = 20, 0.15  # worst poses that an audit adds, and how far apart they are [m]
 _ROUNDS = 6
-_STARTING = 0.75  # of the time, for new starts
+_STARTING = 0.85  # of the time, for new starts
 _FIRST_STEP, _LATER_STEP = 0.1, 0.02  # longest steps of the first linear program, of the ranges
 _SAME = 1e-3  # of the margin: what an audit may find less
 _SPARE = 0.002  # of the clearance: what is searched for more than is asked
@@ -85,7 +85,8 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
             if found.starts == 0 and requirements.start == "robot":
                 improve("the robot's own layout", _FIRST_STEP)
             else:
-                y = anneal(few, clearance, rng, until)
+                near = found.y if found.starts % 2 and found.starts > 1 else None
+                y = anneal(few, clearance, rng, until, near)
                 improve(f"start {found.starts + 1}", _FIRST_STEP)
             found.starts += 1
         for number in range(_ROUNDS):
