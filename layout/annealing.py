@@ -16,7 +16,7 @@ _NEGATIVE = 0.05  # weight of the mean of negative margins
 _SPARE = 1.3  # times the clearance, since there are few poses
 _AT_BOUND = 0.5  # probability that a redrawn coordinate is at one of its bounds
 _SMALL = 0.1  # standard deviation of a small move, of the range of a coordinate
-_HOT, _WARM = 0.1, 0.03  # first temperature, of the force scale, from a random layout and near a good one
+_HOT, _WARM = 0.1, 0.01  # first temperature, of the force scale, from a random layout and near a good one
 _CLEARANCE_COSTS = 5.0  # force scales per metre of missing clearance
 
 
