@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending, file_path
@@ -51,6 +50,8 @@ def save_motion(robot: Robot, contents: Contents, file: str | os.PathLike[str]) 
 
 def _messages(robot: Robot, contents: Contents) -> Iterator[tuple[int, str, str, dict[str, Any]]]:
     """Yield time [ns], topic, schema and content of each message."""
+    from scipy.spatial.transform import Rotation  # loads for longer than most commands take
+
     values = {name: variable.values for name, variable in {**contents.coordinates, **contents.variables}.items()}
     times, pose, carriers = values["time"], values["pose"], values["carrier_pose"]
     ends = np.stack([points.anchors(robot, carriers), points.attachments(robot, pose)], axis=2)  # (N, m, 2, 3)

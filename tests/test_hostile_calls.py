@@ -72,6 +72,7 @@ NOT_CALLED = {
     "Compared",
     "Design",
     "HeldOut",
+    "Mistake",
     "Outlier",
     "Parameter",
     "Sigma",

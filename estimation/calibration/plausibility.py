@@ -21,6 +21,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...models import points
+from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, check_measurements, measured_poses
 from .frames import displaced_frames, fitted_frames
@@ -99,6 +100,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     InputError
         If the measurements have another number of cables.
     """
+    robot = as_robot(robot)
     given = check_measurements(robot, measurements)
     parameters = Parameters(robot, ())
     table = parameters.table(parameters.first)
@@ -147,7 +149,7 @@ def mended(robot: Robot, measurements: Measurements) -> tuple[Measurements, list
     InputError
         If the measurements have another number of cables, or several errors are equally probable.
     """
-    texts: list[str] = []
+    robot, texts = as_robot(robot), list[str]()
     for _ in range(MOST_MISTAKES):
         found = mistake(robot, measurements)
         if found is None:

@@ -32,7 +32,7 @@ def recordings(paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]])
     files: list[Path] = []
     for given in paths if several else [paths]:  # pyright: ignore
         path = file_path("log", given, f"the path of {WHAT}")
-        parts = sorted(part for part in path.iterdir() if part.suffix in PARTS) if path.is_dir() else [path]
+        parts = sorted(part for part in path.iterdir() if part.suffix in PARTS) if os.path.isdir(path) else [path]
         if not parts:
             packed = any(part.suffix == ".zstd" for part in path.iterdir())
             got = "compressed ones; `zstd -d` unpacks them" if packed else "none"
