@@ -45,7 +45,9 @@ class _Program:
         A = np.hstack([-slopes[good] * self.scale, np.ones((good.sum(), 1)), np.zeros((good.sum(), 1))])
         b = every.ravel()[chosen][good]
         if clearance > 0.0 and evaluation.pairs.size:
-            near = evaluation.distance_slopes(y, MOST_DISTANCES, clearance + 4.0 * delta * float(self.scale.max()))
+            near = evaluation.distance_slopes(
+                y, MOST_DISTANCES, clearance + 4.0 * delta * float(self.scale.max(initial=0.0))
+            )
             by = np.hstack(
                 [-near.by_variables * self.scale, np.zeros((len(near.value), 1)), -np.ones((len(near.value), 1))]
             )

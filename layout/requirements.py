@@ -17,6 +17,7 @@ NO_WRENCH: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 Axis = Literal["x", "y", "z"]
 Count = Annotated[Whole, Field(ge=1, le=100)]
 CableNumber = Annotated[Whole, Field(ge=0)]
+MOST_PAIRED = 8  # cables: 40 320 pairings
 MOST_ROWS = 20_000  # poses times wrenches of all requirements, of each of which the search computes a margin
 LEAST_MARGIN = 1.0  # [N]: a flat available wrench set has the margin 0, and a rounding error makes that positive
 POINTS = ("anchor", "attachment")
@@ -36,6 +37,11 @@ class Free(Part):
     )
     range: Range | None = Field(default=None, description="for t_min and t_max: smallest and largest value [N]")
     equal: bool = Field(default=False, description="true: the cables have one point or value in common")
+    pairing: bool = Field(
+        default=False,
+        description="true: for attachment, instead of a box: the cables exchange their attachments, and every pairing "
+        "is compared; nothing else is free, and there are at most 8 cables",
+    )
     copy_of: tuple[CableNumber, ...] | None = Field(
         default=None,
         min_length=1,
@@ -48,6 +54,13 @@ class Free(Part):
     @model_validator(mode="after")
     def _where(self) -> Self:
         points = self.part in POINTS
+        if self.pairing:
+            if self.part != "attachment":
+                raise ValueError(f"pairing must be left out for {self.part}: the attachments are exchanged")
+            for name in ("box", "range", "copy_of", "mirrored", "equal"):
+                if getattr(self, name):
+                    raise ValueError(f"{name} must be left out with pairing")
+            return self._with_different_cables()
         wanted, other = ("box", "range") if points else ("range", "box")
         if getattr(self, other) is not None:
             raise ValueError(f"{other} must be left out for {self.part}, which has a {wanted}")
@@ -63,6 +76,9 @@ class Free(Part):
         if self.copy_of is not None and (self.cables is None or len(self.cables) != len(self.copy_of)):
             count = "all" if self.cables is None else len(self.cables)
             raise ValueError(f"copy_of must name as many cables as `cables`, {count}, got {len(self.copy_of)}")
+        return self._with_different_cables()
+
+    def _with_different_cables(self) -> Self:
         for name, cables in (("cables", self.cables), ("copy_of", self.copy_of)):
             if cables is not None and len(set(cables)) < len(cables):
                 raise ValueError(f"{name} must name each cable once, got {list(cables)}")
@@ -155,6 +171,8 @@ class Requirements(Part):
 
     @model_validator(mode="after")
     def _not_too_many(self) -> Self:
+        if len(self.free) > 1 and any(each.pairing for each in self.free):
+            raise ValueError("free must have one item if that is a pairing, got more")
         size = sum(each.size for each in self.require)
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} poses times wrenches, got {size}")

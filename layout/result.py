@@ -44,7 +44,7 @@ class Design(Reported, Displayed):
     poses, audited
         Number of poses times wrenches of the requirements, and of random ones in the last audit.
     starts
-        Number of layouts from which it searched.
+        Number of layouts from which it searched, or of pairings that it compared.
     stopped
         Whether the search was interrupted.
     """
@@ -96,7 +96,9 @@ class Design(Reported, Displayed):
         if self.impossibility is not None:
             parts.append(f"proof for one pose and wrench: {self.impossibility.certificate.describe(self._up())}")
             return Report(about, self.status, self._summary(), parts)
-        searched = f"{self.starts} start{'s' * (self.starts != 1)}, {self.poses} poses times wrenches"
+        pairing = self.requirements.free[0].pairing
+        searched = quantity(self.starts) + (" pairings" if pairing else f" start{'s' * (self.starts != 1)}")
+        searched += f", {self.poses} poses times wrenches"
         facts = [("searched", f"{searched}, audited at {quantity(self.audited)} random ones")]
         if self.stopped:
             facts.append(("", "INTERRUPTED: the best so far"))
@@ -112,6 +114,8 @@ class Design(Reported, Displayed):
     def _why(self, found: Reasons) -> list[Part]:
         state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
         bounds = f"{found.at_bounds} free numbers are at a bound of their box"
+        if self.requirements.free[0].pairing:
+            state, bounds = "the best of all pairings at the poses of the grid", "the points are given"
         facts = [("layout", f"{state}; {bounds}")]
         facts += [
             (one.change, f"margin {quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")

@@ -14,6 +14,7 @@ from ..models.files import as_robot
 from ..solvers.margins import margins
 from .evaluation import Evaluation, Rows, rows_of
 from .impossibility import find_impossibility
+from .pairings import best_pairing, with_attachments
 from .reasons import reasons
 from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design, judged_margin
@@ -85,22 +86,35 @@ def design(
         raise InputError(f"robot {chosen.name!r} must have {wanted_cables}, got {chosen.m}")
     variables = variables_of(chosen, wanted)
     grid = rows_of(chosen, wanted.require, [each.places() for each in wanted.require])
-    impossible = find_impossibility(variables, grid)
+    # Of other pairings the boxes of the robot's own points prove nothing.
+    impossible = None if wanted.free[0].pairing else find_impossibility(variables, grid)
     if impossible is not None:
         before = _judged(chosen, chosen.length, grid)
         return Design(
             chosen, chosen, wanted, "infeasible", before, before, _nearest(Evaluation(variables, grid), None), None,
             impossible, len(grid.pose_of), 0, 0, False,
         )  # fmt: skip
+    if wanted.free[0].pairing:
+        cables = wanted.free[0].cables or tuple(range(chosen.m))
+        attachment_of, count = best_pairing(chosen, grid, cables, wanted.clearance)
+        paired = variables_of(with_attachments(chosen, attachment_of), wanted)
+        return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)
     found = search(variables, wanted, progress or (lambda what, share, best: None))
-    return _designed(variables, wanted, found.y, found.rows, len(grid.pose_of), found.starts, found.stopped)
+    return _designed(chosen, variables, wanted, found.y, found.rows, len(grid.pose_of), found.starts, found.stopped)
 
 
 def _designed(
-    variables: Variables, wanted: Requirements, y: np.ndarray, rows: Rows, count: int, starts: int, stopped: bool
+    before: Robot,
+    variables: Variables,
+    wanted: Requirements,
+    y: np.ndarray,
+    rows: Rows,
+    count: int,
+    starts: int,
+    stopped: bool,
 ) -> Design:
     """Judge the layout at the rows and at new random poses, and find the reasons."""
-    before, robot = variables.robot, variables.robot_at(y)
+    robot = variables.robot_at(y)
     random = np.random.default_rng([wanted.seed, 1])
     per_demand = max(1000, AUDITED // sum(len(each.demands) for each in wanted.require))
     audited = rows_of(before, wanted.require, [each.sampled(per_demand, random) for each in wanted.require])

@@ -7,7 +7,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.inputs import shown
 from ..models import Robot
-from .requirements import POINTS, Free, Requirements
+from .requirements import MOST_PAIRED, POINTS, Free, Requirements
 
 _AXES = "xyz"
 
@@ -88,7 +88,7 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
     names: list[str] = []
     points: list[np.ndarray] = []
     for free in requirements.free:
-        if free.copy_of is not None:
+        if free.copy_of is not None or free.pairing:
             continue
         bounds = _bounds(free)
         for number, cable in enumerate(free.cables or range(robot.m)):
@@ -129,6 +129,8 @@ def _check(robot: Robot, requirements: Requirements) -> None:
     taken: dict[tuple[str, int], int] = {}
     for number, free in enumerate(requirements.free):
         where = f"free[{number}]"
+        if free.pairing and (count := len(free.cables or range(robot.m))) > MOST_PAIRED:
+            raise InputError(f"{where}.cables must be at most {MOST_PAIRED} for a pairing, got {count}")
         for name in ("cables", "copy_of"):
             for cable in getattr(free, name) or ():
                 if cable >= robot.m:

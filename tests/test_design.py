@@ -1,7 +1,7 @@
 """Designs of robots: better than published ones, inside their boxes, honest about what is impossible and what binds."""
 
 import json
-from itertools import product
+from itertools import permutations, product
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from towline.layout import Free
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.impossibility import find_impossibility
 from towline.layout.linear_programs import maximise
+from towline.layout.pairings import with_attachments
 from towline.layout.reasons import reasons
 from towline.layout.variables import variables_of
 from towline.models.points import placed, rotations
@@ -237,6 +238,35 @@ def test_what_a_layout_can_do_is_never_called_impossible(name, share, seed):
     assert find_impossibility(variables, rows_of(robot, read.require, [pose[None]])) is None
 
 
+@pytest.mark.parametrize(("name", "clearance"), [("planar-4", 0.0), ("ipanema-2", 0.0), ("ipanema-2", 0.02)])
+def test_the_best_pairing_is_that_of_brute_force(name, clearance):
+    robot = load(name)
+    cables = [0, 1, 2, 3] if name == "planar-4" else [0, 3, 4, 6]
+    # Spoilt, so that another pairing is better.
+    own = list(range(robot.m))
+    own[cables[0]], own[cables[1]], own[cables[2]] = cables[1], cables[2], cables[0]
+    spoilt = with_attachments(robot, np.array(own))
+    poses = robot.home + 0.1 * np.random.default_rng(2).normal(size=(12, 6)) * robot.dof_mask * [1, 1, 1, 0, 0, 0]
+    free = [{"part": "attachment", "cables": cables, "pairing": True}]
+    result = design(spoilt, free, [{"poses": poses.tolist()}], clearance=clearance)
+    kept = np.flatnonzero(robot.dof_mask)
+    w = (Dynamics(robot).required_wrench(poses[0], np.zeros(6), np.zeros(6)) * robot.wrench_scale)[kept]
+    found = []
+    for pairing in permutations(cables):
+        order = np.arange(robot.m)
+        order[cables] = pairing
+        other = with_attachments(spoilt, order)
+        apart = Interference(between_cables=clearance) if clearance else None
+        if apart and not apart.evaluate(other, Places.at_home(other, poses)).all():
+            continue
+        A = Dynamics(other).wrench_matrix(poses)[:, kept] * robot.wrench_scale[kept][:, None]
+        found.append(min(capacity_margin(TensionProblem(a, w, robot.t_min, robot.t_max)).value for a in A))
+    assert result.starts == 24
+    assert result.margin == pytest.approx(max(found), abs=1e-9)
+    assert result.margin > result.margin_before
+    assert "the best of all pairings" in result.report()
+
+
 def test_an_interrupt_keeps_the_best_so_far():
     robot, calls = load("ipanema-2"), []
 
@@ -291,6 +321,10 @@ HOSTILE = [
      "no copies"),
     ({"free": [{"part": "anchor", "box": {"min": [0, 0, 0], "max": [-1, 1, 1]}}]}, "min must not exceed max"),
     ({"free": [{"part": "anchor", "box": {"min": [0, 0, 0], "max": [float("nan"), 1, 1]}}]}, "box.max"),
+    ({"free": [{"part": "anchor", "pairing": True}]}, "pairing must be left out for anchor"),
+    ({"free": [{"part": "attachment", "pairing": True, "equal": True}]}, "equal must be left out with pairing"),
+    ({"free": [{"part": p, "pairing": p[0] == "a", "range": {"attachment": None, "t_max": {"min": 50, "max": 60}}[p]}
+               for p in ("attachment", "t_max")]}, "one item"),
     ({"require": [{}]}, "box or poses must be given"),
     ({"require": [{"poses": [[0, 0]]}]}, "poses"),
     ({"require": [{"poses": [[0, 0, 0, 0, 0, float("inf")]]}]}, "poses"),
