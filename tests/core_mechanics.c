@@ -49,9 +49,11 @@ int main(int argc, char **argv) {
                                 results(rows, 7 * m)};
     const towline_motion_of_platform motion = {poses, velocities, accelerations, NULL};
     double *anchors = results(rows, 3 * m), *attachments = results(rows, 3 * m), *S = results(rows, 42 * m);
-    double *by_pose = results(rows, 36), *by_axes = results(rows, 36), *w = results(rows, 6);
+    double *distances = results(rows, m * (m - 1) / 2), *by_pose = results(rows, 36), *by_axes = results(rows, 36),
+           *w = results(rows, 6);
     towline_lines_of_rows(robot, at, want);
     towline_ends(robot, at, anchors, attachments);
+    towline_cable_distances(robot, at, distances);
     towline_columns_by_geometry(robot, at, S);
     towline_wrench_by_pose(robot, at, tensions, 0, by_pose);
     towline_wrench_by_pose(robot, at, tensions, 1, by_axes);
@@ -59,6 +61,7 @@ int main(int argc, char **argv) {
     put(want.lengths, rows * m), put(want.A, rows * 6 * m), put(want.J, rows * 6 * m);
     put(want.anchors, rows * 3 * m), put(want.sensitivity, rows * 7 * m);
     put(anchors, rows * 3 * m), put(attachments, rows * 3 * m), put(S, rows * 42 * m);
+    put(distances, rows * (m * (m - 1) / 2));
     put(by_pose, rows * 36), put(by_axes, rows * 36), put(w, rows * 6);
     free(robot), free(poses), free(velocities), free(accelerations), free(carriers), free(tensions);
     return 0;

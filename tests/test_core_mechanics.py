@@ -260,11 +260,13 @@ def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path_factory, lanes, pr
             )
             _core.lines(record, given[0], c, *of_lines)
             _core.ends(record, given[0], c, *ends)
+            distances = np.empty((rows, m * (m - 1) // 2))
+            _core.cable_distances(record, given[0], c, distances)
             _core.columns_by_geometry(record, given[0], c, S)
             _core.wrench_by_pose(record, given[0], c, given[4], D[0])
             _core.wrench_by_axes(record, given[0], c, given[4], D[1])
             _core.required_wrench(record, pose[:rows], velocity[:rows], acceleration[:rows], None, w)
-            expected = np.concatenate([array.ravel() for array in (*of_lines, ends, S, D, w)])
+            expected = np.concatenate([array.ravel() for array in (*of_lines, ends, S, distances, D, w)])
             np.testing.assert_array_equal(np.frombuffer(done.stdout), expected)
 
 

@@ -1,6 +1,8 @@
 """Capacity margins of many wrenches by the Gale dual: against projections, facets and differences."""
 
+import subprocess
 from itertools import product
+from math import comb
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from towline import core
 from towline.solvers import TensionProblem, capacity_margin
 from towline.solvers.margins import all_reserves, margins, reserves
 
+from .c_programs import program_of, sources_of, watched_objects
 from .problems import geometric_matrix
 
 
@@ -107,3 +110,25 @@ def test_arrays_that_do_not_fit_are_refused():
             core.margins(*wrong)
     with pytest.raises(ValueError, match="wrench matrices"):
         core.margins(np.ones((2, 6, 11)), w, np.zeros(11), np.ones(11), found, None)
+
+
+@pytest.mark.parametrize("lanes", [True, False])
+def test_sanitizers_are_silent_and_bits_are_the_same(tmp_path_factory, lanes):
+    """With none, infinite, huge and tiny numbers, and of as many rows as there are lanes, more, and one."""
+    parts = watched_objects(tmp_path_factory, sources_of("available_wrench"), lanes=lanes)
+    program = program_of(tmp_path_factory, "core_margins.c", parts)
+    rng = np.random.default_rng(9)
+    for (n, m), rows in product([(1, 1), (2, 5), (6, 6), (6, 8), (6, 10)], (1, 19)):
+        arrays = [rng.normal(size=(rows, n, m)), rng.normal(size=(rows, n)), np.ones(m), rng.uniform(10, 20, m)]
+        for array in arrays[:2]:
+            array.flat[rng.integers(array.size, size=3)] = rng.choice([np.nan, np.inf, -np.inf, 1e308, 1e-308, 0.0], 3)
+        expected = [np.empty(rows), np.empty((rows, comb(m, n - 1)))]
+        core.margins(*arrays, *expected)
+        for processor in range(core.PROCESSOR + 1 if lanes else 1):
+            sent = b"".join(array.tobytes() for array in arrays)
+            command = [program, *map(str, (n, m, rows, processor))]
+            done = subprocess.run(command, input=sent, capture_output=True, check=False)
+            assert done.returncode == 0, done.stderr.decode()
+            np.testing.assert_array_equal(
+                np.frombuffer(done.stdout), np.concatenate([each.ravel() for each in expected])
+            )
