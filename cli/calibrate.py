@@ -61,7 +61,7 @@ def calibrate(
         bool,
         typer.Option(
             "--fix",
-            help="Mend the input error that the log probably has (order of cables, units, conventions, frames).",
+            help="Correct probable input errors of the log first (order of cables, units, conventions, frames).",
         ),
     ] = False,
     out: Annotated[
@@ -78,8 +78,8 @@ def calibrate(
     """Estimate anchors, offsets and more from measured cable lengths, and write a calibrated robot file.
 
     The file includes the covariance of its new parameters. Carriers are at home. Nothing is written, and the exit code
-    is 1, if the log probably has an input error (order of cables, units, conventions of angles, frames), which --fix
-    mends, if the fit did not converge, or if validation samples fit worse than with the robot's file.
+    is 1, if the log probably has an input error (order of cables, units, conventions of angles, frames), the fit did
+    not converge, or validation samples fit worse than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
     from ..estimation.calibration import mended

@@ -24,7 +24,7 @@ def design(
     robot: RobotArgument,
     requirements: Annotated[
         Path,
-        typer.Argument(metavar="REQUIREMENTS", help="A requirement file (YAML): what is free, and what it must do."),
+        typer.Argument(metavar="REQUIREMENTS", help="A requirement file (YAML): free numbers, poses and wrenches."),
     ],
     out: Annotated[
         Path | None,
@@ -50,8 +50,8 @@ def design(
 ) -> None:
     """Find anchors, attachments and tension limits with the largest capacity margin, and report what limits it.
 
-    Exit code 1 if no layout that meets the requirements was found, or if it is proven that none exists. Ctrl-C ends the
-    search with the best layout so far.
+    The exit code is 1 if no layout that meets the requirements was found, or if none exists, which is then proven.
+    Ctrl-C ends the search with the best layout so far.
     """
     from ..layout import Requirements, read_requirements
     from ..layout import design as find

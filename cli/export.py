@@ -36,15 +36,15 @@ def export(
         str | None,
         typer.Option(
             metavar="DRIVE",
-            help="With --fmu: what the cables of the plant are commanded, lengths, rates, forces or tensions; default: "
-            "tensions, or nothing where lengths are constant.",
+            help="With --fmu: type of the plant's cable commands (lengths, rates, forces or tensions); default: "
+            "tensions, or constant lengths for robots that have these.",
         ),
     ] = None,
     reference: Annotated[
         str | None,
         typer.Option(
             metavar="PLAN.nc|'x y z roll pitch yaw'",
-            help="With --fmu: plan or pose where the robot begins, in {G} [m, rad]; default: its home.",
+            help="With --fmu: pose in {G} [m, rad], or plan, at which a simulation starts; default: home.",
         ),
     ] = None,
     out: Annotated[

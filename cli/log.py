@@ -19,14 +19,14 @@ FieldsOption = Annotated[
 def log(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", help="CSV, NetCDF or MCAP files, or bags of ROS 1 (.bag) or ROS 2 (folder)."),
+        typer.Argument(metavar="LOG", help="CSV, NetCDF or MCAP files, or bags of ROS 1 (.bag) or ROS 2 (folder)."),
     ],
     fields: FieldsOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """List what logs contain: topics, rates, gaps, fields with their units, and what these are taken for.
+    """List what logs contain (topics, rates, gaps, fields, units), which fields towline uses, and what for.
 
-    The exit code is 1 if no lengths are found, without which a log cannot be used.
+    The exit code is 1 if no lengths are found, since a log without them cannot be used.
     """
     from ..estimation.logs import read_map, recordings
     from ..estimation.logs.listing import listing, report

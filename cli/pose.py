@@ -47,7 +47,7 @@ def pose(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.csv", help="With --log: file of poses and covariances; default: LOG-poses.csv here."
+            metavar="FILE.csv", help="With --log: file of poses and covariances; default: LOG-poses.csv in this folder."
         ),
     ] = None,
     figures: Annotated[

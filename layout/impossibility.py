@@ -67,7 +67,7 @@ class Impossibility(Displayed):
         text = self.certificate.text(up)
         return (
             f"no layout inside the boxes can do it: at pose ({quantity_row(self.pose)}) along {text.along}, needed "
-            f"{text.needed}, all layouts {text.available}"
+            f"{text.needed}, available in the best layout {text.available}"
         )
 
 

@@ -26,14 +26,14 @@ POINTS = ("anchor", "attachment")
 class Free(Part):
     """Numbers of some cables that a design chooses: points in a box, or tension limits in a range."""
 
-    part: Literal["anchor", "attachment", "t_min", "t_max"] = Field(description="which number of the cables")
+    part: Literal["anchor", "attachment", "t_min", "t_max"] = Field(description="kind of the numbers")
     cables: tuple[CableNumber, ...] | None = Field(
         default=None, min_length=1, description="cables, counted from 0; default: all"
     )
     box: Box | None = Field(
         default=None,
-        description="for anchor and attachment: where, in the frame of carrier or platform; without thickness a face, "
-        "a line or a point [m]",
+        description="for anchor and attachment: where, in the frame of carrier or platform [m]; where min and max are "
+        "equal, the box is a face, a line or a point",
     )
     range: Range | None = Field(default=None, description="for t_min and t_max: smallest and largest value [N]")
     equal: bool = Field(default=False, description="true: the cables have one point or value in common")
@@ -45,10 +45,10 @@ class Free(Part):
     copy_of: tuple[CableNumber, ...] | None = Field(
         default=None,
         min_length=1,
-        description="instead of box and range: the cables, as many, whose points or values these cables have",
+        description="instead of box or range: one cable for each of `cables`, whose point or value is copied",
     )
     mirrored: Axis | None = Field(
-        default=None, description="with copy_of: the coordinate of the points that changes its sign; default: none"
+        default=None, description="with copy_of: the coordinate of the points whose sign is reversed; default: none"
     )
 
     @model_validator(mode="after")
@@ -86,7 +86,7 @@ class Free(Part):
 
 
 class Requirement(Part):
-    """Poses at which the cables must balance wrenches; every combination counts."""
+    """Poses at which the cables must balance wrenches; every combination of the lists is required."""
 
     box: Box | None = Field(default=None, description="box of positions of the platform in {G} [m]")
     grid: tuple[Count, Count, Count] = Field(default=(7, 7, 5), description="with a box: positions along x, y and z")
@@ -161,7 +161,7 @@ class Requirements(Part):
         ge=LEAST_MARGIN,
         description="smallest capacity margin, with moments divided by the `length` of the robot's file [N]",
     )
-    clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: any")
+    clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: no limit")
     maximise: Literal["margin"] = Field(default="margin", description="objective: the smallest capacity margin")
     start: Literal["robot", "random"] = Field(
         default="robot", description="first layout: the robot's own, moved into the boxes, or a random one"
@@ -172,7 +172,7 @@ class Requirements(Part):
     @model_validator(mode="after")
     def _not_too_many(self) -> Self:
         if len(self.free) > 1 and any(each.pairing for each in self.free):
-            raise ValueError("free must have one item if that is a pairing, got more")
+            raise ValueError(f"free must have no item besides a pairing, got {len(self.free) - 1} more")
         size = sum(each.size for each in self.require)
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} poses times wrenches, got {size}")

@@ -101,11 +101,11 @@ class Design(Reported, Displayed):
         searched += f", {self.poses} poses times wrenches"
         facts = [("searched", f"{searched}, audited at {quantity(self.audited)} random ones")]
         if self.stopped:
-            facts.append(("", "INTERRUPTED: the best so far"))
+            facts.append(("", "INTERRUPTED: this is the best layout so far"))
         if self.status == "not-found":
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
             wanted += [f"clearance of {quantity(self.requirements.clearance, 'm')}"] * (self.requirements.clearance > 0)
-            facts.append(("wanted", f"{' and a '.join(wanted)}; this is no proof that no layout has it"))
+            facts.append(("wanted", f"{' and a '.join(wanted)}; this does not prove that no layout has it"))
         parts.append(Section("", facts))
         if self.reasons is not None:
             parts += self._why(self.reasons)
@@ -115,7 +115,7 @@ class Design(Reported, Displayed):
         state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
         bounds = f"{found.at_bounds} free numbers are at a bound of their box"
         if self.requirements.free[0].pairing:
-            state, bounds = "the best of all pairings at the poses of the grid", "the points are given"
+            state, bounds = "the best of all pairings at the poses of the grid", "all points are given"
         facts = [("layout", f"{state}; {bounds}")]
         facts += [
             (one.change, f"margin {quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")

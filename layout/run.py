@@ -72,7 +72,7 @@ def design(
         given = {"free": free, "require": require, **options}
         for name, value in given.items():
             if value is not None:
-                raise InputError(f"{name} must be left out with requirements, which have it")
+                raise InputError(f"{name} must be left out with requirements, which contain it")
         one_of("maximise", maximise, ("margin",))
         wanted = read_requirements(requirements)
     else:

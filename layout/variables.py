@@ -140,13 +140,13 @@ def _check(robot: Robot, requirements: Requirements) -> None:
         for cable in free.cables or range(robot.m):
             if (free.part, cable) in taken:
                 first = taken[free.part, cable]
-                raise InputError(f"{where} must not free {free.part} {cable}, which free[{first}] has, again")
+                raise InputError(f"{where} must not free {free.part} of cable {cable}, as free[{first}] does")
             taken[free.part, cable] = number
     for number, free in enumerate(requirements.free):
         for cable in free.copy_of or ():
             source = taken.get((free.part, cable))
             if source is not None and requirements.free[source].copy_of is not None:
-                raise InputError(f"free[{number}].copy_of must name cables that are no copies, got {cable}")
+                raise InputError(f"free[{number}].copy_of must name cables that are not copies themselves, got {cable}")
 
 
 def _layout_of(robot: Robot) -> np.ndarray:

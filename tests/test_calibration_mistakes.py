@@ -152,7 +152,7 @@ def test_a_body_off_is_a_hint_in_the_report():
 def test_the_command_mends(tmp_path):
     robot, poses, y = a_log("cogiro", 2)
     for what, text in (
-        ("frame anywhere", "the poses look measured in a frame"),
+        ("frame anywhere", "the poses seem to be measured in a frame"),
         ("sign of a cable", "l1 seems to have"),
     ):
         given, lengths = mistakes(robot, poses, y)[what]

@@ -162,7 +162,7 @@ def test_a_map_names_fields(log, tmp_path):
         ("lengths: /winch/position[*]", "map: lengths must name fields of the log, got /winch/position"),
         ("lengths: l1 [N]", "the unit of l1 must be one of m, dm, cm, .* got 'N'"),
         ("position: [l1, l2]", "map: position must name 3 fields, got 2"),
-        ("pose: /mocap", "map: pose must name a topic or a structure of the log, got /mocap; it has the table"),
+        ("pose: /mocap", "map: pose must name a topic or a structure of the log, got /mocap; the log has the table"),
         ("- 1", "mapping"),
     ],
 )
@@ -239,7 +239,7 @@ def test_a_recording_that_was_cut_is_read_as_far_as_it_goes(files, log, tmp_path
     content = files["json.mcap"].read_bytes()
     (tmp_path / "cut.mcap").write_bytes(content[: len(content) * 2 // 3])
     (one,) = recordings(tmp_path / "cut.mcap")
-    assert one.notes == ["the file has no end: it is read as far as it goes"]
+    assert one.notes == ["the end of the file is missing: everything before it is read"]
     assert 0 < one.topics["/joints"].count <= 2000
 
 

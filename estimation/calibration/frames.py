@@ -39,7 +39,7 @@ class Frames(NamedTuple):
     def __str__(self) -> str:
         texts = []
         for (shift, turn), what in (
-            (self.outer, "the poses look measured in a frame that is"),
+            (self.outer, "the poses seem to be measured in a frame that is"),
             (self.inner, "the poses look like those of a body whose frame is, seen from the platform frame,"),
         ):
             angle = float(np.linalg.norm(Rotation.from_matrix(turn).as_rotvec()))

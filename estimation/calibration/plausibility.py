@@ -163,7 +163,7 @@ def mended(robot: Robot, measurements: Measurements) -> tuple[Measurements, list
 
 def _better(text: str, before: float, after: float) -> str:
     times = quantity(before / max(after, 1e-12), digits=2)
-    return f"{text}: lengths and poses of the log then agree {times} times better"
+    return f"{text}: with this corrected, lengths and poses agree {times} times better"
 
 
 def _mended(

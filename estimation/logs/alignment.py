@@ -28,7 +28,7 @@ CORRELATED = 5.0  # by which the errors of a model exceed those of as much noise
 
 
 class Clock(NamedTuple):
-    """Time of the poses = offset + rate * time of the lengths [s], how alike the speeds are, up to 1, and sigmas."""
+    """Time of the poses = offset + rate * time of the lengths [s], the correlation of speeds, up to 1, and sigmas."""
 
     offset: float
     rate: float
@@ -60,7 +60,7 @@ def align(
         If the speeds have too little in common.
     """
     found = [_coarse(times, readings, pose_times, lengths, _speeds)]
-    if found[0][2] < SURE:  # poses in another frame still tell how fast the platform is
+    if found[0][2] < SURE:  # poses in another frame still show how fast the platform is
         offset, _, likeness = _coarse(times, readings, pose_times, poses[:, :3], _whole_speed)
         found.append((offset, np.arange(lengths.shape[1]), likeness))
     fitted = [

@@ -71,7 +71,7 @@ def _uses(found: Fields) -> dict[str, str | None]:
     no_lengths = None if found.lengths else "lengths"
     poses = bool(found.position or found.orientation)
     return {
-        "calibration with poses": no_lengths or (None if poses else "poses (maybe in another file: --poses)"),
+        "calibration with poses": no_lengths or (None if poses else "poses (or give another file with --poses)"),
         "calibration without poses": no_lengths,
         "pose from lengths": no_lengths,
         "replay": no_lengths or (None if timed else "times"),
@@ -99,15 +99,15 @@ def report(data: dict[str, Any]) -> Report:
     if data["problem"]:
         parts.append(data["problem"])
     fields = [(name, _briefly(names) or "not found") for name, names in data["fields"].items()]
-    uses = [(name, f"no: without {missing}" if missing else "yes") for name, missing in data["uses"].items()]
-    parts += [Section("What the fields are taken for", fields), Section("What the log can be used for", uses)]
+    uses = [(name, f"no, missing: {missing}" if missing else "yes") for name, missing in data["uses"].items()]
+    parts += [Section("Fields that towline uses", fields), Section("What the log can be used for", uses)]
     count = len(data["files"])
     return Report("log", "", f"{count} files" if count > 1 else data["files"][0]["kind"], parts)
 
 
 def _names(topic: dict[str, Any]) -> str:
     names = [f"{name} [{unit}]" if unit else name for name, unit in topic["fields"].items()]
-    return _briefly(names) or "no numbers, or an encoding that is not known"
+    return _briefly(names) or "no numbers, or an unknown encoding"
 
 
 def _briefly(names: list[str]) -> str:

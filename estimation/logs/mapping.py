@@ -63,7 +63,7 @@ def read_map(path: str | os.PathLike[str]) -> LogMap:
 
 
 def fields_of(recordings: Sequence[Recording], given: LogMap | None = None, m: int | None = None) -> Fields:
-    """Return the fields of logs: those that a map names, and of all others those of the usual names.
+    """Return the fields of logs: those that a map names, and for all other roles those with usual names.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _usual(
         raise InputError("must have an orientation as roll, pitch, yaw or as qx, qy, qz, qw, got both")
     if len(complete) > 1:
         names = "; ".join(f"{one[0].full} ..." for one in complete[:MOST_LISTED])
-        raise InputError(f"must have one candidate for {what}, got {names}: name them in a map")
+        raise InputError(f"must have one candidate for {what}, got {names}: choose one in a map (--fields)")
     return complete[0] if complete else ()
 
 
@@ -167,7 +167,7 @@ def _named(recordings: Sequence[Recording], what: str, given: LogMap) -> tuple[F
         found = list(_matching(recordings, name))
         if not found:
             there = ", ".join(plain(topic.name or "the table") for one in recordings for topic in one.topics.values())
-            raise InputError(f"map: {what} must name fields of the log, got {plain(name)}; it has {there}")
+            raise InputError(f"map: {what} must name fields of the log, got {plain(name)}; the log has {there}")
         for recording, topic, field in found:
             result.append(Field(recording, topic, field, unit or topic.fields[field]))
     sizes = {"position": (0, 3), "orientation": (0, 3, 4)}.get(what)
@@ -209,5 +209,7 @@ def _below(recordings: Sequence[Recording], prefix: str) -> list[tuple[Recording
     ]
     if not found:
         there = ", ".join(plain(topic.name or "the table") for one in recordings for topic in one.topics.values())
-        raise InputError(f"map: pose must name a topic or a structure of the log, got {plain(prefix)}; it has {there}")
+        raise InputError(
+            f"map: pose must name a topic or a structure of the log, got {plain(prefix)}; the log has {there}"
+        )
     return found

@@ -150,7 +150,7 @@ def _until_cut(messages: Iterator[Message], notes: list[str]) -> Iterator[Messag
     except EOFError:
         if not some:
             raise
-        notes.append("the file has no end: it is read as far as it goes")
+        notes.append("the end of the file is missing: everything before it is read")
 
 
 def _mcap(path: Path, wanted: set[str] | None) -> Iterator[Message]:
@@ -160,7 +160,7 @@ def _mcap(path: Path, wanted: set[str] | None) -> Iterator[Message]:
         from mcap.records import Message as Record
         from mcap.stream_reader import StreamReader, breakup_chunk
     except ImportError:
-        raise InputError(f"is MCAP, which {INSTALL} reads") from None
+        raise InputError(f"is MCAP, for which the extra logs must be installed: {INSTALL}") from None
     schemas: dict[int, Any] = {}
     channels: dict[int, tuple[str, str, Decoder | None]] = {}
     with _Bounded(path).open() as file:
@@ -192,7 +192,7 @@ def _bag(path: Path, wanted: set[str] | None) -> Iterator[Message]:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise InputError(f"is a bag of ROS, which {INSTALL} reads") from None
+        raise InputError(f"is a bag of ROS, for which the extra logs must be installed: {INSTALL}") from None
     with AnyReader([_Bounded(path)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         store = reader.typestore  # which is the reader's no longer when it is closed
         store.max_sequence_length = MOST_ELEMENTS
@@ -250,7 +250,7 @@ def _decoder(encoding: str, schema: Any) -> Decoder | None:
         from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
         from rosbags.typesys.msg import normalize_msgtype
     except ImportError:
-        raise InputError(f"has messages of ROS, which {INSTALL} reads") from None
+        raise InputError(f"has messages of ROS, for which the extra logs must be installed: {INSTALL}") from None
     store, text = get_typestore(Stores.EMPTY), schema.data.decode()
     store.max_sequence_length = MOST_ELEMENTS
     if schema.encoding == "ros2idl":

@@ -1,4 +1,4 @@
-"""`recordings`: open logs of any kind; which one it is, is decided by how the file begins."""
+"""`recordings`: open logs of any kind; the first bytes of a file decide which."""
 
 import os
 from collections.abc import Sequence
@@ -36,7 +36,9 @@ def recordings(paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]])
         if not parts:
             packed = any(part.suffix == ".zstd" for part in path.iterdir())
             got = "compressed ones; `zstd -d` unpacks them" if packed else "none"
-            raise InputError(f"{printable(str(path))} must be {WHAT}, a folder with .mcap or .db3 files, got {got}")
+            raise InputError(
+                f"{printable(str(path))} must be {WHAT}; a folder must have .mcap or .db3 files, got {got}"
+            )
         files += parts
     if not files:
         raise InputError(f"log must be the path of {WHAT}, or several, got none")

@@ -64,7 +64,7 @@ def read_measurements(
     path
         File, or several. CSV has a header such as `t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], ...,
         tension0 [N]`; NetCDF is from `Measurements.save` or a simulation, or has variables named like these columns.
-        Empty fields or nan mark poses that were not measured. Of messages, those of usual types are known.
+        Empty fields or nan mark poses that were not measured. Messages of usual types are recognised.
     sigma
         Standard deviations as for `Measurements`; default: those of the file if `Measurements.save` wrote it, otherwise
         the defaults of `Measurements`.
@@ -212,7 +212,7 @@ def _at(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:
     if samples.times is None or times is None:
         if len(samples.values) == (0 if times is None else len(times)) or times is samples.times:
             return samples
-        raise InputError(f"{one.full} must have times, as it has other samples than the others, got none")
+        raise InputError(f"{one.full} must have times, since it has more or fewer samples than others, got none")
     if times is samples.times or np.array_equal(times, samples.times):
         return Samples(times, samples.values)
     return Samples(times, _interpolated(times, samples))
@@ -289,9 +289,9 @@ def _merged(
     kept = np.isfinite(moved).all(axis=1) & inside
     kept &= True if forces is None else np.isfinite(forces).all(axis=1)
     if not kept.any():
-        raise InputError("lengths and poses must be recorded at the same time, got none that are")
+        raise InputError("lengths and poses must have samples at the same times, got none")
     if not kept.all():
-        notes.append(f"{quantity(int((~kept).sum()))} samples are left out, which not all sensors have")
+        notes.append(f"{quantity(int((~kept).sum()))} samples that not all sensors have are left out")
     forces = None if forces is None else Samples(at[kept], forces[kept])
     turned = None if quaternions is None else quaternions[kept]
     return Samples(at[kept], moved[kept]), forces, places[kept], turned

@@ -29,7 +29,7 @@ TOLD_APART = 4.0  # standard deviations by which one cable is more likely wrong 
 
 
 class Wrong(NamedTuple):
-    """Successive samples that no pose fits, from `first` to `last`, and the cables one of which is wrong, from 0."""
+    """Successive samples that no pose fits, from `first` to `last`, and the cables of which one is wrong, from 0."""
 
     first: int
     last: int

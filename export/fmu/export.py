@@ -63,13 +63,13 @@ def export_fmu(
     file
         File to write, with the ending .fmu.
     part
-        "plant", as of `Plant`, its "controller", `ComputedTorque`, or "both" in a loop.
+        "plant" (`Plant`), "controller" (`ComputedTorque`), or "both" in a closed loop.
     drive
         Type of the cable commands of the plant, see `Plant` (default: tensions, which the plant realises as in
         `simulate`, or constant lengths for robots that have these).
     reference
-        A plan, the NetCDF file of one, a path or a pose (6,), at the beginning of which the robot is in the beginning
-        (default: its home).
+        A plan, the NetCDF file of one, a path or a pose (6,), at the beginning of which a simulation starts
+        (default: the robot's home).
 
     Returns
     -------
@@ -96,7 +96,7 @@ def export_fmu(
 
 
 def unit_files(robot: Robot, part: str = "plant", drive: str | None = None, reference: Any = None) -> dict[str, bytes]:
-    """Return the files of a unit, less binaries, by their names; arguments and errors as in `export_fmu`."""
+    """Return the files of a unit without binaries, by their names; arguments and errors as in `export_fmu`."""
     one_of("part", part, PARTS)
     if drive is not None and part == "controller":
         raise InputError(f"drive must be left out for part 'controller', which has no plant, got {drive!r}")

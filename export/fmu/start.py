@@ -1,4 +1,4 @@
-"""What a unit begins with: plant and controller of a robot, at the beginning of a motion."""
+"""The start of a unit: plant and controller of a robot, at the beginning of a motion."""
 
 from typing import Any
 

@@ -21,12 +21,12 @@ _JERK = {"jerk": ("m/s3", "rad/s3")}
 # Parts that have a parameter, its name and unit, its place, its least value, and what it is.
 _PARAMETERS = (
     (("plant", "both"), "plant.mass", "kg", "mass", 1e-9, "mass of the platform"),
-    (("plant", "both"), "plant.longest_step", "s", "longest_step", 1e-9, "longest step of Runge-Kutta"),
-    (("plant", "both"), "plant.tension_lag", "s", "plant.tension_lag", 0.0, "lag of tensions, if these are commanded"),
+    (("plant", "both"), "plant.longest_step", "s", "longest_step", 1e-9, "longest Runge-Kutta step"),
+    (("plant", "both"), "plant.tension_lag", "s", "plant.tension_lag", 0.0, "lag of commanded tensions"),
     (("plant", "both"), "plant.winch_bandwidth", "rad/s", "plant.winch_bandwidth", 1e-3, "bandwidth of winches"),
     (("plant", "both"), "plant.carrier_bandwidth", "rad/s", "plant.carrier_bandwidth", 1e-3, "that of mobile carriers"),
-    (PARTS[1:], "controller.bandwidth", "rad/s", "bandwidth", 0.0, "bandwidth of the decay of errors"),
-    (PARTS[1:], "controller.damping", "", "damping", 0.0, "damping ratio of this decay"),
+    (PARTS[1:], "controller.bandwidth", "rad/s", "bandwidth", 0.0, "bandwidth of the error dynamics"),
+    (PARTS[1:], "controller.damping", "", "damping", 0.0, "damping ratio of the error dynamics"),
     (PARTS[1:], "controller.integral", "1/s3", "integral", 0.0, "gain of the integral of errors"),
     (PARTS[1:], "controller.observer", "rad/s", "controller.observer", 0.0, "bandwidth of estimated disturbances"),
     (("both",), "controller.period", "s", "period", 1e-6, "period of the controller"),
@@ -88,18 +88,18 @@ def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str
     for k, name, carrier in moving:
         about = f"motion of carrier {carrier.name}"
         add(sensor, _motion(name, velocity), "measured", about, 12 * (1 + k), sensed)
-    about = "mean tension in the last step, as a sensor has it"
+    about = "mean tension in the last step, as a sensor reports it"
     add(sensor, cables("cable[{}].mean_tension", "N"), "mean_tension", about, 0, sensed)
     if simulates:
         add("output", cables("cable[{}].tension", "N"), "tension", "tension")
         lengths = cables("cable[{}].length", "m") + cables("cable[{}].rate", "m/s")
-        add("output", lengths, "lengths", "distance of the ends along the cable, or its rate")
+        add("output", lengths, "lengths", "distance between the ends along the cable, or its rate")
         if robot.platform.aero:
             add("input", [(f"wind.{axis}", "m/s") for axis in "xyz"], "wind", "velocity of the air")
         wrench = [
             (f"wrench.{name}.{axis}", unit) for name, unit in (("force", "N"), ("moment", "N.m")) for axis in "xyz"
         ]
-        add("input", wrench, "wrench", "force or moment about the CoM on the platform, beside cables and weight")
+        add("input", wrench, "wrench", "force or moment about the CoM on the platform, besides cables and weight")
     if controls:
         add("input", _motion("reference", _MOTION), "reference", "reference of the platform", 0, np.nan)
         add("input", cables("reference.tension[{}]", "N"), "t_ref", "tension to stay near", 0, np.nan)

@@ -1,4 +1,4 @@
-"""`between_points`: regions that pass between the points as which a platform without a body is treated."""
+"""`between_points`: regions that pass between the points by which a platform without a body is represented."""
 
 from collections.abc import Sequence
 
@@ -57,5 +57,5 @@ def between_points(seen: Instants, limits: Sequence[Limit], limited: Sequence[np
     others = f" (and {len(meetings) - 1} more)" * (len(meetings) > 1)
     return [
         f"{called} passes between the points of the platform: it is {quantity(-depth, 'm', 3)} inside the hull of "
-        f"centre of mass and attachments{when}{others}; platform.body in the robot's file keeps it out"
+        f"centre of mass and attachments{when}{others}; a platform.body in the robot's file would keep it out"
     ]

@@ -1,4 +1,4 @@
-"""`slipped_units`: numbers of a task that are of the robot's size in another unit, such as millimetres for metres."""
+"""`slipped_units`: numbers of a task that fit the robot only in another unit, such as millimetres instead of metres."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -11,12 +11,12 @@ from ...base.text import quantity
 from ...models import Robot
 from ..tasks.task import Task
 
-FAR = 5.0  # times the robot's size: how far away its tasks are not
+FAR = 5.0  # times the robot's size: no task of it is farther away
 FAR_ANYWHERE = 100.0  # the same of robots whose carriers can go anywhere
 SMALLER = {"centimetres": 100.0, "millimetres": 1000.0}  # in a metre
-TURN, QUARTER = 2 * np.pi + 0.1, np.pi / 2 + 0.1  # [rad]: more is no pose, and no limit
-FAST = {"m/s": 60.0, "m/s^2": 500.0, "rad/s": 20.0}  # more is no speed or acceleration of a cable robot
-LEAST = 0.02  # of the robot's size: what is less in millimetres is rather in centimetres
+TURN, QUARTER = 2 * np.pi + 0.1, np.pi / 2 + 0.1  # [rad]: larger angles occur in no pose, and in no limit
+FAST = {"m/s": 60.0, "m/s^2": 500.0, "rad/s": 20.0}  # no cable robot is faster or accelerates more
+LEAST = 0.02  # of the robot's size: what would be smaller in millimetres is taken for centimetres
 GRAMS = 1000.0  # in a kilogram
 _UNIT = re.compile(r"\[([^\]]+)\]")  # in the description of a field
 
@@ -49,9 +49,9 @@ _NO = np.zeros(0)
 
 
 def slipped_units(robot: Robot, task: Task) -> list[str]:
-    """Return a sentence for each unit that a task seems to have instead of the one that towline reads.
+    """Return a sentence for each unit in which numbers of a task seem to be, instead of the unit that towline reads.
 
-    A number is suspect if it is too large for the robot, and usual in the other unit.
+    A number is suspect if it is too large for the robot, but usual in the other unit.
     """
     numbers = list(_numbers(task, ""))
     suspects = [
