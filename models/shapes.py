@@ -71,7 +71,7 @@ class Block(Part):
 
     @property
     def rounding(self) -> float:
-        """Return by how much it is larger than its faces on all sides [m]: not at all."""
+        """Return by how much it is larger than its faces on all sides [m], which is 0."""
         return 0.0
 
     @property

@@ -86,7 +86,7 @@ def test_wrong_samples_are_named(robot, tmp_path):
     write(tmp_path / "slip.csv", times, table)
     done = towline("pose", robot, "--log", "slip.csv", cwd=tmp_path)
     assert done.returncode == 1
-    assert "samples 100 to 199 (from 2 s): no pose fits, most likely the length of cable 3 is wrong" in done.stdout
+    assert "samples 100 to 199 (from 2 s): no pose fits; most likely the length of cable 3 is wrong" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ class LogPoses(Displayed):
             which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
             at = "" if self.times is None else f" (from {quantity(float(self.times[one.first]), 's', 6)})"
             names = " or ".join(str(cable + 1) for cable in one.cables)
-            yield f"{which}{at}: no pose fits, most likely the length of cable {names} is wrong"
+            yield f"{which}{at}: no pose fits; most likely the length of cable {names} is wrong"
         if len(self.wrong) > MOST_NAMED:
             yield f"and {quantity(len(self.wrong) - MOST_NAMED)} more"
 
@@ -115,7 +115,7 @@ class LogPoses(Displayed):
         return file
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what is known of all samples together, for JSON."""
+        """Return a summary of all samples, ready for JSON."""
         return {
             "samples": len(self.estimate.pose),
             "residual": float(np.sqrt(np.mean(np.square(self.estimate.residuals)))),
