@@ -60,7 +60,7 @@ def design(
     Returns
     -------
     :
-        The result; if the requirements are impossible with a certificate, and after an interrupt the best so far.
+        The result: after an interrupt the best so far, and with a certificate if the requirements are impossible.
 
     Raises
     ------

@@ -88,7 +88,7 @@ def test_gaps_are_listed(tmp_path):
     (topic,) = told["files"][0]["topics"]
     assert (topic["gaps"], topic["longest_gap"]) == (1, pytest.approx(2.01))
     assert told["uses"] == {
-        "calibration with poses": "poses (maybe in another file: --poses)",
+        "calibration with poses": "poses (or give another file with --poses)",
         "calibration without poses": None,
         "pose from lengths": None,
         "replay": None,
