@@ -15,7 +15,6 @@ from .robots_as_built import as_built, moved_anchors, random_poses
 from .warm import towline
 
 
-
 def doubt(robot, measurements):
     found = mistake(robot, measurements)
     return None if found is None else found.text
