@@ -1,5 +1,4 @@
-/* What a unit for co-simulation shares with its importer: the types of FMI 3.0,
- * Functional Mock-up Interface. */
+/* What a unit for co-simulation shares with its importer: the types of FMI 3.0, Functional Mock-up Interface. */
 #ifndef TOWLINE_FMI3_H
 #define TOWLINE_FMI3_H
 
@@ -35,24 +34,15 @@ typedef uint8_t fmi3Byte;
 typedef const char *fmi3String;
 typedef const fmi3Byte *fmi3Binary;
 
-typedef enum {
-  fmi3OK,
-  fmi3Warning,
-  fmi3Discard,
-  fmi3Error,
-  fmi3Fatal
-} fmi3Status;
-typedef int fmi3DependencyKind,
-    fmi3IntervalQualifier; /* enumerations that this unit never writes */
+typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
+typedef int fmi3DependencyKind, fmi3IntervalQualifier; /* enumerations that this unit never writes */
 
-typedef void (*fmi3LogMessageCallback)(fmi3InstanceEnvironment environment,
-                                       fmi3Status status, fmi3String category,
+typedef void (*fmi3LogMessageCallback)(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
                                        fmi3String message);
 typedef void (*fmi3ClockUpdateCallback)(fmi3InstanceEnvironment environment);
-typedef void (*fmi3IntermediateUpdateCallback)(
-    fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean sets,
-    fmi3Boolean gets, fmi3Boolean finished, fmi3Boolean can_return,
-    fmi3Boolean *returns, fmi3Float64 *return_time);
+typedef void (*fmi3IntermediateUpdateCallback)(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean sets,
+                                               fmi3Boolean gets, fmi3Boolean finished, fmi3Boolean can_return,
+                                               fmi3Boolean *returns, fmi3Float64 *return_time);
 typedef void (*fmi3LockPreemptionCallback)(void);
 typedef void (*fmi3UnlockPreemptionCallback)(void);
 

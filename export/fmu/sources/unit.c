@@ -1,6 +1,6 @@
 /*
- * The steps of a unit. The controller is that of control/computed_torque.py:
- * the problem of core/control/step.c, solved, and a command in any case.
+ * The steps of a unit. The controller is that of control/computed_torque.py: the problem of core/control/step.c, solved,
+ * and a command in any case.
  */
 #include "unit.h"
 
@@ -13,256 +13,226 @@ enum { PLANNED = 0, SOFT = 2, HOLD = 3, MOST_STEPS = 1000000 };
 static const double ROUNDING = 1e-9; /* of a step */
 
 static int are_finite(const double *x, ptrdiff_t count) {
-  double sum = 0;
-  for (ptrdiff_t i = 0; i < count; i++) {
-    sum += x[i] - x[i];
-  }
-  return sum == 0;
+    double sum = 0;
+    for (ptrdiff_t i = 0; i < count; i++) {
+        sum += x[i] - x[i];
+    }
+    return sum == 0;
 }
 
 /* ---- The controller. ---- */
 
 /*
- * Whether tensions give the wrench up to what is negligible. Of fewer cables
- * than degrees of freedom, carriers give the rest, so only what is missing
- * along a cable counts, and `carried` in all.
+ * Whether tensions give the wrench up to what is negligible. Of fewer cables than degrees of freedom, carriers give the
+ * rest, so only what is missing along a cable counts, and `carried` in all.
  */
-static int is_given(const towline_unit *unit, const towline_problem *problem,
-                    const towline_answer *answer) {
-  const int m = problem->m;
-  double missing[6], square = 0, freedom = 0;
-  for (int k = 0; k < 6; k++) {
-    freedom += unit->known.freedom[k];
-    missing[k] = problem->w[k];
-    for (int i = 0; i < m; i++) {
-      missing[k] -= problem->A[k * m + i] * answer->tensions[i];
-    }
-    missing[k] /= k < 3 ? 1 : unit->length;
-    square += missing[k] * missing[k];
-  }
-  if (m >= freedom) {
-    const int proven = answer->status == TOWLINE_INFEASIBLE ||
-                       answer->status == TOWLINE_SINGULAR;
-    return proven && answer->shortfall <= unit->negligible;
-  }
-  for (int i = 0; i < m; i++) {
-    double along = 0;
+static int is_given(const towline_unit *unit, const towline_problem *problem, const towline_answer *answer) {
+    const int m = problem->m;
+    double missing[6], square = 0, freedom = 0;
     for (int k = 0; k < 6; k++) {
-      along += missing[k] / (k < 3 ? 1 : unit->length) * problem->A[k * m + i];
+        freedom += unit->known.freedom[k];
+        missing[k] = problem->w[k];
+        for (int i = 0; i < m; i++) {
+            missing[k] -= problem->A[k * m + i] * answer->tensions[i];
+        }
+        missing[k] /= k < 3 ? 1 : unit->length;
+        square += missing[k] * missing[k];
     }
-    if (!(fabs(along) <= unit->negligible)) {
-      return 0;
+    if (m >= freedom) {
+        const int proven = answer->status == TOWLINE_INFEASIBLE || answer->status == TOWLINE_SINGULAR;
+        return proven && answer->shortfall <= unit->negligible;
     }
-  }
-  return square <= unit->carried * unit->carried;
+    for (int i = 0; i < m; i++) {
+        double along = 0;
+        for (int k = 0; k < 6; k++) {
+            along += missing[k] / (k < 3 ? 1 : unit->length) * problem->A[k * m + i];
+        }
+        if (!(fabs(along) <= unit->negligible)) {
+            return 0;
+        }
+    }
+    return square <= unit->carried * unit->carried;
 }
 
-/* Write tensions for a problem, and what they are: the last ones, towards the
- * planned ones, if it is none. */
-static int solve(const towline_unit *unit, const towline_problem *problem,
-                 double *tensions) {
-  towline_answer answer;
-  const towline_status status =
-      towline_solve_always(problem, TOWLINE_RHO, &answer);
-  for (int i = 0; i < problem->m; i++) {
-    const double planned = problem->t_ref[i],
-                 wanted = isfinite(planned) ? planned : unit->cable[i].last;
-    tensions[i] = status == TOWLINE_INVALID
-                      ? fmin(fmax(wanted, problem->t_min[i]), problem->t_max[i])
-                      : answer.tensions[i];
-  }
-  if (status == TOWLINE_INVALID) {
-    return HOLD;
-  }
-  return status == TOWLINE_OPTIMAL || is_given(unit, problem, &answer) ? PLANNED
-                                                                       : SOFT;
+/* Write tensions for a problem, and what they are: the last ones, towards the planned ones, if it is none. */
+static int solve(const towline_unit *unit, const towline_problem *problem, double *tensions) {
+    towline_answer answer;
+    const towline_status status = towline_solve_always(problem, TOWLINE_RHO, &answer);
+    for (int i = 0; i < problem->m; i++) {
+        const double planned = problem->t_ref[i], wanted = isfinite(planned) ? planned : unit->cable[i].last;
+        tensions[i] =
+            status == TOWLINE_INVALID ? fmin(fmax(wanted, problem->t_min[i]), problem->t_max[i]) : answer.tensions[i];
+    }
+    if (status == TOWLINE_INVALID) {
+        return HOLD;
+    }
+    return status == TOWLINE_OPTIMAL || is_given(unit, problem, &answer) ? PLANNED : SOFT;
 }
 
 /* Keep the ordered positions of carriers inside their boxes. */
 static void stay_inside(towline_unit *unit) {
-  for (int c = 0; c < unit->known.carriers; c++) {
-    for (int k = 0; k < 3; k++) {
-      double *order = unit->ordered + 18 * c + k;
-      const double inside =
-          fmin(fmax(order[0], unit->box[0][c][k]), unit->box[1][c][k]);
-      if (inside != order[0]) {
-        order[0] = inside;
-        order[6] = order[12] = 0;
-      }
+    for (int c = 0; c < unit->known.carriers; c++) {
+        for (int k = 0; k < 3; k++) {
+            double *order = unit->ordered + 18 * c + k;
+            const double inside = fmin(fmax(order[0], unit->box[0][c][k]), unit->box[1][c][k]);
+            if (inside != order[0]) {
+                order[0] = inside;
+                order[6] = order[12] = 0;
+            }
+        }
     }
-  }
 }
 
-/* Write the commands for what is measured, `dt` after the last ones [s]; 0 for
- * the first. */
+/* Write the commands for what is measured, `dt` after the last ones [s]; 0 for the first. */
 static void control(towline_unit *unit, double dt) {
-  const towline_robot *robot = &unit->known;
-  const int m = robot->cables;
-  double A[6 * UNIT_CABLES], w[6], low[UNIT_CABLES], high[UNIT_CABLES];
-  for (int i = 0; i < m; i++) {
-    unit->cable[i].then = unit->cable[i].last;
-    unit->cable[i].measured = unit->mean_tension[i];
-  }
-  memcpy(unit->ordered, unit->carriers, sizeof unit->ordered);
-  memcpy(unit->ordered_jerks, unit->jerks, sizeof unit->ordered_jerks);
-  const towline_row row = {
-      .measured = unit->measured,
-      .reference = unit->reference,
-      .t_ref = unit->t_ref,
-      .carriers = unit->ordered,
-      .cables = unit->cable,
-      .platform = &unit->platform,
-      .carrier_memory = unit->carrier,
-      .A = A,
-      .w = w,
-      .low = low,
-      .high = high,
-  };
-  towline_write_problem(robot, &unit->controller, dt, dt, row);
-  const towline_problem problem = {
-      6, m, A, w, low, high, unit->t_ref, NULL, unit->length, 0};
-  int answered = solve(unit, &problem, unit->tensions);
-  unit->platform.integrates = answered == PLANNED;
-  for (int i = 0; i < m; i++) {
-    unit->tensions[i] =
-        unit->cable[i].is_cut ? unit->little[i] : unit->tensions[i];
-    unit->cable[i].last = unit->tensions[i];
-  }
-  if (towline_most_actuators(robot) > 0) {
-    const towline_flight flight = {
+    const towline_robot *robot = &unit->known;
+    const int m = robot->cables;
+    double A[6 * UNIT_CABLES], w[6], low[UNIT_CABLES], high[UNIT_CABLES];
+    for (int i = 0; i < m; i++) {
+        unit->cable[i].then = unit->cable[i].last;
+        unit->cable[i].measured = unit->mean_tension[i];
+    }
+    memcpy(unit->ordered, unit->carriers, sizeof unit->ordered);
+    memcpy(unit->ordered_jerks, unit->jerks, sizeof unit->ordered_jerks);
+    const towline_row row = {
         .measured = unit->measured,
+        .reference = unit->reference,
+        .t_ref = unit->t_ref,
         .carriers = unit->ordered,
-        .tensions = unit->tensions,
         .cables = unit->cable,
         .platform = &unit->platform,
-        .memory = unit->carrier,
-        .turning = &unit->turning,
-        .actuation = unit->actuation,
+        .carrier_memory = unit->carrier,
+        .A = A,
+        .w = w,
+        .low = low,
+        .high = high,
     };
-    const double lacking =
-        towline_write_thrusts(robot, &unit->controller, dt, flight);
-    answered =
-        lacking > unit->negligible && answered == PLANNED ? SOFT : answered;
-  }
-  stay_inside(unit);
-  unit->answered = answered;
+    towline_write_problem(robot, &unit->controller, dt, dt, row);
+    const towline_problem problem = {6, m, A, w, low, high, unit->t_ref, NULL, unit->length, 0};
+    int answered = solve(unit, &problem, unit->tensions);
+    unit->platform.integrates = answered == PLANNED;
+    for (int i = 0; i < m; i++) {
+        unit->tensions[i] = unit->cable[i].is_cut ? unit->little[i] : unit->tensions[i];
+        unit->cable[i].last = unit->tensions[i];
+    }
+    if (towline_most_actuators(robot) > 0) {
+        const towline_flight flight = {
+            .measured = unit->measured,
+            .carriers = unit->ordered,
+            .tensions = unit->tensions,
+            .cables = unit->cable,
+            .platform = &unit->platform,
+            .memory = unit->carrier,
+            .turning = &unit->turning,
+            .actuation = unit->actuation,
+        };
+        const double lacking = towline_write_thrusts(robot, &unit->controller, dt, flight);
+        answered = lacking > unit->negligible && answered == PLANNED ? SOFT : answered;
+    }
+    stay_inside(unit);
+    unit->answered = answered;
 }
 
 /* ---- The plant. ---- */
 
-/* Write the reference of a carrier at the beginning of a step, and at its end;
- * return whether it has a jerk. */
-static int order_carrier(const towline_unit *unit, int carrier, double step,
-                         double *begin, double *end) {
-  const int most = towline_most_actuators(&unit->robot);
-  const double *order = unit->ordered + 18 * carrier,
-               *jerk = unit->ordered_jerks + 6 * carrier;
-  memcpy(begin, unit->actuation + most * carrier, (size_t)most * sizeof *begin);
-  begin += TOWLINE_MOST_ACTUATORS, end += TOWLINE_MOST_ACTUATORS;
-  memcpy(begin, order, 18 * sizeof *begin);
-  for (int k = 0; k < 6; k++) {
-    const double v = order[6 + k], a = order[12 + k], j = jerk[k];
-    end[k] =
-        order[k] + step * (v + 0.5 * step * a) + step * step * step * j / 6;
-    end[6 + k] = v + step * a + 0.5 * step * step * j;
-    end[12 + k] = a + step * j;
-  }
-  return !are_finite(jerk, 6) ||
-         memcmp(jerk, (const double[6]){0}, 6 * sizeof *jerk) != 0;
+/* Write the reference of a carrier at the beginning of a step, and at its end; return whether it has a jerk. */
+static int order_carrier(const towline_unit *unit, int carrier, double step, double *begin, double *end) {
+    const int most = towline_most_actuators(&unit->robot);
+    const double *order = unit->ordered + 18 * carrier, *jerk = unit->ordered_jerks + 6 * carrier;
+    memcpy(begin, unit->actuation + most * carrier, (size_t)most * sizeof *begin);
+    begin += TOWLINE_MOST_ACTUATORS, end += TOWLINE_MOST_ACTUATORS;
+    memcpy(begin, order, 18 * sizeof *begin);
+    for (int k = 0; k < 6; k++) {
+        const double v = order[6 + k], a = order[12 + k], j = jerk[k];
+        end[k] = order[k] + step * (v + 0.5 * step * a) + step * step * step * j / 6;
+        end[6 + k] = v + step * a + 0.5 * step * step * j;
+        end[12 + k] = a + step * j;
+    }
+    return !are_finite(jerk, 6) || memcmp(jerk, (const double[6]){0}, 6 * sizeof *jerk) != 0;
 }
 
-/* Move the plant by a step [s]; return 0, and leave its state, if the motion
- * diverges. */
+/* Move the plant by a step [s]; return 0, and leave its state, if the motion diverges. */
 static int simulate(towline_unit *unit, double step) {
-  const towline_robot *robot = &unit->robot;
-  const ptrdiff_t m = robot->cables, size = towline_plant_state_size(robot);
-  const ptrdiff_t width = towline_plant_command_size(robot);
-  const double substeps = ceil(step / unit->longest_step - ROUNDING);
-  double commands[2 * UNIT_COMMAND] = {0}, history[2 * UNIT_STATE],
-                      tensions[2 * UNIT_CABLES];
-  int leads = 0;
-  if (!(substeps <= MOST_STEPS)) {
-    return 0;
-  }
-  commands[0] = robot->has_aero;
-  memcpy(commands + 1, unit->wind, sizeof unit->wind);
-  memcpy(commands + 4, unit->wrench, sizeof unit->wrench);
-  double *cables = commands + TOWLINE_PLATFORM_COMMANDS, *carriers = cables + m;
-  memcpy(cables, unit->cables == UNIT_WINCHES ? unit->winches : unit->tensions,
-         (size_t)m * sizeof *cables);
-  if (unit->cables == UNIT_BY_LENGTHS) {
-    towline_plant_winch_lengths(robot, 1, step, unit->state, unit->lengths,
-                                unit->tensions, unit->last_rates, commands,
-                                width);
-  }
-  for (int c = 0; c < robot->carriers; c++) {
-    double *begin = carriers + TOWLINE_CARRIER_COMMANDS * c;
-    leads |= order_carrier(unit, c, step, begin, begin + width);
-  }
-  const towline_run run = {
-      1, 1 + leads, 1, 1, substeps < 1 ? 1 : (int32_t)substeps, step};
-  towline_plant_run(robot, &unit->plant, &run, unit->state, commands, history,
-                    tensions);
-  if (!are_finite(history, 2 * size) || !are_finite(tensions, 2 * m)) {
-    return 0;
-  }
-  memcpy(unit->state, history + size, (size_t)size * sizeof *history);
-  for (ptrdiff_t i = 0; i < m; i++) {
-    unit->tension[i] = tensions[m + i];
-    unit->mean_tension[i] = 0.5 * (tensions[i] + tensions[m + i]);
-  }
-  towline_unit_sense(unit);
-  return 1;
+    const towline_robot *robot = &unit->robot;
+    const ptrdiff_t m = robot->cables, size = towline_plant_state_size(robot);
+    const ptrdiff_t width = towline_plant_command_size(robot);
+    const double substeps = ceil(step / unit->longest_step - ROUNDING);
+    double commands[2 * UNIT_COMMAND] = {0}, history[2 * UNIT_STATE], tensions[2 * UNIT_CABLES];
+    int leads = 0;
+    if (!(substeps <= MOST_STEPS)) {
+        return 0;
+    }
+    commands[0] = robot->has_aero;
+    memcpy(commands + 1, unit->wind, sizeof unit->wind);
+    memcpy(commands + 4, unit->wrench, sizeof unit->wrench);
+    double *cables = commands + TOWLINE_PLATFORM_COMMANDS, *carriers = cables + m;
+    memcpy(cables, unit->cables == UNIT_WINCHES ? unit->winches : unit->tensions, (size_t)m * sizeof *cables);
+    if (unit->cables == UNIT_BY_LENGTHS) {
+        towline_plant_winch_lengths(robot, 1, step, unit->state, unit->lengths, unit->tensions, unit->last_rates,
+                                    commands, width);
+    }
+    for (int c = 0; c < robot->carriers; c++) {
+        double *begin = carriers + TOWLINE_CARRIER_COMMANDS * c;
+        leads |= order_carrier(unit, c, step, begin, begin + width);
+    }
+    const towline_run run = {1, 1 + leads, 1, 1, substeps < 1 ? 1 : (int32_t)substeps, step};
+    towline_plant_run(robot, &unit->plant, &run, unit->state, commands, history, tensions);
+    if (!are_finite(history, 2 * size) || !are_finite(tensions, 2 * m)) {
+        return 0;
+    }
+    memcpy(unit->state, history + size, (size_t)size * sizeof *history);
+    for (ptrdiff_t i = 0; i < m; i++) {
+        unit->tension[i] = tensions[m + i];
+        unit->mean_tension[i] = 0.5 * (tensions[i] + tensions[m + i]);
+    }
+    towline_unit_sense(unit);
+    return 1;
 }
 
 void towline_unit_sense(towline_unit *unit) {
-  if (unit->simulates) {
-    towline_plant_sense(&unit->robot, 1, unit->state, unit->measured,
-                        unit->lengths);
-  }
+    if (unit->simulates) {
+        towline_plant_sense(&unit->robot, 1, unit->state, unit->measured, unit->lengths);
+    }
 }
 
 /* ---- Both. ---- */
 
 /* Write what parameters say to where the core reads it. */
 static void apply_parameters(towline_unit *unit) {
-  towline_body *platform = &unit->robot.body[0];
-  unit->robot.mass = unit->mass;
-  for (int k = 0; k < 3; k++) {
-    platform->mass[k] = unit->mass * unit->robot.freedom[k];
-    platform->inverse_mass[k] = unit->robot.freedom[k] / unit->mass;
-  }
-  for (int k = 0; k < 6; k++) {
-    unit->controller.kp[k] = unit->bandwidth * unit->bandwidth;
-    unit->controller.kd[k] = 2 * unit->damping * unit->bandwidth;
-    unit->controller.ki[k] = unit->integral;
-  }
+    towline_body *platform = &unit->robot.body[0];
+    unit->robot.mass = unit->mass;
+    for (int k = 0; k < 3; k++) {
+        platform->mass[k] = unit->mass * unit->robot.freedom[k];
+        platform->inverse_mass[k] = unit->robot.freedom[k] / unit->mass;
+    }
+    for (int k = 0; k < 6; k++) {
+        unit->controller.kp[k] = unit->bandwidth * unit->bandwidth;
+        unit->controller.kd[k] = 2 * unit->damping * unit->bandwidth;
+        unit->controller.ki[k] = unit->integral;
+    }
 }
 
 int towline_unit_step(towline_unit *unit, double time, double step) {
-  const int both = unit->simulates && unit->controls;
-  const double count = both ? fmax(1, floor(step / unit->period + 0.5)) : 1,
-               part = step / count;
-  if (!(step > 0 && count <= MOST_STEPS) || !are_finite(&time, 1) ||
-      !are_finite(&step, 1)) {
-    return 0;
-  }
-  apply_parameters(unit);
-  for (int k = 0; k < count; k++) {
-    const double now = time + k * part,
-                 since = unit->has_begun ? now - unit->last_time : 0;
-    if (unit->controls) {
-      if (unit->has_begun && !(since > 0)) {
+    const int both = unit->simulates && unit->controls;
+    const double count = both ? fmax(1, floor(step / unit->period + 0.5)) : 1, part = step / count;
+    if (!(step > 0 && count <= MOST_STEPS) || !are_finite(&time, 1) || !are_finite(&step, 1)) {
         return 0;
-      }
-      control(unit, since);
-      unit->last_time = now;
-      unit->has_begun = 1;
     }
-    if (unit->simulates && !simulate(unit, part)) {
-      return 0;
+    apply_parameters(unit);
+    for (int k = 0; k < count; k++) {
+        const double now = time + k * part, since = unit->has_begun ? now - unit->last_time : 0;
+        if (unit->controls) {
+            if (unit->has_begun && !(since > 0)) {
+                return 0;
+            }
+            control(unit, since);
+            unit->last_time = now;
+            unit->has_begun = 1;
+        }
+        if (unit->simulates && !simulate(unit, part)) {
+            return 0;
+        }
     }
-  }
-  unit->time = time + step;
-  return 1;
+    unit->time = time + step;
+    return 1;
 }
