@@ -23,11 +23,11 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("plan wang-flying rest.yaml --out x.txt", "--out must end in .nc, got 'x.txt'"),
-        ("plan wang-flying rest.yaml --out x", "--out must end in .nc, got 'x'"),
+        ("plan wang-flying rest.yaml --out x.txt", "--out must end in .nc or .mcap, got 'x.txt'"),
+        ("plan wang-flying rest.yaml --out x", "--out must end in .nc or .mcap, got 'x'"),
         ("plan wang-flying rest.yaml --report x.txt", "--report must end in .html or .htm, got 'x.txt'"),
         ("plan wang-flying rest.yaml --vary margin=0:1:1 --out x.txt", "--out must end in .nc, got 'x.txt'"),
-        ("simulate wang-flying rest.yaml --out x.txt", "--out must end in .nc, got 'x.txt'"),
+        ("simulate wang-flying rest.yaml --out x.txt", "--out must end in .nc or .mcap, got 'x.txt'"),
         ("time wang-flying rest.yaml --out x.txt", "--out must end in .yaml or .yml, got 'x.txt'"),
         ("workspace wang-flying --out x.txt", "--out must end in .nc or .zarr, got 'x.txt'"),
         ("workspace wang-flying --mesh x.txt", "--mesh must end in .stl, got 'x.txt'"),
@@ -41,9 +41,9 @@ def test_a_file_is_what_its_name_ends_in(folder, command, message):
     assert [path.name for path in folder.iterdir()] == ["rest.yaml"]
 
 
-def test_results_are_saved_under_names_that_end_in_nc(folder):
+def test_results_are_saved_under_names_that_end_in_nc_or_mcap(folder):
     result = plan("wang-flying", REST)
-    with pytest.raises(InputError, match=r"^file must end in \.nc, got 'x\.txt'$"):
+    with pytest.raises(InputError, match=r"^file must end in \.nc or \.mcap, got 'x\.txt'$"):
         result.save("x.txt")
     assert result.save("x.NC").exists()
 
