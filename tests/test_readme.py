@@ -22,6 +22,7 @@ from typer.testing import CliRunner
 import towline
 from towline import Requirements, Robot, Task
 from towline.cli.main import app
+from towline.estimation.logs.mapping import LogMap
 from towline.models.parsing import parse_yaml
 from towline.studies.accounts.claim import Verdict
 from towline.studies.flying import flights, repair, shaken, vibration
@@ -66,7 +67,8 @@ def run(block, namespace):
     if block.language == "python":
         exec(compile(block.text, "example", "exec"), namespace)
     elif block.language == "yaml":
-        model = Robot if "\nplatform:" in block.text else Requirements if "\nrequire:" in block.text else Task
+        kinds = {"\nplatform:": Robot, "\nrequire:": Requirements, "\nlengths:": LogMap}
+        model = next((kinds[key] for key in kinds if key in f"\n{block.text}"), Task)
         parse_yaml(block.text, model, block.title or "block")
     elif block.language == "sh":
         for line in block.lines:
