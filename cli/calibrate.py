@@ -101,7 +101,7 @@ def calibrate(
     measurements = read.measurements
     if fix:
         measurements, texts = mended(loaded, measurements)
-        read.notes.extend(f"mended: {text}" for text in texts)
+        read.notes.extend(f"corrected: {text}" for text in texts)
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     report = result.report()  # before anything is written
     file = None if result.refused else result.save(target)
@@ -112,7 +112,7 @@ def calibrate(
             typer.echo(f"  {note}")
     print_result(as_json, data, lambda: report, [*([] if file is None else [file]), *pictures])
     if result.refused:
-        hint = "; --fix mends it" if result.doubt and result.mistake and result.mistake.mended else ""
+        hint = "; --fix corrects it" if result.doubt and result.mistake and result.mistake.mended else ""
         typer.echo(f"towline: {target} is not written: {result.refused}{hint}", err=True)
         raise typer.Exit(1)
 

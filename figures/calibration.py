@@ -25,7 +25,7 @@ def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = 
     before, after
         (N, m) [m].
     times
-        Of the samples, (N,) [s]; default: they are counted.
+        Times of the samples, (N,) [s]; default: their numbers.
     """
     canvas = style.figure(height=3.4)
     along = "sample" if times is None else "time [s]"
@@ -42,13 +42,13 @@ def consistency(residuals: np.ndarray, cost: np.ndarray, largest: float, times: 
     Parameters
     ----------
     residuals
-        Of the lengths, (N, m) [m].
+        Residuals of the lengths, (N, m) [m].
     cost
         Sum of squares in standard deviations, (N,).
     largest
         Limit that sound samples rarely exceed, or nan.
     times
-        Of the samples, (N,) [s]; default: they are counted.
+        Times of the samples, (N,) [s]; default: their numbers.
     """
     canvas = style.figure(height=3.4)
     along = "sample" if times is None else "time [s]"

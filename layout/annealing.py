@@ -28,13 +28,13 @@ def anneal(
     Parameters
     ----------
     evaluation
-        Of few rows, since it is done 8000 times.
+        An evaluation of few poses, because it is repeated thousands of times.
     clearance
         Smallest distance between cables [m].
     until
         Time of `time.perf_counter` at which it ends early [s].
     near
-        Where to start, at a lower temperature; default: at random.
+        Initial layout, annealed at a lower temperature; default: random ones.
     """
     variables = evaluation.variables
     low, high, points = variables.low, variables.high, variables.points

@@ -160,11 +160,11 @@ def test_the_command_mends(tmp_path):
         done = towline("calibrate", "cogiro", "log.nc", cwd=tmp_path)
         assert done.returncode == 1
         assert text in done.stderr
-        assert done.stderr.endswith("; --fix mends it\n")
+        assert done.stderr.endswith("; --fix corrects it\n")
         done = towline("calibrate", "cogiro", "log.nc", "--fix", "--json", "--out", "mine.yaml", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         told = json.loads(done.stdout)
-        assert told["notes"][0].startswith(f"mended: {text}")
+        assert told["notes"][0].startswith(f"corrected: {text}")
         assert told["residual_after"] < 1.2e-3
         (tmp_path / "mine.yaml").unlink()
 
@@ -189,5 +189,5 @@ def test_mistakes_in_two_files_with_two_clocks(what, tmp_path):
     assert done.returncode == 0, done.stderr + done.stdout
     told = json.loads(done.stdout)
     assert float(told["notes"][0].split()[6]) == pytest.approx(7200, abs=1e-2)
-    assert any(note.startswith("mended: ") for note in told["notes"])
+    assert any(note.startswith("corrected: ") for note in told["notes"])
     assert told["residual_after"] < 3e-3

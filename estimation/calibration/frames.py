@@ -25,7 +25,7 @@ DAMPING = 1e-3
 
 
 class Frames(NamedTuple):
-    """Poses T of the measured frame in {G} and B of the platform frame in the measured body, and what is left [m]."""
+    """Poses T of the measured frame in {G} and B of the platform frame in the measured body, and the error left [m]."""
 
     outer: tuple[np.ndarray, np.ndarray]  # (3,) [m], (3, 3)
     inner: tuple[np.ndarray, np.ndarray]
@@ -67,7 +67,7 @@ def fitted_frames(robot: Robot, table: np.ndarray, position: np.ndarray, rotatio
     table
         `Parameters.table` of the robot.
     position, rotation
-        As they were measured, (N, 3) [m], (N, 3, 3).
+        Measured positions (N, 3) [m] and rotations (N, 3, 3).
     y
         Readings, (N, m) [m].
     """

@@ -21,7 +21,7 @@ ROLES = ("lengths", "position", "orientation", "tensions")
 def listing(recordings: Sequence[Recording], given: LogMap | None = None) -> dict[str, Any]:
     """Return the contents of logs as plain data: files with topics, fields by their roles, and uses.
 
-    What keeps roles from being found is the value of `problem`, in one line.
+    If a role cannot be found, `problem` is the reason, in one line.
     """
     try:
         found, problem = fields_of(recordings, given), None
