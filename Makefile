@@ -76,5 +76,5 @@ clean:
 
 # One installation, not one after the core's: each builds towline anew.
 .venv/dev.stamp: pyproject.toml constraints.txt $(CORE) | .venv/venv.stamp
-	$(INSTALL) ".[bench,cluster,dev,docs,fmu,mesh,mujoco,notebooks,timing,viewer]"
+	$(INSTALL) ".[bench,cluster,dev,docs,fmu,logs,mesh,mujoco,notebooks,timing,viewer]"
 	touch .venv/core.stamp $@
