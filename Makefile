@@ -8,7 +8,10 @@ INSTALL := $(BIN)/python -m pip install --no-compile --quiet --disable-pip-versi
 # What the extension is built from.
 CORE := setup.py $(wildcard core/*.h core/*/*.[ch] core/packaging/*.py)
 
-.PHONY: demo test setup lint types unit docs lowest newest errata pictures clean
+# What the page that computes runs.
+LIVE := viewer/live/robot_at_rest.c $(sort $(wildcard core/*.h $(patsubst %,core/%/*.[ch],available_wrench distribution mechanics numbers)))
+
+.PHONY: demo test setup lint types unit docs live lowest newest errata pictures clean
 
 demo: .venv/core.stamp
 	$(BIN)/towline demo
@@ -23,7 +26,7 @@ setup: .venv/dev.stamp
 lint: .venv/dev.stamp
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/clang-format --dry-run -Werror --style=file:core/.clang-format core/*.h core/*/*.[ch] export/fmu/sources/*.[ch]
+	$(BIN)/clang-format --dry-run -Werror --style=file:core/.clang-format core/*.h core/*/*.[ch] export/fmu/sources/*.[ch] viewer/live/*.c
 
 types: .venv/dev.stamp
 	$(BIN)/basedpyright --pythonpath $(BIN)/python
@@ -36,6 +39,16 @@ unit: .venv/dev.stamp
 # The documentation site, in site/; a warning is an error, as long as no --quiet keeps it from being counted.
 docs: .venv/dev.stamp
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+# The core for the page that computes. The package ziglang compiles to WebAssembly wherever it is installed; the sources' hash is
+# the file's build ID, by which a test finds a file that is older than they are.
+live: .venv/venv.stamp
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --target build/ziglang --upgrade ziglang
+	PYTHONPATH=build/ziglang $(BIN)/python -m ziglang cc --target=wasm32-wasi -mexec-model=reactor -Os -s -Wall -Wextra -Werror \
+	  -ffp-contract=off -fno-math-errno -fno-trapping-math -DTOWLINE_CABLES=32 -DTOWLINE_NO_LANES -Icore -Icore/distribution \
+	  -Wl,-z,stack-size=262144 -Wl,--build-id=0x$$(cat $(LIVE) | sha256sum | cut -d ' ' -f 1) -o viewer/live/robot_at_rest.wasm \
+	  viewer/live/robot_at_rest.c core/distribution/*.c core/numbers/processor.c \
+	  core/available_wrench/available_wrench.c core/available_wrench/facets_plain.c
 
 # A selection of the tests with the oldest versions of the dependencies that pyproject.toml accepts, or with the newest.
 lowest newest:

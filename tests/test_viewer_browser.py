@@ -340,21 +340,3 @@ def test_a_page_of_another_site_cannot_open_the_socket(browser, foreign_page):
         assert told["own"][0] == "open"
         assert told["other"][0] == "refused"
         assert "403" in told["other"][1]
-
-
-def test_on_a_phone_the_page_from_disk_shows_the_whole_robot(page, tmp_path):
-    subject = read("cogiro")
-    page.set_viewport_size({"width": 400, "height": 800})
-    page.goto(save_page(subject, tmp_path / "cogiro.html").as_uri())
-    robot, spots = subject.robot, None
-    for _ in range(40):
-        page.wait_for_timeout(250)
-        if page.locator("canvas").count():
-            spots = pixels(page, subject, np.vstack([robot.home_anchors, robot.home_attachments]), free=1.0)
-            if dark_near(picture(page, tmp_path / "phone.png"), spots).mean() > 0.6:
-                break
-    else:
-        pytest.fail("the ends of the cables are elsewhere")
-    assert (spots > 0).all()
-    assert (spots < [400, 800]).all()
-    assert np.ptp(spots[:, 0]) > 150

@@ -14,6 +14,9 @@ from ..workspace.region import reach_boxes, surrounding_box
 
 FARTHEST = 1e6  # [m] from the origin of {G}: pictures have seven digits
 SMALLEST = 1e-6  # [m]
+FIELD_OF_VIEW = 0.75  # [rad]
+ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
+CELLS = 10  # of the grid along the robot's size, about
 
 
 class Points(NamedTuple):
@@ -45,6 +48,28 @@ class Extent(NamedTuple):
     def size(self) -> float:
         """Return the length of the diagonal [m]."""
         return float(np.linalg.norm(self.high - self.low))
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Return the centre, where the initial camera looks, (3,) in {G} [m]."""
+        return (self.low + self.high) / 2
+
+    @property
+    def nearest(self) -> float:
+        """Return the distance from the centre at which the box fits into a picture that is wider than high [m]."""
+        return float(0.62 * self.size / np.sin(FIELD_OF_VIEW / 2))
+
+    @property
+    def cell(self) -> float:
+        """Return the edge of the grid's cells [m]: 1, 2 or 5 times a power of ten."""
+        wanted = self.size / CELLS
+        power = 10.0 ** np.floor(np.log10(wanted))
+        return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+
+    @property
+    def floor(self) -> float:
+        """Return the height of the grid [m], a little below the box, where no platform lies in it."""
+        return float(self.low[2] - 0.03 * self.size)
 
     @staticmethod
     def of(*points: np.ndarray) -> Extent:

@@ -57,7 +57,7 @@ class Panel:
             if subject.replay is not None:
                 self._add_film(subject.replay)
         with self._gui.add_folder("Legend"):
-            self._gui.add_html(labels.legend(subject, stage.cell))
+            self._gui.add_html(labels.legend(subject, stage.extent.cell))
 
     def _add_cuts(self, positions: np.ndarray) -> None:
         """Add a switch for the points (n, 3) of a workspace, and a slider for each axis to cut away those beyond it."""

@@ -16,19 +16,19 @@ from ..base.errors import InputError
 from ..base.inputs import file_path, required, shown, whole_number
 from ..base.quiet import quiet
 from ..base.writing import whole_file
-from ..models import Dynamics
 from .access import guarded
 from .frames import Frames, with_script
-from .geometry import Geometry
+from .geometry import ALONG, Geometry
+from .live_page import live_page
 from .page import aside, camera
 from .panel import Panel
-from .posing import opening_pose
-from .snapshot import at_rest
-from .stage import ALONG, Stage
+from .stage import Stage
 from .subject import Subject
 
 if TYPE_CHECKING:
     import viser
+
+    from .replay import Replay
 
 LOOPBACK = "127.0.0.1"
 PORT = 8080
@@ -69,8 +69,8 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     """Write a subject as one HTML file that loads nothing and needs no server; a failure leaves no partial file.
 
-    A plan plays; a robot is shown with its tensions at home, or at the feasible pose nearest to it, and with the points
-    of its workspace if there are any.
+    A plan plays. A robot, with the points of its workspace if there are any, opens at home, or at the feasible pose
+    nearest to it, and its platform and carriers can be dragged: the page computes tensions, margin and certificate.
 
     Parameters
     ----------
@@ -82,26 +82,23 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If `subject` is not a `Subject`, viser is not installed, or the file cannot be written.
+        If `subject` is not a `Subject`, viser is not installed and the subject is a plan or a simulation, the core
+        has no room for the robot, or the file cannot be written.
     """
     required("subject", subject, Subject)
     path = file_path("file", file)
+    document = live_page(subject) if subject.replay is None else _film(subject, subject.replay)
     with whole_file(path) as temporary:
-        temporary.write_text(_page(subject), encoding="utf-8")
+        temporary.write_text(document, encoding="utf-8")
     return path
 
 
-def _page(subject: Subject) -> str:
+def _film(subject: Subject, replay: Replay) -> str:
     # viser records what a server is told, so there is one, on a port that nobody is told.
     with _started(LOOPBACK, 0) as server:
         geometry = Geometry(subject.robot)
         stage = Stage(server, subject, geometry, captioned=True)
-        replay = subject.replay
-        if replay is None:
-            robot = subject.robot
-            frames = [at_rest(Dynamics(robot), geometry, opening_pose(robot, geometry), robot.carrier_home)]
-        else:
-            frames = [replay.at(int(index)) for index in replay.frames(FRAME_RATE)]
+        frames = [replay.at(int(index)) for index in replay.frames(FRAME_RATE)]
         marks = Frames(server)
         with marks.instant():
             stage.show(frames[0], subject.other_at(frames[0]))
@@ -114,8 +111,8 @@ def _page(subject: Subject) -> str:
     title = escape(subject.title)
     head, _, rest = document.partition("<head>")
     body, end, tail = rest.rpartition("</body>")
-    own = f"<title>{title}</title>{camera(stage.centre, ALONG, stage.nearest)}"
-    return f"{head}<head>{own}{body}{aside(subject, frames, stage.cell)}{end}{tail}"
+    own = f"<title>{title}</title>{camera(stage.extent.centre, ALONG, stage.extent.nearest)}"
+    return f"{head}<head>{own}{body}{aside(subject, frames, stage.extent.cell)}{end}{tail}"
 
 
 def _check_address(host: str, port: int) -> None:

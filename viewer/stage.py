@@ -17,7 +17,7 @@ from ..figures.robot import box_edges
 from ..figures.tension_colours import place, rgb, shades
 from ..models.body import surface
 from . import labels
-from .geometry import Extent, Geometry
+from .geometry import ALONG, FIELD_OF_VIEW, Extent, Geometry
 from .shapes import posts, rotors, sheaves
 from .snapshot import Snapshot, arrow
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from .subject import Subject
 
-FIELD_OF_VIEW = 0.75  # [rad]
 WIDE = 1.4  # width over height of a picture
 CABLE_WIDTH = 4.0  # [pixels]
 THIN = 1.5
@@ -35,8 +34,6 @@ DOT = 0.008  # of the robot's size: diameter of the ends of cables
 HEAD = 0.25  # of an arrow's length
 BARBS = 12
 AIMS = 50  # of a camera that are remembered
-ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
-CELLS = 10  # of the grid along the robot's size, about
 
 Colour = tuple[int, int, int]
 
@@ -57,10 +54,8 @@ class Stage:
 
     Attributes
     ----------
-    centre
-        Where the initial camera looks, (3,) in {G} [m].
-    nearest
-        The distance from there at which the robot fits into a picture that is wider than high [m].
+    extent
+        Box around what is shown; the initial camera looks at its centre.
     """
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
@@ -69,21 +64,13 @@ class Stage:
         extent = subject.replay.extent if subject.replay else geometry.extent
         if subject.other is not None:
             extent = Extent.of(*extent, *subject.other.extent)
-        self._extent = extent
-        self._size, self.centre = extent.size, (extent.low + extent.high) / 2
-        self.nearest = 0.62 * self._size / np.sin(FIELD_OF_VIEW / 2)
+        self.extent = extent
+        self._size = extent.size
         self.frame(server.initial_camera, WIDE, 1.0)
         self._draw_surroundings(subject)
         self._make_actors(captioned)
         if subject.other is not None:
             self._make_shadow(subject.other.path)
-
-    @property
-    def cell(self) -> float:
-        """Return the edge of the grid's cells [m]: 1, 2 or 5 times a power of ten."""
-        wanted = self._size / CELLS
-        power = 10.0 ** np.floor(np.log10(wanted))
-        return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
 
     def show(self, instant: Snapshot, other: Snapshot | None = None) -> None:
         """Draw an instant, and one of another plan or simulation as a shadow."""
@@ -174,11 +161,11 @@ class Stage:
             Of its picture [pixels].
         """
         free = 1.0 - labels.SHEET_SHARE if width < height else 1.0
-        away = self.nearest / min(width / height, free, 1.0)
+        away = self.extent.nearest / min(width / height, free, 1.0)
         side = np.cross([0.0, 0.0, 1.0], ALONG)
         upwards = np.cross(ALONG, side / np.linalg.norm(side))
         # The part that the panel leaves free has its centre above that of the picture.
-        centre = self.centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
+        centre = self.extent.centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
         camera.position = centre + away * ALONG
         camera.look_at = centre
         camera.fov = FIELD_OF_VIEW
@@ -191,14 +178,14 @@ class Stage:
         pointed elsewhere stays.
         """
         camera = client.camera
-        framed, aims = (WIDE, 1.0), deque([self.centre], AIMS)
+        framed, aims = (WIDE, 1.0), deque([self.extent.centre], AIMS)
 
         def fit() -> None:
             nonlocal framed
             shape, looked_at = (float(camera.image_width), float(camera.image_height)), camera.look_at
             # An update may be older than the framing before it, so the places before count too.
-            untouched = min(np.abs(looked_at - aim).max() for aim in (self.centre, *aims)) < 1e-3 * self._size
-            initial = np.abs(looked_at - self.centre).max() < 1e-3 * self._size
+            untouched = min(np.abs(looked_at - aim).max() for aim in (self.extent.centre, *aims)) < 1e-3 * self._size
+            initial = np.abs(looked_at - self.extent.centre).max() < 1e-3 * self._size
             upright, was_upright = shape[0] < shape[1], framed[0] < framed[1]
             if untouched and ((upright and initial) or (shape != framed and (upright or was_upright))):
                 framed = shape
@@ -209,12 +196,11 @@ class Stage:
         camera.on_update(lambda _: fit())
 
     def _draw_surroundings(self, subject: Subject) -> None:
-        scene, cell = self._scene, self.cell
+        scene, cell = self._scene, self.extent.cell
         # Shadows tell little here, and their shaders keep a machine without a GPU busy for seconds.
         scene.configure_default_lights(cast_shadow=False)
         width = 2 * cell * np.ceil(self._size / cell)
-        # A little below, where no platform lies in it.
-        floor = np.array([*(np.round(self.centre[:2] / cell) * cell), self._extent.low[2] - 0.03 * self._size])
+        floor = np.array([*(np.round(self.extent.centre[:2] / cell) * cell), self.extent.floor])
         scene.add_grid(
             "/grid",
             width=width,
@@ -302,7 +288,7 @@ class Stage:
         self._arrow = self._segments("/missing", np.zeros((1 + BARBS, 2, 3)), rgb(style.colour(1)), 1.5 * CABLE_WIDTH)
         self._arrow.visible = False
         self._short = scene.add_label("/shortfall", "", anchor="bottom-center", visible=False)
-        above = np.array([*self.centre[:2], self._extent.high[2] + 0.12 * size])
+        above = np.array([*self.extent.centre[:2], self.extent.high[2] + 0.12 * size])
         self._caption = scene.add_label("/caption", "", position=above, anchor="bottom-center") if captioned else None
 
     def _make_shadow(self, path: np.ndarray) -> None:

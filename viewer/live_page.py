@@ -1,0 +1,128 @@
+"""Write the page of a robot that computes: it runs the numeric core, compiled to WebAssembly, in the browser.
+
+live/robot_at_rest.wasm is compiled by `make live`, because the C compilers of most machines cannot, and is part of the
+repository; a test compares it with its sources.
+"""
+
+import json
+from base64 import b64encode
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Any
+
+import numpy as np
+
+from ..figures import style
+from ..figures.hull import faces
+from ..figures.robot import box_edges
+from ..figures.tension_colours import NO_TENSION, rgb, shades
+from ..models import Robot
+from ..models.body import surface
+from ..models.record import record_of
+from .geometry import ALONG, Geometry
+from .posing import few_cables, opening_pose
+from .shapes import posts, rotors
+from .sliders import sliders
+from .subject import Subject
+
+FOLDER = Path(__file__).with_name("live")
+SHADES = 65  # of the colour scale
+PART = (150, 150, 150)
+NEARER = 0.85  # than in the viewer, whose panel lies over the scene
+
+
+def live_page(subject: Subject) -> str:
+    """Return the page of a robot, with the points of its workspace if there are any, as one HTML document.
+
+    Raises `InputError` if the core has no room for the robot, or the robot cannot be drawn.
+    """
+    robot, geometry = subject.robot, Geometry(subject.robot)
+    data = _data(subject, geometry)
+    moving = any(it.carrier is not None and it.coordinate < 3 for it in sliders(robot, geometry))
+    return Template((FOLDER / "live.html").read_text(encoding="utf-8")).substitute(
+        title=escape(subject.title),
+        carriers=" or a carrier" if moving else "",
+        cell=f"{geometry.extent.cell:g}",
+        data=json.dumps(data).replace("<", "\\u003c"),
+        script=(FOLDER / "live.js").read_text(encoding="utf-8"),
+    )
+
+
+def _data(subject: Subject, geometry: Geometry) -> dict[str, Any]:
+    robot, extent = subject.robot, geometry.extent
+    cloud = subject.cloud
+    return {
+        "name": robot.name,
+        "core": b64encode((FOLDER / "robot_at_rest.wasm").read_bytes()).decode(),
+        "record": b64encode(record_of(robot).tobytes()).decode(),
+        "t_min": robot.t_min.tolist(),
+        "t_max": robot.t_max.tolist(),
+        "length": robot.length,
+        "com": list(robot.platform.com),
+        "pose": opening_pose(robot, geometry).tolist(),
+        "carriers": robot.carrier_home.tolist(),
+        "sliders": [it._asdict() | {"label": it.label} for it in sliders(robot, geometry)],
+        "bodies": [_platform(robot), *(_carrier(robot, index) for index in range(len(robot.carriers)))],
+        "posts": [ends.tolist() for ends in posts(robot, extent.floor)],
+        "boxes": [
+            edge.tolist()
+            for carrier in robot.carriers
+            for box in carrier.drawing.boxes
+            for edge in box_edges(np.array(box.min), np.array(box.max))
+        ],
+        "grid": _grid(geometry),
+        "cloud": []
+        if cloud is None
+        else [[place, _css(hue)] for place, hue in zip(cloud.positions.tolist(), cloud.colours, strict=True)],
+        "reach": style.colour(3),
+        "centre": extent.centre.tolist(),
+        "size": extent.size,
+        "distance": NEARER * extent.nearest,
+        "few": few_cables(robot),
+        "weight": robot.weight,
+        "view": [float(np.arctan2(ALONG[1], ALONG[0])), float(np.arcsin(ALONG[2]))],
+        "flat": not set(robot.platform.dof) - {"x", "z", "pitch"},
+        "typical": robot.force_scale,
+        "shades": [_css(shade) for shade in shades(np.linspace(0.0, 1.0, SHADES))],
+        "noTension": NO_TENSION,
+    }
+
+
+def _platform(robot: Robot) -> dict[str, Any]:
+    corners = robot.attachments if robot.platform.body is None else surface(robot.platform.body)
+    return _body("platform", corners, rgb(style.colour(4)), [])
+
+
+def _carrier(robot: Robot, index: int) -> dict[str, Any]:
+    carrier = robot.carriers[index]
+    lines = rotors(float(robot.carrier_radius[index])) if carrier.drawing.rotors else []
+    corners = robot.anchors[robot.carrier_of_cable == index] if carrier.drawing.body else np.zeros((0, 3))
+    return _body(carrier.name, corners, PART, lines)
+
+
+def _body(name: str, corners: np.ndarray, colour: tuple[int, ...], lines: list[np.ndarray]) -> dict[str, Any]:
+    return {
+        "name": name,
+        "corners": corners.tolist(),
+        "faces": [face.tolist() for face in faces(corners)],
+        "colour": colour,
+        "lines": [line.tolist() for line in lines],
+    }
+
+
+def _grid(geometry: Geometry) -> list[list[list[float]]]:
+    """Return the lines of the floor's grid, around the robot and one cell beyond."""
+    extent, cell = geometry.extent, geometry.extent.cell
+    low, high = np.floor(extent.low / cell) - 1, np.ceil(extent.high / cell) + 1
+    lines = []
+    for axis in (0, 1):
+        for k in np.arange(low[axis], high[axis] + 1):
+            ends = np.array([[0.0, 0.0, extent.floor], [0.0, 0.0, extent.floor]])
+            ends[:, axis], ends[:, 1 - axis] = k * cell, (low[1 - axis] * cell, high[1 - axis] * cell)
+            lines.append(ends.tolist())
+    return lines
+
+
+def _css(colour: np.ndarray) -> str:
+    return "#" + bytes(colour).hex()
