@@ -58,6 +58,7 @@ def test_the_wheel_is_the_packages_and_their_data(wheel, tracked):
     assert len(robots) > 20
     step = {name for name in tracked if name.startswith(("export/step/template/", "export/fmu/sources/"))}
     pages = {name for name in tracked if re.fullmatch(r"(figures|viewer)/[^/]*\.(html|js)", name)}
+    pages |= {name for name in tracked if name.startswith("viewer/live/")}
     claims = {name for name in tracked if re.fullmatch(r"studies/\w+/claims\.yaml", name)}
     new = {name for name in tracked if re.fullmatch(r"cli/templates/[^/]*\.yaml", name)}
     schema = {"py.typed", "ocp/tasks/task.schema.json"}
