@@ -3,7 +3,7 @@
 from .commands import commands
 from .keys import robot_keys, task_keys
 from .notebooks import notebooks
-from .robots import robots
+from .robots import live_pages, robots
 
 __all__ = ["pages"]
 
@@ -15,5 +15,6 @@ def pages() -> dict[str, str | bytes]:
         "reference/robot-keys.md": robot_keys(),
         "reference/task-keys.md": task_keys(),
         "reference/robots.md": robots(),
+        **live_pages(),
         **notebooks(),
     }

@@ -2,6 +2,8 @@
 
 from towline import load
 from towline.models.library import contents
+from towline.viewer import read
+from towline.viewer.live_page import live_page
 
 from .markup import escaped, table
 
@@ -10,7 +12,7 @@ HEAD = """# The robots of the library
 These robots ship with towline. `cogiro` in a command, or `load("cogiro")` in Python, is the robot of that name.
 `towline robots cogiro` diagnoses it, and `towline robots cogiro --figure cogiro.png` draws the picture that you see
 here: cables are coloured by their tensions at rest at home, or grey if the robot cannot rest there. Green points are
-positions at which it can rest.
+positions at which it can rest. *Drag it* opens a page that computes tensions while you move the platform.
 
 """
 
@@ -27,7 +29,12 @@ def robots() -> str:
         facts = f"{robot.m} cables, {len(robot.platform.dof)} degrees of freedom ({dof}), carriers: {carriers}."
         sections.append(
             f"## {name} {{ #{name} }}\n\n![{name}: carriers, cables and platform](pictures/robots/{name}.png)"
-            f"{{ width=400 }}\n\n{facts}\n\n{escaped(robot.source)}\n"
+            f"{{ width=400 }}\n\n[Drag it](../live/{name}.html)\n\n{facts}\n\n{escaped(robot.source)}\n"
         )
     listed = table(["robot", "cables", "degrees of freedom", "carriers", "mass [kg]"], rows)
     return HEAD + listed + "\n" + "\n".join(sections)
+
+
+def live_pages() -> dict[str, str | bytes]:
+    """Return the pages on which the robots can be dragged, by their paths."""
+    return {f"live/{entry['name']}.html": live_page(read(entry["name"])) for entry in contents()}
