@@ -29,9 +29,9 @@ from .audits.cost import cost
 from .audits.violation import relative_violation
 from .global_path.space import Space
 from .global_path.start import motion_past
-from .nlp.interrupts import heeding
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
+from .nlp.waiting import heeding
 from .plan import Plan
 from .proofs.durations import Durations, durations
 from .proofs.infeasible_ends import infeasible_ends

@@ -17,8 +17,7 @@ from pathlib import Path
 import casadi as ca
 import pytest
 
-from towline.ocp.nlp.interrupts import heeding
-from towline.ocp.nlp.waiting import wait_for
+from towline.ocp.nlp.waiting import heeding, wait_for
 
 TOWLINE = Path(sys.executable).with_name("towline")
 PROMPT = 1.0  # [s] of processor time from the signal to the end

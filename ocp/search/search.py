@@ -12,13 +12,12 @@ from ..audits.audit import Audit, audit
 from ..audits.violation import relative_violation
 from ..nlp.grid import Grid
 from ..nlp.guess import initial_guess, usual_guess
-from ..nlp.interrupts import raise_if_swallowed
 from ..nlp.linear import LinearDistances
 from ..nlp.near import Near, has_places
 from ..nlp.program import Program, build
 from ..nlp.rows import Mesh
 from ..nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
-from ..nlp.waiting import wait_for
+from ..nlp.waiting import raise_if_swallowed, wait_for
 from ..plan import Plan
 from ..result import PlannerStep
 from ..tasks.deviation import Deviation
