@@ -92,21 +92,13 @@ class Execution:
 
 @dataclass(frozen=True)
 class Workers:
-    """Evaluate jobs by an executor.
-
-    Attributes
-    ----------
-    limit
-        Returns how many jobs may be under way now; a cluster may grow and shrink.
-    failures
-        Exceptions that mean that workers have failed, each with its message; {0} stands for the exception.
-    look
-        Raises SolverError if there are no workers any more; called again and again while a result is awaited.
-    """
+    """Evaluate jobs by an executor."""
 
     executor: Executor
-    limit: Callable[[], int]
+    limit: Callable[[], int]  # returns how many jobs may be under way now; a cluster may grow and shrink
+    # Exceptions that mean that workers have failed, each with its message; {0} stands for the exception.
     failures: Mapping[type[Exception], str] = field(default_factory=dict)
+    # Raises SolverError if there are no workers any more; called again and again while a result is awaited.
     look: Callable[[], None] = lambda: None
 
     def map(

@@ -190,7 +190,7 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
     from ..figures import robot as figure
     from ..figures import style
     from ..models import Dynamics
-    from ..models.rotor_discs import rotor_discs
+    from ..statics.scene import rotor_discs
     from ..workspace import hints
 
     positions, feasible = hints(Dynamics(robot))

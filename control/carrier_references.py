@@ -18,21 +18,11 @@ SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are
 
 
 class Moved(ABC):
-    """Coordinates of carriers in a predictive solution, with their accelerations as controls.
+    """Coordinates of carriers in a predictive solution, with their accelerations as controls."""
 
-    Attributes
-    ----------
-    freed
-        Carrier and coordinate of each one that may leave the reference, (f, 2) or (0, 2).
-    tethers
-        Carriers held by cables of fixed length, (k,) of `TETHER`.
-    count
-        Number of coordinates, f.
-    """
-
-    freed: np.ndarray
-    tethers: np.ndarray
-    count: int
+    freed: np.ndarray  # carrier and coordinate of each one that may leave the reference, (f, 2) or (0, 2)
+    tethers: np.ndarray  # carriers held by cables of fixed length, (k,) of `TETHER`
+    count: int  # number of coordinates, f
 
     @abstractmethod
     def reset(self) -> None:

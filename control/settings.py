@@ -14,19 +14,11 @@ SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from the
 
 
 class Limits(NamedTuple):
-    """Limits of tensions and of their rates, each (m,).
+    """Limits of tensions and of their rates, each (m,)."""
 
-    Attributes
-    ----------
-    low, high
-        [N].
-    rate
-        [N/s], infinite without a limit.
-    """
-
-    low: np.ndarray
-    high: np.ndarray
-    rate: np.ndarray
+    low: np.ndarray  # [N]
+    high: np.ndarray  # likewise
+    rate: np.ndarray  # [N/s], infinite without a limit
 
 
 def limits_of(robot: Robot, rate: Any) -> Limits:

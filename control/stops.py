@@ -22,8 +22,8 @@ from ..base.errors import InputError
 from ..base.inputs import number
 from ..base.netcdf import Contents
 from ..base.text import quantity
-from ..models.dimensions import dimensions, motion_variables, over
 from ..models.dynamics import dynamics_of
+from ..models.motion_file import dimensions, motion_variables, over
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
 from ..solvers import Certificate, certify, solve_batch

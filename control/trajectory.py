@@ -36,31 +36,18 @@ def moved_on(motion: Motion, time: float | np.ndarray) -> Motion:
 
 
 class Trajectory(NamedTuple):
-    """A reference over time.
+    """A reference over time."""
 
-    Attributes
-    ----------
-    duration
-        Duration [s]; None for a pose to hold.
-    at
-        Function of times (n,) [s] that returns pose, velocity and acceleration of the platform, (n, 6) each, and of the
-        carriers, (n, c, 6) each.
-    tensions
-        Function of times that returns the planned tensions, (n, m) [N]; None if none are planned.
-    keep_out
-        For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
-    doubt
-        Row of the report that says that the reference is a plan with a broken limit; empty if it is not.
-    wind
-        Velocity of the air in {G} for which it is planned, (3,) [m/s]; None without air.
-    """
-
-    duration: float | None
+    duration: float | None  # duration [s]; None for a pose to hold
+    # Function of times (n,) [s] that returns pose, velocity and acceleration of the platform, (n, 6) each, and of the
+    # carriers, (n, c, 6) each.
     at: Callable[[np.ndarray], tuple[Motion, Motion]]
+    # Function of times that returns the planned tensions, (n, m) [N]; None if none are planned.
     tensions: Callable[[np.ndarray], np.ndarray] | None = None
+    # For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
     keep_out: Sequence[Sequence[np.ndarray]] = ()
-    doubt: str = ""
-    wind: np.ndarray | None = None
+    doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit; empty if it is not
+    wind: np.ndarray | None = None  # velocity of the air in {G} for which it is planned, (3,) [m/s]; None without air
 
 
 class HasTrajectory(Protocol):

@@ -35,49 +35,27 @@ class Timing(NamedTuple):
 
 @dataclass(frozen=True)
 class Scene:
-    """A robot at each frame; everything in {G} [m].
-
-    Attributes
-    ----------
-    anchors, attachments
-        (k, m, 3).
-    path, path_times
-        Origin of the platform's frame (n, 3) over times [s] of their own, fine enough for a smooth trail.
-    carriers, names
-        Origins of the carriers' frames (k, c, 3), and their names; ground carriers are not among them.
-    bodies
-        For each carrier the indices of its cables; three or more anchors are drawn as a body.
-    boxes
-        Corners (low, high) of reach boxes.
-    rotors
-        Circles in which rotors turn, (k, r, p, 3); default: none.
-    obstacles
-        For each region to keep out of, the lines that outline it, (n, 3) each.
-    tensions
-        (k, m) [N], nan where there are none.
-    t_min, t_max
-        (m,) [N].
-    cut
-        Which cables have been cut, (k, m); None if none are.
-    surface
-        Points of the platform's surface, (k, n, 3), whose hull is drawn; default: the attachments.
-    """
+    """A robot at each frame; everything in {G} [m]."""
 
     title: str
-    anchors: np.ndarray
-    attachments: np.ndarray
+    anchors: np.ndarray  # (k, m, 3)
+    attachments: np.ndarray  # likewise
+    # Origin of the platform's frame (n, 3) over times [s] of their own, fine enough for a smooth trail.
     path: np.ndarray
-    path_times: np.ndarray
+    path_times: np.ndarray  # likewise
+    # Origins of the carriers' frames (k, c, 3), and their names; ground carriers are not among them.
     carriers: np.ndarray
-    names: list[str]
-    bodies: list[np.ndarray]
-    boxes: list[tuple[np.ndarray, np.ndarray]]
-    obstacles: list[list[np.ndarray]]
-    tensions: np.ndarray
-    t_min: np.ndarray
-    t_max: np.ndarray
+    names: list[str]  # likewise
+    bodies: list[np.ndarray]  # for each carrier the indices of its cables; three or more anchors are drawn as a body
+    boxes: list[tuple[np.ndarray, np.ndarray]]  # corners (low, high) of reach boxes
+    obstacles: list[list[np.ndarray]]  # for each region to keep out of, the lines that outline it, (n, 3) each
+    tensions: np.ndarray  # (k, m) [N], nan where there are none
+    t_min: np.ndarray  # (m,) [N]
+    t_max: np.ndarray  # likewise
+    # Circles in which rotors turn, (k, r, p, 3); default: none.
     rotors: np.ndarray = field(default_factory=lambda: np.zeros((1, 0, 2, 3)))
-    cut: np.ndarray | None = None
+    cut: np.ndarray | None = None  # which cables have been cut, (k, m); None if none are
+    # Points of the platform's surface, (k, n, 3), whose hull is drawn; default: the attachments.
     surface: np.ndarray | None = None
 
     @property

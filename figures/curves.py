@@ -18,27 +18,14 @@ FLATTEST = 1e-3  # height of a panel over its largest value: below, curves that 
 
 
 class Panel(NamedTuple):
-    """A panel with curves.
+    """A panel with curves."""
 
-    Attributes
-    ----------
-    label
-        Label of the vertical axis, with the unit.
-    curves
-        (n,) each, by their names in the legend; an empty name has no entry, and nan leaves a gap.
-    bounds
-        Values of dashed lines, by their labels.
-    dots
-        As `curves`, drawn as dots, for points that should lie on a curve.
-    logarithmic
-        Use a logarithmic vertical axis.
-    """
-
-    label: str
+    label: str  # label of the vertical axis, with the unit
+    # (n,) each, by their names in the legend; an empty name has no entry, and nan leaves a gap.
     curves: Mapping[str, np.ndarray]
-    bounds: Mapping[str, float] = {}
-    dots: Mapping[str, np.ndarray] = {}
-    logarithmic: bool = False
+    bounds: Mapping[str, float] = {}  # values of dashed lines, by their labels
+    dots: Mapping[str, np.ndarray] = {}  # as `curves`, drawn as dots, for points that should lie on a curve
+    logarithmic: bool = False  # use a logarithmic vertical axis
 
 
 def curves(

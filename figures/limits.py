@@ -17,26 +17,14 @@ LEAST = 0.1  # of a limit: a panel is at least so high; a limit that is farther 
 
 
 class Limited(NamedTuple):
-    """A quantity over time and its limits.
+    """A quantity over time and its limits."""
 
-    Attributes
-    ----------
-    name, unit
-        Name and unit of the limit.
-    labels
-        Names of the curves.
-    values
-        (n, k).
-    low, high
-        The limits; an infinite one is not drawn.
-    """
-
-    name: str
-    unit: str
-    labels: list[str]
-    values: np.ndarray
-    low: float
-    high: float
+    name: str  # name and unit of the limit
+    unit: str  # likewise
+    labels: list[str]  # names of the curves
+    values: np.ndarray  # (n, k)
+    low: float  # the limits; an infinite one is not drawn
+    high: float  # likewise
 
 
 def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:

@@ -39,30 +39,14 @@ Part = Section | Table | str  # of a report; the last is a sentence
 
 @dataclass(frozen=True)
 class Report(Displayed):
-    """A report: one line with the result, then the facts behind it.
+    """A report: one line with the result, then the facts behind it."""
 
-    Attributes
-    ----------
-    about
-        What the result is of, such as robot and task.
-    status
-        The result in one word; empty where there is none.
-    summary
-        What decided it, in one line.
-    parts
-        Sections, tables and sentences, in order.
-    drawings
-        Draws the figures of the page.
-    files
-        Title and text of each file that the page has.
-    """
-
-    about: str
-    status: str
-    summary: str
-    parts: Sequence[Part]
-    drawings: Callable[[], Iterable[Drawing]] = tuple
-    files: Sequence[tuple[str, str]] = ()
+    about: str  # what the result is of, such as robot and task
+    status: str  # the result in one word; empty where there is none
+    summary: str  # what decided it, in one line
+    parts: Sequence[Part]  # sections, tables and sentences, in order
+    drawings: Callable[[], Iterable[Drawing]] = tuple  # draws the figures of the page
+    files: Sequence[tuple[str, str]] = ()  # title and text of each file that the page has
 
     @property
     def headline(self) -> str:

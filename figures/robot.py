@@ -17,39 +17,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RobotSketch:
-    """The parts of a robot to draw; everything in {G} [m].
-
-    Attributes
-    ----------
-    anchors, attachments
-        (m, 3).
-    com
-        (3,).
-    carriers
-        (c, 3) origins of the carriers' frames, and their names.
-    boxes
-        Corners (low, high) of reach boxes.
-    tensions
-        (m,) [N], or None for grey cables.
-    t_min, t_max
-        (m,) [N].
-    resting
-        Positions at which the platform can rest, (k, 3); default: none.
-    rotors
-        Circles in which rotors turn, (r, p, 3); default: none.
-    """
+    """The parts of a robot to draw; everything in {G} [m]."""
 
     title: str
-    anchors: np.ndarray
-    attachments: np.ndarray
-    com: np.ndarray
-    carriers: np.ndarray
+    anchors: np.ndarray  # (m, 3)
+    attachments: np.ndarray  # likewise
+    com: np.ndarray  # (3,)
+    carriers: np.ndarray  # (c, 3) origins of the carriers' frames, and their names
     names: list[str]
-    boxes: list[tuple[np.ndarray, np.ndarray]]
-    tensions: np.ndarray | None
-    t_min: np.ndarray
-    t_max: np.ndarray
+    boxes: list[tuple[np.ndarray, np.ndarray]]  # corners (low, high) of reach boxes
+    tensions: np.ndarray | None  # (m,) [N], or None for grey cables
+    t_min: np.ndarray  # (m,) [N]
+    t_max: np.ndarray  # likewise
+    # Positions at which the platform can rest, (k, 3); default: none.
     resting: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    # Circles in which rotors turn, (r, p, 3); default: none.
     rotors: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 

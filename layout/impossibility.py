@@ -30,21 +30,11 @@ _SUM = 1e3  # weight of the equation that shares sum to one
 
 @dataclass(frozen=True, repr=False)
 class Impossibility(Displayed):
-    """A required wrench that no layout inside the boxes can give.
+    """A required wrench that no layout inside the boxes can give."""
 
-    Attributes
-    ----------
-    pose
-        Where it is required, (6,) [m, rad].
-    wrench
-        The required wrench about the CoM in {G}, (6,) [N, N m].
-    certificate
-        The direction, what is needed along it, and the most that any layout gives.
-    """
-
-    pose: np.ndarray
-    wrench: np.ndarray
-    certificate: Certificate
+    pose: np.ndarray  # where it is required, (6,) [m, rad]
+    wrench: np.ndarray  # the required wrench about the CoM in {G}, (6,) [N, N m]
+    certificate: Certificate  # the direction, what is needed along it, and the most that any layout gives
 
     def verify(self, variables: Variables) -> bool:
         """Return whether the direction proves it, by the bound for these variables alone."""

@@ -119,8 +119,7 @@ def _designed(
     per_demand = max(1000, AUDITED // sum(len(each.demands) for each in wanted.require))
     audited = rows_of(before, wanted.require, [each.sampled(per_demand, random) for each in wanted.require])
     every = rows.joined(audited)
-    worst = np.argsort(Evaluation(variables, every).margins(y))[:_JUDGED]
-    margin = _judged(robot, before.length, every.only(worst))
+    margin = _judged(robot, before.length, every)
     evaluation = Evaluation(variables, rows)
     nearest = _nearest(evaluation, y)
     if wanted.clearance > 0.0:
@@ -129,7 +128,7 @@ def _designed(
     feasible = margin >= wanted.margin and nearest >= wanted.clearance
     return Design(
         robot, before, wanted, "feasible" if feasible else "not-found", margin,
-        _least(before, before.length, every), nearest, reasons(evaluation, y, wanted.clearance), None, count,
+        _judged(before, before.length, every), nearest, reasons(evaluation, y, wanted.clearance), None, count,
         len(audited.pose_of), starts, stopped,
     )  # fmt: skip
 
@@ -140,10 +139,6 @@ def _problems(robot: Robot, length: float, rows: Rows) -> tuple[np.ndarray, np.n
     scale = np.repeat([1.0, 1.0 / length], 3)[kept]
     A = dynamics_of(robot).wrench_matrix(rows.poses)[:, kept] * scale[:, None]
     return A[rows.pose_of], rows.wrenches[:, kept] * scale
-
-
-def _least(robot: Robot, length: float, rows: Rows) -> float:
-    return float(margins(*_problems(robot, length, rows), robot.t_min, robot.t_max).min())
 
 
 def _judged(robot: Robot, length: float, rows: Rows) -> float:

@@ -27,33 +27,15 @@ _SPARE = 0.002  # of the clearance: what is searched for more than is asked
 
 @dataclass
 class Found:
-    """The best layout of a search so far, and how the search went.
+    """The best layout of a search so far, and how the search went."""
 
-    Attributes
-    ----------
-    y
-        Variables, (p,).
-    margin
-        Smallest margin over all rows and the audited poses [N].
-    missing
-        Missing clearance at these poses [m].
-    rows
-        All rows: those of the requirements, and what audits have added.
-    starts
-        Layouts from which linear programs were run.
-    audit_agrees
-        Whether the random poses of the last audit are no worse than the rows.
-    stopped
-        Whether the search was interrupted.
-    """
-
-    y: np.ndarray
-    rows: Rows
-    margin: float = -np.inf
-    missing: float = np.inf
-    starts: int = 0
-    audit_agrees: bool = False
-    stopped: bool = False
+    y: np.ndarray  # variables, (p,)
+    rows: Rows  # all rows: those of the requirements, and what audits have added
+    margin: float = -np.inf  # smallest margin over all rows and the audited poses [N]
+    missing: float = np.inf  # missing clearance at these poses [m]
+    starts: int = 0  # layouts from which linear programs were run
+    audit_agrees: bool = False  # whether the random poses of the last audit are no worse than the rows
+    stopped: bool = False  # whether the search was interrupted
 
     def better(self, margin: float, short: float) -> bool:
         """Return whether another result is better: less clearance is missing, or none and the margin is larger."""

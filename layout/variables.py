@@ -14,29 +14,15 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class Variables:
-    """Maps variables y to the layout: z = fixed + S y, the anchors (3 m), attachments (3 m), t_min (m) and t_max (m).
-
-    Attributes
-    ----------
-    S
-        (8 m, p), 1, -1 or 0.
-    fixed
-        What does not change, (8 m).
-    low, high
-        Bounds of the variables, (p,).
-    names
-        Of the variables, such as "cables[2].anchor.x".
-    points
-        Variables that are one point or one tension limit, and move together.
-    """
+    """Maps variables y to the layout z = fixed + S y: anchors (3 m), attachments (3 m), t_min (m) and t_max (m)."""
 
     robot: Robot
-    S: np.ndarray  # (8 m, p)
-    fixed: np.ndarray  # (8 m,)
-    low: np.ndarray  # (p,)
+    S: np.ndarray  # (8 m, p), 1, -1 or 0
+    fixed: np.ndarray  # what does not change, (8 m,)
+    low: np.ndarray  # bounds of the variables, (p,)
     high: np.ndarray  # (p,)
-    names: tuple[str, ...]
-    points: tuple[np.ndarray, ...]
+    names: tuple[str, ...]  # of the variables, such as "cables[2].anchor.x"
+    points: tuple[np.ndarray, ...]  # variables that are one point or one tension limit, and move together
 
     @property
     def size(self) -> int:

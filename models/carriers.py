@@ -7,17 +7,16 @@ pitch and yaw.
 
 from functools import lru_cache, reduce
 from operator import or_
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from ..base.errors import InputError
-from .carrier_answers import Actuator, Drawing, Effort, MotionLimits, RigidBody
-from .part import AT_ORIGIN, BodyInertia, Box, Finite, Name, NonNegative, Part, Pose, Positive, inertia_matrix
+from .parsing import json_schema
+from .part import AT_ORIGIN, BodyInertia, Box, Finite, Inertia, Name, NonNegative, Part, Pose, Positive, inertia_matrix
 from .rotation import Matrix
-from .schema import json_schema
 
 __all__ = [
     "Actuator",
@@ -36,10 +35,55 @@ __all__ = [
     "QuadrotorCarrier",
     "RigidBody",
 ]
-
 Drive = Literal["both", "fixed-length", "variable-length"]
 USUAL_RADIUS = 0.3  # [m] of a quadrotor of 1 kg
 POSITION, TILT, YAW = (0, 1, 2), (3, 4), (5,)
+
+
+class MotionLimits(NamedTuple):
+    """The limits of a carrier's own motion; default: no limit."""
+
+    speed: float | None = None  # [m/s]
+    acceleration: float | None = None  # [m/s^2]
+    tilt: float | None = None  # of its z axis to the vertical [rad]
+    reach: Box | None = None  # where its origin may be, in {G} [m]
+
+
+class RigidBody(NamedTuple):
+    """The mass of a body [kg], and its inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in its axes [kg m^2]."""
+
+    mass: float
+    inertia: Inertia
+
+
+class Actuator(NamedTuple):
+    """An actuator of a carrier: force [N] and moment [N m] for each unit of its command, in the carrier's axes."""
+
+    name: str
+    wrench: tuple[float, ...]  # (6,)
+    low: float  # of the command
+    high: float
+
+
+class Effort(NamedTuple):
+    """An effort that a motion requires of a carrier, with the range that it has."""
+
+    name: str
+    unit: str
+    values: Matrix  # (k, 1)
+    low: float
+    high: float
+    axes: tuple[str, ...] = ("",)  # (k,) names of the values, if there are several
+    scale: float | None = None  # a typical size; default: the robot's scale of forces
+
+
+class Drawing(NamedTuple):
+    """Describe what figures and viewer draw of a carrier besides its anchors."""
+
+    body: bool  # at its pose, with its name and path
+    axes: bool  # of its frame, since it turns
+    boxes: tuple[Box, ...]  # around it in {G} [m]
+    rotors: bool = False  # four, as far from its origin as its body reaches
 
 
 class Carrier(Part):

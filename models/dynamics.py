@@ -193,7 +193,7 @@ class Dynamics(Displayed):
 
     @one_array
     def aerodynamic_wrench(self, pose: Array, velocity: Array, wind: Array) -> Array:
-        """Return W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.wind`.
+        """Return W_e: force [N] and moment about the CoM [N m] of the air, (..., 6), in {G}; see `models.rigid_body`.
 
         Arguments as in `required_wrench`.
         """

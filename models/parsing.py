@@ -5,6 +5,7 @@ import io
 import os
 import re
 import warnings
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,13 +20,18 @@ from ..base.errors import InputError
 from ..base.inputs import LONGEST_TEXT, MOST_ROWS, check_ending, file_path, printable, shown
 from ..base.reading import read_bytes
 from ..base.writing import whole_file
-from .schema import json_schema
 
 ENDINGS = (".yaml", ".yml")
 MOST_BRACKETS = 50  # inside each other; no file of towline needs more than three
 MOST_ITEMS = 30_000  # values and keys, some 50 us each; a file with the covariance of 24 cables has 29 200
 NAMES = 'must have only letters, digits, ".", "_" and "-", and begin with a letter or digit'  # `part.Name`
 Model = TypeVar("Model", bound=BaseModel)
+
+
+@cache
+def json_schema(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the JSON Schema of a model, computed once; another kind of carrier empties the cache."""
+    return model.model_json_schema()
 
 
 def to_yaml(model: BaseModel) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.display import Displayed
 from ..base.errors import InputError
-from . import kinematics, relative, wind
+from . import kinematics, relative, rigid_body
 from .arrays import Array, one_array, several_arrays
 from .batch import call
 from .files import as_robot
@@ -115,7 +115,7 @@ class RelativeDynamics(Displayed):
     def _in_wind(self) -> ca.Function:
         motion, air = Motion.symbols(6), ca.SX.sym("wind", 3)
         pose_G, velocity_G, _ = relative.motion_in_world(motion)
-        W_e = wind.aerodynamic_wrench(self.robot, pose_G, velocity_G, air)
+        W_e = rigid_body.aerodynamic_wrench(self.robot, pose_G, velocity_G, air)
         R_A = kinematics.rotation(motion.carrier_pose[3:6])
         w = self.functions["required_wrench"](*motion) - ca.vertcat(R_A.T @ W_e[0:3], R_A.T @ W_e[3:6])
         names = [*Motion._fields, "wind"]

@@ -1,4 +1,4 @@
-"""Newton and Euler for the platform in {G}: the wrench that its motion needs.
+"""Newton and Euler for the platform in {G}: the wrench that its motion needs, and the aerodynamic wrench on it.
 
     force  : m (a_c - g)                       a_c = ddx + alpha x R c + omega x (omega x R c)
     moment : I alpha + omega x I omega         I = R I_b R^T, omega = R Omega, alpha = R (dP dTheta + P ddTheta)
@@ -7,10 +7,18 @@ about the CoM, whose position in the platform frame is c. Source: paper F, Eqs. 
 Eq. 4, which omits the gyroscopic term, and Eq. 12, which takes ddTheta for the angular acceleration.
 
 A load that the platform carries needs the same about its own CoM, and the moment of its force about the platform's.
+
+The air's wrench is that of paper F,
+
+    F_x = 1/2 rho C_d S V_x |V_x|,  F_y alike,  F_z = 1/2 rho C_l S (V_x^2 + V_y^2),  no moment about the CoM
+
+where V is the air's velocity relative to the platform's CoM, along the axes of {G}. Eq. 25 has V_x^2 for
+V_x |V_x| and so never pushes backwards; that form is kept under `form: printed`.
 """
 
 import casadi as ca
 
+from ..base.errors import InputError
 from .robot import Robot
 from .rotation import Matrix, body_rate, rotation, turning
 
@@ -64,3 +72,19 @@ def body_wrench(
     a_com = acceleration[0:3] + ca.cross(alpha, offset) + ca.cross(omega, ca.cross(omega, offset))
     turned = R @ inertia @ R.T
     return ca.vertcat(mass * (a_com - gravity), turned @ alpha + ca.cross(omega, turned @ omega))
+
+
+def aerodynamic_wrench(robot: Robot, pose: Matrix, velocity: Matrix, wind: Matrix) -> Matrix:
+    """Return W_e, (6, 1): force [N] and moment about the CoM [N m] of the air on the platform, in {G}.
+
+    Pose and velocity, (6, 1) each, are of the platform frame in {G}; wind (3, 1) is the air's velocity there [m/s].
+    Raises `InputError` if the robot's file has no `platform.aero`.
+    """
+    aero = robot.platform.aero
+    if aero is None:
+        raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero, got a wind")
+    V = wind - com_velocity(robot, pose, velocity)
+    pressure_area = 0.5 * aero.air_density * aero.area
+    along = V[0:2] ** 2 if aero.form == "printed" else V[0:2] * ca.fabs(V[0:2])
+    lift = pressure_area * aero.lift * (V[0] ** 2 + V[1] ** 2)
+    return ca.vertcat(pressure_area * aero.drag * along, lift, ca.DM.zeros(3))

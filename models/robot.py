@@ -9,23 +9,61 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from itertools import combinations
 from pathlib import Path
 from typing import Any, Self, cast
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from ..base.display import BLUE, ORANGE, Curve, Fact, picture
 from ..base.errors import InputError
-from ..base.inputs import number, required, shown, whole_number
+from ..base.inputs import number, printable, required, shown, whole_number
+from ..base.text import quantity, quantity_range, quantity_row
 from . import parameters, points
 from .cable import Cable
-from .carriers import AnyCarrier, Drive
-from .displayed_robot import DisplayedRobot
-from .drive import lengths_to_keep, usual_drive
-from .part import COORDINATES, LARGEST, Box, Finite, Name, Vector3, inertia_matrix
+from .carriers import AnyCarrier, Carrier, Drive
+from .part import COORDINATES, LARGEST, Box, Finite, Name, Part, Vector3, inertia_matrix
 from .platform import Platform
-from .pulleys import check_pulleys
 from .uncertainty import Uncertainty
+
+PLANES = {"x": [[0, 0], [1, 0], [0, 1]], "y": [[1, 0], [0, 0], [0, 1]], "z": [[1, 0], [0, 1], [0, 0]]}  # without it
+OBLIQUE = [[0.9, -0.25], [-0.45, -0.45], [0.0, 0.95]]  # (3, 2), from above
+
+
+class DisplayedRobot(Part):
+    """The base of `Robot`, whose numbers its headline, facts and picture show."""
+
+    def _headline(self) -> str:
+        robot: Any = self
+        kinds = [carrier.kind for carrier in robot.carriers]
+        carriers = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
+        return f"{robot.name}: {robot.m} cables; carriers: {carriers}"
+
+    def _facts(self) -> Iterable[Fact]:
+        robot: Any = self
+        return [
+            ("mass", quantity(robot.platform.mass, "kg")),
+            ("moves", ", ".join(robot.platform.dof)),
+            ("home", f"({quantity_row(robot.home)}) [m, rad]"),
+            ("cables there", quantity_range(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1), "m")),
+            ("t_min", quantity_range(robot.t_min, "N")),
+            ("t_max", quantity_range(robot.t_max, "N")),
+            ("drive", robot.drive),
+            ("source", printable(robot.source)),
+        ]
+
+    def _picture(self) -> str:
+        """Return cables and platform at home, in the plane of a planar robot, else obliquely from above."""
+        robot: Any = self
+        flat = [plane for name, plane in PLANES.items() if name not in robot.platform.dof]
+        view = np.array(flat[0] if flat else OBLIQUE)
+        anchors, attachments = robot.home_anchors @ view, robot.home_attachments @ view  # (m, 2)
+        rows = [i for pair in combinations(range(robot.m), 2) for i in (*pair, 0)] or [0]
+        body = attachments[rows]
+        body[2::3] = np.nan
+        cables: list[Curve] = [(*np.stack([a, b]).T, BLUE) for a, b in zip(anchors, attachments, strict=True)]
+        return picture([(*body.T, ORANGE), *cables], equal=True)
 
 
 def _without_default(schema: dict[str, Any]) -> None:
@@ -284,3 +322,53 @@ class Robot(DisplayedRobot):
         """Return the characteristic length [m]: the largest distance from the CoM to an attachment."""
         arms = np.linalg.norm(self.attachments - np.array(self.platform.com), axis=1)
         return float(arms.max()) if arms.max() > 0 else 1.0
+
+
+def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cables: tuple[Cable, ...]) -> None:
+    """Refuse an attachment on the swivel axis of its pulley, or inside the sheave.
+
+    Parameters
+    ----------
+    offsets, axes
+        From anchors to attachments, (m, 3) [m], and the swivel axes, (m, 3) [-], in {G} at home.
+    radii
+        Of the sheaves, (m,) [m]; 0 for a cable without.
+
+    Raises `ValueError` that names the attachment.
+    """
+    up = np.sum(offsets * axes, axis=1)
+    across = np.linalg.norm(offsets - up[:, None] * axes, axis=1)
+    outside = (across > 1e-9) & (across**2 - 2 * across * radii + up**2 > 0)
+    for index in np.flatnonzero((radii > 0) & ~outside):
+        raise ValueError(
+            f"cables[{index}].attachment must lie off the swivel axis and outside the sheave of its pulley at "
+            f"home, got {cables[index].attachment}"
+        )
+
+
+def usual_drive(carriers: Iterable[Carrier], cables: Iterable[Cable]) -> Drive:
+    """Return the drive of a robot whose file has none, from its cables and the carriers that hold these.
+
+    Cables keep their lengths if all hang from carriers that move them about, such as quadrotors, and none has a winch,
+    or an encoder or a pulley, which belong to one. All others have winches.
+    """
+    towed = all(carrier.tows for carrier in carriers)
+    winches = any(part is not None for cable in cables for part in (cable.winch, cable.encoder, cable.pulley))
+    return "fixed-length" if towed and not winches else "both"
+
+
+def lengths_to_keep(cables: tuple[Cable, ...], at_home: np.ndarray) -> tuple[Cable, ...]:
+    """Return the cables of a robot with fixed lengths; one without a length has its distance at home, (m,) [m].
+
+    Raises `ValueError` if a cable without a length runs over a pulley.
+    """
+    for index, cable in enumerate(cables):
+        if cable.length is None and cable.pulley is not None:
+            raise ValueError(
+                f"cables[{index}].length must be a number > 0 [m] if drive is fixed-length and the cable has a pulley, "
+                "got none"
+            )
+    return tuple(
+        cable if cable.length is not None else cable.model_copy(update={"length": float(length)})
+        for cable, length in zip(cables, at_home, strict=True)
+    )

@@ -16,41 +16,37 @@ from .stl import read_stl
 DENT = 1e-5  # of its size by which a convex surface may be inside its hull: files have 7 digits
 
 
-class Sphere(Part):
+class _Round:
+    """A body of all points within a radius of a centre or a line."""
+
+    radius: float
+
+    @property
+    def rounding(self) -> float:
+        """Return by how much it is larger than its centre or line on all sides [m]."""
+        return self.radius
+
+    @property
+    def thickness(self) -> float:
+        """Return the least distance of two planes between which it fits [m]."""
+        return 2 * self.radius
+
+
+class Sphere(Part, _Round):
     """A ball."""
 
     kind: Literal["sphere"]
     centre: Vector3 = Field(description="in its frame [m]")
     radius: Positive = Field(description="[m]")
 
-    @property
-    def rounding(self) -> float:
-        """Return by how much it is larger than its centre on all sides [m]."""
-        return self.radius
 
-    @property
-    def thickness(self) -> float:
-        """Return the least distance of two planes between which it fits [m]."""
-        return 2 * self.radius
-
-
-class Capsule(Part):
+class Capsule(Part, _Round):
     """All points within `radius` of the line from `start` to `end`."""
 
     kind: Literal["capsule"]
     start: Vector3 = Field(description="in its frame [m]")
     end: Vector3 = Field(description="in its frame [m]")
     radius: Positive = Field(description="[m]")
-
-    @property
-    def rounding(self) -> float:
-        """Return by how much it is larger than its line on all sides [m]."""
-        return self.radius
-
-    @property
-    def thickness(self) -> float:
-        """Return the least distance of two planes between which it fits [m]."""
-        return 2 * self.radius
 
 
 class Block(Part):

@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from . import elasticity, forward, kinematics, rigid_body, wind
+from . import elasticity, forward, kinematics, rigid_body
 from .cables.pulley import Exit
 from .motion import Motion
 from .robot import Robot
@@ -70,7 +70,9 @@ class WorldFunctions:
 
     @cached_property
     def _W_e(self) -> Matrix:
-        return wind.aerodynamic_wrench(self._robot, *(self._symbols[name] for name in ("pose", "velocity", "wind")))
+        return rigid_body.aerodynamic_wrench(
+            self._robot, *(self._symbols[name] for name in ("pose", "velocity", "wind"))
+        )
 
     @cached_property
     def _K_t(self) -> Matrix:

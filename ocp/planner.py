@@ -25,8 +25,7 @@ from ..base.text import quantity
 from ..models import Robot
 from ..models.files import as_robot
 from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
-from .audits.cost import cost
-from .audits.violation import relative_violation
+from .audits.violation import cost, relative_violation
 from .global_path.space import Space
 from .global_path.start import motion_past
 from .nlp.rows import Mesh

@@ -20,11 +20,9 @@ from .tasks.deviation import Deviation
 from .tasks.paths import Motion
 from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
-from .warnings.between_points import between_points
-from .warnings.inside_bodies import into_each_other, into_places
+from .warnings.inside_bodies import between_points, into_each_other, into_places
 from .warnings.instants import Instants
-from .warnings.leaves_its_points import leaves_its_points
-from .warnings.outside_frame import outside_frame
+from .warnings.outside_frame import leaves_its_points, outside_frame
 from .warnings.short_cables import short_cables
 from .warnings.slipped_units import slipped_units
 

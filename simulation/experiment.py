@@ -14,33 +14,17 @@ Wind = Callable[[np.ndarray, int], np.ndarray]  # the wind at times (K,) [s] for
 
 
 class Experiment(NamedTuple):
-    """Settings shared by all runs: controller period, references, wind, noise and events, see `Conditions`.
+    """Settings shared by all runs: controller period, references, wind, noise and events, see `Conditions`."""
 
-    Attributes
-    ----------
-    period, substeps, disturbance, noise
-        As in `Conditions`.
-    references
-        Reference of each period.
-    wind
-        Velocity of the air in {G}; None without air.
-    events
-        Events in order of time.
-    keep_out
-        Outlines of the keep-out regions of the reference, see `Trajectory`.
-    doubt
-        Row of the report that says that the reference is a plan with a broken limit, see `Trajectory`.
-    """
-
-    period: float
-    substeps: int
-    references: Sequence[Reference]
-    wind: Wind | None
-    disturbance: np.ndarray
-    noise: Noise
-    events: tuple[Event, ...]
-    keep_out: Sequence[Sequence[np.ndarray]]
-    doubt: str = ""
+    period: float  # as in `Conditions`
+    substeps: int  # as in `Conditions`
+    references: Sequence[Reference]  # reference of each period
+    wind: Wind | None  # velocity of the air in {G}; None without air
+    disturbance: np.ndarray  # as in `Conditions`
+    noise: Noise  # as in `Conditions`
+    events: tuple[Event, ...]  # events in order of time
+    keep_out: Sequence[Sequence[np.ndarray]]  # outlines of the keep-out regions of the reference, see `Trajectory`
+    doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit, see `Trajectory`
 
     __repr__ = record
 

@@ -16,7 +16,7 @@ from ..base.netcdf import Contents, Variable, save_netcdf
 from ..base.text import quantity
 from ..control import ANSWERS, Controller
 from ..figures.report import Report, Section
-from ..models.dimensions import over
+from ..models.motion_file import over
 from ..models.parsing import parse_yaml, to_yaml
 from ..models.robot import Robot
 from ..plant import Plant

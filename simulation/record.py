@@ -11,28 +11,14 @@ from ..models.robot import Robot
 
 
 class Period(NamedTuple):
-    """A period of parallel runs, from its beginning on. The next one overwrites its arrays.
+    """A period of parallel runs, from its beginning on. The next one overwrites its arrays."""
 
-    Attributes
-    ----------
-    number
-        Number of the period, from 0.
-    alive
-        Runs that have not diverged at its end, (N,).
-    motions, lengths
-        As `core.sense` writes them.
-    tensions
-        Mean tensions over the period, (N, m) [N].
-    command
-        Command of all runs; for a single run its arrays have no leading dimension.
-    """
-
-    number: int
-    alive: np.ndarray
-    motions: np.ndarray
-    lengths: np.ndarray
-    tensions: np.ndarray
-    command: Command
+    number: int  # number of the period, from 0
+    alive: np.ndarray  # runs that have not diverged at its end, (N,)
+    motions: np.ndarray  # as `core.sense` writes them
+    lengths: np.ndarray  # likewise
+    tensions: np.ndarray  # mean tensions over the period, (N, m) [N]
+    command: Command  # command of all runs; for a single run its arrays have no leading dimension
 
 
 class Record(Displayed):

@@ -1,6 +1,8 @@
 """Simulate one reference many times with different seeds, on workers and with a checkpoint: `fly_many`."""
 
 import hashlib
+import inspect
+import io
 import pickle
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext, suppress
@@ -9,6 +11,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
+from typing_extensions import override
 
 from ..base.checkpoint import Kind, open_checkpoint
 from ..base.errors import InputError
@@ -18,7 +22,6 @@ from ..control import Controller
 from ..plant import Plant
 from .experiment import Experiment, Wind
 from .flights import copies, fly_block, passed
-from .identity import identity
 from .run_statistics import FIGURES
 from .winds import MeanWind
 
@@ -28,7 +31,6 @@ TRIED = 10  # periods of one flight, which tell how large the first block may be
 FASTER = 8  # times as many flights in a block as in the longest that has been measured, at most
 PARTS = 4  # blocks for each worker, as far as there are flights, so that none waits long for the last
 FEWEST = 25  # flights in a block, unless they take long; with fewer side by side each takes longer
-
 KIND = Kind("flights", "block")  # a result is the figures of a block, by the number of its first flight
 Part = tuple[int, np.ndarray, float]  # of all flights: the first, figures, and the time that they took [s]
 
@@ -165,3 +167,31 @@ def _named(wind: Wind) -> str:
     """Return an identification of a wind, readable unless it is a user's function."""
     known = f"{wind} " if isinstance(wind, MeanWind) else ""
     return known + identity(wind)
+
+
+class _Pickler(pickle.Pickler):
+    """Pickle to bytes that are the same in each process, which are never read again."""
+
+    @override
+    def persistent_id(self, obj: Any) -> Any:
+        # Sets of names are iterated in another order in each process; models have one of the keys in their file.
+        if isinstance(obj, BaseModel):
+            return type(obj).__name__, obj.model_dump_json()
+        if isinstance(obj, set | frozenset):
+            return sorted(map(repr, obj))
+        return None
+
+
+def identity(something: Any) -> str:
+    """Return a hash of an object's content and of the source of its class or function, as far as there is one.
+
+    Raises `pickle.PicklingError`, `AttributeError` or `TypeError` if the object cannot be pickled.
+    """
+    stream = io.BytesIO()
+    _Pickler(stream).dump(something)
+    code = something if inspect.isroutine(something) else type(something)
+    try:
+        source = inspect.getsource(code)
+    except (OSError, TypeError):  # built in, or typed into a console
+        source = ""
+    return hashlib.sha256(stream.getvalue() + source.encode()).hexdigest()[:16]

@@ -18,17 +18,16 @@ from ..control import ANSWERS
 from ..figures.drawn import Filmed
 from ..figures.outlines import outline_variables
 from ..figures.report import Report, Reported, Section
-from ..models.dimensions import dimensions, motion_variables, over
-from ..models.motion_file import save_motion
+from ..models.motion_file import dimensions, motion_variables, over, save_motion
 from ..models.parsing import to_yaml
 from .data import SimulationData
-from .occurrences import occurrences, sentence
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
     from ..figures.animation import Scene
+from typing import NamedTuple
 
 RESOLVED = 0.01  # [mm]: the digits of a smaller position error mean nothing
 
@@ -207,3 +206,43 @@ class Simulation(SimulationData, Filmed, Reported):
             f"computed torque from t = {at:.3f} s on: {quantity(missed, 'm/s^2')} of the platform's acceleration "
             "was not predicted"
         )
+
+
+class Occurrence(NamedTuple):
+    """An event, or the first excess of a limit, at a time [s].
+
+    Its kind is "fault" (also of a stop, a push and any other event), "slack", "tension", "error" or "end".
+    """
+
+    at: float
+    kind: str
+    what: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it ready for JSON."""
+        return {"at_s": self.at, "kind": self.kind, "what": self.what}
+
+
+def occurrences(flight: SimulationData) -> list[Occurrence]:
+    """Return the events of a run and the first instants at which limits were exceeded, in order of time."""
+    found = [Occurrence(event.at, "fault", event.describe(flight.robot)) for event in flight.conditions.events]
+    if flight.slack.any():
+        row, cable = np.argwhere(flight.slack)[0]
+        found.append(Occurrence(float(flight.times[row]), "slack", f"the first cable to slacken was {cable + 1}"))
+    if (above := flight.above > 0).any():
+        row, cable = np.argwhere(above)[0]
+        found.append(
+            Occurrence(float(flight.times[row]), "tension", f"cable {cable + 1} was the first above its t_max")
+        )
+    if (beyond := ~(flight.error <= flight.tolerance)).any():
+        within = quantity(1e3 * flight.tolerance, "mm")
+        found.append(Occurrence(float(flight.times[np.argmax(beyond)]), "error", f"the error exceeded {within}"))
+    if flight.lasted < len(flight.references):
+        found.append(Occurrence(flight.lasted * flight.period, "end", "the simulation diverged"))
+    shown = [event for event in found if event.at <= max(flight.lasted, 1) * flight.period]
+    return sorted(shown, key=lambda event: event.at)
+
+
+def sentence(of: list[Occurrence]) -> str:
+    """Return them in one sentence."""
+    return "; ".join(f"{event.what} at {event.at:.4g} s" for event in of)

@@ -22,25 +22,16 @@ class Facets(Displayed):
     """Half-spaces of N available wrench sets.
 
     w is available if and only if low <= normals @ w <= high and outside @ (w - offset) = 0.
-
-    Attributes
-    ----------
-    normals
-        (N, K, n), of length one. Directions that are no facet's are among them; they do no harm, as each of them
-        bounds the set where it ends.
-    low, high
-        The minimum and the maximum along each normal, (N, K) [N].
-    outside
-        Projection on the wrenches that no tensions can give, (N, n, n); zero where A has n independent columns.
-    offset
-        A wrench of the set's plane, (N, n) [N].
     """
 
-    normals: np.ndarray  # (N, K, n)
-    low: np.ndarray  # (N, K)
+    # (N, K, n), of length one. Directions that are no facet's are among them; they do no harm, as each of them bounds
+    # the set where it ends.
+    normals: np.ndarray
+    low: np.ndarray  # the minimum and the maximum along each normal, (N, K) [N]
     high: np.ndarray  # (N, K)
-    outside: np.ndarray  # (N, n, n)
-    offset: np.ndarray  # (N, n)
+    # Projection on the wrenches that no tensions can give, (N, n, n); zero where A has n independent columns.
+    outside: np.ndarray
+    offset: np.ndarray  # A wrench of the set's plane, (N, n) [N]
 
 
 def facets(A: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> Facets:

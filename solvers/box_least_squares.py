@@ -24,18 +24,12 @@ _STILL = 1e-5
 
 
 class Projection(NamedTuple):
-    """The projection of w on the available wrench set, in newtons (moments divided by the problem's length).
+    """The projection of w on the available wrench set, in newtons (moments divided by the problem's length)."""
 
-    Attributes
-    ----------
-    closest :
-        Tensions inside the limits whose wrench is nearest to w [N], shape (m,). The wrench is unique, they need not be.
-    residual :
-        What they do not reach, S (w - A closest) [N], shape (n,), orthogonal to the last digit to every cable that is
-        not at a limit. It has that accuracy relative to its own length, however short it is beside w.
-    """
-
+    # Tensions inside the limits whose wrench is nearest to w [N], shape (m,). The wrench is unique, they need not be.
     closest: Array
+    # What they do not reach, S (w - A closest) [N], shape (n,), orthogonal to the last digit to every cable that is not
+    # at a limit. It has that accuracy relative to its own length, however short it is beside w.
     residual: Array
 
 

@@ -12,8 +12,8 @@ from ..core import CABLES, ROWS, solve_packed
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
 from .methods import METHODS
-from .methods.active_set import ActiveSet
 from .methods.method import Method, Proposal
+from .methods.qp import ActiveSet
 from .problem import Array, TensionProblem
 from .solution import TensionSolution
 from .standard_form import StandardForm, standard_forms

@@ -13,13 +13,13 @@ from ..models.body import surface
 from ..models.dynamics import dynamics_of
 from ..models.points import placed
 from ..models.robot import Robot
-from ..models.rotor_discs import rotor_discs
 
 if TYPE_CHECKING:
     import xarray as xr
 
 TRAIL = 5000  # points of the trail at most
 LONGEST = 100  # letters of the title
+ROUND = np.linspace(0.0, 2 * np.pi, 33)
 
 
 def scene(robot: Robot, dataset: xr.Dataset, times: np.ndarray) -> Scene:
@@ -52,3 +52,17 @@ def scene(robot: Robot, dataset: xr.Dataset, times: np.ndarray) -> Scene:
         surface=None if body is None else placed(poses[rows], surface(body)),
         cut=dataset["cut"].to_numpy()[rows] > 0 if "cut" in dataset else None,
     )
+
+
+def rotor_discs(robot: Robot, carriers: np.ndarray) -> np.ndarray:
+    """Return a circle with the radius of each carrier that has rotors, (k, r, p, 3) in {G} [m].
+
+    Parameters
+    ----------
+    carriers
+        Poses of all carriers, (k, c, 6) [m, rad].
+    """
+    which = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.rotors]
+    circle = np.stack([np.cos(ROUND), np.sin(ROUND), np.zeros_like(ROUND)], axis=1)
+    circles = [placed(carriers[:, index], robot.carrier_radius[index] * circle) for index in which]
+    return np.stack(circles, axis=1) if which else np.zeros((len(carriers), 0, len(ROUND), 3))

@@ -14,8 +14,8 @@ from towline.figures.animation import Scene
 from towline.figures.convergence import convergence
 from towline.figures.curve_in_space import curve_in_space
 from towline.figures.curves import Panel, curves
-from towline.figures.from_above import from_above
 from towline.figures.views import views
+from towline.studies.flying.pairing import from_above
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

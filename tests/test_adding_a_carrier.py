@@ -14,9 +14,8 @@ from towline.base.errors import InputError
 from towline.export.mjcf import to_mjcf
 from towline.models import carriers
 from towline.models.carriers import Carrier, GroundCarrier
-from towline.models.parsing import parse_yaml, to_yaml
+from towline.models.parsing import json_schema, parse_yaml, to_yaml
 from towline.models.robot import Robot
-from towline.models.schema import json_schema
 from towline.ocp import time_along
 from towline.ocp.reports.drawings import drawings
 from towline.viewer.geometry import Geometry

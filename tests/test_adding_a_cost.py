@@ -10,7 +10,7 @@ import pytest
 from towline import Task, plan, sweep
 from towline.base.errors import InputError
 from towline.models.parsing import parse_yaml, to_yaml
-from towline.ocp.audits.cost import cost
+from towline.ocp.audits.violation import cost
 from towline.ocp.costs import Cost, RateCost
 
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-a-cost.md").read_text()

@@ -15,7 +15,7 @@ from towline.control import ComputedTorque, Reference, State
 from towline.core._core import sense
 from towline.estimation.calibration.geometry import runs
 from towline.estimation.calibration.parameters import Parameters
-from towline.export.step.mechanics import mechanics
+from towline.export.step.export import mechanics
 from towline.models import Dynamics, Robot, load, points, pose_from_lengths, rotation
 from towline.models.part import inertia_matrix
 from towline.ocp.tasks.scenario import _pose_in

@@ -7,10 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from towline.base.errors import InputError
-from towline.benchmarks.control import run
+from towline.benchmarks.control import TASKS, Task, record, run
 from towline.benchmarks.control_contenders import CONTENDERS, REFERENCE, TOWLINE, Contender, condense, horizon_of
 from towline.benchmarks.control_programs import measure
-from towline.benchmarks.control_tasks import TASKS, Task, record
 from towline.cli.bench import app
 from towline.control import Predictive
 from towline.models import load

@@ -6,8 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import Robot, load, plan
 from towline.models.parsing import parse_yaml, to_yaml
-from towline.models.rotor_discs import rotor_discs
-from towline.statics.scene import scene
+from towline.statics.scene import rotor_discs, scene
 from towline.viewer.shapes import rotors
 
 QUAD = {

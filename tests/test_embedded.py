@@ -10,8 +10,7 @@ import pytest
 import towline
 from towline import Robot, available, load, solve_batch
 from towline.export.step.costs import costs
-from towline.export.step.export import step_files
-from towline.export.step.mechanics import mechanics, moving_carriers
+from towline.export.step.export import mechanics, moving_carriers, step_files
 from towline.models import Dynamics
 from towline.models.tape_c import operations
 from towline.solvers.status import STATUSES

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan, time_along
-from towline.ocp.audits.cost import cost
+from towline.ocp.audits.violation import cost
 from towline.ocp.proofs.durations import durations
 from towline.ocp.search.start import deviation_from
 from towline.ocp.search.time_law import fastest

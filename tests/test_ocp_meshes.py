@@ -18,7 +18,7 @@ from towline.models.parsing import to_yaml
 from towline.ocp import plan, read_task
 from towline.ocp.audits.audit import audit
 from towline.ocp.limits.clearance import cable_outside, point_outside
-from towline.ocp.reports.keep_out import outline
+from towline.ocp.reports.trajectory import outline
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task_limits import Block, ConvexMesh
 

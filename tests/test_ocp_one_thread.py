@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from towline.ocp.nlp.one_thread import VARIABLES
+from towline.ocp.nlp.solver import VARIABLES
 
 SCRIPT = """
 import time

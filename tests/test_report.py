@@ -21,8 +21,8 @@ from towline.figures.style import typeset
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.excess import Excess
-from towline.ocp.reports.keep_out import outline
 from towline.ocp.reports.report import headline, sections, spans_table, stages_table
+from towline.ocp.reports.trajectory import outline
 from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
 from towline.solvers import TensionProblem, certify
 from towline.statics.scene import scene

@@ -19,25 +19,13 @@ ACCEPTED, REFUSED = style.colour(2), style.colour(5)  # bluish green and orange:
 
 @dataclass(frozen=True)
 class Cloud(Displayed):
-    """Coloured points in {G}.
+    """Coloured points in {G}."""
 
-    Attributes
-    ----------
-    positions, colours
-        (n, 3) [m] and bytes (n, 3).
-    legend
-        (name, colour) pairs.
-    summary
-        The number of points, as a sentence.
-    dataset
-        Source dataset.
-    """
-
-    positions: np.ndarray
-    colours: np.ndarray
-    legend: list[tuple[str, str]]
-    summary: str
-    dataset: xr.Dataset
+    positions: np.ndarray  # (n, 3) [m]
+    colours: np.ndarray  # bytes (n, 3)
+    legend: list[tuple[str, str]]  # (name, colour) pairs
+    summary: str  # the number of points, as a sentence
+    dataset: xr.Dataset  # source dataset
 
 
 def cloud(dataset: xr.Dataset, where: str) -> Cloud:

@@ -15,19 +15,11 @@ POINTS = 240  # of a curve, about one for each pixel of the panel
 
 @dataclass(frozen=True)
 class Curves(Displayed):
-    """Tensions and margins of a motion at k of its instants, which include its worst.
+    """Tensions and margins of a motion at k of its instants, which include its worst."""
 
-    Attributes
-    ----------
-    times
-        (k,) [s], increasing.
-    tensions, margins
-        (k, m) and (k,) [N], nan where there are no tensions.
-    """
-
-    times: np.ndarray
-    tensions: np.ndarray
-    margins: np.ndarray
+    times: np.ndarray  # (k,) [s], increasing
+    tensions: np.ndarray  # (k, m) [N], nan where there are no tensions
+    margins: np.ndarray  # (k,) [N], nan there too
 
     @property
     def infeasible(self) -> np.ndarray:

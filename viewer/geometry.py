@@ -20,22 +20,12 @@ CELLS = 10  # of the grid along the robot's size, about
 
 
 class Points(NamedTuple):
-    """Points of m cables in {G} [m].
+    """Points of m cables in {G} [m]."""
 
-    Attributes
-    ----------
-    anchors, attachments
-        (..., m, 3).
-    exits
-        Where each cable leaves its pulley, (..., m, 3); the anchor if it has none.
-    com
-        Centre of mass of the platform, (..., 3).
-    """
-
-    anchors: np.ndarray
-    exits: np.ndarray
-    attachments: np.ndarray
-    com: np.ndarray
+    anchors: np.ndarray  # (..., m, 3)
+    exits: np.ndarray  # where each cable leaves its pulley, (..., m, 3); the anchor if it has none
+    attachments: np.ndarray  # (..., m, 3)
+    com: np.ndarray  # centre of mass of the platform, (..., 3)
 
 
 class Extent(NamedTuple):

@@ -11,7 +11,6 @@ from ..base.errors import InputError, TowlineError
 from ..workspace.surface import Surface
 from ..workspace.surface import surface as surface_of
 from . import labels
-from .film import film
 from .frames import Frames
 from .geometry import FARTHEST
 from .posing import Posing
@@ -26,8 +25,16 @@ if TYPE_CHECKING:
     from .snapshot import Snapshot
     from .stage import Stage
     from .subject import Subject
+import tempfile
+from pathlib import Path
+
+from ..figures.animation import FASTEST, draw, timing
+from ..statics.scene import scene
+from .replay import Replay
 
 PATIENCE = 60.0  # [s] for a browser to draw a picture
+RATE = 12.5  # [1/s]
+LONGEST = 12.0  # [s] of the film: longer motions are shown faster
 
 
 class Panel:
@@ -156,3 +163,12 @@ def _send_picture(client: viser.ClientHandle | None, name: str) -> None:
     file = io.BytesIO()
     imsave(file, np.clip(picture[..., :3] * opaque + 1.0 - opaque, 0.0, 1.0), format="png")
     client.send_file_download(name, file.getvalue(), save_immediately=True)
+
+
+def film(replay: Replay) -> bytes:
+    """Return a film of the saved instants of a replay as GIF."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.gif"
+        speed = min(max(replay.duration / LONGEST, 1.0), FASTEST)
+        when = timing(path, replay.duration, float(f"{speed:.2g}"), RATE)
+        return draw(scene(replay.robot, replay.dataset, when.times), when, path).read_bytes()

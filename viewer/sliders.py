@@ -15,23 +15,13 @@ TILT = 0.6  # [rad] of carriers that have no limit of their own
 
 
 class Slider(NamedTuple):
-    """A slider for one coordinate.
+    """A slider for one coordinate."""
 
-    Attributes
-    ----------
-    carrier
-        Index of its carrier, or None for the platform.
-    coordinate
-        Index in (x, y, z, roll, pitch, yaw).
-    low, high, step
-        [m] or [rad].
-    """
-
-    carrier: int | None
-    coordinate: int
-    low: float
-    high: float
-    step: float
+    carrier: int | None  # index of its carrier, or None for the platform
+    coordinate: int  # index in (x, y, z, roll, pitch, yaw)
+    low: float  # [m] or [rad]
+    high: float  # likewise
+    step: float  # likewise
 
     @property
     def label(self) -> str:

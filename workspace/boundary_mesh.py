@@ -20,18 +20,10 @@ MOST_CELLS = 512  # along an edge: 10^8 poses at once
 
 @dataclass(frozen=True, eq=False)
 class Mesh(Displayed):
-    """Triangles, counter-clockwise when seen from outside.
+    """Triangles, counter-clockwise when seen from outside."""
 
-    Attributes
-    ----------
-    vertices
-        Vertices in {G}, (n, 3) [m].
-    faces
-        Indices of vertices, (k, 3); empty if the workspace is.
-    """
-
-    vertices: np.ndarray  # (n, 3)
-    faces: np.ndarray  # (k, 3)
+    vertices: np.ndarray  # vertices in {G}, (n, 3) [m]
+    faces: np.ndarray  # indices of vertices, (k, 3); empty if the workspace is
 
     @property
     def volume(self) -> float:

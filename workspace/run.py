@@ -20,8 +20,7 @@ from ..base.inputs import one_of, required, shown, whole_number, with_fields
 from ..base.version import __version__
 from ..models import Robot
 from .condition import Condition, condition_from, for_robots
-from .counting import Counter
-from .counts import Counts
+from .counts import Counter, Counts
 from .dataset import dataset
 from .domain import Domain
 from .refinement import Refinement

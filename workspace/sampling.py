@@ -22,21 +22,12 @@ MOST_SOBOL = 2**32
 
 @dataclass(frozen=True)
 class Sampler(Displayed):
-    """Points of the unit cube of as many dimensions as `extent` has.
+    """Points of the unit cube of as many dimensions as `extent` has."""
 
-    Attributes
-    ----------
-    method
-        random, sobol or grid.
-    requested
-        Number of samples that was requested; a grid has at most this many, `samples`.
-    extent
-        Ranges of the quantities, (d,) [m, rad]; the cells of a grid are about equally long in all of them.
-    """
-
-    method: str
-    requested: int
+    method: str  # random, sobol or grid
+    requested: int  # number of samples that was requested; a grid has at most this many, `samples`
     seed: int
+    # Ranges of the quantities, (d,) [m, rad]; the cells of a grid are about equally long in all of them.
     extent: tuple[float, ...]
 
     @cached_property
@@ -51,7 +42,7 @@ class Sampler(Displayed):
 
     def units(self, chunk: int) -> np.ndarray:
         """Return the points of a chunk, (n, d), between 0 and 1."""
-        count, dimension = size_of(chunk, self.samples), len(self.extent)
+        count, dimension = min(CHUNK, self.samples - chunk * CHUNK), len(self.extent)
         if self.method == "random":
             key = np.array([self.seed, chunk], dtype=np.uint64)
             return np.random.Generator(np.random.Philox(key=key)).random((count, dimension))
@@ -64,11 +55,6 @@ class Sampler(Displayed):
 def chunks_of(samples: int) -> int:
     """Return the number of chunks for a number of samples."""
     return -(-samples // CHUNK)
-
-
-def size_of(chunk: int, samples: int) -> int:
-    """Return the number of samples in a chunk; only the last chunk has fewer than `CHUNK`."""
-    return min(CHUNK, samples - chunk * CHUNK)
 
 
 def cells_of(extent: np.ndarray, most: int) -> tuple[int, ...]:

@@ -27,23 +27,12 @@ BANDS = 8  # of colour
 
 @dataclass(frozen=True, eq=False)
 class Surface(Displayed):
-    """The boundary of a workspace, and the margins inside it.
+    """The boundary of a workspace, and the margins inside it."""
 
-    Attributes
-    ----------
-    mesh
-        The boundary.
-    axes
-        Coordinates of the grid's points along each axis of {G} [m].
-    shares
-        Accepted fraction of the samples at each point of the grid.
-    margins
-        Capacity margin at rest at each point of the grid with attitude and carriers at home [N], at least 0.
-    """
-
-    mesh: Mesh
-    axes: tuple[np.ndarray, ...]
-    shares: np.ndarray
+    mesh: Mesh  # the boundary
+    axes: tuple[np.ndarray, ...]  # coordinates of the grid's points along each axis of {G} [m]
+    shares: np.ndarray  # accepted fraction of the samples at each point of the grid
+    # Capacity margin at rest at each point of the grid with attitude and carriers at home [N], at least 0.
     margins: np.ndarray
 
     @property

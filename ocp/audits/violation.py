@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..result import PlanData
 from ..tasks.scenario import Scenario
 from .audit import Audit
 from .excess import Excess
@@ -29,3 +30,10 @@ def _share(scenario: Scenario, excess: Excess) -> float:
     quantity = excess.unit.partition("/")[0].partition(",")[0].strip()
     scale = {"m": length, "N": force, "N m": force * length}.get(quantity, 1.0)
     return abs(excess.value - excess.bound) / (abs(excess.bound) or scale)
+
+
+def cost(plan: PlanData) -> float:
+    """Return the objective of a feasible plan without free coordinates, but for the jerk that it does not have."""
+    audit, task = plan.audit, plan.scenario.task
+    margin = 0.0 if plan.margin is None else plan.margin - task.margin
+    return plan.scenario.costs.along(audit.times, audit.motion, audit.carriers, audit.tensions, margin)

@@ -20,21 +20,12 @@ MISSED = 0.1  # of the weight, which few cables cannot balance to the last bit; 
 
 
 class Kept(NamedTuple):
-    """By how much limits are kept by n poses at rest.
+    """By how much limits are kept by n poses at rest."""
 
-    Attributes
-    ----------
-    slack
-        (n,) [m]: by how much everything that moves may move before a limit is exceeded; negative where one is.
-    points
-        (n, k, 3) [m]: what moves: attachments, anchors, and corners of bodies.
-    worst
-        (n,) index of the limit that is kept by least; -1 where there are no tensions.
-    """
-
+    # (n,) [m]: by how much everything that moves may move before a limit is exceeded; negative where one is.
     slack: np.ndarray
-    points: np.ndarray
-    worst: np.ndarray
+    points: np.ndarray  # (n, k, 3) [m]: what moves: attachments, anchors, and corners of bodies
+    worst: np.ndarray  # (n,) index of the limit that is kept by least; -1 where there are no tensions
 
 
 class AtRest:

@@ -5,13 +5,18 @@ limit at rest (`need`), two trees of configurations grow from start and end (`tr
 and the shape of its formation (`space`). A configuration is clear if tensions exist there at rest and all limits are
 kept by a reserve (`at_rest`). A straight piece between two is clear if no distance can be exceeded between the
 configurations that are checked (`clear_space`). Motion is left to the program.
+
+In a narrow gap hardly any formation is clear, and trees that change position and formation together rarely find the way
+to it. A formation that passes the gap is found there; with it, only positions are searched.
 """
 
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.random import Generator
 
 from ...base.display import Displayed
 from ...base.text import quantity
@@ -23,7 +28,6 @@ from .at_rest import AtRest
 from .clear_space import ClearSpace
 from .end_formations import with_clear_ends
 from .need import STILL, limit_name
-from .one_formation import in_one_formation
 from .smoothing import rounded, shortened
 from .space import Space
 from .tree import connect
@@ -34,6 +38,7 @@ MOST, MOST_OF_TEAM = (20_000, 30_000), (5_000, 60_000)  # configurations that ar
 IN_ONE_FORMATION = 0.2  # of the configurations
 AGAIN = 1.0  # of what the first path took: what is spent on a shorter one, past other sides of obstacles
 PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a unit of length in a unit of time
+ON_THE_WAY, IN_PLACE = 3_000, 2_000  # configurations for one formation's way, and for its change at an end
 
 
 @dataclass(frozen=True)
@@ -119,3 +124,36 @@ def _connected(clear: ClearSpace, rng: np.random.Generator, longest: float = np.
     if path is None:
         path = connect(clear, start, end, clear.targets(rng, longest), slides=rng if clear.space.shaped else None)
     return None if path is None else GlobalPath(clear.space, rounded(shortened(path, clear, rng), clear))
+
+
+def in_one_formation(clear: ClearSpace, rng: Generator, most: float) -> np.ndarray | None:
+    """Return clear configurations (k, count) from start to end, or None if at `most` so many do not show them."""
+    start, end = clear.space.ends
+    formation, most = clear.space.groups[-1], min(clear.evaluated + most, clear.most)
+    while clear.evaluated < most and clear.in_time:
+        fitting = clear.fitting(rng)
+        if fitting is None:
+            continue
+        first, last = (np.where(formation, fitting, each) for each in (start, end))
+        if not clear.are_clear(np.stack([first, last])):
+            continue
+        way = connect(clear, first, last, _positions(clear, rng, fitting), ON_THE_WAY)
+        before = None if way is None else connect(clear, start, first, _formations(clear, rng, start), IN_PLACE)
+        after = None if before is None else connect(clear, last, end, _formations(clear, rng, end), IN_PLACE)
+        if way is not None and before is not None and after is not None:
+            return np.vstack([before, way[1:], after[1:]])
+    return None
+
+
+def _positions(clear: ClearSpace, rng: Generator, fitting: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield random positions and attitudes with one formation."""
+    while True:
+        yield np.where(clear.space.groups[-1], fitting, clear.space.sample(rng))
+
+
+def _formations(clear: ClearSpace, rng: Generator, at: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield random formations in place."""
+    while True:
+        target = at.copy()
+        target[clear.space.groups[-1]] = clear.space.sample_shape(rng)
+        yield target

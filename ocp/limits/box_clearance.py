@@ -9,14 +9,16 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 
-from .piecewise import within_segment
-
 Point: TypeAlias = Any  # (3, 1), SX or DM
 _Line: TypeAlias = tuple[Any, Any]  # height above a face at the start of a segment, and its change to the end [m]
-
 _TINY = 1e-12  # [m^2], keeps the root's derivative finite where things touch
 _FINE = 2.0**-40  # of a segment
 _FLAT = 1e-12  # share of a segment's squared length: less of it along the axes that count is a segment beside the box
+
+
+def within_segment(share: Any) -> Any:
+    """Return the share of a segment that is nearest to this one, from 0 to 1."""
+    return ca.fmin(ca.fmax(share, 0.0), 1.0)
 
 
 @cache

@@ -9,7 +9,7 @@ from typing_extensions import override
 from ...models import Robot
 from .clearance import between_cables
 from .distance import Distance, Pair
-from .limit import Limit
+from .limit import Limit, Rate
 from .state import State
 
 SMALLEST = 1e-3  # [m], of the scale of a length
@@ -96,3 +96,28 @@ def _share_an_end(robot: Robot, i: int, j: int) -> bool:
     of_carrier = robot.carrier_of_cable
     same_anchor = of_carrier[i] == of_carrier[j] and np.array_equal(robot.anchors[i], robot.anchors[j])
     return same_anchor or np.array_equal(robot.attachments[i], robot.attachments[j])
+
+
+class Margin(Limit):
+    """Keep each tension inside its limits by a margin. Only soft: a hard margin bounds the tensions themselves."""
+
+    name, unit = "margin", "N"
+
+    def __init__(self, robot: Robot, least: float):
+        self.low, self.scale = least, robot.force_scale
+        self.labels = names(robot) * 2
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        low, high = ca.DM(state.robot.t_min), ca.DM(state.robot.t_max)
+        return ca.vertcat(state.tensions - low, high - state.tensions)
+
+
+class TensionRate(EachCable, Rate):
+    """Limit the rate of each tension."""
+
+    name, unit = "tension_rate", "N/s"
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        return state.tensions

@@ -9,9 +9,8 @@ from typing import Any, TypeAlias
 import casadi as ca
 
 from ...models.shapes import Block, Capsule, ConvexMesh, Shape, Sphere
-from .box_clearance import segment_outside_box
+from .box_clearance import segment_outside_box, within_segment
 from .convex_clearance import cable_outside_mesh, point_outside_mesh
-from .piecewise import within_segment
 
 Point: TypeAlias = Any  # (3, 1), SX or DM
 Place: TypeAlias = Shape

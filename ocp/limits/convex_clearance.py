@@ -13,7 +13,7 @@ import numpy as np
 from ...models.part import Pose, Vector3
 from ...models.polyhedron import Polyhedron
 from ...models.shapes import ConvexMesh
-from .piecewise import within_segment
+from .box_clearance import within_segment
 
 Point: TypeAlias = Any  # (3, 1), SX or DM
 

@@ -34,19 +34,11 @@ AHEAD = 0.1  # of the path: where it begins to change
 
 @dataclass(frozen=True)
 class Formation(Displayed):
-    """The deviation of a formation from that at home, along the path.
-
-    Attributes
-    ----------
-    shares
-        (k,) of the duration.
-    shape
-        (k, 4): lateral [m], vertical [m], yaw [rad] and squeeze.
-    """
+    """The deviation of a formation from that at home, along the path."""
 
     scenario: Scenario
-    shares: np.ndarray
-    shape: np.ndarray
+    shares: np.ndarray  # (k,) of the duration
+    shape: np.ndarray  # (k, 4): lateral [m], vertical [m], yaw [rad] and squeeze
 
     def motion(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the poses of the platform (n, 6) and of the carriers (n, c, 6) at `times` [s]."""

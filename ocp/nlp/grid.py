@@ -14,23 +14,12 @@ LEAST = 4  # steps of a phase, where there are enough
 
 @dataclass(frozen=True)
 class Grid(Displayed):
-    """The points of a program.
+    """The points of a program."""
 
-    Attributes
-    ----------
-    shares
-        Where all points are, inner ones too, (k,), from 0 to 1 of the duration.
-    weights
-        Of the mean over the duration, at the points, (k,).
-    steps
-        The length of each interval at the scenario's duration, (n,) [s].
-    take_up
-        The duration of the phase on the ground of which an interval is a part, (n,) [s]; 0: it is of none.
-    """
-
-    shares: np.ndarray
-    weights: np.ndarray
-    steps: np.ndarray
+    shares: np.ndarray  # where all points are, inner ones too, (k,), from 0 to 1 of the duration
+    weights: np.ndarray  # of the mean over the duration, at the points, (k,)
+    steps: np.ndarray  # the length of each interval at the scenario's duration, (n,) [s]
+    # The duration of the phase on the ground of which an interval is a part, (n,) [s]; 0: it is of none.
     take_up: np.ndarray
 
     @staticmethod

@@ -14,8 +14,19 @@ from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .layout import Layout
 from .part import Constraints, Part, part_of
-from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread, stretch
-from .thin import swept
+from .rows import (
+    OTHER_COSTS,
+    Mesh,
+    Row,
+    bounded,
+    costs_at,
+    in_world,
+    motions,
+    reference_symbols,
+    spread,
+    stretch,
+    swept,
+)
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
 

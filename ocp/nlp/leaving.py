@@ -14,8 +14,7 @@ from ..limits import Body
 from ..limits.limits import motions as whole_motions
 from ..tasks.ends import fixed_values
 from ..tasks.scenario import Scenario
-from .columns import Columns
-from .derivatives import Block
+from .derivatives import Block, Columns
 from .held import at_ends, held_spans
 from .layout import Layout
 from .part import function_of

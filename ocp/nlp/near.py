@@ -20,18 +20,10 @@ from ..tasks.scenario import Scenario
 
 @dataclass(frozen=True)
 class Near(Displayed):
-    """The points at which a program keeps each limit, or each distance of one: of limits that are not local all.
+    """The points at which a program keeps each limit, or each distance of one: of limits that are not local all."""
 
-    Attributes
-    ----------
-    chosen
-        (parts, points), see `parts`.
-    holds
-        Where each is in force, (parts, points); default: everywhere.
-    """
-
-    chosen: np.ndarray
-    holds: np.ndarray | None = None
+    chosen: np.ndarray  # (parts, points), see `parts`
+    holds: np.ndarray | None = None  # where each is in force, (parts, points); default: everywhere
 
     @classmethod
     def everywhere(cls, scenario: Scenario, shares: np.ndarray) -> Self:

@@ -5,15 +5,14 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from ...models.rigid_body import aerodynamic_wrench
 from ...models.rotation import rotation
-from ...models.wind import aerodynamic_wrench
 from ..limits import Rate
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
 from .part import Constraints, Part, part_of
-from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread
-from .thin import swept
+from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread, swept
 
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight

@@ -15,23 +15,12 @@ Constraints: TypeAlias = tuple[list[ca.SX], list[Row]]  # values, and their name
 
 
 class Part(NamedTuple):
-    """A node or an interval.
+    """A node or an interval."""
 
-    Attributes
-    ----------
-    cost
-        A function of its own, since IPOPT evaluates objective and constraints one after the other.
-    function
-        The values of its rows.
-    rows
-        Names and bounds of these.
-    local
-        Index of each local limit, what returns the function of some of its values, and its rows.
-    """
-
-    cost: ca.Function
-    function: ca.Function
-    rows: list[Row]
+    cost: ca.Function  # A function of its own, since IPOPT evaluates objective and constraints one after the other
+    function: ca.Function  # the values of its rows
+    rows: list[Row]  # names and bounds of these
+    # Index of each local limit, what returns the function of some of its values, and its rows.
     local: list[tuple[int, Callable[[list[int]], ca.Function], list[Row]]]
 
 

@@ -32,8 +32,7 @@ from ..tasks.ends import carrier_ends, fixed_values
 from ..tasks.paths import RestPath, WaypointPath
 from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
-from .columns import Columns
-from .derivatives import Block, Mapped, derivatives
+from .derivatives import Block, Columns, Mapped, derivatives
 from .grid import Grid
 from .held import eased, held_wrench
 from .interval import interval_of, points
@@ -47,40 +46,22 @@ from .rows import Mesh, Row, stretch
 
 @dataclass(frozen=True)
 class Program(Displayed):
-    """A nonlinear program in CasADi's form, its bounds, and how to read its solution.
-
-    Attributes
-    ----------
-    problem
-        {"x", "p", "f", "g"} for `casadi.nlpsol`.
-    lower, upper, lower_g, upper_g
-        Bounds of x and g.
-    near
-        Where it has the rows of local limits.
-    costs
-        What the objective sums, and the weights of their sets.
-    blocks
-        The rows of g, in their order.
-    local
-        How many of the first blocks are of local limits.
-    parameters
-        Values of the parameters p of `problem`; only a movable one has some.
-    """
+    """A nonlinear program in CasADi's form, its bounds, and how to read its solution."""
 
     scenario: Scenario
     mesh: Mesh
     layout: Layout
     shares: np.ndarray  # (k,) of the duration, where the points are
-    problem: dict[str, ca.MX]
-    lower: np.ndarray
-    upper: np.ndarray
-    lower_g: np.ndarray
-    upper_g: np.ndarray
-    near: Near
-    costs: list[tuple[Mapped, np.ndarray]]
-    blocks: list[Block]
-    local: int
-    parameters: np.ndarray
+    problem: dict[str, ca.MX]  # {"x", "p", "f", "g"} for `casadi.nlpsol`
+    lower: np.ndarray  # bounds of x and g
+    upper: np.ndarray  # likewise
+    lower_g: np.ndarray  # likewise
+    upper_g: np.ndarray  # likewise
+    near: Near  # where it has the rows of local limits
+    costs: list[tuple[Mapped, np.ndarray]]  # what the objective sums, and the weights of their sets
+    blocks: list[Block]  # the rows of g, in their order
+    local: int  # how many of the first blocks are of local limits
+    parameters: np.ndarray  # values of the parameters p of `problem`; only a movable one has some
 
     def of(self, scenario: Scenario) -> Program:
         """Return the program, which has parameters, of another scenario that differs in its references and ends only.

@@ -10,12 +10,13 @@ import numpy as np
 from ...base.display import Displayed
 from ..limits import Limit
 from ..tasks.bernstein import Values
-from ..tasks.scenario import Scenario
+from ..tasks.scenario import POSITION, Scenario
 from .held import Spans, held_spans
 from .layout import DURATION, MARGIN, Layout
 
 OTHER_COSTS = 1e-6  # of all but the missing wrench, in the elastic program: which is then the least there is
 MANY = 12  # free coordinates: robots with more are teams
+STEPS = 4  # a motion is rarely that many times as fast as its reference
 
 
 class Row(NamedTuple):
@@ -30,27 +31,15 @@ class Row(NamedTuple):
 
 @dataclass(frozen=True)
 class Mesh(Displayed):
-    """The number of intervals of a program, and its distance from the limits.
+    """The number of intervals of a program, and its distance from the limits."""
 
-    Attributes
-    ----------
-    steps
-        Intervals.
-    reserve
-        Further distance from the tension limits [N], for what happens between the nodes.
-    shrink
-        Share by which the limits of the task and of the carriers are reduced, for the same reason (`Limit.rows`).
-    further
-        Name of a limit, what it is about, and the share by which it is reduced beside, as an audit missed it.
-    elastic
-        Whether A t = w + s with a high cost on the slack s, so that there is always a solution.
-    """
-
-    steps: int
-    reserve: float = 0.0
+    steps: int  # intervals
+    reserve: float = 0.0  # further distance from the tension limits [N], for what happens between the nodes
+    # Share by which the limits of the task and of the carriers are reduced, for the same reason (`Limit.rows`).
     shrink: float = 0.0
+    # Name of a limit, what it is about, and the share by which it is reduced beside, as an audit missed it.
     further: tuple[tuple[str, str, float], ...] = ()
-    elastic: bool = False
+    elastic: bool = False  # whether A t = w + s with a high cost on the slack s, so that there is always a solution
 
     def shrink_of(self, limit: Limit) -> float:
         """Return the share by which a limit is reduced."""
@@ -138,3 +127,19 @@ def in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.S
     if not scenario.relative:
         return platform
     return list(scenario.dynamics.relative.motion_in_world(*platform, *carriers[0]))
+
+
+def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
+    """Return the limits that the program keeps between nodes rather than at them, and their functions.
+
+    They are distances from regions that are thinner than a few steps of the reference motion. The result is
+    empty for teams, since four quadrotors took four times as long through a slot.
+    """
+    if scenario.count > MANY:
+        return {}
+    platform, carriers = scenario.references(scenario.scheme.shares(mesh.steps) * scenario.duration)
+    ways = [np.diff(motion.pose[:, POSITION], axis=0) for motion in (platform, *carriers)]
+    longest = max(float(np.linalg.norm(way, axis=1).max()) for way in ways)  # from node to node
+    thin = [limit for limit in scenario.limits if limit.thickness < STEPS * longest]
+    functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
+    return {limit: function for limit, function in functions.items() if function is not None}

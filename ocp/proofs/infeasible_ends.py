@@ -31,17 +31,10 @@ GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube,
 
 
 class InfeasibleEnds(NamedTuple):
-    """The proof that no motion keeps a task's limits.
+    """The proof that no motion keeps a task's limits."""
 
-    Attributes
-    ----------
-    excess
-        Each limit that is exceeded whatever the planner chooses, where it is exceeded by most.
-    certificate
-        That of an end at which no tensions exist; None if both ends have tensions or are not fixed.
-    """
-
-    excess: list[Excess]
+    excess: list[Excess]  # each limit that is exceeded whatever the planner chooses, where it is exceeded by most
+    # That of an end at which no tensions exist; None if both ends have tensions or are not fixed.
     certificate: Certificate | None
 
     def describe(self) -> str:

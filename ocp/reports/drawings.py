@@ -13,11 +13,11 @@ from ...figures.limits import limits
 from ...figures.views import views
 from ...statics.scene import scene
 from ..result import PlanData
-from .limited import limited
 from .trajectory import output_rows
 
 if TYPE_CHECKING:
     import xarray as xr
+from ...figures.limits import Limited
 
 INSTANTS = 60  # along the carriers' paths in the views
 
@@ -38,3 +38,17 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
     if plan.iterates:
         drawn["convergence"] = Drawing("Convergence of the solver", convergence(plan.iterates))
     return drawn
+
+
+def limited(plan: PlanData, rows: np.ndarray) -> list[Limited]:
+    """Return the limits of task, robot and carriers at the audit's `rows`, those of one name and bound together."""
+    gathered: dict[tuple[str, str, float, float], tuple[list[str], list[np.ndarray]]] = {}
+    for limit, values in zip(plan.scenario.limits, plan.audit.limited, strict=True):
+        if limit.shown:
+            labels, curves = gathered.setdefault((limit.title, limit.unit, limit.low, limit.high), ([], []))
+            labels += limit.labels
+            curves.append(values[rows])
+    return [
+        Limited(name, unit, labels, np.hstack(curves), low, high)
+        for (name, unit, low, high), (labels, curves) in gathered.items()
+    ]

@@ -9,7 +9,7 @@ from ...base import processors
 from ...base.errors import TowlineError
 from ...base.inputs import printable
 from ...models import Robot
-from ..audits.cost import cost
+from ..audits.violation import cost
 from ..plan import Plan
 from ..planner import plan
 from ..reports.report import decisive

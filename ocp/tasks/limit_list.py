@@ -10,7 +10,7 @@ from ...models import Robot
 from ...models.body import AnyBody, skeleton
 from ...models.shapes import Shape
 from ..limits.bodies import LOAD, PLATFORM, body_outside, inside_room
-from ..limits.cables import CableAcceleration, CableClearance, CableLength, CableSpeed, WinchPower
+from ..limits.cables import CableAcceleration, CableClearance, CableLength, CableSpeed, Margin, TensionRate, WinchPower
 from ..limits.carriers import (
     CarrierAcceleration,
     CarrierReach,
@@ -18,8 +18,8 @@ from ..limits.carriers import (
     CarrierSpeed,
     CarrierTilt,
     CarrierTurnAcceleration,
+    efforts,
 )
-from ..limits.efforts import efforts
 from ..limits.limit import Limit
 from ..limits.limits import Limits
 from ..limits.places import CablesOutside, CarriersOutside, PlatformOutside
@@ -30,10 +30,10 @@ from ..limits.platform import (
     PlatformSpeed,
     PlatformTilt,
     PlatformTurn,
+    TubeAttitude,
+    TubePosition,
     ZoneSpeed,
 )
-from ..limits.tensions import Margin, TensionRate
-from ..limits.tube import TubeAttitude, TubePosition
 from .task import FreeBase, Task
 from .task_limits import AnyKeepOut, TaskLimits
 

@@ -19,30 +19,17 @@ SAME_TIME = 1e-9  # of the duration: an instant so near to the start of a phase 
 
 @dataclass(frozen=True, eq=False)
 class LaidPhase(Displayed):
-    """A phase of a task.
-
-    Attributes
-    ----------
-    start, end
-        [s].
-    load
-        What the platform carries, (10,), as `Dynamics.carried_wrench` takes it; zeros: nothing.
-    columns
-        S, (6, s) [N per N, N m per N], moments about the platform's CoM, in {G}; s is 0 without ground.
-    slack
-        Whether the lower limit of its tensions is 0.
-    at_start, at_end
-        Bounds of the support forces at its ends, (2, s) [N]; the upper one may be infinite.
-    """
+    """A phase of a task."""
 
     name: str
-    start: float
-    end: float
-    load: np.ndarray
+    start: float  # [s]
+    end: float  # likewise
+    load: np.ndarray  # what the platform carries, (10,), as `Dynamics.carried_wrench` takes it; zeros: nothing
+    # S, (6, s) [N per N, N m per N], moments about the platform's CoM, in {G}; s is 0 without ground.
     columns: np.ndarray
-    slack: bool
-    at_start: np.ndarray
-    at_end: np.ndarray
+    slack: bool  # whether the lower limit of its tensions is 0
+    at_start: np.ndarray  # bounds of the support forces at its ends, (2, s) [N]; the upper one may be infinite
+    at_end: np.ndarray  # likewise
 
     @property
     def rests(self) -> bool:

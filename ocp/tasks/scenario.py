@@ -16,10 +16,11 @@ from ...models import Dynamics, Robot, points
 from ...models.body import skeleton
 from ...models.part import Vector3
 from ...models.ranges import PositiveRange
+from ..costs.cost import Cost
 from ..costs.costs import Costs
+from ..costs.terms import CarrierAcceleration, CarrierOffset, Jerk, Margin, PathDeviation, Tension, TensionRate, Time
 from ..limits.limit import Hull, Limit
 from ..limits.limits import Limits
-from .cost_list import cost_list
 from .deviation import Deviation
 from .paths import AnyPath, Motion, RestPath
 from .phases import LaidPhase, Phases
@@ -36,35 +37,20 @@ MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
 
 @dataclass(frozen=True)
 class Scenario(Displayed):
-    """A robot and its task, with the quantities that follow from both.
-
-    Attributes
-    ----------
-    path
-        That of the platform: the task's, or the same geometry with a time law that the planner chose.
-    relative
-        Whether the platform's path is given in the frame of the robot's only carrier.
-    platform_free
-        Coordinates of the platform that may leave the path.
-    carrier_free
-        (carrier, coordinate) pairs that the planner chooses.
-    phases
-        Those of the task, if it has some.
-    tightened
-        By how much the tension limits are tightened for the uncertain robots, (m,) [N]; default: not.
-    """
+    """A robot and its task, with the quantities that follow from both."""
 
     robot: Robot
     task: Task
-    path: AnyPath
+    path: AnyPath  # that of the platform: the task's, or the same geometry with a time law that the planner chose
     dynamics: Dynamics
-    relative: bool
-    platform_free: list[int]
-    carrier_free: list[tuple[int, int]]
+    relative: bool  # whether the platform's path is given in the frame of the robot's only carrier
+    platform_free: list[int]  # coordinates of the platform that may leave the path
+    carrier_free: list[tuple[int, int]]  # (carrier, coordinate) pairs that the planner chooses
     limits: Limits
     carrier_paths: dict[int, AnyPath] = field(repr=False)
     duration: float  # [s]; of a task that leaves it free: where the planner starts, then what it chose
-    phases: Phases = field(default_factory=Phases, repr=False)
+    phases: Phases = field(default_factory=Phases, repr=False)  # those of the task, if it has some
+    # By how much the tension limits are tightened for the uncertain robots, (m,) [N]; default: not.
     tightened: np.ndarray | None = None
 
     @cached_property
@@ -271,3 +257,26 @@ def _pose_in(frame: np.ndarray, pose: np.ndarray) -> np.ndarray:
     R = points.rotations(frame[:, 3:])
     turned = points.angles(R.swapaxes(1, 2) @ points.rotations(pose[:, 3:]))
     return np.hstack([points.in_frame(frame, pose[:, :3]), turned])
+
+
+def cost_list(robot: Robot, task: Task) -> Costs:
+    """Return the costs of `task`."""
+    objective = task.objective
+    costs: list[Cost] = [
+        Tension(objective.tension or robot.force_scale),
+        CarrierOffset(objective.carrier_offset),
+        CarrierAcceleration(objective.carrier_acceleration),
+        Jerk(objective.jerk),
+    ]
+    deviation = objective.deviation or _tenth_of_tube(robot, task)
+    if 0 < deviation < np.inf:
+        costs.append(PathDeviation(deviation))
+    for kind, amount in ((TensionRate, objective.tension_rate), (Time, objective.time), (Margin, objective.margin)):
+        if amount is not None:
+            costs.append(kind(amount))
+    return Costs(robot, (*costs, *objective.own))
+
+
+def _tenth_of_tube(robot: Robot, task: Task) -> float:
+    turn = 0.0 if task.tube.attitude == "free" else task.tube.turn
+    return 0.1 * max(task.tube.radius, robot.length * turn)

@@ -36,24 +36,13 @@ class Scheme(Displayed):
 
     An interval has a point at its start, one at each share in `inner`, and one at its end, which is the next
     interval's start. Every point has q, v and a.
-
-    Attributes
-    ----------
-    degree
-        Degree of the acceleration.
-    inner
-        Further points inside an interval, as shares of it.
-    weights
-        Weights of the quadrature over an interval, at its points from start to end.
-    smooth
-        Whether jerk and snap, the next two derivatives, are unknowns at the nodes as well.
     """
 
     name: SchemeName
-    degree: int
-    inner: tuple[float, ...]
-    weights: tuple[float, ...]
-    smooth: bool = False
+    degree: int  # degree of the acceleration
+    inner: tuple[float, ...]  # further points inside an interval, as shares of it
+    weights: tuple[float, ...]  # weights of the quadrature over an interval, at its points from start to end
+    smooth: bool = False  # whether jerk and snap, the next two derivatives, are unknowns at the nodes as well
 
     @property
     def size(self) -> int:

@@ -160,10 +160,12 @@ class ParametrisedPath:
         """
         angle = np.arange(SIDES) * 2 * np.pi / SIDES
         around = np.stack([np.cos(angle), np.sin(angle)])  # (2, SIDES)
-        rest, first, second = (
-            limits.accelerations.along(Motion(platform.pose, *of(platform)), Motion(carriers.pose, *of(carriers)))
-            for of in (_at_rest, _accelerated, _moving)
+        still, along = [np.zeros_like(body.pose) for body in (platform, carriers)], limits.accelerations.along
+        rest = along(Motion(platform.pose, still[0], still[0]), Motion(carriers.pose, still[1], still[1]))
+        first = along(
+            Motion(platform.pose, still[0], platform.velocity), Motion(carriers.pose, still[1], carriers.velocity)
         )
+        second = along(platform, carriers)
         rows = []
         for limit, R, P, Q in zip(limits.accelerations, rest, first, second, strict=True):
             P, Q = P - R, Q - R
@@ -222,21 +224,6 @@ class ParametrisedPath:
         )
         still = speed <= max(STILL * speed.max(), SAME)
         _refuse(s, still, "path must move platform or carriers everywhere, as lines, circles and waypoints do", "rest")
-
-
-def _at_rest(body: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocity and acceleration of a motion by s for u = x = 0."""
-    return np.zeros_like(body.pose), np.zeros_like(body.pose)
-
-
-def _accelerated(body: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return them for u = 1 and x = 0."""
-    return np.zeros_like(body.pose), body.velocity
-
-
-def _moving(body: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return them for u = 0 and x = 1."""
-    return body.velocity, body.acceleration
 
 
 def _grid(start: float, end: float, intervals: int, bent: bool) -> np.ndarray:

@@ -67,20 +67,11 @@ class PhasePlane(Displayed):
 
 @dataclass(frozen=True)
 class Proof(Displayed):
-    """A proof that at one point of the path no allowed speed and acceleration has tensions inside their limits.
+    """A proof that at one point of the path no allowed speed and acceleration has tensions inside their limits."""
 
-    Attributes
-    ----------
-    s
-        The place.
-    problem
-        The tension problem of the speed and acceleration that come nearest.
-    certificate
-        Of the problem. Along its direction every other allowed speed and acceleration misses at least as much.
-    """
-
-    s: float
-    problem: TensionProblem
+    s: float  # the place
+    problem: TensionProblem  # the tension problem of the speed and acceleration that come nearest
+    # Of the problem. Along its direction every other allowed speed and acceleration misses at least as much.
     certificate: Certificate
 
 

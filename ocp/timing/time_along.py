@@ -178,7 +178,9 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
             reason = f"no time law passed the audit in {ATTEMPTS} attempts"
             return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
-        missing, excess = _missing(law, audited), _excess(audited)
+        missing = _missing(law, audited)
+        known = (each for each in audited.excess if each.limit in KNOWN_LIMITS)
+        excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
         # A grid too coarse for a bend misses it by so much that as large a reserve would leave no tension at all.
         if intervals < MOST_INTERVALS and (missing.newtons.max() > COARSE * weight or excess > COARSE_EXCESS):
             intervals = min(2 * intervals, MOST_INTERVALS)
@@ -233,11 +235,6 @@ def _reserve(s: np.ndarray, short: list[_Stretches], weight: float) -> np.ndarra
         for row in range(len(start)):
             reserve[(s >= start[row]) & (s <= end[row])] += 2 * newtons[row]
     return np.minimum(reserve, LARGEST_RESERVE * weight)
-
-
-def _excess(audited: Audit) -> float:
-    """Return the largest relative excess of a limit other than those of tensions."""
-    return max([0.0, *(each.value / each.bound - 1.0 for each in audited.excess if each.limit in KNOWN_LIMITS)])
 
 
 class _Piece(NamedTuple):

@@ -6,9 +6,6 @@ constant and the limits of both points hold (the Interpolation scheme). Source: 
 time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018.
 """
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +14,8 @@ from toppra.constraint import LinearConstraint
 from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
 from toppra.interpolator import AbstractGeometricPath
 from typing_extensions import override
+
+from ...base.quiet import quiet
 
 STEEPNESS = 1e-2  # of the largest row along u; toppra drops 1e-8 of x at each step, which must be little beside x
 UNLIMITED = 1e7  # x in toppra's units that no limit has stopped; its own bounds are at 1e8
@@ -87,7 +86,7 @@ def fastest(s: np.ndarray, rows: Rows) -> Law:
     if never.any():
         return Law(None, int(np.argmax(never)))
     grid = s * unit
-    with _silence():
+    with quiet("toppra"):  # which warns of laws that do not exist: a normal result here
         algorithm = TOPPRA([_HalfPlanes(scaled)], _Interval(float(grid[-1])), gridpoints=grid, solver_wrapper="seidel")
         result: Any = algorithm.compute_parameterization(0.0, 0.0, return_data=True)  # hints: three or four values
     _, speeds, _, reach = result
@@ -108,15 +107,3 @@ def _normalised(rows: Rows) -> tuple[Any, Rows]:
     a, b = np.where(idle, 0.0, rows.a * per_size), np.where(idle, 0.0, rows.b * per_size)
     c = np.where(idle, -1.0, rows.c * per_size)
     return np.any(idle & (rows.c > 0), axis=1), Rows(a, b, c, np.minimum(rows.x_max, 2 * UNLIMITED))
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Keep toppra from logging warnings about laws that do not exist, which is a normal result here."""
-    logger = logging.getLogger("toppra")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)

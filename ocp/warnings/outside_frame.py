@@ -5,12 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.text import quantity, quantity_row
-from ...models import Robot
+from ..tasks.paths import PathBase, WaypointPath
 from .instants import Instants
 
 LEAST = 1e-3  # [m], and of the size of the frame, whichever is less: nearer than this it is inside
 FLAT = 0.1  # of the largest span of the anchors: an axis along which they span less has no sides
 AXES = "xyz"
+LEFT = 1e-6  # [m]
 
 
 class Side(NamedTuple):
@@ -59,7 +60,8 @@ def _sides(seen: Instants) -> list[Side]:
         return []
     low, high = seen.anchors.min(axis=(0, 1)), seen.anchors.max(axis=(0, 1))
     spans = high - low
-    floor = _falls_down(robot) and low[2] >= 0
+    x, y, z = robot.gravity
+    floor = z < 0 and np.hypot(x, y) < 1e-6 * abs(z) and low[2] >= 0
     sides = []
     for axis, name in enumerate(AXES):
         if axis < 2 and spans[axis] <= FLAT * spans.max():
@@ -79,7 +81,13 @@ def _sides(seen: Instants) -> list[Side]:
     return [side for side in sides if side.beyond(usual).max() <= LEAST * 1e-3]
 
 
-def _falls_down(robot: Robot) -> bool:
-    """Return whether gravity points along -z of {G}."""
-    x, y, z = robot.gravity
-    return z < 0 and np.hypot(x, y) < 1e-6 * abs(z)
+def leaves_its_points(path: PathBase) -> list[str]:
+    """Return a sentence if a path through waypoints leaves the box of its points."""
+    if not isinstance(path, WaypointPath):
+        return []
+    far = path.outside()
+    worst = int(far.argmax())
+    if far[worst] < LEFT:
+        return []
+    text = f"the path leaves the box of its points by up to {quantity(far[worst], 'm')} along {'xyz'[worst]}"
+    return [f"{text}; the shape legs stays inside"]

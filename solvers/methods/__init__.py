@@ -1,10 +1,8 @@
 """The methods, one file each; `METHODS` lists them by name."""
 
-from .active_set import ActiveSet
 from .analytic_centre import AnalyticCentre
 from .centroid import Centroid
 from .closed_form import ClosedForm
-from .daqp import Daqp
 from .dykstra import Dykstra
 from .improved_closed_form import ImprovedClosedForm
 from .largest_margin import LargestMargin
@@ -15,7 +13,7 @@ from .min_max import MinMax
 from .min_norm import MinNorm
 from .one_norm import OneNorm
 from .p_norm import PNorm
-from .qp import QuadraticProgram
+from .qp import ActiveSet, Daqp, QuadraticProgram
 from .soft_wrench import SoftWrench
 from .two_norm import TwoNorm
 

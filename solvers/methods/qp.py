@@ -7,6 +7,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from .method import Method, Proposal, StandardForm
+from .numerics.least_norm import least_norm
 
 # As tight as each can go: their defaults leave wrench errors of newtons, and the standard form has condition one. Every
 # one is bounded in iterations or time, since some loop for ever on infeasible problems.
@@ -27,13 +28,11 @@ _SETTINGS: dict[str, dict[str, Any]] = {
     "scs": {"eps_abs": 1e-10, "eps_rel": 0.0, "max_iters": 100_000, "time_limit_secs": 5.0},
     "highs": {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10, "time_limit": 5.0},
 }
-
 # OSQP crawls where the feasible tensions have next to no interior; how slowly depends on its step size. Of 5000
 # problems with most tensions at their limits, 21 are left after the first attempt and 1 after all of these.
 _SECOND_THOUGHTS: dict[str, list[dict[str, Any]]] = {
     "osqp": [{"rho": 1000.0}, {"adaptive_rho": False}, {"rho": 10.0, "max_iter": 100_000}]
 }
-
 # A limit this many units away is left out at first: s is of order one, and residuals of interior-point methods are
 # relative to the largest number that they see.
 _FAR = 1e3
@@ -108,3 +107,35 @@ def _call_once(
         reason = answer.extras.get("status") or getattr(answer.extras.get("info"), "status", "no solution")
         return Proposal(None, detail=f"{name}: {reason}")
     return Proposal(np.asarray(answer.x, dtype=np.float64))
+
+
+class Daqp(Method):
+    """Weighted least squares to t_ref inside the limits, by a dual active-set method."""
+
+    name = "daqp"
+    guarantee = (
+        "the unique optimum, exact up to rounding, continuous in w; no tensions and a certificate if there are none"
+    )
+    source = "DAQP: D. Arnström, A. Bemporad, D. Axehill, IEEE Trans. Autom. Control 67(8), 2022"
+    exact = True
+    continuous = True
+    least_squares = True
+    seeks_reference = True
+
+    def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
+        """Minimise |s|^2 with Q s = b as equality rows and the limits as simple bounds."""
+        return least_norm(form)
+
+
+class ActiveSet(Daqp):
+    """Weighted least squares to t_ref inside the limits, by a dual active-set method in the null space.
+
+    `solve` runs the C core, `towline.core`. Where that is not sure, and for problems larger than those it has room for,
+    the daqp package proposes and `solve` judges, as with the other methods: some 0.2 ms a call.
+    """
+
+    name = "active-set"
+    source = (
+        "null space: Golub and Van Loan, Matrix Computations, 5.4; D. Goldfarb, A. Idnani, Math. Program. 27, 1983; "
+        "R. Seidel, Discrete Comput. Geom. 6, 1991"
+    )

@@ -5,15 +5,23 @@ cos a_i and sin a_i, a_i = 60 degrees (i - 1): their only products of second ord
 cos^2 a_i + sin^2 a_i, a constant. Six points of three functions, 1, cos a_i and sin a_i, span three dimensions at most.
 """
 
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from ...figures import style
 from ...figures.drawing import Drawing
-from ...figures.from_above import from_above
 from ...models import load
 from ...models.diagnosis import diagnose
 from ..accounts.account import Chapter
 from ..accounts.claim import Verdict
 from .claims import claim
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ROWS = 6  # of J, whose inverse step 7 of section V takes
 LEVEL = 200  # positions and yaws at which the coordinates are formed
@@ -60,3 +68,26 @@ def _points(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return anchors and attachments, (6, 3) each; cable i has the number of its anchor."""
     robot = load(name)
     return robot.anchors, robot.attachments
+
+
+def from_above(pairings: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
+    """Draw (anchors, attachments), (m, 3) each [m], of several pairings side by side, under their titles."""
+    canvas = style.figure(height=0.9 + 3.0 / len(pairings))
+    for place, (title, (anchors, attachments)) in enumerate(pairings.items(), 1):
+        share = canvas.axes[0] if canvas.axes else None
+        ax = style.axes(canvas, "x [m]", "y [m]" if place == 1 else "", (1, len(pairings), place), share)
+        ax.tick_params(labelleft=place == 1)
+        for anchor, attachment in zip(anchors, attachments, strict=True):
+            ax.plot(*np.stack([anchor, attachment])[:, :2].T, color="#999999", linewidth=1.0)
+        ends = ((anchors, "s", 1, "anchors A", 1.12), (attachments, "o", 0, "attachments B", 0.75))
+        for points, mark, index, label, away in ends:
+            shade = style.colour(index)
+            ax.plot(*points[:, :2].T, mark, color=shade, markersize=3, label=label)
+            for number, point in enumerate(points, 1):
+                look = {"fontsize": style.NOTE, "ha": "center", "va": "center", "color": shade}
+                ax.annotate(f"{number}", away * point[:2], **look)
+        ax.set_aspect("equal")
+        ax.margins(0.12)
+        style.heading(ax, title, 1 / len(pairings))
+    style.legend_below(canvas, *canvas.axes)
+    return canvas

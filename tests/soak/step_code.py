@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towline.base.errors import InputError
-from towline.export.step.export import step_files
-from towline.export.step.mechanics import moving_carriers
+from towline.export.step.export import moving_carriers, step_files
 from towline.models import Dynamics, Robot
 
 Array = NDArray[np.float64]

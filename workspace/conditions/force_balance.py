@@ -4,26 +4,14 @@ Three cables balance all six rows exactly only on a set of measure zero, so the 
 sample. Its prisms follow from the forces alone.
 """
 
-from typing import Literal
+from typing import ClassVar, Literal
 
-import numpy as np
-
-from ...models import Robot
-from ..condition import TensionCondition
-from ..feasibility import feasible, rest_wrench, shortfall, wrench_rows
-from ..places import Places
+from .static_equilibrium import BalanceAtRest
 
 
-class ForceBalance(TensionCondition):
+class ForceBalance(BalanceAtRest):
     """Tensions inside the limits balance the weight as a force; moments are ignored."""
 
+    forces_only: ClassVar[bool] = True
+
     kind: Literal["force-balance"] = "force-balance"
-
-    def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
-        rows = wrench_rows(robot, forces_only=True)
-        return feasible(robot, places, rest_wrench(robot)[None], rows, self.robust)
-
-    def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the distance from the required force to the available ones, (n,) [N]."""
-        rows = wrench_rows(robot, forces_only=True)
-        return shortfall(robot, places, rest_wrench(robot)[None], rows, self.robust)

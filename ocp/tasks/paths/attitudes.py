@@ -9,7 +9,7 @@ shares a and b done, R = R_k exp(a w_k) exp(b w_k+1), with the body rate and its
 from which Euler rates follow by the rate matrix (`models.rotation`).
 """
 
-from functools import cache, cached_property
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -36,6 +36,7 @@ class Attitudes:
         self._angles = angles
         self._quaternions = _quaternions(angles)
         self._axes, self._turns = _turns(self._quaternions[:-1], self._quaternions[1:])
+        self._padded = np.vstack([self._axes, np.zeros(3)]), np.append(self._turns, 0.0)  # of none after the last
 
     @property
     def steps(self) -> np.ndarray:
@@ -52,11 +53,6 @@ class Attitudes:
     def constant(self) -> bool:
         """Return whether all attitudes are the same."""
         return not self._turns.any()
-
-    @cached_property
-    def _padded(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the axes and the angles of all turns, and of none after the last, (n, 3) and (n,)."""
-        return np.vstack([self._axes, np.zeros(3)]), np.append(self._turns, 0.0)
 
     def along(self, leg: np.ndarray, first: Progress, second: Progress) -> Motion:
         """Return (roll, pitch, yaw) and two derivatives, (n, 3) each; angles lie within one turn.

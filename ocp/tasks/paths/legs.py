@@ -22,9 +22,8 @@ from functools import cached_property
 import numpy as np
 
 from .attitudes import Attitudes, Progress, nearest_turn
-from .leg_law import leg_law
 from .motion import Motion
-from .overlap import MOST, even_out, largest_left, meeting, shares_of_time, size
+from .overlap import MOST, even_out, largest_left, leg_law, meeting, shares_of_time, size
 
 BLEND = 0.01  # of the span of the points; accelerations hardly fall with more
 LOOKS = 48  # at the angles of each leg

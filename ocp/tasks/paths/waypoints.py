@@ -1,7 +1,7 @@
 """`WaypointPath`: a path through given poses, of straight legs or as a spline."""
 
 from functools import lru_cache
-from itertools import pairwise
+from itertools import combinations, pairwise
 from math import remainder
 from typing import Any, Literal, Self
 
@@ -13,7 +13,6 @@ from ....models.part import Finite, NonNegative
 from .base import PathBase, PoseOrPosition, check_times, or_file, or_number, with_points_of_file
 from .legs import Legs
 from .motion import Motion
-from .shortest_order import MOST, shortest_order
 from .stations import Stations
 from .waypoint_spline import WaypointSpline
 
@@ -24,8 +23,9 @@ GONE = {
     "smooth": "write 'shape: spline' for a smooth curve through the points, or nothing for straight legs",
     "uniform": "write nothing, for straight legs, which `towline time` takes at any speed",
 }
-
 _legs, _spline = lru_cache(maxsize=64)(Legs), lru_cache(maxsize=64)(WaypointSpline)
+MOST = 12  # inner points, for which all subsets are 4096
+SHORTER = 1e-9  # relative: of two orders with so little between them the given one stays
 
 
 class WaypointPath(PathBase):
@@ -204,3 +204,32 @@ class WaypointPath(PathBase):
     @override
     def bends(self) -> np.ndarray:
         return super().bends() if self.shape == "spline" else self._legs.bends()
+
+
+def shortest_order(points: np.ndarray) -> list[int]:
+    """Return the indices of points (n, 6) [m, rad] in the order of the shortest path; the first and the last one stay.
+
+    1 rad counts as 1 m, and angles turn the shortest way. Source: M. Held, R. M. Karp, "A dynamic programming approach
+    to sequencing problems", 1962.
+    """
+    apart = points[:, None] - points
+    apart[..., 3:] -= 2 * np.pi * np.round(apart[..., 3:] / (2 * np.pi))
+    distance = np.linalg.norm(apart, axis=2).tolist()
+    last, inner = len(points) - 1, range(1, len(points) - 1)
+    # By the points that are visited, as a set, and the last one of them: the shortest path so far, and the one before.
+    best = {(frozenset([k]), k): (distance[0][k], 0) for k in inner}
+    for size in range(2, len(points) - 1):
+        for visited in map(frozenset, combinations(inner, size)):
+            for k in visited:
+                others = visited - {k}
+                best[visited, k] = min((best[others, j][0] + distance[j][k], j) for j in others)
+    order, visited = [last], frozenset(inner)
+    if visited:
+        order.append(min(visited, key=lambda k: best[visited, k][0] + distance[k][last]))
+    while len(visited) > 1:
+        k = order[-1]
+        order.append(best[visited, k][1])
+        visited -= {k}
+    order = [0, *reversed(order)]
+    as_given, sorted_ones = (sum(distance[j][k] for j, k in pairwise(each)) for each in (range(last + 1), order))
+    return order if sorted_ones < (1 - SHORTER) * as_given else list(range(last + 1))
