@@ -99,6 +99,13 @@ def test_quadrotors_are_guessed_to_tilt_as_their_cables_pull():
     np.testing.assert_allclose(carriers.pose[:, :, 3:], robot.carrier_home[None, :, 3:].repeat(5, axis=0), atol=1e-6)
 
 
+def test_short_motions_of_a_team_are_found():
+    """With nothing in the way: the programs of teams are factorised in a way of their own, which must not fail here."""
+    path = {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}
+    found = plan(load("multi-quadrotor-3"), {"path": path, "duration": 2, "base": {"kind": "free", "ends": "rest"}})
+    assert found.feasible, found.message
+
+
 def test_a_time_limit_ends_a_search():
     """Beyond its limit it takes what laying out, building and the step under way take: what one without time does."""
     robot, took = load("multi-quadrotor-4"), []
