@@ -16,6 +16,7 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of, printable, shown
 from ..base.processors import one_thread_each
+from .log import FieldsOption
 from .options import (
     FPS,
     SPEED,
@@ -29,6 +30,7 @@ from .options import (
     print_result,
 )
 from .outputs import check_outputs
+from .replay import replay_log
 from .resuming import check_unused, checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
 from .stopping import add_to_message
 from .watching import counting, watching
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from ..simulation import Execution, Simulation
 
 _MANY = "With --runs: "
+WINDOW = 0.5  # [s]
 CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "open-loop")
 
 
@@ -47,8 +50,9 @@ def simulate(
     plan: Annotated[
         Path,
         typer.Argument(
-            metavar="PLAN",
-            help="A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF).",
+            metavar="PLAN|LOG",
+            help="A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF); or a "
+            "recording to replay: CSV, NetCDF, MCAP or a ROS bag.",
         ),
     ],
     controller: Annotated[
@@ -118,13 +122,39 @@ def simulate(
     ] = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
+    replay: Annotated[
+        bool, typer.Option("--replay", help="Replay PLAN as a recording also if it is a file of a simulation.")
+    ] = False,
+    poses: Annotated[
+        Path | None, typer.Option(metavar="LOG", help="With a recording: log of the poses, if it is another file.")
+    ] = None,
+    fields: FieldsOption = None,
+    drive: Annotated[
+        str | None,
+        typer.Option(
+            help="With a recording: what drives the plant: lengths, tensions or forces (default: by the log)."
+        ),
+    ] = None,
+    delay: Annotated[
+        float, typer.Option(help="With a recording: known delay of the robot behind its recorded commands [s].")
+    ] = 0.0,
+    window: Annotated[float, typer.Option(help="With a recording: duration of a window [s].")] = WINDOW,
+    fit: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.yaml",
+            help="With a recording: fit what explains the residuals, and write the robot if it is better in windows "
+            "that were not fitted.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate a plan in closed loop, with wind, sensor noise and events.
+    """Simulate a plan in closed loop, with wind, sensor noise and events; or replay a recording.
 
     A run passes if it does not diverge, its position error stays within --tolerance, no tension exceeds t_max by more
     than 0.1 % of the cable's range, and no cable with t_min above zero goes slack. The exit code is 0 if all runs pass,
-    otherwise 1.
+    otherwise 1. A recording is repeated in windows, from the recorded state on, by its commands; it passes if 95 % of
+    the position residuals are within --tolerance.
     """
     from ..figures.style import FORMATS
 
@@ -134,6 +164,22 @@ def simulate(
     if runs is None:
         many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
         check_unused(many, "--runs", "flights")
+    of_log = {"--replay": replay, "--poses": poses, "--fields": fields, "--drive": drive, "--fit": fit}
+    of_log |= {"--delay": delay, "--window": window != WINDOW}
+    from ..estimation.logs.opening import is_recording
+
+    if replay or is_recording(plan):
+        of_plan = {"--controller": controller != CONTROLLERS[0], "--wind": wind, "--gusts": gusts, "--noise": noise}
+        of_plan |= {"--event": event, "--duration": duration, "--seed": seed, "--runs": runs, "--animate": animate}
+        for name, value in of_plan.items():
+            if value:
+                raise InputError(f"{name} must be left out with a recording, got {shown(value)}")
+        options = {"poses": poses, "fields": fields, "drive": drive, "delay": delay, "window": window}
+        replay_log(robot, plan, options | {"tolerance": tolerance}, fit, out, figures, form, as_json)
+        return
+    for name, value in of_log.items():
+        if value:
+            raise InputError(f"{name} must be left out without a recording, got {shown(value)}")
     stored = checkpoint_of(checkpoint, resume)
     if runs is not None and animate is not None:
         raise InputError(f"--animate must be left out with --runs, got {animate}")

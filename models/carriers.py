@@ -155,6 +155,10 @@ class Carrier(Part):
         """Return the actuators that move its body."""
         return ()
 
+    def imposed(self) -> "Carrier":
+        """Return a carrier in its place whose motion is imposed, or itself if it never moves."""
+        return PrescribedCarrier(name=self.name, home=self.home, kind="prescribed") if self.moves else self
+
     def required_effort(
         self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray
     ) -> tuple[Effort, ...]:

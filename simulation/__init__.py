@@ -6,6 +6,7 @@ from ..base.execution import Execution
 from ..base.former_names import moved_name
 from .conditions import Conditions
 from .events import Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
+from .log_replay import Replay, replay
 from .own_run import simulation_of
 from .sensors import Noise
 from .simulate import simulate
@@ -21,10 +22,12 @@ __all__ = [
     "Miss",
     "Noise",
     "Push",
+    "Replay",
     "Simulation",
     "Stick",
     "StopReference",
     "Wall",
+    "replay",
     "simulate",
     "simulation_of",
 ]

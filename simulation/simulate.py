@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 from warnings import warn
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..base.inputs import required, shown, whole_number, with_fields
 from ..control import ComputedTorque, Controller, Reference
 from ..control.planned_references import references_at
 from ..control.trajectory import Trajectory, read_trajectory
+from ..estimation.logs.opening import is_recording
 from ..models.files import as_robot
 from ..models.parsing import validate
 from ..models.robot import Robot
@@ -29,6 +30,7 @@ from .events import Event, read_events
 from .experiment import Experiment
 from .flights import flights
 from .flying import fly
+from .log_replay import replay
 from .record import Record
 from .runs import fly_many
 from .sensors import Noise
@@ -112,7 +114,9 @@ def simulate(
     robot
         A `Robot`, the name of one in the library, or the path of a robot file.
     reference
-        A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to hold.
+        A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to hold; or the path of
+        a recording (CSV, MCAP, a bag, NetCDF without a plan), which `replay` repeats: then all other arguments are left
+        out, and the result is a `Replay`.
     controller
         Controller (default: `ComputedTorque(robot)`). A single run calls its `reset` and uses the object itself. Many
         runs use copies, unless it accepts batches.
@@ -143,6 +147,13 @@ def simulate(
         If workers end before their work is done, or the extra `cluster` is not installed.
     """
     given: dict[str, Any] = dict(options)
+    if isinstance(reference, str | os.PathLike) and is_recording(reference):
+        others = controller, wind, noise, duration, runs, conditions, execution, events or None, seed or None
+        if given or any(one is not None for one in others):
+            raise InputError(
+                f"reference must be a plan if simulate has other arguments, got the log {shown(reference)}"
+            )
+        return cast(Any, replay(robot, reference))
     if (former := given.pop("faults", None)) is not None:
         if events:
             raise InputError(f"faults must be left out with events, whose former name it is, got {shown(former)}")

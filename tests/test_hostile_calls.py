@@ -10,6 +10,7 @@ import functools
 import inspect
 import random
 import re
+import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from functools import cache, partial
@@ -68,6 +69,7 @@ NOT_CALLED = {
     "PoseEstimate",
     "RobotShare",
     "Simulation",
+    "Replay",
     "Calibration",
     "Compared",
     "Design",
@@ -182,6 +184,18 @@ def a_run():
     plant = Plant(ROBOT, drive="tensions")
     commands = np.tile(plant.command(np.full(plant.robot.m, 2.0)), (3, 1))
     return plant, plant.run(plant.start(), commands, 1e-3)
+
+
+@cache
+def a_recording() -> Path:
+    file = Path(tempfile.mkdtemp()) / "log.csv"
+    rows = [
+        f"{t},0,0,-1,0,0,0,{','.join(['2'] * 6)},{','.join(['1'] * 6)},0,0,0,0,0,0" for t in np.arange(0, 0.3, 0.02)
+    ]
+    lengths, pulls = (",".join(f"{name}{i}" for i in range(6)) for name in ("l", "tension"))
+    carrier = ",".join(f"quad_{name}" for name in ("x", "y", "z", "roll", "pitch", "yaw"))
+    file.write_text("\n".join([f"t,x,y,z,roll,pitch,yaw,{pulls},{lengths},{carrier}", *rows]) + "\n")
+    return file
 
 
 def a_plan() -> towline.Plan:
@@ -317,6 +331,10 @@ VALID: dict[str, Callable[[], Any]] = {
     "carriers": lambda: np.zeros((1, 1, 6)),
     "rows": lambda: slice(0, 1),
     "simulate.reference": lambda: robot().home,
+    "replay.log": a_recording,
+    "replay.delay": lambda: 0.0,
+    "window": lambda: 0.1,
+    "fit": lambda: False,
     "simulation_of.plant": lambda: a_run()[0],
     "history": lambda: a_run()[1],
     "simulation_of.reference": lambda: None,

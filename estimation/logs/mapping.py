@@ -13,7 +13,7 @@ from ...base.errors import InputError
 from ...base.inputs import file_path
 from ...models.parsing import read_yaml
 from ...models.part import Part
-from .names import UNITS, Role, role
+from .names import UNITS, Role, measured_name, role
 from .recording import Recording, Topic, plain
 
 AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
@@ -44,6 +44,9 @@ class Fields(NamedTuple):
     position: tuple[Field, ...] = ()
     orientation: tuple[Field, ...] = ()
     time: tuple[Field, ...] = ()
+    commands: tuple[Field, ...] = ()
+    thrusts: tuple[Field, ...] = ()
+    efforts: tuple[Field, ...] = ()
 
 
 class LogMap(Part):
@@ -55,6 +58,9 @@ class LogMap(Part):
     position: str | list[str] = Key([], description="x, y, z")
     orientation: str | list[str] = Key([], description="quaternion x, y, z, w, or roll, pitch, yaw")
     time: str | None = Key(None, description="time of the columns of a table")
+    commands: str | list[str] = Key([], description="commanded lengths [m] or tensions [N], as `lengths`")
+    thrusts: str | list[str] = Key([], description="thrust of each flying carrier, as `lengths`")
+    carriers: dict[str, str] = Key({}, description="topic or beginning of the names of each moving carrier's fields")
 
 
 def read_map(path: str | os.PathLike[str]) -> LogMap:
@@ -62,7 +68,9 @@ def read_map(path: str | os.PathLike[str]) -> LogMap:
     return read_yaml(file_path("map", path), LogMap)
 
 
-def fields_of(recordings: Sequence[Recording], given: LogMap | None = None, m: int | None = None) -> Fields:
+def fields_of(
+    recordings: Sequence[Recording], given: LogMap | None = None, m: int | None = None, carriers: Sequence[str] = ()
+) -> Fields:
     """Return the fields of logs: those that a map names, and for all other roles those with usual names.
 
     Parameters
@@ -73,6 +81,8 @@ def fields_of(recordings: Sequence[Recording], given: LogMap | None = None, m: i
         Names of the fields; default: the usual ones.
     m
         Number of cables, which decides among several candidates.
+    carriers
+        Names of carriers, whose poses are not the platform's.
 
     Raises
     ------
@@ -80,26 +90,80 @@ def fields_of(recordings: Sequence[Recording], given: LogMap | None = None, m: i
         If a name of the map is not there, part of a position or an orientation is missing, or there are several
         candidates.
     """
-    found = {name: _named(recordings, name, given) for name in Fields._fields} if given else {}
+    roles = ("lengths", "tensions", "position", "orientation", "time")
+    found = {name: _named(recordings, name, given) for name in roles} if given else {}
     if given and given.pose:
         parts = _below(recordings, given.pose)
         for name in ("position", "orientation"):
             found[name] = found[name] or _usual(parts, name, m, ())
-    everything = [(one, topic, name) for one in recordings for topic in one.topics.values() for name in topic.fields]
-    for name in ("lengths", "tensions", "position", "orientation", "time"):
+    everything = _everything(recordings)
+    others = [_prefix(given, name) for name in carriers]
+    of_platform = [one for one in everything if not any(_within(one[1].full(one[2]), name) for name in others)]
+    for name in roles:
         if not found.get(name) and not (given and given.pose and name in ("position", "orientation")):
-            found[name] = _usual(everything, name, m, found.get("position", ()))
+            fields = of_platform if name in ("position", "orientation") else everything
+            found[name] = _usual(fields, name, m, found.get("position", ()))
     return Fields(**found)
 
 
+def command_fields(
+    recordings: Sequence[Recording], given: LogMap | None, m: int, carriers: Sequence[str] = ()
+) -> Fields:
+    """Return the fields of commands and thrusts, and of the tensions that towline writes beside lengths under tension.
+
+    Thrusts with the name of one of the `carriers` are left to `carrier_fields`.
+
+    Raises `InputError` as `fields_of`.
+    """
+    roles = ("commands", "thrusts")
+    found = {name: _named(recordings, name, given) for name in roles} if given else {}
+    everything = _everything(recordings)
+    others = [_prefix(given, name) for name in carriers]
+    alone = [one for one in everything if not any(_within(one[1].full(one[2]), name) for name in others)]
+    for name in (*roles, "efforts", "time"):
+        if not found.get(name):
+            found[name] = _usual(alone if name == "thrusts" else everything, name, m, ())
+    return Fields(**found)
+
+
+def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrier: str) -> Fields:
+    """Return the fields of a carrier: its pose and its thrust. Raises `InputError` as `fields_of`."""
+    prefix, everything = _prefix(given, carrier), _everything(recordings)
+    parts = [one for one in everything if _within(one[1].full(one[2]), prefix)]
+    roles = ("position", "orientation", "thrusts")
+    found = {name: _usual(parts, name, None, (), prefix) for name in roles}
+    return Fields(**found, time=_usual(everything, "time", None, ()))
+
+
+def _everything(recordings: Sequence[Recording]) -> list[tuple[Recording, Topic, str]]:
+    return [(one, topic, name) for one in recordings for topic in one.topics.values() for name in topic.fields]
+
+
+def _prefix(given: LogMap | None, carrier: str) -> str:
+    return (given.carriers if given else {}).get(carrier, carrier)
+
+
+def _within(full: str, prefix: str) -> str:
+    """Return what follows a topic or a beginning of names in the name of a field, empty if it is another's."""
+    pattern = rf"(?:^|[^0-9A-Za-z]){re.escape(prefix.strip('/'))}[^0-9A-Za-z]+(.+)"
+    found = re.search(pattern, full, re.IGNORECASE)
+    return found[1] if found else ""
+
+
 def _usual(
-    everything: Sequence[tuple[Recording, Topic, str]], what: str, m: int | None, position: Sequence[Field]
+    everything: Sequence[tuple[Recording, Topic, str]],
+    what: str,
+    m: int | None,
+    position: Sequence[Field],
+    prefix: str = "",
 ) -> tuple[Field, ...]:
-    """Return the fields of a role by their usual names, in order."""
-    roles = ("quaternion", "angles") if what == "orientation" else (what,)
+    """Return the fields of a role by their usual names, those after `prefix` if there is one, in order."""
+    several = {"orientation": ("quaternion", "angles"), "commands": ("lengths", "tensions")}
+    roles = several.get(what, (what,))
     groups: dict[tuple[int, str, str, str], list[tuple[Role, Field]]] = {}
     for recording, topic, name in everything:
-        found = role(topic.full(name))
+        full = _within(topic.full(name), prefix) if prefix else topic.full(name)
+        found = role(full if what != "commands" else measured_name(full) or "")
         if found is None or found.role not in roles:
             continue
         key = (id(recording), topic.name if what == "time" else "", found.role, found.group)
@@ -121,16 +185,20 @@ def _usual(
                 raise InputError(f"must have all columns {wanted} or none of them, got {names}")
             complete += [] if missing else [tuple(by_name[axis] for axis in AXES[kind])]
         else:
-            order = sorted(by_name, key=int)
-            first, count = int(order[0]), len(order)
+            order = sorted(by_name, key=lambda which: int(which or 0))
+            first, count = int(order[0] or 0), len(order)
             wanted = [str(i) for i in range(min(first, 1), min(first, 1) + count)]
-            if order != wanted and not members[0][1].topic.name:
+            if order not in (wanted, [""]) and not members[0][1].topic.name:
                 names = [_like(members[0], i) for i in (wanted[0], wanted[-1])]
                 lost = _like(members[0], next(i for i in wanted if i not in order))
                 raise InputError(f"must have columns {names[0]} to {names[1]} without a gap, got no {lost}")
             complete.append(tuple(by_name[i] for i in order))
-    if len(complete) > 1 and m is not None and what in ("lengths", "tensions"):
+    if len(complete) > 1 and m is not None and what in ("lengths", "tensions", "commands"):
         complete = [one for one in complete if len(one) == m] or complete
+    if len(complete) > 1 and what in ("lengths", "tensions"):
+        complete = [one for one in complete if measured_name(one[0].full) is None] or complete
+    if len(complete) > 1 and what == "position":  # messages of poses rather than transforms and scenes
+        complete = [one for one in complete if "Pose" in one[0].topic.kind] or complete
     if len(complete) > 1 and position:
         complete = [one for one in complete if one[0].topic is position[0].topic] or complete
     if len(complete) > 1 and what == "orientation" and {len(one) for one in complete} == {3, 4} and len(complete) == 2:

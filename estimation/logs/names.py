@@ -10,10 +10,13 @@ NUMBERS = {"1": 1.0, "-": 1.0}
 UNITS = {
     "lengths": LENGTHS,
     "tensions": FORCES,
+    "efforts": FORCES,
     "position": LENGTHS,
     "angles": ANGLES,
     "quaternion": NUMBERS,
     "time": TIMES,
+    "thrusts": FORCES,
+    "commands": {**LENGTHS, **FORCES},
 }
 _BEFORE = r"(?:.*[./_ ])?"
 _AFTER = r"(?:[./_ ](?:length|position|pos|data|value))*"
@@ -34,8 +37,14 @@ PATTERNS = {
     "position": (rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])", r"/?[pt]?[_ ]?([xyz])"),
     "quaternion": (rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",),
     "angles": (rf"{_BEFORE}(roll|pitch|yaw)",),
+    "thrusts": (rf"{_BEFORE}thrusts?(?:[./_ ](?:data|value))*[_ ]?\[?(\d*)\]?(?:[./_ ](?:data|value))*",),
+    "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
     "time": (rf"%?(t|times?|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds|elapsed(?:[_ ]time)?)",),
 }
+# What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
+_COMMAND = re.compile(
+    r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?)(?=[./_ \[]|\d|$)"
+)
 _SUFFIX = re.compile(r"(.+?)\s*(?:[_ ]|\()(mm|cm|m|rad|deg|ms|us|ns|s|n|kn)\)?")
 _EXACT = {unit.lower(): unit for units in UNITS.values() for unit in units}
 
@@ -60,6 +69,12 @@ def role(name: str) -> Role | None:
                     group = f"{text[: match.start(1)]}#{text[match.end(1) :]}"
                     return Role(which, match[1], group, unit)
     return None
+
+
+def measured_name(name: str) -> str | None:
+    """Return the name that the measured value of a commanded one has, or None if it is no command."""
+    found, count = _COMMAND.subn("", name.lower())
+    return found if count else None
 
 
 def epoch_unit(largest: float) -> str:

@@ -45,6 +45,25 @@ def recordings(paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]])
     return [_recording(file) for file in files]
 
 
+def is_recording(path: str | os.PathLike[str]) -> bool:
+    """Return whether a path is an existing log by its kind, and no NetCDF file of a plan or a simulation."""
+    file = file_path("log", path)
+    try:
+        if file.is_dir():
+            return True
+        with file.open("rb") as stream:
+            begin = stream.read(16)
+        kind = next((kind for magic, kind in BEGINS.items() if begin.startswith(magic)), file.suffix.lower())
+        if kind != "NetCDF":
+            return kind in (*BEGINS.values(), ".csv", ".tsv", ".txt")
+        import h5py
+
+        with h5py.File(file, "r") as content:
+            return "robot" not in content.attrs and "cable_lengths" in content
+    except (OSError, ValueError):
+        return False
+
+
 def _recording(file: Path) -> Recording:
     where = printable(str(file))
     check_file(file, WHAT, LARGEST_BAG)

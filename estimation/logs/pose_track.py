@@ -7,7 +7,9 @@ from copy import copy
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-NEIGHBOURS = 5  # samples of a parabola
+from ...models import points
+from .smoothing import NEIGHBOURS, smooth, widest_parabola
+
 WIDEST = 5.0  # median times between measured poses; the motion inside a longer gap is not known
 
 
@@ -25,9 +27,18 @@ class PoseTrack:
         (N, 3) [m], (N, 3, 3).
     known
         Samples at which the pose was measured, (N,) of bool; at least four.
+    neighbours
+        Number of samples of a parabola.
     """
 
-    def __init__(self, times: np.ndarray, position: np.ndarray, rotation: np.ndarray, known: np.ndarray):
+    def __init__(
+        self,
+        times: np.ndarray,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        known: np.ndarray,
+        neighbours: int = NEIGHBOURS,
+    ):
         from scipy.interpolate import CubicSpline
 
         self._times, self._measured = times, times[known]
@@ -38,7 +49,7 @@ class PoseTrack:
         # q and -q are the same rotation: neighbours get the same sign.
         signs = np.where(np.einsum("ni,ni->n", quaternions[1:], quaternions[:-1]) < 0, -1.0, 1.0)
         quaternions[1:] *= np.cumprod(signs)[:, None]
-        self._curve = CubicSpline(measured, _smooth(measured, np.hstack([position[known], quaternions])))
+        self._curve = CubicSpline(measured, smooth(measured, np.hstack([position[known], quaternions]), neighbours))
         self._last: tuple[float, tuple[np.ndarray, ...]] | None = None
 
     def at_samples(self, rows: np.ndarray) -> PoseTrack:
@@ -78,16 +89,9 @@ class PoseTrack:
         return values[:, :3], Rotation.from_quat(q).as_matrix(), slopes[:, :3], rate
 
 
-def _smooth(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Smooth values (n, d) by least-squares parabolas through each and its four nearest neighbours."""
-    count = len(times)
-    if count < NEIGHBOURS:
-        return values
-    first = np.clip(np.arange(count) - NEIGHBOURS // 2, 0, count - NEIGHBOURS)
-    rows = first[:, None] + np.arange(NEIGHBOURS)  # (n, 5)
-    apart = times[rows] - times[:, None]
-    apart /= np.abs(apart).max(axis=1, keepdims=True)
-    basis = np.stack([np.ones_like(apart), apart, apart**2], axis=2)  # (n, 5, 3)
-    transposed = np.swapaxes(basis, 1, 2)
-    shares = np.linalg.solve(transposed @ basis, transposed)[:, 0]  # (n, 5): the value at 0 of the parabola
-    return np.einsum("nk,nkd->nd", shares, values[rows])
+def track_of(times: np.ndarray, poses: np.ndarray) -> tuple[PoseTrack, int]:
+    """Return poses (N, 6), nan where not measured, as a track as smooth as their noise allows, and its neighbours."""
+    known = np.asarray(np.isfinite(poses).all(axis=1))
+    turning = np.hstack([poses[known, :3], np.unwrap(poses[known, 3:], axis=0)])
+    neighbours, filled = widest_parabola(times[known], turning), np.where(known[:, None], poses, 0.0)
+    return PoseTrack(times, filled[:, :3], points.rotations(filled[:, 3:]), known, neighbours), neighbours

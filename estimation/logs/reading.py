@@ -42,12 +42,15 @@ class Log(NamedTuple):
         Remarks on files and clocks, one line each.
     begin
         Reading of the lengths' clock at time 0 of the measurements [s].
+    recordings
+        The files.
     """
 
     measurements: Measurements
     fields: Fields
     notes: list[str]
     begin: float = 0.0
+    recordings: Sequence[Recording] = ()
 
 
 def read_measurements(
@@ -102,7 +105,8 @@ def read_log(
     where = "; ".join(one.where for one in [*first, *others])
     try:
         found = _fields([*first, *others] if given else first, others, given, known)
-        return measurements_of(found, [*first, *others], sigma, known)
+        everything = [*first, *others]
+        return measurements_of(found, everything, sigma, known)._replace(recordings=everything)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
@@ -111,12 +115,13 @@ def _fields(
     all_: Sequence[Recording], others: Sequence[Recording], given: LogMap | None, robot: Robot | None
 ) -> Fields:
     m = None if robot is None else robot.m
-    found = fields_of(all_, given, m)
+    moving = () if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
+    found = fields_of(all_, given, m, moving)
     if others and not given:
-        of_poses = fields_of(others, None, m)
+        of_poses = fields_of(others, None, m, moving)
         times = found.time + of_poses.time
         found = found._replace(position=of_poses.position, orientation=of_poses.orientation, time=times)
-    if not found.lengths:
+    if not found.lengths and not (robot is not None and robot.fixed_lengths is not None and found.position):
         names = [topic.full(name) for one in all_ for topic in one.topics.values() for name in topic.fields]
         listed = ", ".join(names[:12]) + (" ..." if len(names) > 12 else "")
         raise InputError(f"must have columns l0, l1, ... of lengths, got {listed or 'none'}")
@@ -128,32 +133,33 @@ def measurements_of(
 ) -> Log:
     """Return the measurements of some fields, at the times of whichever of lengths and poses has fewer samples."""
     notes = [note for one in from_ for note in one.notes]
-    stated = found.lengths[0].recording.sigma
+    main = (found.lengths or found.position)[0]
+    stated = main.recording.sigma
     sigmas: dict[str, Any] = {"sigma": sigma} if sigma is not None else {"sigma": dict(stated)} if stated else {}
-    read = _Reader(found)
-    lengths = read.stream(found.lengths)
-    tensions = read.stream(found.tensions) if found.tensions else None
+    read = Reader(found)
     position = read.stream(found.position) if found.position else None
+    lengths = read.stream(found.lengths) if found.lengths else _constant(robot, position)
+    tensions = read.stream(found.tensions) if found.tensions else None
     orientation = read.stream(found.orientation) if found.orientation else None
     times = lengths.times
     begin = float(times[0]) if times is not None and times[0] > COUNTED else 0.0
     if position is not None and orientation is not None:
-        orientation = _at(position.times, orientation, found.orientation[0])
+        orientation = at_times(position.times, orientation, found.orientation[0])
     pose = position or orientation
     source = (found.position or found.orientation or found.lengths)[0]
-    together = source.topic is found.lengths[0].topic
+    together = source.topic is main.topic
     if pose is not None and not together:
         if times is None or pose.times is None:
             raise InputError("lengths and poses of several files or topics must have times, got none")
         quaternions = None if orientation is None else _quaternions(orientation.values)
         places = np.full((len(pose.values), 3), np.nan) if position is None else position.values
         lengths, tensions, places, quaternions = _merged(
-            lengths, tensions, Samples(pose.times, places), quaternions, source, found.lengths[0], robot, notes
+            lengths, tensions, Samples(pose.times, places), quaternions, source, main, robot, notes
         )
         position = None if position is None else Samples(lengths.times, places)
         orientation = None if quaternions is None else Samples(lengths.times, quaternions)
     elif tensions is not None:
-        tensions = _at(lengths.times, tensions, found.tensions[0])
+        tensions = at_times(lengths.times, tensions, found.tensions[0])
     _check_finite(lengths.values, found.lengths)
     arguments: dict[str, Any] = {"times": None if lengths.times is None else lengths.times - begin}
     if tensions is not None:
@@ -166,7 +172,14 @@ def measurements_of(
     return Log(Measurements(lengths.values, **arguments, **sigmas), found, notes, begin)
 
 
-class _Reader:
+def _constant(robot: Robot | None, position: Samples | None) -> Samples:
+    """Return the constant lengths of a robot without winches at the times of its positions."""
+    assert robot is not None
+    assert position is not None
+    return Samples(position.times, np.tile(np.asarray(robot.fixed_lengths), (len(position.values), 1)))
+
+
+class Reader:
     """Read each topic once."""
 
     def __init__(self, found: Fields):
@@ -186,7 +199,10 @@ class _Reader:
             parts.append(Samples(whole.times, column[:, None]))
         if all(one.topic is fields[0].topic for one in fields):
             return Samples(parts[0].times, np.hstack([part.values for part in parts]))
-        several = [parts[0], *(_at(parts[0].times, part, one) for part, one in zip(parts[1:], fields[1:], strict=True))]
+        several = [
+            parts[0],
+            *(at_times(parts[0].times, part, one) for part, one in zip(parts[1:], fields[1:], strict=True)),
+        ]
         whole = np.hstack([part.values for part in several])
         kept = np.isfinite(whole).all(axis=1)
         return Samples(None if parts[0].times is None else parts[0].times[kept], whole[kept])
@@ -207,7 +223,7 @@ class _Reader:
         return self._done[key]
 
 
-def _at(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:
+def at_times(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:
     """Return samples at other times, nan inside gaps and beyond the ends."""
     if samples.times is None or times is None:
         if len(samples.values) == (0 if times is None else len(times)) or times is samples.times:
@@ -285,7 +301,7 @@ def _merged(
         places = np.where(nowhere, np.nan, places)
         quaternions = None if quaternions is None else Rotation.from_matrix(matrices).as_quat()
     moved = _interpolated(at, lengths) if at is not times else lengths.values
-    forces = None if tensions is None else _at(at, tensions, first).values
+    forces = None if tensions is None else at_times(at, tensions, first).values
     kept = np.isfinite(moved).all(axis=1) & inside
     kept &= True if forces is None else np.isfinite(forces).all(axis=1)
     if not kept.any():

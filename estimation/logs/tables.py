@@ -20,6 +20,8 @@ from .recording import Recording, Samples, Topic
 MOST_FIELDS = 40_000_000  # of a CSV file
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
+POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
+OF_CARRIERS = {"carrier_pose": (POSE, POSE_UNITS), "actuation": (("thrust",), ("N",))}  # of a simulation
 WRITTEN = {"cable_lengths": ("l", LENGTHS), "tensions": ("tension", FORCES), "time": ("t", TIMES)}  # by towline
 
 
@@ -51,12 +53,14 @@ def from_netcdf(content: bytes, where: str) -> Recording:
     try:
         # NetCDF 4 is HDF5. Of a damaged file, h5netcdf would complain once more on standard error when it is forgotten.
         with h5py.File(io.BytesIO(content), "r") as file:
+            there = check_hdf5(file, len(content), _is_read, ALWAYS_ACCEPTED)
             arrays = {
                 name: (np.asarray(variable[...]), _attributes(variable))
-                for name, variable in check_hdf5(file, len(content), _is_read, ALWAYS_ACCEPTED).items()
+                for name, variable in there.items()
                 if variable.dtype.kind in "fiu"
             }
             known = _attributes(file)
+            carriers = [name.decode() for name in np.ravel(there["carrier"][()])] if "carrier" in there else []
     except InputError:
         raise
     except Exception as error:  # h5py raises of any kind for damaged files
@@ -69,10 +73,12 @@ def from_netcdf(content: bytes, where: str) -> Recording:
     for name, (values, attributes) in arrays.items():
         if name == "pose":
             check_units(name, attributes)
-            _add(columns, units, POSE, values, ["m"] * 3 + ["rad"] * 3)
+            _add(columns, units, POSE, values, POSE_UNITS)
         elif "cable_lengths" in arrays and name in WRITTEN:
             # Lengths of a simulation are those under tension, so its tensions are left out.
             if name == "tensions" and not stated:
+                efforts = [f"cables/joints[cable {i + 1}].effort" for i in range(values.shape[-1])]  # as in MCAP
+                _add(columns, units, efforts, values, ["N"] * len(efforts))
                 continue
             prefix, accepted = WRITTEN[name]
             unit = str(attributes.get("units", ""))
@@ -81,10 +87,23 @@ def from_netcdf(content: bytes, where: str) -> Recording:
             one = values.ndim < 2
             names = [prefix] if one else [f"{prefix}{i}" for i in range(values.shape[1])]
             _add(columns, units, names, values[:, None] if one else values, [unit] * len(names))
+        elif name == "tensions_commanded":
+            names = [f"tension_command_{i}" for i in range(values.shape[-1])]
+            _add(columns, units, names, values, ["N"] * len(names))
         elif values.ndim == 1:
             if role(name) and "units" not in attributes:
                 raise InputError(f"variable {name} must have the attribute units, got none")
             _add(columns, units, [name], values[:, None], [str(attributes.get("units", ""))])
+    topics: dict[str, Topic] = {}
+    for i, carrier in enumerate(carriers):  # in topics of their own, so that no pose of theirs is the platform's
+        own: dict[str, np.ndarray] = {}
+        named: dict[str, str] = {}
+        for name, (names, stated_units) in OF_CARRIERS.items():
+            values = arrays[name][0] if name in arrays else np.empty(0)
+            if values.ndim == 3 and values.shape[1:] >= (i + 1, len(names)):
+                _add(own, named, names, values[:, i, : len(names)], stated_units)
+        if own:
+            topics[carrier] = _table(own, named, carrier)
     longest: dict[int, int] = {}
     for column in columns.values():
         longest[len(column)] = longest.get(len(column), 0) + 1
@@ -94,15 +113,15 @@ def from_netcdf(content: bytes, where: str) -> Recording:
         sizes = ", ".join(str(size) for size in sorted(longest))
         raise InputError(f"variables must have one size, got {sizes} ({wrong[0]})")
     columns = {name: column for name, column in columns.items() if len(column) == rows}
-    return Recording(where, "NetCDF", {"": _table(columns, units)}, stated)
+    return Recording(where, "NetCDF", {"": _table(columns, units), **topics}, stated)
 
 
-def _table(columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> Topic:
+def _table(columns: Mapping[str, np.ndarray], units: Mapping[str, str], name: str = "") -> Topic:
     def read(names: Sequence[str]) -> Samples:
         return Samples(None, np.column_stack([columns[name] for name in names]))
 
     count = len(next(iter(columns.values()))) if columns else 0
-    return Topic("", "columns", count, None, {name: units[name] for name in columns}, read)
+    return Topic(name, "columns", count, None, {name: units[name] for name in columns}, read)
 
 
 def _add(columns: dict, units: dict, names: Sequence[str], values: np.ndarray, stated: Sequence[str]) -> None:
@@ -117,7 +136,7 @@ def _add(columns: dict, units: dict, names: Sequence[str], values: np.ndarray, s
 
 
 def _is_read(name: str) -> bool:
-    return bool(role(name)) or name in WRITTEN or name == "pose"
+    return bool(role(name)) or name in (*WRITTEN, *OF_CARRIERS, "carrier", "pose", "tensions_commanded")
 
 
 def _attributes(of: Any) -> dict[str, Any]:

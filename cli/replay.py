@@ -1,0 +1,55 @@
+"""Replay a recording, for `towline simulate ROBOT LOG`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from ..base.errors import InputError
+from ..base.inputs import check_ending
+from .options import print_result
+from .outputs import check_outputs
+
+
+def replay_log(
+    robot: Any,
+    log: Path,
+    options: dict[str, Any],
+    fit: Path | None,
+    out: Path | None,
+    figures: Path | None,
+    form: str,
+    as_json: bool,
+) -> None:
+    """Replay, save, draw and print; the exit code is 1 if the replay fails, or the fitted robot is not written."""
+    from ..models import load
+    from ..simulation import replay
+
+    loaded = load(robot)
+    target = check_ending("--out", out or Path(f"{log.stem}-replay.nc"), ".nc")
+    if fit is not None:
+        check_ending("--fit", fit, ".yaml", ".yml")
+    outputs = {"--out": target, "--fit": fit, "--figures": figures and figures / f"replay.{form}"}
+    check_outputs(outputs, {"the log": log, "--poses": options["poses"]})
+    try:
+        result = replay(loaded, log, fit=fit is not None, **options)
+    except InputError as error:
+        raise InputError(_as_options(str(error))) from None
+    written = {"file": result.save(target)}
+    if fit is not None and not result.refused:
+        written["robot_file"] = result.save_robot(fit)
+    pictures = [] if figures is None else result.plot(figures, form)
+    data = {**result.to_dict(), **written, "figures": pictures}
+    print_result(as_json, data, result.report, (*written.values(), *pictures))
+    if fit is not None and result.refused:
+        typer.echo(f"towline: {fit} is not written: {result.refused}", err=True)
+    if not result.passed or (fit is not None and result.refused):
+        raise typer.Exit(1)
+
+
+def _as_options(text: str) -> str:
+    """Name options in place of arguments in an error."""
+    first = text.split(" ", 1)[0]
+    return f"--{text}" if first in ("drive", "delay", "window", "tolerance") else text

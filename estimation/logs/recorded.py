@@ -1,0 +1,211 @@
+"""`read_recorded`: the motion and the commands of a robot over a recording, for its replay."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.csv_columns import LENGTHS
+from ...base.display import Displayed
+from ...base.errors import InputError
+from ...models import points
+from ...models.files import as_robot
+from ...models.robot import Robot
+from ..pose.from_log import lengths_of, poses_from_log
+from .mapping import Field, Fields, LogMap, carrier_fields, command_fields, read_map
+from .reading import Log, Paths, Reader, at_times, read_log
+from .recording import Recording, Samples
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded(Displayed):
+    """N samples of a robot's motion and of its commands, as far as they were recorded, with one clock.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    times
+        (N,) [s], increasing.
+    pose
+        Of the platform frame in {G}, (N, 6) [m, rad], nan where not measured.
+    measured
+        Which coordinates of the pose are measured, (6,) of bool; the others are computed from the lengths.
+    lengths
+        Unstrained cable lengths by the encoders of the file, (N, m) [m], or None.
+    tensions
+        (N, m) [N], or None.
+    commands
+        Commanded unstrained lengths [m] or tensions [N], (N, m), or None.
+    commanded
+        "lengths" or "tensions".
+    carrier_pose
+        Poses of the carriers in {G}, (N, c, 6) [m, rad]; those that never move are at home. A carrier that moves and
+        was not recorded has nan.
+    thrusts
+        Thrust of each carrier, (N, c) [N], nan where not recorded.
+    notes
+        Remarks, one line each.
+    """
+
+    robot: Robot
+    times: np.ndarray
+    pose: np.ndarray
+    measured: np.ndarray
+    lengths: np.ndarray | None
+    tensions: np.ndarray | None
+    commands: np.ndarray | None
+    commanded: str
+    carrier_pose: np.ndarray
+    thrusts: np.ndarray
+    notes: Sequence[str]
+
+
+def read_recorded(
+    robot: Robot | str | os.PathLike[str],
+    log: Paths,
+    poses: Paths | None = None,
+    fields: str | os.PathLike[str] | None = None,
+) -> Recorded:
+    """Read the motion and the commands of a robot from a log.
+
+    Parameters
+    ----------
+    robot
+        The robot; its moving carriers are found by their names.
+    log, poses, fields
+        As `path`, `poses` and `fields` of `read_measurements`.
+
+    Raises
+    ------
+    InputError
+        As `read_measurements`, and if the log has no times.
+    """
+    known = as_robot(robot)
+    try:
+        read = read_log(log, None, poses, known, fields)
+    except InputError as error:
+        raise (InputError(f"log: {error}") if isinstance(log, list | tuple) else error) from None
+    given = None if fields is None else read_map(fields)
+    where = "; ".join(one.where for one in read.recordings)
+    try:
+        measured = read.measurements
+        if measured.times is None:
+            raise InputError("must have times for a replay, got none")
+        if measured.m != known.m:
+            raise InputError(f"must have a length for each of the {known.m} cables of {known.name}, got {measured.m}")
+        times, notes = measured.times + read.begin, list(read.notes)
+        found = command_fields(read.recordings, given, known.m, [carrier.name for carrier in known.carriers])
+        reader = Reader(found)
+
+        def at(which: Sequence[Field], size: int) -> np.ndarray | None:
+            if not which:
+                return None
+            if len(which) != size:
+                raise InputError(f"{which[0].full} must be one of {size} fields, got {len(which)}")
+            return _filled(times, reader.stream(which), which[0])
+
+        efforts = at(found.efforts, known.m) if measured.tensions is None else None
+        commands, is_length = at(found.commands, known.m), bool(found.commands) and found.commands[0].unit in LENGTHS
+        lengths = lengths_of(known, measured.lengths) if read.fields.lengths else None
+        if lengths is not None and efforts is not None:  # which are lengths under tension
+            lengths = lengths / lengths_of(known, np.ones_like(efforts), efforts) * lengths_of(known, np.ones(known.m))
+        if commands is not None and is_length:
+            commands = lengths_of(known, commands)
+        if found.commands and found.commands == read.fields.lengths:  # which are not measured
+            lengths = None
+        tensions = measured.tensions if efforts is None else efforts
+        if found.commands and found.commands == read.fields.tensions:
+            tensions = None
+        pose, known_part = _poses(known, read, notes)
+        carrier_pose, thrusts = _carriers(known, read.recordings, given, times)
+        flying = [i for i, carrier in enumerate(known.carriers) if carrier.actuators]
+        if found.thrusts and not np.isfinite(thrusts).any():
+            given_thrusts = at(found.thrusts, len(flying))
+            thrusts[:, flying] = np.nan if given_thrusts is None else given_thrusts
+        return Recorded(
+            robot=known,
+            times=times,
+            pose=pose,
+            measured=known_part,
+            lengths=lengths,
+            tensions=tensions,
+            commands=commands,
+            commanded="lengths" if is_length else "tensions",
+            carrier_pose=carrier_pose,
+            thrusts=thrusts,
+            notes=notes,
+        )
+    except InputError as error:
+        text = str(error)
+        raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
+
+
+def _filled(times: np.ndarray, samples: Samples, field: Field) -> np.ndarray:
+    """Return samples at other times; before, after and inside gaps the nearest ones are held."""
+    values = at_times(times, samples, field).values
+    good = np.isfinite(values).all(axis=1)
+    if not good.any():
+        raise InputError(f"{field.full} must have samples at the times of the poses, got none")
+    if good.all():
+        return values
+    return np.column_stack([np.interp(times, times[good], column[good]) for column in values.T])
+
+
+def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (N, 6), and which of their coordinates were measured; locked ones are at home."""
+    measured, moves = read.measurements, robot.dof_mask > 0
+    poses = np.full((len(measured), 6), np.nan) if measured.poses is None else measured.poses.copy()
+    known = np.asarray(np.isfinite(poses).any(axis=0))
+    poses[:, ~moves] = np.where(np.isfinite(poses[:, moves][:, :1]), robot.home[~moves], np.nan)
+    if not known[moves].all():
+        if any(carrier.moves for carrier in robot.carriers) or not read.fields.lengths:
+            raise InputError("must have poses of the platform, position and orientation, got others")
+        computed = poses_from_log(robot, measured).estimate.pose
+        poses[:, ~known] = computed[:, ~known]
+        notes.append("coordinates of the pose that were not measured are computed from the lengths")
+    return poses, known & moves
+
+
+def _carriers(
+    robot: Robot, recordings: Sequence[Recording], given: LogMap | None, times: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (N, c, 6) and thrusts (N, c) of the carriers."""
+    poses = np.tile(robot.carrier_home, (len(times), 1, 1))
+    thrusts = np.full(poses.shape[:2], np.nan)
+    for index, carrier in enumerate(robot.carriers):
+        if not carrier.free_coordinates(robot.drive):
+            continue
+        found = carrier_fields(recordings, given, carrier.name)
+        reader = Reader(found)
+        poses[:, index, :3] = np.nan
+        if found.position:
+            poses[:, index, :3] = at_times(times, reader.stream(found.position), found.position[0]).values
+        if found.orientation:
+            poses[:, index, 3:] = _angles(times, reader, found)
+        elif not carrier.keeps_attitude:
+            poses[:, index, 3:] = np.nan
+        if found.thrusts:
+            values = _filled(times, reader.stream(found.thrusts), found.thrusts[0])
+            thrusts[:, index] = values[:, 0]
+    return poses, thrusts
+
+
+def _angles(times: np.ndarray, reader: Reader, found: Fields) -> np.ndarray:
+    samples = reader.stream(found.orientation)
+    if samples.values.shape[1] == 3:
+        samples = Samples(samples.times, np.unwrap(samples.values, axis=0))
+        return at_times(times, samples, found.orientation[0]).values
+    from scipy.spatial.transform import Rotation
+
+    values = samples.values.copy()
+    jumps = np.einsum("ni,ni->n", values[1:], values[:-1]) < 0  # q and -q are the same rotation
+    values[1:] *= np.cumprod(np.where(jumps, -1.0, 1.0))[:, None]
+    values = at_times(times, Samples(samples.times, values), found.orientation[0]).values
+    known = np.isfinite(values).all(axis=1) & (np.linalg.norm(values, axis=1) > 0.5)
+    angles = np.full((len(times), 3), np.nan)
+    angles[known] = points.angles(Rotation.from_quat(values[known]).as_matrix())
+    return angles

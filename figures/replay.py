@@ -1,0 +1,66 @@
+"""Draw a replay: residuals over a recording, window by window, and with what explains them fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LABELS = {
+    "position": ("position [mm]", 1e3),
+    "rotation": ("rotation [mrad]", 1e3),
+    "tensions": ("tension [N]", 1.0),
+    "lengths": ("length [mm]", 1e3),
+}
+
+
+def replay(
+    times: np.ndarray,
+    residuals: Mapping[str, np.ndarray],
+    explained: Mapping[str, np.ndarray],
+    noise: Mapping[str, float],
+    title: str,
+    by: str = "",
+) -> Figure:
+    """Draw the size of each kind of residual over time, and its noise.
+
+    Parameters
+    ----------
+    times
+        Times of the samples of each window, (W, S) [s].
+    residuals, explained
+        Measured less simulated by kind, (W, S, k), with the model and with the parameter that explains most.
+    noise
+        Standard deviation of each kind.
+    title
+        Result in one line.
+    by
+        Name of the parameter of `explained`.
+    """
+    canvas = style.figure(height=0.9 + 1.1 * len(residuals))
+    panels = style.panels_below(canvas, "time [s]", [LABELS[name][0] for name in residuals])
+    for ax, (name, part) in zip(panels, residuals.items(), strict=False):
+        scale = LABELS[name][1]
+        curves = [(part, 0, "model"), *([(explained[name], 1, f"with {by} fitted")] if explained else [])]
+        for values, index, label in curves:
+            for k, (at, window) in enumerate(zip(times, values, strict=True)):
+                look: dict[str, Any] = style.look(index) | {"linewidth": 0.9}
+                ax.plot(at, scale * _size(window), **look, label=label if k == 0 else None)
+        usual = np.sqrt(part.shape[-1]) if name in ("position", "rotation") else 1.0
+        ax.axhline(scale * usual * noise[name], color="#444444", linewidth=0.8, linestyle=":", label="noise, rms")
+        ax.set_ylim(bottom=0.0)
+    style.heading(panels[0], title)
+    style.legend_below(canvas, panels[0])
+    return canvas
+
+
+def _size(values: np.ndarray) -> np.ndarray:
+    """Return the length of vectors (S, 3), or the root mean square over the cables (S, m)."""
+    squares = np.square(values)
+    return np.sqrt(np.sum(squares, axis=-1) if values.shape[-1] == 3 else np.mean(squares, axis=-1))

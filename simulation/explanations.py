@@ -1,0 +1,214 @@
+"""`Matching`: a recording compared with its plant, and which of the model's parameters explains the difference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t as student
+
+from .replayed_robot import Parameters
+from .windows import Windows
+
+# Of each parameter: its smallest and largest value, and the step of its derivative.
+RANGES = {
+    "delay": (-0.2, 0.2, 1e-3),
+    "friction": (0.0, 1e5, 0.1),
+    "mass": (0.2, 5.0, 0.01),
+    "stiffness": (0.1, 10.0, 0.02),
+}
+STEPS, HALVINGS = 4, 3  # of Gauss and Newton, and of a step that is too long
+REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
+NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
+DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
+TIED = 0.1  # of what the best explains: others that explain as much, up to this, cannot be told apart from it
+SHOWN = 0.1  # of a parameter (of 0.1 s, of a tenth of the tensions): its deviation where a recording does not show it
+BLURRED = 0.2  # of the squares of the derivative by the stiffness: what may be noise of lengths
+FARTHEST = 5.0  # standard deviations of a start
+OUTLYING = 25.0  # times the usual sum of squares of a window
+LOST = 1e6  # what a residual is where the simulation diverges
+
+
+class Explanation(NamedTuple):
+    """Share of the residuals that one parameter alone explains.
+
+    Attributes
+    ----------
+    name
+        "delay", "friction", "mass" or "stiffness".
+    before, value, sigma
+        Its value in the model, the value with the least residual and the standard deviation of that, by the scatter of
+        the windows and the noise: in [s], [N], or as a factor of the file's.
+    explained
+        Share of the squared residuals beyond the noise that it removes.
+    shown
+        Whether the recording shows it well enough to be found.
+    named
+        Whether it certainly explains something.
+    """
+
+    name: str
+    before: float
+    value: float
+    sigma: float
+    explained: float
+    shown: bool
+    named: bool
+
+
+class Match(NamedTuple):
+    """Residuals with some parameters.
+
+    Attributes
+    ----------
+    parameters
+        The parameters.
+    drift
+        Measured less simulated over the noise, from the starts on, (W, R).
+    left
+        The same without what other starts would explain, and corrections of starts over their deviations, (W, R + P).
+    """
+
+    parameters: Parameters
+    drift: np.ndarray
+    left: np.ndarray
+
+    @property
+    def cost(self) -> np.ndarray:
+        """Return the sum of squares of each window, (W,)."""
+        return np.sum(self.left**2, axis=1)
+
+
+class Matching:
+    """Compare a recording with its plant for different parameters.
+
+    Attributes
+    ----------
+    windows
+        The windows, their starts corrected within the noise of the recording. Their noise has that of simulations too.
+    first
+        Residuals with the first parameters.
+    kept
+        Windows that are no outliers, (W,) of bool.
+    noise
+        What residuals are if nothing except noise differs, in windows from the recorded state on, by kind.
+    """
+
+    def __init__(self, windows: Windows, parameters: Parameters):
+        self.windows = windows
+        self._linearise(parameters)
+        echo, sensors = self._echo(parameters), dict(windows.noise)
+        self.noise = self._with_echo(sensors, echo)
+        windows.noise = self._with_echo(sensors, self._project(echo))
+        self._linearise(parameters)
+        self._echoed = self._project(self._echo(parameters))
+        self.first = self.at(parameters)
+        self.kept = self._good & (self.first.cost <= OUTLYING * np.median(self.first.cost))
+
+    def _linearise(self, parameters: Parameters) -> None:
+        """Correct the starts where that reduces residuals, and keep how these depend on them."""
+        windows, sigma = self.windows, self.windows.start_sigma
+        every = windows.predict(parameters, nudged=True)
+        self._good = np.asarray(np.isfinite(every).all(axis=(0, 2)))
+        every = np.where(self._good[:, None], every, 0.0)
+        known = np.tile(np.diag(1 / sigma), (len(windows.starts), 1, 1))
+        Q, R = np.linalg.qr(np.concatenate([np.moveaxis(every[1:], 0, 2), known], axis=1))  # (W, R + P, P)
+        self._Q, given = Q, self._with_start(every[0])
+        better = windows.start - np.linalg.solve(R, Q.swapaxes(1, 2) @ given[..., None])[..., 0]
+        # With a wrong model they would get to where nothing is linear.
+        before, windows.start = windows.start, np.clip(better, -FARTHEST * sigma, FARTHEST * sigma)
+        improved = np.sum(self._away(parameters) ** 2, axis=1) < np.sum(given**2, axis=1)
+        windows.start = np.where(improved[:, None], windows.start, before)
+
+    def _away(self, parameters: Parameters) -> np.ndarray:
+        return self._with_start(np.nan_to_num(self.windows.predict(parameters)[0], nan=LOST))
+
+    def _with_start(self, residuals: np.ndarray) -> np.ndarray:
+        """Return residuals with the corrections of the starts, over their deviations, (W, R + P)."""
+        return np.concatenate([residuals, self.windows.start / self.windows.start_sigma], axis=1)
+
+    def _project(self, vectors: np.ndarray) -> np.ndarray:
+        """Return (W, R + P) without what other starts would explain."""
+        return vectors - (self._Q @ (self._Q.swapaxes(1, 2) @ vectors[..., None]))[..., 0]
+
+    def _echo(self, parameters: Parameters) -> np.ndarray:
+        """Return what the noise of the recording does to its simulation, over the noise, (W, R + P)."""
+        shaken = self.windows.shaken()
+        away = np.nan_to_num(shaken.predict(parameters)[0] - self.windows.predict(parameters)[0])
+        return np.concatenate([away, np.zeros_like(self.windows.start)], axis=1)
+
+    def _with_echo(self, noise: Mapping[str, float], echo: np.ndarray) -> dict[str, float]:
+        """Return the noise of each kind of residual, of sensors and of the simulation."""
+        widths, size = self.windows.widths, self.windows.start.shape[1]
+        square = np.mean(np.square(echo[:, :-size].reshape(*self.windows.rows.shape, -1)), axis=(0, 1))
+        more = [part[part > 0].mean() if part.any() else 0.0 for part in np.split(square, np.cumsum(widths)[:-1])]
+        return {name: float(noise[name] * np.sqrt(1 + extra)) for name, extra in zip(noise, more, strict=True)}
+
+    def at(self, parameters: Parameters) -> Match:
+        """Return the residuals for other parameters."""
+        away = self._away(parameters)
+        return Match(parameters, away[:, : -self.windows.start.shape[1]], self._project(away))
+
+    def slope(self, parameters: Parameters, name: str) -> np.ndarray:
+        """Return the derivative of the residuals by a parameter, (W, R + P)."""
+        (_, high, step), value = RANGES[name], getattr(parameters, name)
+        step = step if value + step <= high else -step
+        ends = [self.windows.predict(parameters._replace(**{name: one}))[0] for one in (value + step, value)]
+        change = np.nan_to_num((ends[0] - ends[1]) / step)
+        return self._project(np.concatenate([change, np.zeros_like(self.windows.start)], axis=1))
+
+    def fitted(self, first: Match, name: str, used: np.ndarray) -> tuple[Match, float]:
+        """Fit one parameter alone to windows `used`, (W,) of bool; return the match, and the standard deviation."""
+        best, sigma, (low, high, _) = first, np.inf, RANGES[name]
+        for _ in range(STEPS):
+            slope, value = self.slope(best.parameters, name)[used], getattr(best.parameters, name)
+            steep, along = np.sum(slope**2, axis=1), np.sum(slope * best.left[used], axis=1)
+            if not steep.sum() > 0:
+                break
+            change = -along.sum() / steep.sum()
+            scatter = np.sqrt(np.sum((along + change * steep) ** 2))
+            # What as much noise again would change, also on average: simulated tensions end at zero.
+            sigma = float(np.hypot(scatter, np.sum(slope * self._echoed[used])) / steep.sum())
+            trials = (float(np.clip(value + change / 2**i, low, high)) for i in range(HALVINGS))
+            matches = (self.at(best.parameters._replace(**{name: trial})) for trial in trials)
+            better = next((one for one in matches if one.cost[used].sum() < best.cost[used].sum()), None)
+            if better is None:
+                break
+            best = better
+            if abs(getattr(best.parameters, name) - value) < 0.1 * sigma:
+                break
+        return best, sigma
+
+    def explanations(self, first: Match, used: np.ndarray) -> list[tuple[Explanation, Match]]:
+        """Return what each parameter alone explains, from a match on in windows `used`, that of most first."""
+        found, whole, count = [], first.cost[used].sum(), float(np.count_nonzero(first.left[used]))
+        certain = float(student.ppf(1 - DOUBT, max(int(used.sum()) - 1, 1)))
+        tensions = self.windows.recorded.tensions
+        usual = self.windows.robot.force_scale if tensions is None else float(np.median(np.abs(tensions)))
+        for name in applicable(self.windows):
+            match, sigma = self.fitted(first, name, used)
+            before, value = (getattr(one.parameters, name) for one in (first, match))
+            removed = whole - match.cost[used].sum()
+            size = {"delay": 0.1, "friction": max(10 * value, 0.1 * usual)}.get(name, 1.0)
+            shown = sigma < SHOWN * size and RANGES[name][0] < value + (name == "friction") < RANGES[name][1]
+            if name == "stiffness":  # noise of lengths, which it multiplies, would make it too small
+                noise = np.sum(self._echoed[used] ** 2)
+                shown = shown and noise <= BLURRED * np.sum(self.slope(first.parameters, name)[used] ** 2)
+            changed = abs(value - before) > certain * sigma and removed > REMOVED * whole
+            named = bool(shown and changed and whole > NOTHING * count)
+            explained = float(removed / max(whole - count, removed, 1e-12))
+            found.append((Explanation(name, before, value, sigma, explained, bool(shown), named), match))
+        return sorted(found, key=lambda one: (not one[0].shown, -one[0].explained))
+
+
+def applicable(windows: Windows) -> Sequence[str]:
+    """Return the parameters on which a simulation with such commands depends."""
+    names = {"delay": windows.commanded, "friction": windows.drive != "lengths", "mass": True}
+    return [name for name, depends in (names | {"stiffness": windows.drive != "tensions"}).items() if depends]
+
+
+def tied(found: Sequence[Explanation]) -> list[str]:
+    """Return the name that explains most, and those of others that explain as much; none if it explains nothing."""
+    least = (1 - TIED) * found[0].explained if found and found[0].named else np.inf
+    return [one.name for one in found if one.named and one.explained >= least]

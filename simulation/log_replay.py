@@ -1,0 +1,345 @@
+"""`replay`: does the model do what the robot did? A recording, repeated by the plant, with what explains the rest."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.display import Displayed, Fact
+from ..base.errors import InputError
+from ..base.inputs import check_ending, file_path, flag, number, one_of
+from ..base.netcdf import Contents, Variable, save_netcdf
+from ..base.text import quantity
+from ..estimation.logs.reading import Paths
+from ..estimation.logs.recorded import read_recorded
+from ..figures.drawn import Drawn
+from ..figures.report import Report, Reported, Section, Table
+from ..models.parsing import to_yaml
+from ..models.robot import Robot
+from .explanations import Explanation, Matching, tied
+from .replayed_robot import Parameters, changed
+from .windows import Windows
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+UNITS = {"position": (1e3, "mm"), "rotation": (1e3, "mrad"), "tensions": (1.0, "N"), "lengths": (1e3, "mm")}
+BLOCK = 4  # windows that follow each other are fitted, or validate the fit
+GAIN = 0.99  # of the squared residuals of validation windows: what a fit must leave at most
+DRIVES = ("lengths", "tensions", "forces")
+LATEST = 0.2  # [s]
+
+
+@dataclass(frozen=True, eq=False)
+class Replay(Drawn, Reported, Displayed):
+    """The result of `replay`.
+
+    Attributes
+    ----------
+    matching
+        The recording, compared with its plant.
+    found
+        What each parameter alone explains, that which explains most first.
+    explained
+        Residuals with the first one fitted, None if it explains nothing.
+    fitted
+        Parameters after a fit, or None.
+    validation
+        Root mean square of the residuals of validation windows over their noise, before and after a fit, or None.
+    tolerance
+        Largest position residual for a pass [m].
+    """
+
+    matching: Matching
+    found: tuple[Explanation, ...]
+    explained: Mapping[str, np.ndarray] | None
+    fitted: Parameters | None
+    validation: tuple[float, float] | None
+    tolerance: float
+
+    @property
+    def windows(self) -> Windows:
+        """Return the windows of the recording."""
+        return self.matching.windows
+
+    @cached_property
+    def residuals(self) -> dict[str, np.ndarray]:
+        """Return measured less simulated by kind, (W, S, 3) or (W, S, m) in SI units, nan where not measured."""
+        return _by_kind(self.matching)
+
+    def rms(self) -> dict[str, float]:
+        """Return the root mean square of each kind of residual, of one number, without outlying windows."""
+        return self._rms(self.residuals)
+
+    def _rms(self, parts: Mapping[str, np.ndarray]) -> dict[str, float]:
+        return {name: float(np.sqrt(np.nanmean(part[self.matching.kept] ** 2))) for name, part in parts.items()}
+
+    @cached_property
+    def error(self) -> float:
+        """Return what 95 % of the position residuals do not exceed [m]; without positions, of those of lengths."""
+        parts = {name: part[self.matching.kept] for name, part in self.residuals.items()}
+        if "position" in parts:
+            return float(np.nanquantile(np.sqrt(np.nansum(parts["position"] ** 2, axis=-1)), 0.95))
+        return float(np.nanquantile(np.abs(parts["lengths"]), 0.95)) if "lengths" in parts else 0.0
+
+    @property
+    def passed(self) -> bool:
+        """Return whether 95 % of the position residuals are within the tolerance."""
+        return self.error <= self.tolerance
+
+    @property
+    def named(self) -> list[str]:
+        """Return the parameter that explains most, and others that the recording does not distinguish from it."""
+        return tied(self.found)
+
+    @property
+    def robot(self) -> Robot:
+        """Return the robot with the fitted parameters; without a fit, that of the file."""
+        file, fitted = self.windows.recorded.robot, self.fitted
+        if fitted is None:
+            return file
+        # Friction of a robot without models of winches and stiffness that was assumed have no place in a file.
+        return changed(file, fitted if self.windows.drive == "forces" else fitted._replace(friction=0.0))
+
+    @property
+    def refused(self) -> str | None:
+        """Return why `save_robot` writes nothing, in one line, or None."""
+        if self.fitted is None:
+            return "no fit was asked for"
+        same = to_yaml(self.robot) == to_yaml(self.windows.recorded.robot)
+        return "no parameter of the robot's file makes validation windows better" if same else None
+
+    def save_robot(self, file: str | os.PathLike[str]) -> Path:
+        """Write the fitted robot as a robot file atomically.
+
+        Raises
+        ------
+        InputError
+            If the fit does not improve validation windows, see `refused`, or the file cannot be written.
+        """
+        if self.refused:
+            raise InputError(f"the robot is not written: {self.refused}")
+        return self.robot.save(file)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the output of `towline simulate ROBOT LOG --json`, ready for JSON."""
+        windows = self.windows
+        return {
+            "passed": self.passed,
+            "error_95": self.error,
+            "drive": windows.drive,
+            "commands": "measured" if windows.measured_command else "commanded",
+            "windows": len(windows.starts),
+            "outliers": int((~self.matching.kept).sum()),
+            "residual_rms": self.rms(),
+            "noise": dict(self.matching.noise),
+            "explained_by": self.named,
+            "explanations": [one._asdict() for one in self.found],
+            "fitted": None if self.fitted is None else self.fitted._asdict(),
+            "validation": self.validation,
+            "notes": windows.notes,
+        }
+
+    def save(self, file: str | os.PathLike[str]) -> Path:
+        """Save the residuals as NetCDF (.nc) atomically.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        path, times = check_ending("file", file_path("file", file), ".nc"), self._times
+        variables = {"time": Variable(("window", "sample"), times, {"units": "s"})}
+        for name, part in self.residuals.items():
+            last = "axis" if name in ("position", "rotation") else "cable"
+            about = {"units": UNITS[name][1].removeprefix("m") or "m", "long_name": "measured less simulated"}
+            variables[f"{name}_residual"] = Variable(("window", "sample", last), part, about)
+        attributes = {"title": self._headline(), "report": json.dumps(self.to_dict())}
+        return save_netcdf(Contents(variables, {}, attributes), path)
+
+    @property
+    def _times(self) -> np.ndarray:
+        return self.windows.recorded.times[self.windows.rows]
+
+    def figures(self) -> dict[str, Figure]:
+        """Draw "replay": residuals over the recording, and those with what explains most."""
+        from ..figures.replay import replay as draw
+
+        after = self.explained or {}
+        by = self.found[0].name if after else ""
+        return {"replay": draw(self._times, self.residuals, after, self.matching.noise, self._summary(), by)}
+
+    def _headline(self) -> str:
+        return self._report().headline
+
+    def _report(self) -> Report:
+        robot, times = self.windows.recorded.robot, self.windows.recorded.times
+        return Report(
+            about=f"{robot.name}, replay of {quantity(float(times[-1] - times[0]), 's')}",
+            status="passed" if self.passed else "failed",
+            summary=self._summary(),
+            parts=[Section("", self._facts()), self._residual_table(), self._explanation_table(), *self.windows.notes],
+            drawings=self._drawings,
+            files=[("The robot's file", to_yaml(robot))],
+        )
+
+    def _summary(self) -> str:
+        rms, noise = self.rms(), self.matching.noise
+        ratios = {name: rms[name] / noise[name] for name in rms}
+        first, worst = next(iter(rms)), max(ratios, key=lambda name: ratios[name])
+        shown = [first] if ratios[worst] < 2 * max(ratios[first], 1.0) else [first, worst]
+        text = "; ".join(
+            f"{name} residual {_of(name, rms[name])} rms, noise {_of(name, noise[name])}" for name in shown
+        )
+        if self.named:
+            best = self.found[0]
+            return f"{text}; {' or '.join(self.named)} explains {_share(best)}: {_value(best.name, best.value)}"
+        if max(ratios.values()) <= 2:
+            return f"{text}; the model does what the robot did"
+        return f"{text}; none of {', '.join(one.name for one in self.found)} explains it"
+
+    def _facts(self) -> list[Fact]:
+        windows, outliers = self.windows, int((~self.matching.kept).sum())
+        kind = f"{windows.drive}, {'measured' if windows.measured_command else 'as commanded'}"
+        if windows.recorded.robot.fixed_lengths is not None:
+            kind = "thrusts" if windows.commanded else "motion of the carriers"
+        facts = {
+            "commands": kind,
+            "windows": f"{len(windows.starts)} of {quantity(windows.window, 's')}, {outliers} outliers",
+            "error": f"95 % within {_of('position', self.error)} (tolerance {_of('position', self.tolerance)})",
+        }
+        if self.fitted is not None and self.validation is not None:
+            first, (before, after) = self.matching.first.parameters, self.validation
+            values = [
+                f"{name} {_value(name, value)}"
+                for name, value in self.fitted._asdict().items()
+                if value != getattr(first, name)
+            ]
+            change = f"validation windows {before:.3g} times their noise, {after:.3g} after the fit"
+            facts["fit"] = f"{', '.join(values)}; {change}" if values else "no parameter improves validation windows"
+        return list(facts.items())
+
+    def _residual_table(self) -> Table:
+        after = None if self.explained is None else self._rms(self.explained)
+        rows = [
+            [
+                name,
+                _of(name, value),
+                _of(name, noise),
+                f"{value / noise:.2f}",
+                *([_of(name, after[name])] if after else []),
+            ]
+            for (name, value), noise in zip(self.rms().items(), self.matching.noise.values(), strict=True)
+        ]
+        columns = ["", "rms", "noise", "ratio", *([f"with {self.found[0].name} fitted"] if after else [])]
+        return Table("Residuals, measured less simulated", columns, rows, (1, 2, 3, 4))
+
+    def _explanation_table(self) -> Table:
+        rows = []
+        for one in self.found:
+            remark = "" if one.named else "explains nothing" if one.shown else "not shown by this recording"
+            if one.name in self.named[1:]:
+                remark = "not distinguished from the first"
+            sigma = quantity(one.sigma * (1e3 if one.name == "delay" else 1.0), digits=2)
+            value = f"{_value(one.name, one.value)} +- {sigma}" if one.shown else "-"
+            rows.append((one.name, _value(one.name, one.before), value, _share(one) if one.named else "-", remark))
+        return Table("What explains them, each alone", ("", "model", "best", "explains", ""), rows, (1, 2, 3))
+
+
+def replay(
+    robot: Robot | str | os.PathLike[str],
+    log: Paths,
+    poses: Paths | None = None,
+    fields: str | os.PathLike[str] | None = None,
+    drive: str | None = None,
+    delay: float = 0.0,
+    window: float = 0.5,
+    tolerance: float = 0.05,
+    fit: bool = False,
+) -> Replay:
+    """Repeat a recording with the plant, in windows from the recorded state on, driven by the recorded commands.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file.
+    log, poses, fields
+        As `path`, `poses` and `fields` of `read_measurements`.
+    drive
+        What the plant is commanded: "lengths", "tensions", or "forces" of winches (default: recorded commands,
+        otherwise measured lengths of elastic cables, otherwise measured tensions).
+    delay
+        Known time by which the robot follows its recorded commands later [s].
+    window
+        Duration of a window [s].
+    tolerance
+        Largest position residual for a pass, of 95 % of the samples [m].
+    fit
+        Whether to fit what explains the residuals, and to validate the result in windows that were not fitted.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong value, the log cannot be read, or lacks what a replay needs.
+    """
+    if drive is not None:
+        one_of("drive", drive, DRIVES)
+    late, lasting = number("delay", delay, -LATEST, LATEST), number("window", window, 0.05, 10.0)
+    largest, fits = number("tolerance", tolerance, 0.0, 1e6), flag("fit", fit)
+    windows = Windows(read_recorded(robot, log, poses, fields), drive, lasting)
+    matching = Matching(windows, windows.usual._replace(delay=late))
+    found = matching.explanations(matching.first, matching.kept)
+    explained = None
+    if found[0][0].named:
+        again = copy(windows)  # whose starts suit what explains most
+        again.start, again.noise = np.zeros_like(windows.start), dict(windows.noise)
+        explained = _by_kind(Matching(again, found[0][1].parameters))
+    fitted, validation = _fitted(matching) if fits else (None, None)
+    return Replay(matching, tuple(one for one, _ in found), explained, fitted, validation, largest)
+
+
+def _fitted(matching: Matching) -> tuple[Parameters, tuple[float, float]]:
+    """Fit one parameter after the other, as long as that improves windows that are not fitted."""
+    number_of = np.arange(len(matching.kept))
+    fits = number_of // (BLOCK if len(number_of) > BLOCK else 1) % 2 == 0
+    used, others = matching.kept & fits, matching.kept & ~fits
+    best, left = matching.first, set(Parameters._fields)
+    while left and used.any() and others.any():
+        found = next((one for one in matching.explanations(best, used) if one[0].named and one[0].name in left), None)
+        if found is None or found[1].cost[others].sum() > GAIN * best.cost[others].sum():
+            break
+        left.remove(found[0].name)
+        best = found[1]
+    size = max(int(np.count_nonzero(matching.first.left[others])), 1)
+    before, after = (float(np.sqrt(match.cost[others].sum() / size)) for match in (matching.first, best))
+    return best.parameters, (before, after)
+
+
+def _by_kind(matching: Matching) -> dict[str, np.ndarray]:
+    """Return measured less simulated by kind, (W, S, 3) or (W, S, m) in SI units, nan where not measured."""
+    windows, whole = matching.windows, matching.first.drift.reshape(*matching.windows.rows.shape, -1)
+    parts = zip(windows.noise.items(), np.split(whole, np.cumsum(windows.widths)[:-1], axis=-1), strict=True)
+    return {name: np.where(part == 0, np.nan, part * noise) for (name, noise), part in parts}
+
+
+def _of(kind: str, value: float) -> str:
+    scale, unit = UNITS[kind]
+    return quantity(scale * value, unit, 3)
+
+
+def _value(name: str, value: float) -> str:
+    if name in ("mass", "stiffness"):
+        return f"{value:.4g} times the file's"
+    return quantity(1e3 * value, "ms", 3) if name == "delay" else quantity(value, "N", 3)
+
+
+def _share(one: Explanation) -> str:
+    return f"{100 * min(one.explained, 1.0):.0f} %"

@@ -1,0 +1,66 @@
+"""`Parameters` and `modelled`: the robot of a replay, and what it may have wrong."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..models.robot import Robot
+
+STRAIN = 1e-3  # at t_max, of cables whose stiffness is not known
+
+
+class Parameters(NamedTuple):
+    """Parameters that a model may have wrong, besides its geometry.
+
+    Attributes
+    ----------
+    delay
+        Time by which the robot is later than its recorded commands [s].
+    friction
+        Dry friction of the winches, as a force on each cable, the mean over the cables [N].
+    mass, stiffness
+        Mass of the platform and stiffness of the cables, as factors of the file's.
+    """
+
+    delay: float = 0.0
+    friction: float = 0.0
+    mass: float = 1.0
+    stiffness: float = 1.0
+
+
+def modelled(robot: Robot, drive: str, flown: np.ndarray) -> Robot:
+    """Return the robot of the plant.
+
+    Carriers without recorded thrust, those not `flown`, (c,) of bool, move as recorded. All cables stretch, since
+    recorded lengths fit no cables that do not. Only winches that get forces have a model.
+    """
+    carriers = tuple(one if thrust else one.imposed() for one, thrust in zip(robot.carriers, flown, strict=True))
+    cables, lengths = [], np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
+    for cable, length in zip(robot.cables, lengths, strict=True):
+        changes: dict[str, Any] = {} if drive == "forces" else {"winch": None}
+        if cable.stiffness is None:
+            EA = cable.t_max / STRAIN
+            decay = float(np.sqrt(EA / length * robot.platform.mass / robot.m))
+            changes |= {"stiffness": EA, "damping": cable.damping or decay}
+        cables.append(cable.model_copy(update=changes))
+    own = "both" if robot.drive == "variable-length" else robot.drive
+    return robot.model_copy(update={"carriers": carriers, "cables": tuple(cables), "drive": own})
+
+
+def friction_of(robot: Robot) -> float:
+    """Return the mean dry friction of the winches of a robot [N]."""
+    known = [cable.winch.friction for cable in robot.cables if cable.winch is not None]
+    return float(np.mean(known)) if known else 0.0
+
+
+def changed(robot: Robot, to: Parameters) -> Robot:
+    """Return a robot with other parameters; its geometry and cables without stiffness or winch stay."""
+    more, cables = to.friction - friction_of(robot), []
+    for cable in robot.cables:
+        changes: dict[str, Any] = {"stiffness": cable.stiffness and cable.stiffness * to.stiffness}
+        if cable.winch is not None:
+            winch = cable.winch.model_copy(update={"friction": max(cable.winch.friction + more, 0.0)})
+            changes["winch"] = winch
+        cables.append(cable.model_copy(update=changes))
+    platform = robot.platform.model_copy(update={"mass": robot.platform.mass * to.mass})
+    return robot.model_copy(update={"cables": tuple(cables), "platform": platform})

@@ -1,0 +1,372 @@
+"""`Windows`: a plant repeats a recording in short windows, each from the recorded state on by recorded commands."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from ..base.errors import InputError
+from ..core import sense
+from ..estimation.logs.pose_track import PoseTrack, track_of
+from ..estimation.logs.recorded import Recorded
+from ..estimation.logs.recording import GAP
+from ..estimation.logs.smoothing import noise_of, smooth, widest_parabola
+from ..models import points
+from ..models.dynamics import dynamics_of
+from ..plant import Plant, layout
+from ..plant.periods import Periods
+from ..plant.steps import steps_in
+from .replayed_robot import Parameters, changed, friction_of, modelled
+
+STEP = 2e-3  # [s] of the simulation
+MARGIN = 0.05  # [s] of a recording before its first window, and longest gap that is none
+MOST_WINDOWS, MOST_SAMPLES = 80, 40  # of a recording, evenly spread, and of a window
+FEWEST = 5  # samples of a window
+SLOW = 0.01  # [m/s] of a cable, below which friction is less than its value at higher speeds
+NUDGE = 1e-4, 1e-3  # [m, rad] and [m/s, rad/s], by which starts are varied
+SLOPE = 8.0  # deviation of a smoothed slope, about twice that of white noise, over noise / (n^1.5 dt)
+FLOOR = {"position": 2e-5, "rotation": 2e-5, "tensions": 1e-2, "lengths": 1e-5}  # of noise
+
+
+class Windows:
+    """Windows of a recording.
+
+    Parameters
+    ----------
+    recorded
+        The recording.
+    drive
+        What is commanded: "lengths", "tensions", or "forces" of winches; default: commands where these are recorded,
+        otherwise measured lengths of cables with a stiffness, otherwise measured tensions, otherwise lengths.
+    window
+        Duration of a window [s].
+
+    Attributes
+    ----------
+    starts
+        Times at which windows start [s], (W,).
+    rows, inside
+        Samples of each window, (W, S), and which of these belong to it; the last of a shorter window is repeated.
+    usual
+        Parameters of the file.
+    noise
+        Standard deviation of what is compared, by its sensors: position [m], rotation [rad], tensions [N], lengths [m].
+    start, start_sigma
+        Corrections of the recorded states at the starts, (W, P), and their standard deviations, (P,).
+
+    Raises
+    ------
+    InputError
+        If there are no commands, no measurements to compare with, no pose of a moving carrier, or no window.
+    """
+
+    def __init__(self, recorded: Recorded, drive: str | None, window: float):
+        robot, self.recorded, self.window, times = recorded.robot, recorded, window, recorded.times
+        self.notes = list(recorded.notes)
+        self._flown = np.flatnonzero(np.isfinite(recorded.thrusts).all(axis=0))
+        self._choose(drive)
+        self.commanded = robot.fixed_lengths is None or len(self._flown) > 0
+        self.robot = modelled(robot, self.drive, np.isin(np.arange(len(robot.carriers)), self._flown))
+        self.assumed = any(cable.stiffness is None for cable in robot.cables)
+        if self.assumed and self.drive != "tensions":
+            self.notes.append("cables without a stiffness in the file are given one: 0.1 % of elongation at t_max")
+        self.usual = Parameters(friction=friction_of(self.robot))
+        self._known = np.asarray(np.isfinite(recorded.pose).all(axis=1))
+        if self._known.sum() < FEWEST:
+            raise InputError(f"must have a pose at {FEWEST} times or more, got {int(self._known.sum())}")
+        self._track, neighbours = track_of(times, recorded.pose)
+        self._rotation = points.rotations(np.where(self._known[:, None], recorded.pose[:, 3:], 0.0))  # (N, 3, 3)
+        self._carriers = self._carrier_tracks()
+        apart = float(np.median(np.diff(times)))
+        self._place(apart)
+        self.noise = self._noise()
+        self._neighbours = widest_parabola(times, self._command) if self.measured_command else 0
+        self._sample()
+        self._moves = np.flatnonzero(robot.dof_mask)
+        slope = SLOPE / (neighbours**1.5 * apart)
+        of_pose = [self._of_pose[int(i >= 3)] for i in self._moves]
+        of_flown = [self._of_pose[0]] * 3 * len(self._flown)
+        sigma = [*of_pose, *(slope * one for one in of_pose), *of_flown, *(slope * one for one in of_flown)]
+        self.start_sigma, self.start = np.array(sigma), np.zeros((len(self.starts), len(sigma)))
+        pairs = (len(of_pose), len(of_pose), len(of_flown), len(of_flown))
+        self._steps_of_start = np.repeat([*NUDGE, *NUDGE], pairs)  # (P,)
+        self._parts_of_start = np.cumsum(pairs)[:-1]
+
+    def _choose(self, drive: str | None) -> None:
+        """Choose what is commanded, and by which numbers."""
+        of, robot = self.recorded, self.recorded.robot
+        kinds = {"lengths": of.lengths, "tensions": of.tensions}
+        self.measured_command = False
+        if robot.fixed_lengths is not None:
+            self.drive, self._command = "lengths", np.tile(robot.fixed_lengths, (len(of.times), 1))
+        elif of.commands is not None and drive in (None, of.commanded, "forces"):
+            forces = of.commanded == "tensions" and all(cable.winch for cable in robot.cables)
+            self.drive, self._command = "forces" if forces else of.commanded, of.commands
+        else:
+            elastic = all(cable.stiffness for cable in robot.cables)
+            wanted = [drive] if drive in kinds else [*(["lengths"] if elastic else []), "tensions", "lengths"]
+            found = [(name, values) for name in wanted if (values := kinds[name]) is not None]
+            if not found:
+                raise InputError(f"must have {' or '.join(dict.fromkeys(wanted))} of the cables for a replay, got none")
+            (self.drive, self._command), self.measured_command = found[0], True
+        if drive == "forces" and self.drive != drive:
+            raise InputError("must have commanded tensions, and the robot a winch for each cable, for the drive forces")
+
+    def _carrier_tracks(self) -> dict[int, PoseTrack]:
+        tracks, of = {}, self.recorded
+        for index, carrier in enumerate(of.robot.carriers):
+            if carrier.free_coordinates(of.robot.drive):
+                known, name = int(np.isfinite(of.carrier_pose[:, index]).all(axis=1).sum()), carrier.name
+                if known < FEWEST:
+                    raise InputError(f"must have poses of carrier {name} ({name}_x, ..., {name}_qw), got {known}")
+                tracks[index] = track_of(of.times, of.carrier_pose[:, index])[0]
+        return tracks
+
+    def _place(self, apart: float) -> None:
+        """Choose the windows and their samples."""
+        every, times = self.recorded.times, self.recorded.times[self._known]
+        starts = np.arange(times[0] + MARGIN, times[-1] - self.window, self.window)
+        first, last = np.searchsorted(times, starts - MARGIN), np.searchsorted(times, starts + self.window)
+        gaps = np.concatenate([[0], np.cumsum(np.diff(times) > max(GAP * apart, MARGIN))])
+        starts = starts[(last - first >= FEWEST) & (gaps[last - 1] == gaps[np.maximum(first - 1, 0)])]
+        if not len(starts):
+            raise InputError(f"must have poses without a gap for a window of {self.window:g} s or longer, got none")
+        if len(starts) > MOST_WINDOWS:
+            self.notes.append(f"{MOST_WINDOWS} of {len(starts)} windows are used, evenly spread")
+            starts = starts[np.linspace(0, len(starts) - 1, MOST_WINDOWS).astype(int)]
+        spans = [np.arange(*np.searchsorted(every, [at, at + self.window])) for at in starts]
+        spans = [one[np.linspace(0, len(one) - 1, min(len(one), MOST_SAMPLES)).astype(int)] for one in spans]
+        most, self.starts = max(map(len, spans)), starts
+        self.rows = np.stack([np.pad(one, (0, most - len(one)), mode="edge") for one in spans])  # (W, S)
+        self.inside = np.stack([np.arange(most) < len(one) for one in spans])
+
+    def _noise(self) -> dict[str, float]:
+        """Return the noise of what is compared, and keep that of the pose."""
+        of, known, moves = self.recorded, self._known, self.recorded.robot.dof_mask > 0
+        turned = Rotation.from_matrix(self._track.at_times(of.times[known]).at(0.0)[1]).inv()
+        away = (turned * Rotation.from_matrix(self._rotation[known])).as_rotvec()
+        values = {"position": of.pose[known, :3][:, moves[:3]], "rotation": away[:, moves[3:]]}
+        values |= {name: each for name in ("tensions", "lengths") if (each := getattr(of, name)) is not None}
+        noise = {
+            name: max(noise_of(of.times[known] if name in ("position", "rotation") else of.times, each), FLOOR[name])
+            for name, each in values.items()
+        }
+        self._of_pose = noise["position"], noise["rotation"]
+        left_out = {self.drive} if self.measured_command else set()
+        left_out |= set() if of.measured[:3].any() else {"position"}
+        left_out |= set() if of.measured[3:].any() else {"rotation"}
+        noise = {name: value for name, value in noise.items() if name not in left_out}
+        if not noise:
+            raise InputError("must have poses, tensions or lengths that are not commanded to compare with, got none")
+        return noise
+
+    def shaken(self) -> Windows:
+        """Return windows of the same recording with as much noise again in what drives the plant.
+
+        By how much these differ in simulation is the noise that a simulation has from the recording.
+        """
+        of, draw = self.recorded, np.random.default_rng(0).standard_normal
+        carrier_pose, thrusts = of.carrier_pose.copy(), of.thrusts.copy()
+
+        def add(values: np.ndarray) -> None:
+            known = np.asarray(np.isfinite(values).all(axis=1))
+            values += noise_of(of.times[known], values[known]) * draw(values.shape)
+
+        for index in self._carriers:
+            carrier_pose[:, index, 3:] = np.unwrap(carrier_pose[:, index, 3:], axis=0)
+            add(carrier_pose[:, index, :3])
+            add(carrier_pose[:, index, 3:])
+            add(thrusts[:, [index]])
+        named = {"lengths": of.lengths, "tensions": of.tensions}
+        noisy = {name: values.copy() for name, values in named.items() if values is not None}
+        for values in noisy.values():
+            add(values)
+        other = copy(self)
+        other.recorded = replace(of, carrier_pose=carrier_pose, thrusts=thrusts, **noisy)
+        if self.measured_command:
+            other._command = noisy[self.drive]
+        other._carriers = other._carrier_tracks()
+        other._sample()
+        other.recorded = replace(of, thrusts=thrusts)  # to compare with
+        return other
+
+    def _sample(self) -> None:
+        """Evaluate what was recorded along the windows."""
+        of, count = self.recorded, max(1, round(self.window / STEP))
+        self._dt = self.window / count
+        self._grid = self.starts[:, None] + self._dt * np.arange(count + 1)  # (W, K + 1)
+        carriers = np.tile(of.robot.carrier_home, (*self._grid.shape, 1, 1))
+        for index, track in self._carriers.items():
+            carriers[:, :, index] = self._along(track)
+        self._platform, self._carried = self._motion(self._along(self._track)), self._motion(carriers)
+        self._attitudes = {index: self._attitude(carriers[:, :, index, 3:]) for index in self._flown}
+        values = self._command
+        self._signal: Any = lambda at: np.stack([np.interp(at, of.times, column) for column in values.T], axis=-1)
+        if self.drive == "lengths" and self.measured_command and len(of.times) >= FEWEST:
+            self._signal = CubicSpline(of.times, smooth(of.times, values, self._neighbours))
+        dynamics = dynamics_of(self.robot)
+        lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
+        self._cable_speed = np.gradient(lengths, self._dt, axis=1)
+        first = [part[:, 0] for part in (*self._platform, *self._carried)]
+        self._balance = (
+            np.asarray(dynamics.wrench_matrix(first[0], first[3])),
+            np.asarray(dynamics.required_wrench(*first)),
+        )
+        self._pull = None
+        if of.tensions is not None:
+            even = smooth(of.times, of.tensions, widest_parabola(of.times, of.tensions))
+            self._pull = np.stack([np.interp(self.starts, of.times, one) for one in even.T], axis=1).clip(0.0)
+
+    def _along(self, track: PoseTrack) -> np.ndarray:
+        """Return the poses of a track on the grid, (W, K + 1, 6), with angles that do not jump."""
+        position, rotation = track.at_times(self._grid.ravel()).at(0.0)[:2]
+        pose = np.concatenate([position, points.angles(rotation)], axis=1).reshape(*self._grid.shape, 6)
+        pose[..., 3:] = np.unwrap(pose[..., 3:], axis=1)
+        return pose
+
+    def _motion(self, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        velocity = np.gradient(pose, self._dt, axis=1)
+        return pose, velocity, np.gradient(velocity, self._dt, axis=1)
+
+    def _attitude(self, angles: np.ndarray) -> np.ndarray:
+        """Return quaternion (w, x, y, z) and rate in its own axes of a carrier, (W, K + 1, 7), of angles."""
+        R = points.rotations(angles)
+        turned = (R[:, :-1].swapaxes(-1, -2) @ R[:, 1:]).reshape(-1, 3, 3)
+        rate = Rotation.from_matrix(turned).as_rotvec().reshape(len(R), -1, 3) / self._dt
+        quaternion = Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat(scalar_first=True).reshape(*R.shape[:2], 4)
+        return np.concatenate([quaternion, np.pad(rate, ((0, 0), (0, 1), (0, 0)), mode="edge")], axis=-1)
+
+    def _tensions_at_start(self, mass: float) -> np.ndarray:
+        """Return recorded tensions (W, m) [N], or those nearest to a tenth of their range that hold the platform."""
+        if self._pull is not None:
+            return self._pull
+        robot, (A, wrench) = self.robot, self._balance
+        usual = np.minimum(robot.t_min + 0.1 * (robot.t_max - robot.t_min), 2 * robot.force_scale)
+        scale = robot.wrench_scale * (robot.dof_mask > 0)
+        missing = scale * (wrench * np.repeat([mass, 1.0], 3) - A @ usual)
+        return (usual + (np.linalg.pinv(scale[:, None] * A, rcond=1e-6) @ missing[..., None])[..., 0]).clip(0.0)
+
+    def _states(self, plant: Plant, pulls: np.ndarray, shift: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return states (V W, n) and unstrained lengths (V, W, m), for corrections (V, W, P) and tensions (W, m)."""
+        m, free = self.robot.m, self.drive != "tensions"
+        parts = [
+            np.tile(part[:, 0], (len(shift), *[1] * (part.ndim - 1)))
+            for of in (self._platform, self._carried)
+            for part in of[:2]
+        ]
+        by = np.split(shift, self._parts_of_start, axis=-1)
+        for part, more in zip(parts[:2], by[:2], strict=True):
+            part[..., self._moves] += more
+        parts[1][..., self.recorded.robot.dof_mask == 0] = 0.0
+        for part, more in zip(parts[2:], by[2:], strict=True):
+            part[..., self._flown, :3] += more.reshape(*more.shape[:2], -1, 3)
+        pose, velocity, carrier_pose, carrier_velocity = parts
+        given: dict[str, Any] = {"lengths": np.ones(m)} if free else {"tensions": pulls}
+        states = plant.start(pose, velocity, carrier_pose, carrier_velocity, **given).reshape(-1, plant.size)
+        states = np.ascontiguousarray(states)
+        lengths = np.zeros((len(states), 2, m))
+        sense(plant.record, states, np.zeros((len(states), 1 + len(self.robot.carriers), 12)), lengths)
+        stretch = 1 + np.tile(pulls, (len(shift), 1)) / plant.record["cable"]["stiffness"][:m]
+        blocks = states[:, -layout.CABLE_BLOCKS * m :].reshape(len(states), -1, m)
+        if free:
+            blocks[:, layout.LENGTH] = blocks[:, layout.REFERENCE] = lengths[:, 0] / stretch
+        if self.drive == "forces":
+            blocks[:, layout.LENGTH_RATE] = lengths[:, 1] / stretch
+        states[:, -layout.CABLE_BLOCKS * m :] = blocks.reshape(len(states), -1)
+        return states, (lengths[:, 0] / stretch).reshape(*shift.shape[:2], m)
+
+    def predict(self, with_: Parameters, nudged: bool = False) -> np.ndarray:
+        """Return measured less simulated over the noise, (V, W, R), 0 where not measured.
+
+        V = 1; with `nudged` 1 + P: then come the derivatives by the corrections of the start.
+        """
+        m, W, (steps, dt) = self.robot.m, len(self.starts), (self._grid.shape[1] - 1, self._dt)
+        plant = Plant(changed(self.robot, with_), drive=self.drive)
+        substeps = steps_in(dt, Plant(self.robot, drive=self.drive)) + (with_.stiffness > 1.5)
+        by = np.diag(self._steps_of_start) if nudged else np.zeros((0, len(self.start_sigma)))
+        shift = self.start + np.concatenate([np.zeros((1, 1, by.shape[1])), by[:, None]])  # (V, W, P)
+        count = len(shift)
+        states, own = self._states(plant, self._tensions_at_start(with_.mass), shift)
+        rows, cables = self._commands(plant, with_, own)
+        out = np.zeros((count, *self.rows.shape, 7 + 2 * m))
+        at = (self.recorded.times[self.rows] - self.starts[:, None]) / dt
+        number = np.clip(np.floor(at).astype(int), 0, steps - 1)
+        history, tensions = np.zeros((count * W, 2, plant.size)), np.zeros((count * W, 2, m))
+        periods = Periods(plant, dt, substeps)
+        with np.errstate(all="ignore"):
+            for k in range(steps):
+                # Flown carriers turn as recorded: a thrust is known, the torques behind an attitude rarely are.
+                for index, attitude in self._attitudes.items():
+                    body = states[:, layout.BODY * (1 + index) : layout.BODY * (2 + index)]
+                    body[:, layout.QUATERNION : layout.VELOCITY] = np.tile(attitude[:, k, :4], (count, 1))
+                    body[:, layout.RATE :] = np.tile(attitude[:, k, 4:], (count, 1))
+                command = np.tile(rows[:, k : k + 2], (count, 1, 1))
+                command[:, 0, layout.COMMANDS : layout.COMMANDS + m] = cables[:, :, k].reshape(count * W, m)
+                periods.run(states, command, history, tensions)
+                w, s = np.nonzero(number == k)
+                if len(w):
+                    share = (at[w, s] - k)[:, None]
+                    ends = [part.reshape(count, W, 2, -1)[:, w] for part in (history, tensions)]
+                    out[:, w, s] = _seen(plant, *((1 - share) * one[:, :, 0] + share * one[:, :, 1] for one in ends))
+                states[:] = history[:, 1]
+        residuals = self._residuals(out, plant)
+        residuals[1:] = (residuals[1:] - residuals[0]) / self._steps_of_start[:, None, None] if nudged else 0.0
+        return residuals
+
+    def _commands(self, plant: Plant, with_: Parameters, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return commands as rows, (W, K + 1, k), and the numbers of the cables in them, (V, W, K, m)."""
+        middle = self._grid + 0.5 * self._dt - with_.delay
+        if self.drive == "lengths":
+            along = self._signal(self._grid - with_.delay)  # (W, K + 1, m)
+            cables = np.maximum(own[:, :, None] + along[:, 1:] - along[:, :1], layout.SHORTEST)
+        else:
+            pulls = self._signal(middle[:, :-1])
+            if self.drive == "tensions":
+                pulls = (pulls + with_.friction * np.tanh(self._cable_speed[:, :-1] / SLOW)).clip(0.0)
+            cables = np.broadcast_to(pulls, (len(own), *pulls.shape))
+        actuators = max(len(carrier.actuators) for carrier in self.robot.carriers)
+        actuation = np.zeros((*self._grid.shape, len(self.robot.carriers), actuators))
+        for index in self._flown:
+            actuation[:, :, index, 0] = np.interp(middle, self.recorded.times, self.recorded.thrusts[:, index])
+        return plant.command(np.ones(self.robot.m), actuation, *self._carried), cables
+
+    def _residuals(self, out: np.ndarray, plant: Plant) -> np.ndarray:
+        """Return measured less simulated over noise, (V, W, R), from what `_seen` returns, (V, W, S, 7 + 2 m)."""
+        of, rows, inside, parts = self.recorded, self.rows, self.inside[..., None], {}
+        position, quaternion, tensions, lengths = np.split(out, [3, 7, 7 + self.robot.m], axis=-1)
+        known = inside & self._known[rows][..., None]
+        if "position" in self.noise:
+            parts["position"] = np.where(known & of.measured[:3], of.pose[rows, :3] - position, 0.0)
+        if "rotation" in self.noise:
+            recorded = np.broadcast_to(self._rotation[rows], (len(out), *rows.shape, 3, 3)).reshape(-1, 3, 3)
+            away = Rotation.from_matrix(recorded) * Rotation.from_quat(quaternion.reshape(-1, 4)).inv()
+            moves = known & (of.robot.dof_mask[3:] > 0)
+            parts["rotation"] = np.where(moves, away.as_rotvec().reshape(position.shape), 0.0)
+        if "tensions" in self.noise and of.tensions is not None:
+            parts["tensions"] = np.where(inside, of.tensions[rows] - tensions, 0.0)
+        if "lengths" in self.noise and of.lengths is not None:
+            stretches = not (self.drive == "tensions" and self.assumed)
+            stretch = 1 + stretches * tensions / plant.record["cable"]["stiffness"][: self.robot.m]
+            away = np.where(inside, of.lengths[rows] - lengths / stretch, 0.0)
+            away -= away.sum(axis=2, keepdims=True) / inside.sum(axis=1, keepdims=True)  # offsets of the encoders
+            parts["lengths"] = np.where(inside, away, 0.0)
+        self.widths = [part.shape[-1] for part in parts.values()]
+        whole = np.concatenate([part / self.noise[name] for name, part in parts.items()], axis=-1)
+        return whole.reshape(*whole.shape[:2], -1)
+
+
+def _seen(plant: Plant, states: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+    """Return position, quaternion (x, y, z, w), tensions and lengths of states (V, n, size), (V, n, 7 + 2 m)."""
+    flat = np.ascontiguousarray(states.reshape(-1, states.shape[-1]))
+    motions = np.zeros((len(flat), 1 + len(plant.robot.carriers), 12))
+    lengths = np.zeros((len(flat), 2, plant.robot.m))
+    sense(plant.record, flat, motions, lengths)
+    q = flat[:, layout.QUATERNION : layout.VELOCITY]
+    quaternion = np.where(np.isfinite(q).all(axis=1, keepdims=True), q, 1.0)[:, [1, 2, 3, 0]]
+    seen = np.hstack([motions[:, 0, :3], quaternion, tensions.reshape(len(flat), -1), lengths[:, 0]])
+    return seen.reshape(*states.shape[:2], -1)

@@ -1,0 +1,229 @@
+"""Replay of recordings: the right model leaves the noise, a wrong one is named, and what is no recording is one line.
+
+Recordings are made by `simulate` and the plant at 1 kHz, sampled and given noise here.
+"""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from towline import InputError, load, simulate
+from towline.control import LengthControl
+from towline.models.cable import Winch
+from towline.simulation import Replay, replay
+
+from .warm import towline as run
+
+NOISE = {"pose": 5e-4, "length": 5e-5, "tension": 0.3}  # [m, rad], [m], [N]
+SECONDS = 5.0
+
+
+def with_cables(robot, **changes):
+    return robot.model_copy(update={"cables": tuple(one.model_copy(update=changes) for one in robot.cables)})
+
+
+def with_mass(robot, factor):
+    platform = robot.platform
+    return robot.model_copy(update={"platform": platform.model_copy(update={"mass": factor * platform.mass})})
+
+
+PLANAR = with_cables(load("planar-4"), stiffness=20e3, damping=20.0)
+WINCH = Winch(inertia=20, friction=15, speed_max=5, force_max=5000)
+COGIRO = with_cables(load("cogiro"), stiffness=200e3, damping=1000.0, winch=WINCH)
+
+
+def swing(centre, size, rates, seconds=SECONDS):
+    """A path that begins and ends at rest."""
+    times = np.linspace(0, seconds, 101)
+    even = np.clip(np.minimum(times, seconds - times), 0, 1)
+    even = even**3 * (10 - 15 * even + 6 * even**2)
+    poses = np.zeros((len(times), 6))
+    poses[:, :3] = centre + np.array(size) * np.sin(2 * np.pi * np.outer(times, rates)) * even[:, None]
+    return {"kind": "samples", "times": times.tolist(), "poses": poses.tolist()}
+
+
+@cache
+def motion(kind):
+    """A robot and its simulation."""
+    if kind == "thrusts":
+        robot = load("multi-quadrotor-3")
+        pushed = simulate(robot, robot.home, events=["push 6 4 5 at 0.1 for 0.3"], duration=SECONDS, tolerance=9)
+        return robot, pushed.trajectory.isel(time=slice(450, None))  # how it comes back
+    robot, controller, path = {
+        "lengths": (PLANAR, LengthControl(PLANAR), swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8))),
+        "tensions": (load("planar-4"), None, swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8))),
+        "forces": (COGIRO, None, swing((0, 0, 1.5), (1.5, 1, 0.4), (0.25, 0.3, 0.4))),
+    }[kind]
+    return robot, simulate(robot, path, controller).trajectory
+
+
+def columns(kind, rows, seed=0):
+    """The columns of a recording with noise at some of the samples."""
+    robot, trajectory = motion(kind)
+    draw = np.random.default_rng(seed)
+
+    def noisy(values, sigma):
+        return np.asarray(values)[rows] + draw.normal(0, sigma, np.asarray(values)[rows].shape)
+
+    pose, pulls, lengths = (trajectory[name].values for name in ("pose", "tensions", "cable_lengths"))
+    names = ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]")
+    found = {"t [s]": trajectory["time"].values[rows]}
+    found |= dict(zip(names, noisy(pose, NOISE["pose"]).T, strict=True))
+    if kind == "thrusts":
+        for i, carrier in enumerate(robot.carriers):
+            own = noisy(trajectory["carrier_pose"].values[:, i], NOISE["pose"])
+            found |= {f"{carrier.name}_{name}": values for name, values in zip(names, own.T, strict=True)}
+            found[f"{carrier.name}_thrust [N]"] = trajectory["actuation"].values[rows, i, 0]
+        return found
+    EA = np.array([cable.stiffness or np.inf for cable in robot.cables])
+    encoders = noisy(lengths / (1 + pulls / EA), NOISE["length"]) + 0.3  # an offset of the encoders
+    found |= {f"l{i} [m]": values for i, values in enumerate(encoders.T)}
+    if kind == "forces":
+        orders = trajectory["tensions_commanded"].values[rows]
+        found |= {f"tension_cmd_{i} [N]": values for i, values in enumerate(orders.T)}
+    found |= {f"tension_{i} [N]": values for i, values in enumerate(noisy(pulls, NOISE["tension"]).T)}
+    return found
+
+
+def every(kind, rate=100):
+    return slice(0, len(motion(kind)[1]["time"]), 1000 // rate)
+
+
+def written(path, found):
+    np.savetxt(path, np.column_stack(list(found.values())), "%.13g", ",", header=",".join(found), comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("logs")
+    kinds = ("lengths", "tensions", "forces", "thrusts")
+    return {kind: written(folder / f"{kind}.csv", columns(kind, every(kind))) for kind in kinds}
+
+
+@pytest.mark.parametrize("kind", ["lengths", "tensions", "thrusts"])
+def test_the_right_model_leaves_the_noise(kind, logs):
+    result = replay(motion(kind)[0], logs[kind])
+    assert result.passed
+    assert not result.named
+    # Of each kind, what the noise that was added to the recording explains.
+    rms, noise = result.rms(), result.matching.noise
+    assert all(rms[name] < 1.5 * noise[name] for name in rms)
+    assert rms["position"] < 2 * NOISE["pose"]
+    assert "the model does what the robot did" in result.report()
+
+
+CASES = [
+    ("lengths", "mass", with_mass(PLANAR, 1.2), {}, 1 / 1.2),
+    ("lengths", "stiffness", with_cables(PLANAR, stiffness=24e3), {}, 1 / 1.2),
+    ("lengths", "delay", PLANAR, {"delay": 0.02}, 0.0),
+    ("tensions", "mass", with_mass(load("planar-4"), 0.8), {}, 1.25),
+    ("tensions", "delay", load("planar-4"), {"delay": 0.02}, 0.0),
+    ("forces", "friction", with_cables(COGIRO, winch=WINCH.model_copy(update={"friction": 18.0})), {}, 15.0),
+    ("thrusts", "mass", with_mass(load("multi-quadrotor-3"), 1.2), {}, 1 / 1.2),
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "robot", "options", "truth"), CASES)
+def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
+    result = replay(robot, logs[kind], **options)
+    assert result.named[0] == name
+    first = result.found[0]
+    assert first.value == pytest.approx(truth, rel=0.06, abs=0.002)
+    after = result.explained
+    assert after is not None
+    assert result._rms(after)["position"] < result.rms()["position"] * 1.05
+    assert name in result.report().splitlines()[0]
+
+
+def test_what_a_recording_does_not_show_is_not_named(tmp_path):
+    """Without tensions, mass and stiffness only differ by how far cables sag, far less than the noise here."""
+    found = {name: values for name, values in columns("lengths", every("lengths")).items() if "tension" not in name}
+    result = replay(with_mass(PLANAR, 1.2), written(tmp_path / "bare.csv", found))
+    assert not result.named
+    assert result.passed
+
+
+def test_irregular_samples_gaps_and_missing_poses(tmp_path):
+    draw = np.random.default_rng(3)
+    count = len(motion("lengths")[1]["time"])
+    rows = np.sort(draw.choice(count, count // 10, replace=False))
+    rows = rows[(rows < 0.4 * count) | (rows > 0.5 * count)]  # and a gap of half a second
+    found = columns("lengths", rows)
+    for name in ("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]"):
+        found[name][::7] = np.nan
+    found["t [s]"] += 1.7e9
+    result = replay(PLANAR, written(tmp_path / "odd.csv", found))
+    assert result.passed
+    assert not result.named
+    assert result.rms()["position"] < 2 * NOISE["pose"]
+    assert 5 <= len(result.windows.starts) <= 8
+
+
+def test_simulations_are_recordings_of_any_kind(tmp_path):
+    robot = load("planar-4")
+    saved = simulate(robot, swing((0, 0, 0.75), (0.2, 0, 0.12), (0.5, 1, 0.8), 2.0))
+    recording = saved.save(tmp_path / "run.mcap")
+    direct = simulate(robot, recording)
+    assert isinstance(direct, Replay)
+    for result in (direct, replay(robot, saved.save(tmp_path / "run.nc"))):
+        assert result.passed
+        assert result.error < 2e-4  # of a recording without noise, but with means of tensions over periods
+    with pytest.raises(InputError, match="reference must be a plan if simulate has other arguments"):
+        simulate(robot, recording, duration=1)
+
+
+def test_the_command_fits_and_writes_what_validation_windows_confirm(tmp_path, logs):
+    heavy = with_mass(load("planar-4"), 1.2)
+    heavy.save(tmp_path / "heavy.yaml")
+    options = ["--fit", "fitted.yaml", "--figures", "drawn", "--json"]
+    done = run("simulate", "heavy.yaml", logs["tensions"], *options, cwd=tmp_path)
+    assert done.returncode == 1, done.stderr  # the mass is 20 % wrong: 50 mm in half a second
+    answer = json.loads(done.stdout)
+    assert answer["explained_by"] == ["mass"]
+    assert answer["validation"][1] < 2 < 10 < answer["validation"][0]
+    assert load(tmp_path / "fitted.yaml").platform.mass == pytest.approx(4.0, rel=2e-3)
+    assert (tmp_path / "drawn" / "replay.png").read_bytes().startswith(b"\x89PNG")
+    with xr.open_dataset(tmp_path / answer["file"]) as saved:
+        assert saved.position_residual.dims == ("window", "sample", "axis")
+    with pytest.raises(InputError, match="the robot is not written: no parameter"):
+        replay(load(tmp_path / "fitted.yaml"), logs["tensions"], fit=True).save_robot(tmp_path / "again.yaml")
+
+
+HEAD = "t [s],x [m],y [m],z [m],roll [rad],pitch [rad],yaw [rad],l0 [m],l1 [m],l2 [m],l3 [m]\n"
+
+
+@pytest.mark.parametrize(
+    ("robot", "text", "options", "message"),
+    [
+        ("planar-4", HEAD.split(",", 1)[1] + "0,0,1,0,0,0,1,1,1,1\n", [], "must have times for a replay, got none"),
+        ("planar-4", HEAD + "0,0,0,1,0,0,0,1,1,1,1\n", [], "must have a pose at 5 times or more, got 1"),
+        ("planar-4", HEAD + "0,nan,0,1,0,0,0,1,1,1,inf\n", [], "l3 must be a finite number at sample 0, got inf"),
+        (
+            "planar-4",
+            "t [s],l0 [m],l1 [m]\n0,1,1\n",
+            [],
+            "must have a length for each of the 4 cables of planar-4, got 2",
+        ),
+        ("wang-flying", "t [s],x [m]\n0,1\n", [], "must have"),
+        ("planar-4", "", [], "got an empty file"),
+        ("planar-4", HEAD, ["--wind", "1 0 0"], "--wind must be left out with a recording"),
+        ("planar-4", HEAD, ["--window", "nan"], "--window must be a number from 0.05 to 10, got nan"),
+        ("planar-4", HEAD, ["--drive", "rates"], "--drive must be one of lengths, tensions, forces, got 'rates'"),
+    ],
+)
+def test_wrong_input_is_one_line(robot, text, options, message, tmp_path):
+    (tmp_path / "log.csv").write_text(text)
+    done = run("simulate", robot, "log.csv", *options, cwd=tmp_path)
+    assert done.returncode == 2, done.stdout
+    assert message in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+def test_a_carrier_without_a_pose_is_named(logs, tmp_path):
+    found = {name: one for name, one in columns("thrusts", every("thrusts")).items() if "quad2" not in name}
+    with pytest.raises(InputError, match=r"must have poses of carrier quad2 \(quad2_x, ..., quad2_qw\), got 0"):
+        replay("multi-quadrotor-3", written(tmp_path / "lost.csv", found))
