@@ -201,7 +201,10 @@ class Replay(Drawn, Reported, Displayed):
         )
         if self.named:
             best = self.found[0]
-            return f"{text}; {' or '.join(self.named)} explains {_share(best)}: {_value(best.name, best.value)}"
+            text += f"; {' or '.join(self.named)} explains {_share(best)}: {_value(best.name, best.value)}"
+            after = self._rms(self.explained or {})
+            more = any(after[name] > 2 * noise[name] for name in after)
+            return f"{text}; the remainder has other causes" if more else text
         if max(ratios.values()) <= 2:
             return f"{text}; the model does what the robot did"
         return f"{text}; none of {', '.join(one.name for one in self.found)} explains it"

@@ -139,6 +139,15 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert name in result.report().splitlines()[0]
 
 
+def test_a_robot_that_is_late_has_a_positive_delay(tmp_path):
+    rows = np.arange(0, len(motion("tensions")[1]["time"]) - 20, 10)
+    found, early = columns("tensions", rows), columns("tensions", rows + 20)  # commands 20 ms before they act
+    found |= {name: values for name, values in early.items() if "tension" in name}
+    result = replay("planar-4", written(tmp_path / "late.csv", found))
+    assert result.named == ["delay"]
+    assert result.found[0].value == pytest.approx(0.02, abs=0.002)
+
+
 def test_what_a_recording_does_not_show_is_not_named(tmp_path):
     """Without tensions, mass and stiffness only differ by how far cables sag, far less than the noise here."""
     found = {name: values for name, values in columns("lengths", every("lengths")).items() if "tension" not in name}
