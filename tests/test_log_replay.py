@@ -104,7 +104,7 @@ def logs(tmp_path_factory):
     return {kind: written(folder / f"{kind}.csv", columns(kind, every(kind))) for kind in kinds}
 
 
-@pytest.mark.parametrize("kind", ["lengths", "tensions", "thrusts"])
+@pytest.mark.parametrize("kind", ["lengths", "tensions"])
 def test_the_right_model_leaves_the_noise(kind, logs):
     result = replay(motion(kind)[0], logs[kind])
     assert result.passed
@@ -137,6 +137,13 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert after is not None
     assert result._rms(after)["position"] < result.rms()["position"] * 1.05
     assert name in result.report().splitlines()[0]
+
+
+def test_the_right_team_leaves_the_noise_of_short_windows(tmp_path):
+    found = columns("thrusts", slice(0, 1500, 10))
+    result = replay("multi-quadrotor-3", written(tmp_path / "team.csv", found), window=0.3)
+    assert not result.named
+    assert result.rms()["position"] < 2 * NOISE["pose"]
 
 
 def test_a_robot_that_is_late_has_a_positive_delay(tmp_path):
@@ -185,11 +192,12 @@ def test_simulations_are_recordings_of_any_kind(tmp_path):
         simulate(robot, recording, duration=1)
 
 
-def test_the_command_fits_and_writes_what_validation_windows_confirm(tmp_path, logs):
+def test_the_command_fits_and_writes_what_validation_windows_confirm(tmp_path):
+    log = written(tmp_path / "short.csv", columns("tensions", slice(1000, 4100, 10)))
     heavy = with_mass(load("planar-4"), 1.2)
     heavy.save(tmp_path / "heavy.yaml")
     options = ["--fit", "fitted.yaml", "--figures", "drawn", "--json"]
-    done = run("simulate", "heavy.yaml", logs["tensions"], *options, cwd=tmp_path)
+    done = run("simulate", "heavy.yaml", log, *options, cwd=tmp_path)
     assert done.returncode == 1, done.stderr  # the mass is 20 % wrong: 50 mm in half a second
     answer = json.loads(done.stdout)
     assert answer["explained_by"] == ["mass"]
@@ -199,7 +207,7 @@ def test_the_command_fits_and_writes_what_validation_windows_confirm(tmp_path, l
     with xr.open_dataset(tmp_path / answer["file"]) as saved:
         assert saved.position_residual.dims == ("window", "sample", "axis")
     with pytest.raises(InputError, match="the robot is not written: no parameter"):
-        replay(load(tmp_path / "fitted.yaml"), logs["tensions"], fit=True).save_robot(tmp_path / "again.yaml")
+        replay(load(tmp_path / "fitted.yaml"), log, fit=True).save_robot(tmp_path / "again.yaml")
 
 
 HEAD = "t [s],x [m],y [m],z [m],roll [rad],pitch [rad],yaw [rad],l0 [m],l1 [m],l2 [m],l3 [m]\n"
