@@ -190,21 +190,27 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
     from ..figures import robot as figure
     from ..figures import style
     from ..models import Dynamics
+    from ..models.body import surface
+    from ..models.points import placed
     from ..statics.scene import rotor_discs
     from ..workspace import hints
 
     positions, feasible = hints(Dynamics(robot))
+    moving = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.body]
+    body = robot.platform.body
     sketch = figure.RobotSketch(
         title=robot.name,
         anchors=robot.home_anchors,
         attachments=robot.home_attachments,
-        com=robot.home_com,
-        carriers=robot.carrier_home[:, :3],
-        names=[carrier.name for carrier in robot.carriers],
+        carriers=robot.carrier_home[moving, :3],
+        names=[robot.carriers[index].name for index in moving],
         boxes=[(np.array(box.min), np.array(box.max)) for c in robot.carriers for box in c.drawing.boxes],
         tensions=at_home.tensions,
         t_min=robot.t_min,
         t_max=robot.t_max,
+        surface=None if body is None else placed(robot.home, surface(body)),
+        bodies=[robot.home_anchors[robot.carrier_of_cable == index] for index in moving],
+        fixed=np.array([not robot.carriers[index].moves for index in robot.carrier_of_cable]),
         resting=positions[feasible],
         rotors=rotor_discs(robot, robot.carrier_home[None])[0],
     )

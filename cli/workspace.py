@@ -127,7 +127,7 @@ def workspace(
         where = Execution(workers, scheduler, stored, resume is not None, resumable(show, stored, "samples"))
         result = sample(loaded, required, region, _count(samples), method, seed, size=size, keep=keep, execution=where)
     add_to_message("")
-    written = _write(result, target, figure, mesh, surface)
+    written = _write(result, loaded, target, figure, mesh, surface)
     summary = _summary(result)
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
     if as_json:
@@ -157,7 +157,7 @@ def _check_files(
 
 
 def _write(
-    result: xr.Dataset, target: Path, figure: Path | None, mesh: Path | None, surface: Mesh | None
+    result: xr.Dataset, robot: Robot, target: Path, figure: Path | None, mesh: Path | None, surface: Mesh | None
 ) -> list[Path]:
     """Write the samples, their picture and the boundary, and return the files."""
     from ..figures import style
@@ -166,7 +166,7 @@ def _write(
 
     written = [save(result, target)]
     if figure is not None:
-        written.append(style.save(reached(result), figure))
+        written.append(style.save(reached(result, robot.home_anchors), figure))
     if mesh is not None and surface is not None:
         written.append(surface.save(mesh))
     return written

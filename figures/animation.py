@@ -43,6 +43,7 @@ class Scene:
     # Origin of the platform's frame (n, 3) over times [s] of their own, fine enough for a smooth trail.
     path: np.ndarray
     path_times: np.ndarray  # likewise
+    path_missing: np.ndarray  # where no tensions give the motion, (n,)
     # Origins of the carriers' frames (k, c, 3), and their names; ground carriers are not among them.
     carriers: np.ndarray
     names: list[str]  # likewise

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import style
+from .end_labels import name_at_the_end
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 OFFSET = 1e-6  # [m]; carriers that stay so near to their reference have no panel
 GREY = "#d4d4d4"
-GAP = 0.065  # of a panel's height, between the names of curves at its edge
-HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
 DIFFERENCE = 0.01  # of all tensions' range: commands nearer to the real tensions are not drawn over them
 DECADES = 30.0  # largest error over the smallest of flights from which on the axis is logarithmic
 SCALES = ((1.0, 1.0, "m"), (1e-4, 1e-3, "mm"), (0.0, 1e-6, "µm"))  # from which lengths units are used, and their size
@@ -89,7 +88,7 @@ def tensions(trajectory: xr.Dataset) -> Figure:
         style.far_limit(ax, f"{', '.join(far)}, outside the plot")
     ax.set_xlim(time[0], _end(time))
     left = ~gone[-1]
-    _name_at_the_end(ax, real[-1, left], [str(cable) for cable in trajectory["cable"].values[left]])
+    name_at_the_end(ax, real[-1, left], [str(cable) for cable in trajectory["cable"].values[left]])
     _mark_events([ax], trajectory)
     style.legend_below(canvas, ax)
     return canvas
@@ -210,32 +209,3 @@ def _draw_named(ax: Axes, trajectory: xr.Dataset, names: Iterable[Any], values: 
         if np.isfinite(values[:, index]).any():
             ax.plot(trajectory["time"].values, values[:, index], **style.look(index), label=str(name))
     ax.legend(fontsize=style.NOTE, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, handlelength=2.6)
-
-
-def _name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
-    """Write the numbers of cables beside the ends of their curves, so that they are distinct without colours."""
-    low, high = ax.get_ylim()
-    places = (np.clip(values, low, high) - low) / (high - low)
-    order = np.argsort(places)
-    for cable, place in zip(order, _spread(places[order]), strict=True):
-        ax.annotate(
-            names[cable],
-            (1.0, places[cable]),
-            xytext=(1.05, place),
-            xycoords="axes fraction",
-            va="center",
-            fontsize=style.NOTE,
-            arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0},
-            annotation_clip=False,
-        )
-    ax.annotate("cable", (1.0, 1.02), xycoords="axes fraction", fontsize=style.NOTE)
-
-
-def _spread(places: np.ndarray) -> np.ndarray:
-    """Return increasing places with distances of at least `GAP`, moved as much up as down."""
-    gaps = GAP * np.arange(len(places))
-    up = np.maximum.accumulate(places - gaps) + gaps
-    down = np.minimum.accumulate((places - gaps)[::-1])[::-1] + gaps
-    apart = (up + down) / 2
-    apart += max(0.0, -apart[0])  # all of them, so that none leaves the panel below
-    return np.minimum(apart, HIGHEST - gaps[::-1])

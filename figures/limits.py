@@ -1,4 +1,4 @@
-"""Draw the limited quantities of a plan over time, with a panel for each limit."""
+"""Draw how much of each limit a plan uses over time, in percent."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..base.text import quantity
 from . import style
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_CURVES = 8  # of a panel; of more the least and the largest at each time
-LEAST = 0.1  # of a limit: a panel is at least so high; a limit that is farther away than that height is only named
+SHOWN = 0.2  # of a limit: what uses less is only named
+MOST = 10.0  # of a limit, of what should not fall below it
 
 
 class Limited(NamedTuple):
@@ -23,54 +23,61 @@ class Limited(NamedTuple):
     unit: str  # likewise
     labels: list[str]  # names of the curves
     values: np.ndarray  # (n, k)
-    low: float  # the limits; an infinite one is not drawn
+    low: float  # the limits, which may be infinite
     high: float  # likewise
+
+    def used(self) -> np.ndarray | None:
+        """Return how much of the limit is used at each time, (n,), 1 at a limit; None if a share has no meaning.
+
+        Of a range that is not symmetric, half is used in its middle.
+        """
+        low, high, values = self.low, self.high, self.values
+        if np.isfinite(low) and np.isfinite(high):
+            if low >= high:
+                return None
+            share = np.abs(values) / high if low == -high else np.maximum(values - low, high - values) / (high - low)
+        elif np.isfinite(high) and high > 0:
+            share = values / high
+        elif np.isfinite(low) and low > 0:
+            share = low / np.maximum(values, low / MOST)  # a clearance may be negative
+        else:
+            return None
+        known = np.isfinite(share).any(axis=1)
+        return np.where(known, np.max(share, axis=1, where=np.isfinite(share), initial=0.0), np.nan)
+
+    def text(self) -> str:
+        """Return the name with its limits."""
+        unit = self.unit.replace("-", "")
+        low, high = (f"{quantity(bound, unit)}" for bound in (self.low, self.high))
+        finite = np.isfinite([self.low, self.high])
+        if self.low == self.high:
+            bounds = f"exactly {low}"
+        elif finite.all():
+            bounds = f"{low} to {high}" if self.low != -self.high else f"± {high}"
+        else:
+            bounds = f"at least {low}" if finite[0] else f"at most {high}"
+        return style.typeset(f"{self.name.replace('_', ' ')} ({bounds})")
 
 
 def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
-    """Draw quantities over `times` (n,) [s], with a panel for each."""
-    canvas = style.figure(height=0.7 + 1.2 * len(quantities))
-    looks: dict[str, int] = {}
-    panels = style.panels_below(canvas, "time [s]", [f"[{style.typeset(quantity.unit)}]" for quantity in quantities])
-    for ax, quantity in zip(panels, quantities, strict=True):
-        _panel(ax, times, quantity, looks)
-    style.legend_below(canvas, *canvas.axes)
+    """Draw what quantities over `times` (n,) [s] use of their limits; those that use little are named below."""
+    canvas = style.figure(height=1.9 + 0.16 * len(quantities))
+    ax = style.axes(canvas, "time [s]", "share of the limit [%]")
+    drawn: list[tuple[str, np.ndarray]] = []
+    small: list[str] = []
+    for limited in quantities:
+        used = limited.used()
+        if used is not None and np.isfinite(used).any() and np.nanmax(used) >= SHOWN:
+            drawn.append((limited.text(), 100 * used))
+        else:
+            small.append(limited.text() if used is None else f"{limited.text()}: {100 * np.nanmax(used):.2g} %")
+    for index, (label, used) in enumerate(drawn):
+        ax.plot(times, used, **style.look(index), label=label)
+    ax.axhline(100.0, **style.LIMIT)
+    ax.margins(x=0.0)
+    highest = max([100.0, *(float(np.nanmax(used[np.isfinite(used)], initial=0.0)) for _, used in drawn)])
+    ax.set_ylim(0.0, 1.08 * min(highest, 200.0))
+    for label in small:
+        ax.plot([], [], " ", label=label)
+    style.legend_below(canvas, ax)
     return canvas
-
-
-def _panel(ax: Axes, times: np.ndarray, quantity: Limited, looks: dict[str, int]) -> None:
-    values, notes = quantity.values, []
-    if len(quantity.labels) > MOST_CURVES:
-        least, most = values.min(axis=1), values.max(axis=1)
-        ax.fill_between(times, least, most, color="#cccccc", linewidth=0)
-        for edge in (least, most):
-            ax.plot(times, edge, color="#000000", linewidth=1.0)
-        notes.append(f"least and largest of {len(quantity.labels)}")
-    else:
-        for label, curve in zip(quantity.labels, values.T, strict=True):
-            index = looks.setdefault(label, len(looks))
-            ax.plot(times, curve, **style.look(index), label=label)
-    finite = values[np.isfinite(values)]
-    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-    bounds = [bound for bound in (quantity.low, quantity.high) if np.isfinite(bound)]
-    # A curve that hardly changes relative to its limit must look flat.
-    size = max(high - low, LEAST * max((abs(bound) for bound in bounds), default=0.0), 1e-9)
-    near = [bound for bound in bounds if low - size <= bound <= high + size]
-    for bound in near:
-        ax.axhline(bound, **style.LIMIT)
-    notes.append(_as_text(quantity) + ("" if near or not bounds else " (outside the plot)"))
-    middle, shown = (low + high) / 2, [low, high, *near]
-    ax.set_ylim(min(*shown, middle - size / 2) - 0.1 * size, max(*shown, middle + size / 2) + 0.1 * size)
-    ax.margins(x=0.01)
-    style.heading(ax, style.typeset(f"{quantity.name}: {', '.join(notes)}"))
-
-
-def _as_text(quantity: Limited) -> str:
-    low, high, unit = quantity.low, quantity.high, quantity.unit.replace("-", "")
-    if low == high:
-        text = f"exactly {low:g}"
-    elif np.isfinite(low) and np.isfinite(high):
-        text = f"limits {low:g} and {high:g}"
-    else:
-        text = f"lower limit {low:g}" if np.isfinite(low) else f"limit {high:g}"
-    return f"{text} {unit}".rstrip()

@@ -68,13 +68,25 @@ def contents(links: Iterable[Link]) -> str:
 
 def facts(title: str, rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of named facts with a heading; a fact without a name continues the one before it."""
-    return f"{heading(title)}\n{_facts(rows)}"
+    return f"{heading(title)}\n{_facts(rows)}" if title else _facts(rows)
 
 
 def folded(title: str, rows: Iterable[tuple[str, str]], anchor: str) -> str:
     """Return a table of named facts, folded under a title; a link to `anchor` unfolds it."""
     # The anchor is inside: browsers open what hides the target of a link.
     return f"<details><summary>{_safe(title)}</summary>\n{_facts(rows, anchor)}</details>"
+
+
+def fold(title: str, inside: str) -> str:
+    """Return parts of a page folded under a title."""
+    return f"<details><summary>{_safe(title)}</summary>\n{inside}</details>"
+
+
+def beside(left: Sequence[str], right: Sequence[str]) -> list[str]:
+    """Return parts in two columns where the screen is wide enough, else below each other."""
+    if not right:
+        return list(left)
+    return ['<div class="beside"><div>', *left, "</div><div>", *right, "</div></div>"]
 
 
 def columns(title: str, heads: Sequence[str], rows: Iterable[Sequence[str | Link]]) -> str:

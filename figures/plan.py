@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.text import quantity
 from . import style
+from .end_labels import name_at_the_end, together
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,6 +67,8 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
         if title:
             style.heading(ax, title)
     _same_scale(panels)
+    for ax, trajectory in zip(panels, trajectories.values(), strict=True):
+        _name_cables(ax, trajectory)
     style.legend_below(canvas, *panels)
     return canvas
 
@@ -103,8 +106,8 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> None:
     time = trajectory["time"].values
     values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
     missing = ~np.isfinite(values).all(axis=1)
-    for index, cable in enumerate(trajectory["cable"].values):
-        ax.plot(time, values[:, index], **style.look(index), label=f"cable {cable}")
+    for index in range(values.shape[1]):
+        ax.plot(time, values[:, index], **style.look(index))
         needed = np.where(missing, unlimited[:, index], np.nan)
         ax.plot(time, needed, **style.look(index) | {"linewidth": 0.6 * style.look(index)["linewidth"]})
     _draw_phases(ax, trajectory)
@@ -114,6 +117,18 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> None:
         across = {"transform": ax.get_xaxis_transform(), "step": "mid", "label": label}
         ax.fill_between(time, 0, 1, where=missing, color="#e4e4e4", linewidth=0, **across)
     _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
+
+
+def _name_cables(ax: Axes, trajectory: xr.Dataset) -> None:
+    """Write the numbers of the cables beside their curves, of which those that coincide share a label."""
+    ax.margins(x=0.0)
+    values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
+    shown, names = together(
+        np.where(np.isfinite(values), values, unlimited),
+        [str(cable) for cable in trajectory["cable"].values],
+        float(np.diff(ax.get_ylim())[0]),
+    )
+    name_at_the_end(ax, shown[-1], names)
 
 
 def _draw_phases(ax: Axes, trajectory: xr.Dataset) -> None:

@@ -29,8 +29,8 @@ class View(NamedTuple):
 
 
 ABOVE = View("from above", 0, 1)
-FRONT = View("along y", 0, 2)
-SIDE = View("along x", 1, 2)
+FRONT = View("from the front", 0, 2)
+SIDE = View("from the side", 1, 2)
 
 
 def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> tuple[Figure, list[Axes]]:

@@ -46,6 +46,7 @@ class Report(Displayed):
     summary: str  # what decided it, in one line
     parts: Sequence[Part]  # sections, tables and sentences, in order
     drawings: Callable[[], Iterable[Drawing]] = tuple  # draws the figures of the page
+    folded: Sequence[str] = ()  # titles of the parts that the page folds, below the others
     files: Sequence[tuple[str, str]] = ()  # title and text of each file that the page has
 
     @property
@@ -73,18 +74,22 @@ class Report(Displayed):
         """Return the report as a page with its figures inside, which loads nothing."""
         from . import page, style
 
-        parts = []
+        shown, folded = [], []
         for part in self.parts:
+            name = part.title if isinstance(part, Section | Table) else ""
+            hidden = name in self.folded
+            title = "" if hidden else name
             if isinstance(part, str):
-                parts.append(page.paragraph(part))
+                inside = page.paragraph(part)
             elif isinstance(part, Table):
-                parts.append(page.columns(part.title, part.columns, part.rows))
+                inside = page.columns(title, part.columns, part.rows)
             elif any(name for name, _ in part.facts):
-                parts.append(page.facts(part.title or "Result", part.facts))
+                inside = page.facts(title if hidden else title or "Result", part.facts)
             else:
-                parts += [page.heading(part.title), *(page.paragraph(fact) for _, fact in part.facts)]
-        parts += [page.picture(drawing) for drawing in self.drawings()]
-        parts += [page.file(*file) for file in self.files]
+                inside = "\n".join([page.heading(title), *(page.paragraph(fact) for _, fact in part.facts)])
+            (folded if hidden else shown).append(page.fold(name, inside) if hidden else inside)
+        folded += [page.file(*file) for file in self.files]
+        parts = page.beside([*shown, *folded], [page.picture(drawing) for drawing in self.drawings()])
         word, colour = self.status or "result", style.colour(COLOURS.get(self.status, OTHER))
         return page.page(self.about, word, self.summary, colour, parts)
 

@@ -144,7 +144,7 @@ def few_ticks(most: int = 4) -> MaxNLocator:
     """Set few enough tick marks that a small axis stays legible."""
     from matplotlib.ticker import MaxNLocator
 
-    return MaxNLocator(most, prune="both")
+    return MaxNLocator(most, steps=[1, 2, 5, 10], prune="both")
 
 
 def limit_line(ax: Axes, value: float, text: str, place: float = 1.0, above: bool = True) -> None:

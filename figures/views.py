@@ -76,6 +76,9 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
         else:
             ax.plot(*curve.T, **look, label=name)
     ax.plot(*scene.path[:, axes].T, **style.look(0), label="platform")
+    if scene.path_missing.any():
+        beyond = np.where(scene.path_missing[:, None], scene.path[:, axes], np.nan)
+        ax.plot(*beyond.T, color=style.colour(5), linewidth=3.0, label="no tensions inside the limits")
     ax.plot(*scene.path[0, axes], "o", color=style.colour(0), markersize=4, label="start")
 
 

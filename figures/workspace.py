@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VIEWS = (ABOVE, FRONT, SIDE)
+SHARES = (0.1, 0.5, 0.9)  # of the samples along the line of sight: contours
+SMOOTH = 0.8  # [cells]
 MOST_POINTS = 20_000  # of a series in a panel: more are not visible, and files grow
 
 
@@ -70,15 +72,18 @@ def cross_sections(points: np.ndarray, heights: list[float], thickness: float) -
     return canvas
 
 
-def reached(result: xr.Dataset) -> Figure:
-    """Draw the accepted share of the samples along each line of sight: from above, from the front and the side.
+def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> Figure:
+    """Draw where samples were accepted: from above, from the front and from the side.
 
-    Axes along which the region has no extent are left out.
+    Darker areas are those where a larger share of the samples along the line of sight was accepted. Axes along which
+    the region has no extent are left out.
 
     Parameters
     ----------
     result
         From `workspace.sample`, with the counts `tried` and `reached` (x, y, z) of its cells.
+    anchors
+        Anchors to mark, (m, 3) in {G} [m] (default: none).
     """
     thick = [name for name in ("x", "y", "z") if result.sizes[name] > 1]
     views = [view for view in VIEWS if "xyz"[view.across] in thick and "xyz"[view.up] in thick]
@@ -91,19 +96,36 @@ def reached(result: xr.Dataset) -> Figure:
         share = _share(result, tuple(name for name in ("x", "y", "z") if name != along))
         style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(result[along], share, color=style.colour(0))
         return canvas
-    canvas, panels = views_of(
-        np.array(np.meshgrid(*(_ends(result[name].values) for name in "xyz"))).reshape(3, -1).T, views, 0.8
-    )
+    ends = np.array(np.meshgrid(*(_ends(result[name].values) for name in "xyz"))).reshape(3, -1).T
+    canvas, panels = views_of(ends if anchors is None else np.vstack([ends, anchors]), views, 0.8)
     canvas.suptitle(title, fontsize=style.TEXT)
     for ax, view in zip(panels, views, strict=True):
         across, up = "xyz"[view.across], "xyz"[view.up]
         behind = next(name for name in ("x", "y", "z") if name not in (across, up))
-        share = _share(result, (behind,)).transpose(up, across)
-        ax.grid(False)
-        ax.pcolormesh(result[across], result[up], share, vmin=0, vmax=1, cmap="viridis", rasterized=True)
-    label = "share accepted along the line of sight [-]"
-    style.colour_bar(canvas, panels[0].collections[0], panels, label, location="bottom", aspect=40)
+        _contours(ax, result, behind, across, up)
+        if anchors is not None:
+            ax.plot(*anchors[:, [view.across, view.up]].T, "^", color="#000000", markersize=3, label="anchors")
+    style.legend_below(canvas, panels[0])
     return canvas
+
+
+def _contours(ax: Axes, result: xr.Dataset, behind: str, across: str, up: str) -> None:
+    """Fill the areas of `SHARES`, of counts averaged with those of the neighbouring cells, which few samples need."""
+    from scipy.ndimage import gaussian_filter
+
+    tried, reached = (
+        gaussian_filter(np.pad(result[name].sum(behind).transpose(up, across).to_numpy().astype(float), 1), SMOOTH)
+        for name in ("tried", "reached")
+    )
+    share = np.divide(reached, tried, out=np.zeros_like(tried), where=tried > 1e-9)
+    cells = [np.pad(result[name].to_numpy(), 1, mode="reflect", reflect_type="odd") for name in (across, up)]
+    share[[0, -1]] = share[:, [0, -1]] = 0.0  # outside the region, so that contours close
+    colours = [style.colour(2) + alpha for alpha in ("33", "77", "cc")]
+    ax.contourf(*cells, share, levels=[*SHARES, 1.01], colors=colours)
+    ax.contour(*cells, share, levels=[SHARES[1]], colors=style.colour(2), linewidths=0.8)
+    for low, high, colour in zip(SHARES, [*SHARES[1:], None], colours, strict=True):
+        label = f"over {low:.0%}" if high is None else f"{low:.0%} to {high:.0%}"
+        ax.fill([], [], color=colour, label=f"{label} accepted".replace("%", " %"))
 
 
 def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) -> None:

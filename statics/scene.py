@@ -40,6 +40,7 @@ def scene(robot: Robot, dataset: xr.Dataset, times: np.ndarray) -> Scene:
         attachments=attachments,
         path=poses[trail, :3],
         path_times=saved[trail],
+        path_missing=np.asarray(np.isnan(dataset["tensions"].to_numpy()[trail]).any(axis=1)),
         carriers=carriers[:, shown, :3],
         names=[robot.carriers[index].name for index in shown],
         bodies=[np.flatnonzero(robot.carrier_of_cable == index) for index in shown],

@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 from towline import InputError
-from towline.figures import style
+from towline.figures import limits, style
 from towline.figures.curves import Panel, curves
 
 from .figure_cases import FIGURES
@@ -132,8 +132,19 @@ def test_another_format_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_shares_of_limits():
+    """By hand: 3 of 4 m/s is 75 %, 0.2 m where 0.1 m are kept 50 %, and the middle of a range 50 %."""
+    speed = limits.Limited("speed", "m/s", ["a", "b"], np.array([[1.0, -3.0], [2.0, np.nan]]), -4.0, 4.0)
+    np.testing.assert_allclose(speed.used(), [0.75, 0.5])
+    clearance = limits.Limited("clearance", "m", ["a"], np.array([[0.2], [0.05], [0.0]]), 0.1, np.inf)
+    np.testing.assert_allclose(clearance.used(), [0.5, 2.0, 10.0])
+    thrust = limits.Limited("thrust", "N", ["a"], np.array([[10.0], [20.0], [5.0], [25.0]]), 0.0, 20.0)
+    np.testing.assert_allclose(thrust.used(), [0.5, 1.0, 0.75, 1.25])
+    assert limits.Limited("force", "N", ["a"], np.zeros((2, 1)), 0.0, 0.0).used() is None
+
+
 def test_units_are_typeset():
     assert style.typeset("amplitude [um]") == "amplitude [µm]"
     assert style.typeset("acceleration [m/s^2, rad/s^2], jerk [m/s^3]") == "acceleration [m/s², rad/s²], jerk [m/s³]"
-    labels = [panel.get_ylabel() for panel in FIGURES["limits"]().axes]
-    assert labels[:2] == ["[m/s²]", "[m/s²]"]
+    names = [text.get_text() for text in FIGURES["limits"]().legends[0].get_texts()]
+    assert "carrier acceleration (at most 1.2 m/s²)" in names

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from towline import simulate
-from towline.figures import flight
+from towline.figures import end_labels, flight
 
 TIME = np.arange(0, 2, 0.01)
 ANSWERS = ["as_planned", "shifted_plan", "soft_wrench", "hold"]
@@ -87,7 +87,7 @@ def test_tensions_show_slack_limits_and_commands_that_differ():
     there = np.isfinite(dashed[1].get_ydata())
     assert (TIME[there].min(), TIME[there].max()) == pytest.approx((0.5, 0.99))
     shown = {text.get_text() for text in axes.texts}
-    assert {"t_min = 1 N", "t_max = 30 N", "1", "2"} <= shown
+    assert {"t_min = 1 N", "t_max = 30 N", "cable 1", "2"} <= shown
     labels = [text.get_text() for text in axes.figure.legends[0].get_texts()]
     assert labels == ["real", "commanded, where it differs", "slack: cable 2", "t_max = 500 N, outside the plot"]
     (shaded,) = axes.patches
@@ -96,10 +96,10 @@ def test_tensions_show_slack_limits_and_commands_that_differ():
 
 @pytest.mark.parametrize("ends", [[1, 1, 1, 1], [0, 0.01, 0.02, 0.9], [0.5, 0.5, 0.5, 0.51], np.linspace(0, 1, 8)])
 def test_names_beside_curves_are_apart_and_inside(ends):
-    places = flight._spread(np.array(ends, dtype=float))
-    assert (np.diff(places) >= flight.GAP - 1e-12).all()
+    places = end_labels._spread(np.array(ends, dtype=float))
+    assert (np.diff(places) >= end_labels.GAP - 1e-12).all()
     assert places[0] >= -1e-12
-    assert places[-1] <= flight.HIGHEST + 1e-12
+    assert places[-1] <= end_labels.HIGHEST + 1e-12
 
 
 @pytest.mark.parametrize("draw", [flight.flight, flight.tensions])

@@ -4,10 +4,10 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from matplotlib.colors import to_hex
 
 from towline import available, load
-from towline.figures import projection
+from towline.figures import projection, style
 from towline.figures import robot as figure
 from towline.figures.hull import faces, outline
 
@@ -17,7 +17,6 @@ def sketch(robot):
         title=robot.name,
         anchors=robot.home_anchors,
         attachments=robot.home_attachments,
-        com=robot.home_com,
         carriers=robot.carrier_home[:, :3],
         names=[carrier.name for carrier in robot.carriers],
         boxes=[],
@@ -27,27 +26,17 @@ def sketch(robot):
     )
 
 
-@pytest.fixture
-def drawn_faces(monkeypatch):
-    """A function of a robot that draws it and returns the corners (c, 3) of each face of the drawn platform."""
-    drawn = []
-    set_verts = Poly3DCollection.set_verts
-
-    def record(body, verts, *arguments):
-        drawn.extend(np.array(face) for face in verts)
-        set_verts(body, verts, *arguments)
-
-    def draw(robot):
-        drawn.clear()
-        figure.draw(sketch(robot))
-        return list(drawn)
-
-    monkeypatch.setattr(Poly3DCollection, "set_verts", record)
-    return draw
+def drawn_faces(robot):
+    """Draw a robot, and return the corners (c, 3) of each face of the platform."""
+    found = [robot.home_attachments[face] for face in faces(robot.home_attachments)]
+    ax = figure.draw(sketch(robot)).axes[0]
+    blue = [patch for patch in ax.patches if to_hex(patch.get_facecolor()).upper() == style.colour(4)]
+    assert sorted(len(patch.get_xy()) - 1 for patch in blue) == sorted(map(len, found))
+    return found
 
 
 @pytest.mark.parametrize("name", available())
-def test_the_drawn_platform_is_a_convex_body_that_holds_all_attachments(name, drawn_faces):
+def test_the_drawn_platform_is_a_convex_body_that_holds_all_attachments(name):
     robot = load(name)
     points, size = robot.home_attachments, robot.length
     rank = np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-6 * size)
@@ -67,7 +56,7 @@ def test_the_drawn_platform_is_a_convex_body_that_holds_all_attachments(name, dr
 
 
 @pytest.mark.parametrize("name", ["the-cable-robot-simulator", "cogiro"])
-def test_the_faces_close_the_body(name, drawn_faces):
+def test_the_faces_close_the_body(name):
     corners = Counter()
     for face in drawn_faces(load(name)):
         for start, end in zip(face, np.roll(face, -1, axis=0), strict=True):

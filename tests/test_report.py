@@ -18,10 +18,11 @@ from towline.cli.watching import watching
 from towline.figures import animation, film
 from towline.figures.convergence import convergence, runs
 from towline.figures.style import typeset
+from towline.figures.views import views
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.audits.excess import Excess
-from towline.ocp.reports.report import headline, sections, spans_table, stages_table
+from towline.ocp.reports.report import cables_table, headline, sections, spans_table, stages_table
 from towline.ocp.reports.trajectory import outline
 from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
 from towline.solvers import TensionProblem, certify
@@ -190,11 +191,19 @@ def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path)
         file = found.save_report(tmp_path / "new" / "report.html")
         text = file.read_text()
         page = Page(text)
-        told = [(name, typeset(fact)) for section in sections(found) for name, fact in section.facts]
-        # A table's row is one heading or one text here; the spans are below the first section, the stages at the end.
-        for table, below in ((stages_table(found), len(told)), (spans_table(found), len(sections(found)[0].facts))):
-            if table is not None:
-                told[below:below] = [("".join(table.columns), ""), *(("", typeset("".join(row))) for row in table.rows)]
+        # A table's row is one heading or one text here. The spans are below the first section, other tables below all
+        # of them; audit, computation and stages are folded at the end.
+        first, *others = sections(found)
+        ends = [section for section in others if section.title in ("Audit", "Computation")]
+        others = [section for section in others if section not in ends]
+        order = [first, spans_table(found), *others, cables_table(found), *ends, stages_table(found)]
+        told = []
+        for part in filter(None, order):
+            if hasattr(part, "facts"):
+                told += [(name, typeset(fact)) for name, fact in part.facts]
+            else:
+                rows = [("", typeset("".join(row))) for row in part.rows]
+                told += [("".join(typeset(name) for name in part.columns), ""), *rows]
         assert [tuple(row) for row in page.rows] == told
         assert "viewport" in text
         assert found.status.value in page.text
@@ -243,8 +252,21 @@ def test_convergence_shows_every_run():
 
 def test_plots_of_a_plan(free, impossible, tmp_path):
     drawn = [path.name for path in free.plot(tmp_path)]
-    assert drawn == ["path.png", "views.png", "tensions.png", "base.png", "limits.png", "convergence.png"]
-    assert [path.name for path in impossible.plot(tmp_path)] == ["path.png", "views.png", "tensions.png", "base.png"]
+    assert drawn == ["views.png", "tensions.png", "path.png", "base.png", "limits.png", "convergence.png"]
+    assert [path.name for path in impossible.plot(tmp_path)] == ["views.png", "tensions.png", "path.png", "base.png"]
+
+
+def test_views_mark_where_no_tensions_exist(impossible):
+    """Where the trajectory has none, and nowhere else."""
+    saved = impossible.trajectory
+    shown = scene(impossible.scenario.robot, saved, np.array([0.0, 1.0]))
+    missing = np.isnan(saved["tensions"].to_numpy()).any(axis=1)
+    assert missing.any()
+    assert not missing.all()
+    np.testing.assert_array_equal(shown.path_missing, missing)
+    marked = views(shown).axes[0].lines
+    (line,) = (line for line in marked if line.get_label() == "no tensions inside the limits")
+    np.testing.assert_array_equal(np.isfinite(line.get_xdata()), missing)
 
 
 @pytest.mark.parametrize("name", ["wang-flying", "ipanema-1", "wang-ctmrts"])
@@ -376,3 +398,30 @@ def test_watching_shows_and_keeps_what_the_solver_tells():
             watch(0, 1.0, 1.0)
         assert silent.getvalue() == ""
         assert len(watch.rows) == 1
+
+
+def test_the_table_of_cables_says_what_each_winch_must_do():
+    """By the trajectory: lengths, their largest rate, and tensions, to the digits of the table."""
+    found = plan(load("cogiro"), {"path": {"kind": "line", "start": [0, 0, 1], "end": [2, 1, 2]}, "duration": 3})
+    saved = found.trajectory
+    lengths, times = saved["cable_lengths"].to_numpy(), saved["time"].to_numpy()
+    rate = np.abs(np.diff(lengths, axis=0) / np.diff(times)[:, None]).max(axis=0)
+    tensions = saved["tensions"].to_numpy()
+    wanted = [lengths[0], lengths[-1], lengths.min(axis=0), lengths.max(axis=0), rate]
+    wanted += [tensions.min(axis=0), tensions.max(axis=0)]
+    shown = np.array([[float(cell.replace(" ", "")) for cell in row[1:]] for row in cables_table(found).rows]).T
+    for got, expected in zip(shown, wanted, strict=True):
+        np.testing.assert_allclose(got, expected, rtol=1e-3)
+
+
+def test_the_cause_names_the_cables_of_the_certificate(impossible):
+    """Any of those that it binds: the smallest and the largest tension are the robot's, less the task's margin."""
+    cause = dict(sections(impossible)[0].facts)["cause"]
+    proof, robot = impossible.certificate, impossible.scenario.robot
+    for cables, way in ((proof.at_min, "below"), (proof.at_max, "above")):
+        assert (f"would have to go {way}" in cause) == bool(len(cables))
+        named = cause.partition(f" would have to go {way}")[0].rpartition("cable ")[2]
+        assert not len(cables) or named.replace(" or ", ", ").split(", ") == [str(k + 1) for k in cables]
+    margin = impossible.scenario.task.margin
+    assert len(proof.at_min) == 0 or f"below {robot.t_min[0] + margin:g} N" in cause
+    assert len(proof.at_max) == 0 or f"above {robot.t_max[0] - margin:g} N" in cause

@@ -11,8 +11,9 @@ HEAD = """# The robots of the library
 
 These robots ship with towline. `cogiro` in a command, or `load("cogiro")` in Python, is the robot of that name.
 `towline robots cogiro` diagnoses it, and `towline robots cogiro --figure cogiro.png` draws the picture that you see
-here: cables are coloured by their tensions at rest at home, or grey if the robot cannot rest there. Green points are
-positions at which it can rest. *Drag it* opens a page that computes tensions while you move the platform.
+here: cables are coloured by their tensions at rest at home, or grey if the robot cannot rest there. The green area is
+the outline of sampled positions at which it can rest, seen from above. *Drag it* opens a page that computes tensions
+while you move the platform.
 
 """
 

@@ -27,9 +27,9 @@ MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
 PATIENCE = 10  # iterations without a better one
 # Of the pivot tolerances of MUMPS the larger one refactorises less where thrust directions are equations: teams of
-# quadrotors then take half of the time. Of other robots each iteration takes 10 % longer. Ordered by METIS, an iteration
-# of a team past obstacles takes less than half of the time that it takes with MUMPS's own choice. Without a permutation
-# that scales it would take another tenth less, but short motions of teams are then not found.
+# quadrotors then take half of the time. Of other robots each iteration takes 10 % longer. Ordered by METIS, an
+# iteration of a team past obstacles takes less than half of the time that it takes with MUMPS's own choice. Without a
+# permutation that scales it would take another tenth less, but short motions of teams are then not found.
 TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
 TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility

@@ -26,11 +26,11 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
     """Return the figures by the names of their files, without suffix; a figure without content is left out."""
     times = np.linspace(0.0, plan.scenario.duration, INSTANTS)
     drawn = {
-        "path": Drawing("Path of the platform and positions of the carriers", plan_figures.path(trajectory)),
         "views": Drawing("From above and from the side", views(scene(plan.scenario.robot, trajectory, times))),
         "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }
     if trajectory["carrier_moves"].any():
+        drawn["path"] = Drawing("Path of the platform and positions of the carriers", plan_figures.path(trajectory))
         drawn["base"] = Drawing("Carriers relative to the platform", plan_figures.base_offset(trajectory))
     rows = output_rows(plan)
     if quantities := limited(plan, rows):

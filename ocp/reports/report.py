@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ...base.display import Fact
-from ...base.text import at_most, quantity, quantity_row
+from ...base.text import at_most, column, quantity, quantity_range, quantity_row
 from ...figures.drawing import Drawing
 from ...figures.report import Report, Section, Table
 from ...models.parsing import to_yaml
@@ -16,6 +16,7 @@ from .motion_facts import motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
 RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding
+SAME_LENGTH = 1e-9  # [m]
 LEVEL = 1e-3  # [rad]: of a smaller attitude nothing is said
 
 
@@ -77,6 +78,25 @@ def spans_table(plan: PlanData) -> Table | None:
     return Table("Time spans with no feasible tensions", columns, rows) if len(rows) > 1 else None
 
 
+def cables_table(plan: PlanData) -> Table | None:
+    """Return the table of what each winch must do; None if no cable changes its length."""
+    audit, m = plan.audit, plan.scenario.robot.m
+    lengths = plan.scenario.dynamics.cable_lengths(audit.motion.pose, audit.carriers.pose)
+    if np.ptp(lengths, axis=0).max() < SAME_LENGTH:
+        return None
+    passed = np.diff(audit.times)
+    moves = passed > 0  # phases meet at two instants of one time
+    speeds = np.abs(np.diff(lengths, axis=0)[moves] / passed[moves, None]).max(axis=0)
+    tensions = np.where(np.isfinite(audit.tensions), audit.tensions, np.nan)
+    known = np.asarray(np.isfinite(tensions).any(axis=0))
+    every = [lengths[0], lengths[-1], lengths.min(axis=0), lengths.max(axis=0), speeds]
+    every += [np.array([f(tensions[:, k]) if known[k] else np.nan for k in range(m)]) for f in (np.nanmin, np.nanmax)]
+    written = zip(*(column(values.tolist()) for values in every), strict=True)
+    rows = [(str(k + 1), *row) for k, row in enumerate(written)]
+    lengths_are = ("first length [m]", "last [m]", "shortest [m]", "longest [m]", "speed up to [m/s]")
+    return Table("Cables", ("cable", *lengths_are, "tension from [N]", "to [N]"), rows, range(8))
+
+
 def phases_table(plan: PlanData) -> Table | None:
     """Return the table of the phases; None for a task without."""
     rows = [
@@ -110,13 +130,14 @@ def stages_table(plan: PlanData) -> Table | None:
 def report(plan: PlanData, drawings: Callable[[], Iterable[Drawing]] = tuple) -> Report:
     """Return the report of a plan; the spans without tensions follow the first section, which states why."""
     robot, task, (first, *others), spans = plan.scenario.robot, plan.scenario.task, sections(plan), spans_table(plan)
-    tables = [table for table in (phases_table(plan), stages_table(plan)) if table is not None]
+    tables = [table for table in (cables_table(plan), phases_table(plan), stages_table(plan)) if table is not None]
     return Report(
         about=f"{robot.name}, {task.name}",
         status=plan.status.value,
         summary=decisive(plan),
         parts=[first, *([] if spans is None else [spans]), *others, *tables],
         drawings=drawings,
+        folded=("Audit", "Computation", "Stages"),
         files=[
             ("The robot's file", to_yaml(robot)),
             ("Complete task, defaults included (frame: world is {G})", to_yaml(task.in_file())),
@@ -180,6 +201,7 @@ def _reasons(plan: PlanData) -> list[Fact]:
     if (certificate := plan.certificate) is not None:
         text, phase = certificate.text(_up(plan)), _in_phase(plan, certificate.time)
         facts += [
+            *([("cause", cause)] if (cause := _cause(plan, certificate)) else []),
             ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}{phase}"),
             ("pose", _pose_then(plan, certificate.time)),
             *([("wind", wind(certificate.wind))] if certificate.wind is not None else []),
@@ -191,6 +213,19 @@ def _reasons(plan: PlanData) -> list[Fact]:
         ]
     facts += [("limit exceeded", f"{excess}{_in_phase(plan, excess.time)}") for excess in plan.audit.excess]
     return facts
+
+
+def _cause(plan: PlanData, certificate: Certificate) -> str:
+    """Return in a sentence where the platform is and which tensions would help; empty where no cable pulls."""
+    scenario, time = plan.scenario, certificate.time
+    low, high = scenario.bounds_in(None if time is None else scenario.phases.at(time))
+    ways = [
+        f"cable {' or '.join(', '.join(str(k + 1) for k in cables).rsplit(', ', 1))} would have to go {way} "
+        f"{quantity_range(bound[cables], 'N')}"
+        for way, cables, bound in (("below", certificate.at_min, low), ("above", certificate.at_max, high))
+        if cables.size
+    ]
+    return f"at {_pose_then(plan, time)}, {', or '.join(ways)}" if ways else ""
 
 
 def _pose_then(plan: PlanData, time: float | None) -> str:

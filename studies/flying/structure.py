@@ -86,7 +86,7 @@ def _displaced(samples: Instants) -> Claim:
 def _structure() -> Drawing:
     robot = load("wang-flying-printed")
     tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home), rcond=RANK)[:, 2] * robot.weight
-    places = robot.anchors, robot.home_attachments, robot.home[:3], robot.carrier_home[:, :3]
+    places = robot.anchors, robot.home_attachments, robot.carrier_home[:, :3]
     names, title = [carrier.name for carrier in robot.carriers], "the printed pairing at home"
     sketch = RobotSketch(title, *places, names, [], tensions, robot.t_min, robot.t_max)
     return Drawing("Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1", draw(sketch))

@@ -167,7 +167,7 @@ def _bounded(poses: np.ndarray, forces: np.ndarray) -> list[Claim]:
 def _figure(found: Equilibrium) -> Drawing:
     mover = robot("wang-ctmrts", "both")
     ends, names = mover.home_anchors, [carrier.name for carrier in mover.carriers]
-    places = ends, ends - lines(mover, found.pose)[0], found.pose[:3], mover.carrier_home[:, :3]
+    places = ends, ends - lines(mover, found.pose)[0], mover.carrier_home[:, :3]
     boxes, title = list(zip(*reach(mover), strict=True)), "three robots, cables of 1.2 m, at rest"
     sketch = RobotSketch(title, *places, names, boxes, found.tensions, mover.t_min, mover.t_max)
     return Drawing("Figure 1: robot-ends in their boxes (widths inferred), cables and load", draw(sketch))

@@ -1,0 +1,58 @@
+"""Write names beside the ends of curves, so that they are distinct without colours and need no legend."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+GAP = 0.065  # of a panel's height, between the names of curves at its edge
+HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
+SAME = 1e-3  # of the panel's height: curves that are nowhere farther apart share a name
+
+
+def together(values: np.ndarray, names: list[str], height: float) -> tuple[np.ndarray, list[str]]:
+    """Return the curves (n, k) that differ somewhere, and the names of each: "1, 6"."""
+    groups: list[list[int]] = []
+    for index in range(values.shape[1]):
+        for group in groups:
+            apart = np.abs(values[:, index] - values[:, group[0]])
+            if np.isfinite(apart).any() and np.nanmax(apart) < SAME * height:
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return values[:, [group[0] for group in groups]], [", ".join(names[index] for index in group) for group in groups]
+
+
+def name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
+    """Write the numbers of cables beside the ends of their curves, whose last values are (k,)."""
+    low, high = ax.get_ylim()
+    places = (np.clip(values, low, high) - low) / (high - low)
+    order = np.argsort(places)
+    for cable, place in zip(order, _spread(places[order]), strict=True):
+        ax.annotate(
+            f"cable {names[cable]}" if cable == order[-1] else names[cable],
+            (1.0, places[cable]),
+            xytext=(1.05, place),
+            xycoords="axes fraction",
+            va="center",
+            fontsize=style.NOTE,
+            arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0},
+            annotation_clip=False,
+        )
+
+
+def _spread(places: np.ndarray) -> np.ndarray:
+    """Return increasing places with distances of at least `GAP`, moved as much up as down."""
+    gaps = GAP * np.arange(len(places))
+    up = np.maximum.accumulate(places - gaps) + gaps
+    down = np.minimum.accumulate((places - gaps)[::-1])[::-1] + gaps
+    apart = (up + down) / 2
+    apart += max(0.0, -apart[0])  # all of them, so that none leaves the panel below
+    return np.minimum(apart, HIGHEST - gaps[::-1])
