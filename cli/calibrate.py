@@ -8,7 +8,7 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of
 from .log import FieldsOption
-from .options import FormatOption, JsonOption, RobotArgument, print_result
+from .options import FormatOption, JsonOption, ReportOption, RobotArgument, print_result
 from .outputs import check_outputs
 
 
@@ -73,6 +73,7 @@ def calibrate(
         typer.Option(metavar="FOLDER", help="Folder for figures of residuals, anchors and standard deviations."),
     ] = None,
     form: FormatOption = "png",
+    report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Estimate anchors, offsets and more from measured cable lengths, and write a calibrated robot file.
@@ -94,7 +95,8 @@ def calibrate(
     loaded = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
     check_outputs(
-        {"--out": target, "--figures": figures and figures / f"residuals.{form}"}, {"the log": log, "--poses": poses}
+        {"--out": target, "--report": report, "--figures": figures and figures / f"residuals.{form}"},
+        {"the log": log, "--poses": poses},
     )
     check_ending("--out", target, ".yaml", ".yml")
     read = read_log(log, stated, poses, loaded, fields)
@@ -103,14 +105,16 @@ def calibrate(
         measurements, texts = mended(loaded, measurements)
         read.notes.extend(f"corrected: {text}" for text in texts)
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
-    report = result.report()  # before anything is written
-    file = None if result.refused else result.save(target)
+    text = result.report()  # before anything is written
+    written = {} if result.refused else {"file": result.save(target)}
+    if report is not None:
+        written["report"] = result.save_report(report)
     pictures = [] if figures is None else result.plot(figures, form)
-    data = {**result.to_dict(), "notes": read.notes, "file": file, "figures": pictures}
+    data = {**result.to_dict(), "notes": read.notes, "file": None, **written, "figures": pictures}
     if not as_json:
         for note in read.notes:
             typer.echo(f"  {note}")
-    print_result(as_json, data, lambda: report, [*([] if file is None else [file]), *pictures])
+    print_result(as_json, data, lambda: text, [*written.values(), *pictures])
     if result.refused:
         hint = "; --fix corrects it" if result.doubt and result.mistake and result.mistake.mended else ""
         typer.echo(f"towline: {target} is not written: {result.refused}{hint}", err=True)

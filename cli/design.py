@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, RobotArgument, print_json, print_result
+from .options import JsonOption, ReportOption, RobotArgument, print_json, print_result
 from .outputs import check_outputs
 from .stopping import requested, unlisten
 from .watching import progress_bar
@@ -40,6 +40,7 @@ def design(
     seed: Annotated[
         int | None, typer.Option(help="Seed of the random numbers; default: `seed` of the requirements, or 0.")
     ] = None,
+    report: ReportOption = None,
     as_json: JsonOption = False,
     schema: Annotated[
         bool,
@@ -64,7 +65,7 @@ def design(
     if changed:
         read = validate(read.model_dump() | changed, Requirements, "--seconds or --seed")
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.yaml")
-    check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml")})
+    check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml"), "--report": report})
     unlisten()  # an interrupt ends the search, not the command
     with progress_bar(f"design of {read.name}", quiet=as_json) as move:
 
@@ -75,7 +76,9 @@ def design(
         found = find(loaded, requirements=read, progress=progress)
     if requested():  # SIGTERM, which ends the command
         raise KeyboardInterrupt
-    file = found.robot.save(target) if found.feasible else None
-    print_result(as_json, {**found.to_dict(), "file": file}, found.report, [] if file is None else [file])
+    written = {"file": found.robot.save(target)} if found.feasible else {}
+    if report is not None:
+        written["report"] = found.save_report(report)
+    print_result(as_json, {**found.to_dict(), "file": None, **written}, found.report, list(written.values()))
     if not found.feasible:
         raise typer.Exit(1)

@@ -65,6 +65,9 @@ FormatOption = Annotated[
 ]
 
 
+ReportOption = Annotated[
+    Path | None, typer.Option("--report", help="HTML file to write: the report with its figures, in one file.")
+]
 SPEED, FPS = 1.0, 20.0
 SpeedOption = Annotated[float, typer.Option(help="With --animate: speed of the film; 1 is real time.")]
 FpsOption = Annotated[float, typer.Option(help="With --animate: frames per second of the film.")]

@@ -20,7 +20,7 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path 
 
     Raises `InputError` if one cannot be written, or is one of the other files.
     """
-    from ..base.inputs import printable
+    from ..base.inputs import check_ending, printable
     from ..base.reading import files_read
     from ..base.writing import check_writable
 
@@ -29,6 +29,8 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path 
     for what, file in outputs.items():
         if file is None:
             continue
+        if what == "--report":
+            check_ending(what, file, ".html", ".htm")
         target = check_writable(file)
         for other, place in taken:
             if target == place or (target.exists() and place.exists() and target.samefile(place)):

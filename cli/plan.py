@@ -13,6 +13,7 @@ from .options import (
     FormatOption,
     FpsOption,
     JsonOption,
+    ReportOption,
     RobotArgument,
     SpeedOption,
     check_animation,
@@ -53,9 +54,7 @@ def plan(
         ),
     ] = None,
     form: FormatOption = "png",
-    report: Annotated[
-        Path | None, typer.Option(help="HTML file to write: the report with its figures, in one file.")
-    ] = None,
+    report: ReportOption = None,
     animate: Annotated[Path | None, typer.Option(help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")] = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
@@ -120,8 +119,6 @@ def plan(
     loaded, read = load(robot), read_task(task)
     usual = f"{loaded.name}-{read.name}"
     target = check_ending("--out", out or Path(f"{usual}.nc"), ".nc", ".mcap")
-    if report is not None:
-        check_ending("--report", report, ".html", ".htm")
     drawn = figures and figures / f"path.{form}"
     check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": drawn})
     with watching(f"planning {read.name}", quiet=as_json) as watch:

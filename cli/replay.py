@@ -17,8 +17,7 @@ def replay_log(
     robot: Any,
     log: Path,
     options: dict[str, Any],
-    fit: Path | None,
-    out: Path | None,
+    files: dict[str, Path | None],
     figures: Path | None,
     form: str,
     as_json: bool,
@@ -27,17 +26,19 @@ def replay_log(
     from ..models import load
     from ..simulation import replay
 
-    loaded = load(robot)
-    target = check_ending("--out", out or Path(f"{log.stem}-replay.nc"), ".nc")
+    loaded, fit, page = load(robot), files["--fit"], files["--report"]
+    target = check_ending("--out", files["--out"] or Path(f"{log.stem}-replay.nc"), ".nc")
     if fit is not None:
         check_ending("--fit", fit, ".yaml", ".yml")
-    outputs = {"--out": target, "--fit": fit, "--figures": figures and figures / f"replay.{form}"}
+    outputs = {**files, "--out": target, "--figures": figures and figures / f"replay.{form}"}
     check_outputs(outputs, {"the log": log, "--poses": options["poses"]})
     try:
         result = replay(loaded, log, fit=fit is not None, **options)
     except InputError as error:
         raise InputError(_as_options(str(error))) from None
     written = {"file": result.save(target)}
+    if page is not None:
+        written["report"] = result.save_report(page)
     if fit is not None and not result.refused:
         written["robot_file"] = result.save_robot(fit)
     pictures = [] if figures is None else result.plot(figures, form)

@@ -23,6 +23,7 @@ from .options import (
     FormatOption,
     FpsOption,
     JsonOption,
+    ReportOption,
     RobotArgument,
     SpeedOption,
     check_animation,
@@ -122,6 +123,7 @@ def simulate(
     ] = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
+    report: ReportOption = None,
     replay: Annotated[
         bool, typer.Option("--replay", help="Replay PLAN as a recording also if it is a file of a simulation.")
     ] = False,
@@ -175,14 +177,16 @@ def simulate(
             if value:
                 raise InputError(f"{name} must be left out with a recording, got {shown(value)}")
         options = {"poses": poses, "fields": fields, "drive": drive, "delay": delay, "window": window}
-        replay_log(robot, plan, options | {"tolerance": tolerance}, fit, out, figures, form, as_json)
+        outputs = {"--out": out, "--fit": fit, "--report": report}
+        replay_log(robot, plan, options | {"tolerance": tolerance}, outputs, figures, form, as_json)
         return
     for name, value in of_log.items():
         if value:
             raise InputError(f"{name} must be left out without a recording, got {shown(value)}")
     stored = checkpoint_of(checkpoint, resume)
-    if runs is not None and animate is not None:
-        raise InputError(f"--animate must be left out with --runs, got {animate}")
+    for name, file in (("--animate", animate), ("--report", report)):
+        if runs is not None and file is not None:
+            raise InputError(f"{name} must be left out with --runs, got {file}")
     # Before libraries load: the processes of --workers share the processors.
     with one_thread_each(), _named(event or []):
         from ..control import ComputedTorque, LengthControl, OpenLoop, Predictive
@@ -197,7 +201,7 @@ def simulate(
         target = check_ending(
             "--out", out or Path(f"{plan.stem}-flight{end}.nc"), *((".nc",) if runs else (".nc", ".mcap"))
         )
-        outputs = {"the checkpoint": stored, "--out": target, "--animate": animate}
+        outputs = {"the checkpoint": stored, "--out": target, "--animate": animate, "--report": report}
         outputs["--figures"] = figures and figures / f"error{end}.{form}"
         check_outputs(outputs, {"the plan": plan, "--noise": noise})
         kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop)
@@ -208,7 +212,7 @@ def simulate(
         run = partial(simulate, loaded, plan, pilot, seed=seed, conditions=conditions)
         if runs is None:
             film = None if animate is None else (animate, speed, fps)
-            passed = _once(run, plan.stem, target, (figures, form), film, as_json)
+            passed = _once(run, plan.stem, target, (figures, form), film, report, as_json)
         else:
             where = Execution(workers, scheduler, stored, resume is not None)
             passed = _often(partial(run, runs=runs), plan.stem, where, target, (figures, form), as_json)
@@ -232,6 +236,7 @@ def _once(
     target: Path,
     drawn: tuple[Path | None, str],
     film: tuple[Path, float, float] | None,
+    report: Path | None,
     as_json: bool,
 ) -> bool:
     """Simulate once, save, draw and print; return whether the run passed."""
@@ -239,6 +244,8 @@ def _once(
     with watching(f"flying {plan}", quiet=as_json) as watch:
         flight = run()
         written = {"file": flight.save(target)}
+        if report is not None:
+            written["report"] = flight.save_report(report)
         watch.now("drawing")
         pictures = [] if figures is None else flight.plot(figures, form)
         if film is not None:

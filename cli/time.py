@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, RobotArgument, print_result
+from .options import JsonOption, ReportOption, RobotArgument, print_result
 from .outputs import check_outputs
 
 
@@ -22,6 +22,7 @@ def time(
         ),
     ] = None,
     grid: Annotated[int, typer.Option(help="Initial number of intervals of the path; refined if necessary.")] = 200,
+    report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Find the fastest motion along a task's path with every tension inside its limits; exit code 1 if none exists.
@@ -39,11 +40,13 @@ def time(
 
     loaded, read = load(robot), read_task(task)
     target = out if out is not None else Path(f"{loaded.name}-{read.name}-timed.yaml")
-    check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml")})
+    check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml"), "--report": report})
     found = time_along(loaded, read, grid=grid)
-    file = None
+    written = {}
     if found.feasible:
-        file = found.scenario.task.model_copy(update={"name": f"{read.name[:54]}-timed"}).save(target)
-    print_result(as_json, {**found.to_dict(), "file": file}, found.report, [] if file is None else [file])
+        written["file"] = found.scenario.task.model_copy(update={"name": f"{read.name[:54]}-timed"}).save(target)
+    if report is not None:
+        written["report"] = found.save_report(report)
+    print_result(as_json, {**found.to_dict(), "file": None, **written}, found.report, list(written.values()))
     if not found.feasible:
         raise typer.Exit(1)

@@ -11,6 +11,8 @@ from towline import calibration, load, plan, simulate, sweep, time_along
 from towline.base.errors import InputError
 from towline.figures.style import typeset
 
+from .warm import towline as command
+
 LIFT = {"path": {"kind": "line", "start": [0, 0, -1], "end": [0.2, 0, -1]}, "duration": 1.5}
 TOO_HEAVY = {"path": {"kind": "line", "start": [0, 0, -1], "end": [9, 0, -1]}, "duration": 1.5}
 
@@ -83,3 +85,28 @@ def test_a_report_that_cannot_be_written_leaves_nothing(result, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written"):
         result.save_report(tmp_path / "file" / "report.html")
+
+
+LIFT_FILE = "name: lift\npath: {kind: line, start: [0, 0, 1], end: [0.3, 0.2, 1.3]}\nduration: 3\n"
+
+
+def test_commands_write_the_page(tmp_path):
+    """The same facts as on the terminal; nothing if the file cannot be a page."""
+    (tmp_path / "lift.yaml").write_text(LIFT_FILE)
+    commands = [
+        ("plan", "cogiro", "lift.yaml", "--out", "lift.nc"),
+        ("time", "cogiro", "lift.yaml"),
+        ("simulate", "cogiro", "lift.nc"),
+    ]
+    for name, *arguments in commands:
+        done = command(name, *arguments, "--report", f"{name}.html", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert f"    {name}.html" in done.stdout
+        page = html.unescape((tmp_path / f"{name}.html").read_text())
+        assert done.stdout.partition(": ")[2].partition("\n")[0].partition(", ")[2] in page
+    for name, *arguments in [*commands, ("calibrate", "cogiro", "log.csv"), ("design", "cogiro", "lift.yaml")]:
+        refused = command(name, *arguments, "--report", "page.txt", cwd=tmp_path)
+        assert refused.returncode == 2
+        assert not (tmp_path / "page.txt").exists()
+        if name in ("plan", "time", "simulate"):
+            assert refused.stderr == "towline: --report must end in .html or .htm, got 'page.txt'\n"
