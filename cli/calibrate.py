@@ -33,8 +33,8 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, clock; or "
-            "auto. "
+            help="Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, build-up, "
+            "clock, com; with tensions also mass, stiffness, capstan, friction, gains; or auto. "
             "Default: anchors, offsets, and clock if the log records times and poses of a motion.",
         ),
     ] = None,
@@ -42,7 +42,7 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="NAME=SIGMA,...",
-            help="Standard deviations of the file's values [m] (scales [1], clock [s]), as "
+            help="Standard deviations of the file's values, in their units, as "
             "'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.",
         ),
     ] = None,
@@ -50,8 +50,8 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="SIGMA|NAME=SIGMA,...",
-            help="Standard deviation of the lengths [m], or of lengths [m], position [m] and rotation [rad], as "
-            "'lengths=0.001,position=0.0005'; default: the log's, or 1 mm and exact poses.",
+            help="Standard deviation of the lengths [m], or of lengths [m], position [m], rotation [rad] and tensions "
+            "(relative), as 'lengths=0.001,tensions=0.05'; default: the log's, or 1 mm, exact poses and 2 %.",
         ),
     ] = None,
     outliers: Annotated[
@@ -128,7 +128,7 @@ def _sigma(text: str) -> Any:
         return float(text)
     except ValueError:
         raise InputError(
-            f"--sigma must be a number [m], or NAME=NUMBER of lengths, position, rotation, got {text!r}"
+            f"--sigma must be a number [m], or NAME=NUMBER of lengths, position, rotation, tensions, got {text!r}"
         ) from None
 
 

@@ -37,10 +37,11 @@ class Winch(Part):
 
 
 class Encoder(Part):
-    """The reading of a winch: the length from anchor to attachment is offset + scale * reading."""
+    """The reading y of a winch: the unstrained length of the cable is offset + scale * y + build_up * y^2."""
 
     offset: Finite = Field(default=0.0, description="length of the cable at reading 0 [m]")
     scale: Finite = Field(default=1.0, description="metres of cable per unit of reading, not 0")
+    build_up: Finite = Field(default=0.0, description="of layers of cable on the drum, per square of the reading [1/m]")
 
     @field_validator("scale")
     @classmethod

@@ -112,10 +112,4 @@ def _thinned(model: Model) -> Model:
     """Return the model with fewer samples, but with poses of the whole track."""
     count = len(model.measurements)
     rows = np.unique(np.linspace(0, count - 1, MOST_SAMPLES).astype(int)) if count > MOST_SAMPLES else np.arange(count)
-    assert model.track is not None
-    return replace(
-        model,
-        measurements=model.measurements.only(rows),
-        weights=model.weights[:, rows],
-        track=model.track.at_samples(rows),
-    )
+    return model.only(rows)

@@ -1,7 +1,8 @@
 """Cross-validation: a small residual of the training samples does not prove that more parameters help.
 
-The record is cut into blocks in time, every other block is fitted, and the lengths of the others are predicted (unknown
-poses are estimated again). Then the two halves are swapped.
+The workspace is cut into regions across the principal direction of the readings, every other region is fitted, and
+the lengths of the others are predicted (unknown poses are estimated again). Then the two halves are swapped. So the
+outermost samples are extrapolated: blocks in time of a motion that repeats would only be interpolated.
 """
 
 from dataclasses import dataclass, replace
@@ -13,8 +14,9 @@ from ...base.display import Displayed
 from ...base.errors import InputError
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
+from .balance import needs_balance
 from .model import Model, State
-from .parameters import Parameters
+from .parameters import IN_BALANCE, Parameters
 from .solving import (
     Solved,
     check_enough,
@@ -31,10 +33,15 @@ from .solving import (
 )
 from .starts import fit_from
 
-BLOCKS = 10  # of the record
-SHORTEST = 4  # samples of a block; of fewer, every other sample is left out
+REGIONS = 6  # of the workspace
+MOST_COMPARED = 1500  # samples
+ENOUGH = 1e-6  # of the sum of squares, of a step that a fit need not take
+FEWEST = 40  # samples in all; of fewer, every other sample is left out
+CHANCE = 3.0  # times the logarithm of the number of residuals, by which a parameter of forces must reduce their squares
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
+FORCES = ("mass", "com", "capstan", "friction")  # of which auto selects
+ALWAYS = ("clock", "mass", "com", "capstan", "friction", "gains")  # groups that the sets of a comparison share
 CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
 NESTED: tuple[tuple[str, ...], ...] = (
     (),
@@ -53,12 +60,14 @@ class Compared(NamedTuple):
     """A parameter set, and the root mean square of its training and validation residuals [m].
 
     With unknown poses both are corrected for the part of the errors that the poses absorb. Inf if half of the samples
-    do not determine the parameters, or a fit did not converge.
+    do not determine the parameters, or a fit did not converge. `balance` is the root mean square of the validation
+    residuals of forces, in their standard deviations; nan without forces.
     """
 
     free: tuple[str, ...]
     fitted: float
     left_out: float
+    balance: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -89,52 +98,76 @@ class HeldOut(Displayed):
 
 
 def halves(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
-    """Return the samples of the two halves: blocks in time, or every other sample of a short record."""
-    count = len(measurements)
-    blocks = BLOCKS if count >= BLOCKS * SHORTEST else count
-    block = np.arange(count) * blocks // count
-    if measurements.times is None and count < 1000:
-        block = np.arange(count)
-    return np.flatnonzero(block % 2 == 0), np.flatnonzero(block % 2 == 1)
+    """Return the samples of the two halves: every other region of the workspace, or sample of a short record."""
+    count, y = len(measurements), measurements.lengths
+    y = np.clip(y, *np.quantile(y, [0.01, 0.99], axis=0))
+    y = y - y.mean(axis=0)
+    along = y @ np.linalg.eigh(y.T @ y)[1][:, -1]
+    rank = np.argsort(np.argsort(along, kind="stable"), kind="stable")
+    region = rank * (REGIONS if count >= FEWEST else count) // count
+    return np.flatnonzero(region % 2 == 0), np.flatnonzero(region % 2 == 1)
 
 
-def compare(
-    robot: Robot,
-    measurements: Measurements,
-    weights: np.ndarray,
-    free: tuple[str, ...],
-    prior: dict[str, float],
-    clock: float = 0.0,
-) -> HeldOut:
-    """Cross-validate the parameter sets within `free`; arguments are checked.
-
-    Measurements are without slips, weights (m, N) are 0 for outliers, and a clock offset is near `clock` [s].
-    """
-    sets = [one for one in NESTED if set(one) < set(free) - {"clock"}]
-    sets = [(*one, "clock") if one and "clock" in free else one for one in sets]
-    if free == ("clock",):
-        sets = [()]
-    return _compare(robot, measurements, weights, [*sets, free], prior, clock)
+def compare(solved: Solved, free: tuple[str, ...], prior: dict[str, float]) -> HeldOut:
+    """Cross-validate the parameter sets within `free`, of a fit that is checked."""
+    always = tuple(name for name in free if name in ALWAYS)
+    sets = [one for one in NESTED if set(one) < set(free) - set(always)]
+    sets = [(*one, *always) if one else one for one in sets]
+    return _compare(solved, [*(sets or [()]), free], prior)
 
 
 def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[str, ...]:
     """Return the smallest parameter set whose cross-validation error is close to the best.
 
-    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales and pulley
-    radii; with a clock offset if times and poses of a motion were measured. With `outliers`, slips and outliers are
-    removed first. Raises `InputError` if there are too few measurements even for the offsets.
+    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales, pulley radii and,
+    with tensions, stiffness; with a clock offset if times and poses of a motion were measured. Before, mass, CoM and
+    friction are added one by one if they let the balance of forces of the validation samples be predicted better. With
+    `outliers`, slips and outliers are removed first. Raises `InputError` if there are too few measurements even for the
+    offsets.
     """
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
     check_enough(robot, measurements, ("offsets",), {})
-    if "clock" in usual(robot, measurements):
-        sets = [(*one, "clock") if one else one for one in sets]
-    first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, one)][-1]
-    solved = solve(robot, measurements, first, {}, outliers)
-    clock = float(solved.fit.state.x[solved.model.parameters.clock])
-    if "clock" in first and not CERTAIN * _clock_sigma(solved) < abs(clock):
+    clock = ("clock",) if "clock" in usual(robot, measurements) else ()
+    first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, (*one, *clock))][-1]
+    solved = solve(robot, measurements, (*first, *clock), {}, outliers)
+    if clock and not CERTAIN * _clock_sigma(solved) < abs(solved.fit.state.x[solved.model.parameters.clock]):
         # Errors of the poses' velocities let a clock offset seem certain where the lengths hardly change.
-        sets, clock = [tuple(name for name in one if name != "clock") for one in sets], 0.0
-    return _compare(robot, *cleaned(solved), sets, {}, clock).best
+        clock = ()
+    forces = _forces(solved, (*first, *clock))
+    if measurements.tensions is not None:
+        sets += [(*one, "stiffness") for one in sets if "offsets" in one]
+    best = _compare(solved, [(*one, *clock, *forces) if one else one for one in sets], {}).best
+    for word in forces if best else ():
+        without = tuple(name for name in best if name != word)
+        less, whole = (one.balance for one in _compare(solved, [without, best], {}, True).sets)
+        if not _clearly_less(solved, whole, less):  # it had only made up for a wrong geometry
+            best = without
+    return best
+
+
+def _clearly_less(solved: Solved, balance: float, other: float) -> bool:
+    """Return whether an error of forces is less than another by more than one more parameter does by chance."""
+    count = 6 * min(len(solved.model.measurements), MOST_COMPARED)
+    return bool(count * (other**2 - balance**2) > CHANCE * np.log(count) * balance**2)
+
+
+def _forces(solved: Solved, free: tuple[str, ...]) -> tuple[str, ...]:
+    """Return which of mass, CoM and friction the balance of forces needs beside `free`, if there are forces."""
+    given = solved.model.measurements
+    words = ("com",) if given.tensions is None else FORCES
+    model = replace(solved.model, weighs=True)
+    told = given.tensions is not None or needs_balance(model.robot, given)
+    if not (told and model.robot.weight and model.balanced):
+        return ()
+    chosen: tuple[str, ...] = ()
+    best = _compare(solved, [free], {}, True).sets[0].balance
+    while left := [word for word in words if word not in chosen]:
+        tried = _compare(solved, [(*free, *chosen, word) for word in left], {}, True).sets
+        least = min(range(len(left)), key=lambda i: tried[i].balance)
+        if not _clearly_less(solved, tried[least].balance, best):
+            break
+        chosen, best = (*chosen, left[least]), tried[least].balance
+    return chosen
 
 
 def _clock_sigma(solved: Solved) -> float:
@@ -145,71 +178,85 @@ def _clock_sigma(solved: Solved) -> float:
     return float(np.sqrt(variance)) if solved.observability.determined[at] else np.inf
 
 
-def _compare(
-    robot: Robot,
-    measurements: Measurements,
-    weights: np.ndarray,
-    sets: list[tuple[str, ...]],
-    prior: dict[str, float],
-    clock: float,
-) -> HeldOut:
-    whole = replace(model_of(robot, measurements, (), {}), weights=weights)
-    parts = halves(measurements)
+def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float], weighs: bool = False) -> HeldOut:
+    """Cross-validate parameter sets; with `weighs` the balance of forces is part of all fits."""
+    measurements, weights = cleaned(solved)
+    of = solved.model
+    wholes = {}
+    for clock in {"clock" in one for one in sets} | {False}:
+        whole = model_of(of.robot, measurements, ("clock",) if clock else (), {})
+        wholes[clock] = replace(
+            whole, weights=weights, noise=of.noise, unbalanced=of.unbalanced, weighs=weighs, ahead=of.ahead
+        )
+    offset = float(solved.fit.state.x[of.parameters.clock])
+    if len(measurements) > MOST_COMPARED:
+        rows = np.linspace(0, len(measurements) - 1, MOST_COMPARED).astype(int)
+        wholes = {clock: whole.only(rows) for clock, whole in wholes.items()}
+    parts = halves(wholes[False].measurements)
     compared = []
-    before = float(np.sqrt(_mean_square(*poses_fitted(whole))))
+    before = float(np.sqrt(_mean_square(*poses_fitted(wholes[False])))) if () in sets else np.nan
     for free in sets:
         if not free:
             compared.append(Compared((), before, before))
             continue
         own = {name: value for name, value in prior.items() if name in free}
-        results = [_predict(whole, free, own, clock, parts[i], parts[1 - i]) for i in range(2)]
+        whole = wholes["clock" in free]
+        results = [_predict(whole, free, own, offset, parts[i], parts[1 - i]) for i in range(2)]
         known = [result for result in results if result is not None]
-        fitted, left_out = (
-            np.sqrt(np.mean([result[i] for result in known])) if len(known) == 2 else np.inf for i in range(2)
-        )
-        compared.append(Compared(free, float(fitted), float(left_out)))
+        means = np.sqrt(np.mean(known, axis=0)) if len(known) == 2 else np.full(3, np.inf)
+        compared.append(Compared(free, *means.tolist()))
     best = min(compared, key=lambda one: one.left_out)
     good = [one for one in compared if one.left_out <= WORSE * best.left_out]
-    chosen = min(good, key=lambda one: Parameters(robot, one.free).varies.sum(), default=best)
+    chosen = min(good, key=lambda one: Parameters(of.robot, one.free).varies.sum(), default=best)
     return HeldOut(before, compared[-1].left_out, tuple(compared), chosen.free)
 
 
 def _predict(
     whole: Model, free: tuple[str, ...], prior: dict[str, float], clock: float, fitted: np.ndarray, left: np.ndarray
-) -> tuple[float, float] | None:
-    """Return the mean squares [m^2] of training and validation; None with too few samples, or if no fit converged."""
+) -> tuple[float, float, float] | None:
+    """Return the mean squares of training and validation [m^2], and of the balance of forces in the latter.
+
+    None with too few samples, or if no fit converged.
+    """
     if not (len(fitted) and len(left)):
         return None
-
-    def part(rows: np.ndarray, groups: tuple[str, ...], own: dict[str, float]) -> Model:
-        start = None if whole.start is None else whole.start[rows]
-        of = model_of(whole.robot, whole.measurements.only(rows), groups, own, start)
-        return replace(of, weights=whole.weights[:, rows])
-
     try:
         check_enough(whole.robot, whole.measurements.only(fitted), free, prior)
     except InputError:
         return None
-    model = part(fitted, free, prior)
+    parameters = Parameters(whole.robot, free)
+    model = replace(whole.only(fitted), parameters=parameters, prior=prior)
     length = length_of(whole.robot)
     begin = model.begin()
-    begin.x[model.parameters.clock] = clock if "clock" in free else 0.0
-    found = fit_from(model, begin, length)[0]
+    begin.x[parameters.clock] = clock if "clock" in free else 0.0
+    found = fit_from(model, begin, length, enough=ENOUGH)[0]
     if not found.converged:
         return None
-    other = part(left, free, {})
-    nothing = replace(other, parameters=replace(other.parameters, groups=()))
+    weighs = whole.weighs or not set(IN_BALANCE).isdisjoint(free)
+    nothing = replace(whole.only(left), parameters=Parameters(whole.robot, ()), weighs=weighs)
     state = nothing.begin()._replace(x=found.state.x)
     state = fit_from(nothing, state, length)[0].state
-    return _mean_square(model, found.state), _mean_square(nothing, state)
+    return _mean_square(model, found.state), _mean_square(nothing, state), _unbalanced(nothing, state)
+
+
+def _unbalanced(model: Model, state: State) -> float:
+    """Return the mean square of the residuals of forces, in their standard deviations; nan without forces."""
+    used = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
+    if model.balanced is None or not used.any():
+        return np.nan
+    return float((model.residuals(state).balance ** 2).sum() / (model.balanced.freedoms * used.sum()))
 
 
 def _mean_square(model: Model, state: State) -> float:
     """Return the mean square of the lengths' residuals [m^2], corrected for the part that unknown poses absorb."""
     used = model.weights * model.inside(state) > 0
     squares = float((lengths_of(model, state).T[used] ** 2).sum())
-    unknown = int(np.isinf(model.pose_sigmas).sum())
-    return squares / max(int(used.sum()) - unknown, 1)
+    unknown = np.isinf(model.pose_sigmas)
+    absorbed = unknown.sum(axis=1)
+    if model.balanced:
+        # Of poses that need forces too, lengths cannot absorb more errors than there are of them.
+        absorbed = np.minimum(absorbed, model.robot.m - 1)
+    return squares / max(int(used.sum()) - int(absorbed.sum()), 1)
 
 
 def poses_fitted(model: Model) -> tuple[Model, State]:

@@ -1,19 +1,24 @@
 """`Model`: residuals of measurements and their derivatives, by parameters and by poses.
 
-With the reading y of a cable, its length l at the pose, offset o, scale s and the file's scale s0,
+With the reading y of a cable, its length l at the pose, offset o, build-up b, scale s and the file's scale s0,
 
-    e = (f l - o - s y) / sigma                      if all poses were measured
-    e = (s0 / s (f l - o) - s0 y) / sigma            if any pose is unknown
+    e = (f l - o - b y^2 - s y) / sigma                  if all poses were measured
+    e = (s0 / s (f l - o - b y^2) - s0 y) / sigma        if any pose is unknown
 
 The second is in the units of the reading. The first would shrink with the robot, so a robot of zero size would fit
 best. With known poses the first is a linear regression, which readings that hardly change do not determine. f is 1, or
 1 / (1 + t / (E A)) if tensions were measured, because readings refer to the unstrained cable.
 
+Where forces tell more than lengths, or parameters of theirs are free, the balance of the platform (`balance`) is a
+further residual of each sample.
+
 The pose of sample k is the pose measured at t_k + clock, or an initial one, plus a translation and a small rotation in
 {G}. These increments are unknowns if the pose was measured with an error or not at all.
 """
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -25,8 +30,9 @@ from ...models import points
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
 from ..logs.pose_track import PoseTrack
+from .balance import Balance, Balanced, needs_balance
 from .geometry import runs
-from .parameters import OF_CABLE, Parameters, prior_sigmas
+from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, prior_sigmas
 
 
 class State(NamedTuple):
@@ -46,11 +52,12 @@ class State(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Differences divided by their standard deviations: readings (m, N), poses (N, 6) and parameters (P,)."""
+    """Differences over their standard deviations: readings (m, N), poses (N, 6), parameters (P,), balance (N, 6)."""
 
     readings: np.ndarray
     poses: np.ndarray
     parameters: np.ndarray
+    balance: np.ndarray
 
     @property
     def cost(self) -> float:
@@ -60,20 +67,20 @@ class Residuals(NamedTuple):
 
     @property
     def of_samples(self) -> np.ndarray:
-        """Return the sum of squares of each sample's readings and pose, (N,), inf where a cable has no length."""
-        total = (self.readings**2).sum(axis=0) + (self.poses**2).sum(axis=1)
+        """Return the sum of squares of each sample, (N,), inf where a cable has no length."""
+        total = (self.readings**2).sum(axis=0) + (self.poses**2).sum(axis=1) + (self.balance**2).sum(axis=1)
         return np.where(np.isfinite(total), total, np.inf)
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of the residuals of readings.
+    """Derivatives of the residuals of readings, and the balance with its own.
 
     Attributes
     ----------
     cables
-        Derivatives by the nine parameters of the cable itself, (m, N, 9).
+        Derivatives by the parameters of the cable itself, (m, N, 14).
     others
-        Derivatives by clock offset and slips, (m, N, 1 + slips).
+        Derivatives by the parameters of the robot and slips, (m, N, 5 + slips).
     poses
         Derivatives by shift and rotation of the sample itself, (m, N, 6).
     arms, lengths
@@ -85,6 +92,7 @@ class Derivatives(NamedTuple):
     poses: np.ndarray
     arms: np.ndarray
     lengths: np.ndarray
+    balance: Balanced | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +109,16 @@ class Model(Displayed):
         Measured poses over time; default: the clock offset is 0.
     upright
         Standard deviation of unmeasured orientations about their initial values [rad]; inf: none.
+    noise
+        Factor of the stated standard deviations of forces.
+    unbalanced
+        Samples whose balance of forces is left out, (N,) of bool; default: none.
+    forces
+        Forces of the measurements; default: computed.
+    weighs
+        True if the balance of forces is part of the fit whatever the parameters are.
+    ahead
+        Clock offset of the platform's accelerations, near that of its poses [s].
     """
 
     parameters: Parameters
@@ -110,6 +128,11 @@ class Model(Displayed):
     start: np.ndarray | None = None
     track: PoseTrack | None = None
     upright: float = np.inf
+    noise: float = 1.0
+    unbalanced: np.ndarray | None = None
+    forces: Balance | None = None
+    weighs: bool = False
+    ahead: float = 0.0
 
     @property
     def robot(self) -> Robot:
@@ -144,13 +167,40 @@ class Model(Displayed):
         return prior_sigmas(self.parameters, self.prior)
 
     @cached_property
-    def _stretch(self) -> np.ndarray:
-        """Return the length without strain for each metre of length, (m, N)."""
-        tensions, stiffness = self.measurements.tensions, [cable.stiffness for cable in self.robot.cables]
-        if tensions is None:
-            return np.ones((self.robot.m, 1))
-        by = [1 / value if value else 0.0 for value in stiffness]
-        return 1 / (1 + np.maximum(tensions.T, 0.0) * np.array(by)[:, None])
+    def _forces(self) -> Balance:
+        return self.forces or Balance(self.robot, self.measurements)
+
+    @cached_property
+    def balanced(self) -> Balance | None:
+        """Return the balance of forces if it is part of the fit, or None."""
+        wanted = self.weighs or not set(IN_BALANCE).isdisjoint(self.parameters.groups)
+        wanted = wanted or needs_balance(self.robot, self.measurements)
+        return self._forces if wanted and self._forces.freedoms else None
+
+    def only(self, rows: np.ndarray) -> Model:
+        """Return the model of some samples (k,), whose motion is that of all."""
+        return replace(
+            self,
+            measurements=self.measurements.only(rows),
+            weights=self.weights[:, rows],
+            start=None if self.start is None else self.start[rows],
+            track=None if self.track is None else self.track.at_samples(rows),
+            unbalanced=None if self.unbalanced is None else self.unbalanced[rows],
+            forces=self._forces.only(rows),
+        )
+
+    def _stretch(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the length without strain for each metre of length, its tensions [N], (m, N), and their derivatives.
+
+        These are by capstan, friction and gain, (m, N, 3).
+        """
+        m, count = self.robot.m, len(self.measurements)
+        if self.measurements.tensions is None:
+            return np.ones((m, 1)), np.zeros((m, 1)), np.zeros((m, count, 3))
+        felt, by = self._forces.tensions(self.parameters.table(x), smooth=True)
+        pull = felt.T > 0
+        tensions = np.where(pull, felt.T, 0.0)
+        return 1 / (1 + tensions * self.parameters.table(x)[:, 10:11]), tensions, by.swapaxes(0, 1) * pull[..., None]
 
     def begin(self) -> State:
         """Return the parameters of the file, at the initial poses."""
@@ -201,52 +251,70 @@ class Model(Displayed):
         position, rotation = base_position + state.shift, state.turn @ base_rotation
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
         run = runs(robot, table, position, rotation)
-        slip = self.slips(state.x)
+        slip, y = self.slips(state.x), self.measurements.lengths.T
+        stretch, tensions, by_tensions = self._stretch(state.x)
         scale0 = parameters.table(parameters.first)[:, 7:8]
         size_is_open = bool(np.isinf(self.pose_sigmas).any())
         scale = table[:, 7:8]
         ratio, own = (scale0 / scale, scale0) if size_is_open else (np.ones_like(scale), scale)
         inside = self.inside(state)
         weights = self.weights * inside / self.measurements.sigma.lengths
-        excess = self._stretch * run.lengths - table[:, 6:7] - slip  # scale times reading, without noise
-        readings = weights * (ratio * excess - own * self.measurements.lengths.T)
+        excess = stretch * run.lengths - table[:, 6:7] - slip - table[:, 9:10] * y**2  # scale times reading
+        readings = weights * (ratio * excess - own * y)
         sigmas = self.pose_sigmas
         poses = np.zeros((len(position), 6))
         held = (sigmas > 0) & np.isfinite(sigmas)
         if held.any():
             moved = np.concatenate([state.shift, Rotation.from_matrix(state.turn).as_rotvec()], axis=1)
             poses[held] = moved[held] / sigmas[held]
-        residuals = Residuals(readings, poses, (state.x - parameters.first) / self.prior_sigmas)
+        forces = self.balanced and self.balanced.at(
+            parameters, state.x, (position, rotation), self.ahead, self.noise, derive
+        )
+        weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
+        in_balance = np.zeros_like(poses) if forces is None else forces.residuals * weighs[:, None]
+        by_prior = (state.x - parameters.first) / self.prior_sigmas
+        residuals = Residuals(readings, poses, by_prior, in_balance)
         if not derive:
             return residuals, None
         gain = weights * ratio
-        by_length = (gain * self._stretch)[..., None]
+        by_length = (gain * stretch)[..., None]
         along = by_length * run.directions  # by the attachment in {G}
         cables = np.empty((m, len(position), OF_CABLE))
         cables[..., :6] = by_length * run.by_geometry[..., :6]
         cables[..., 6] = -gain
-        cables[..., 7] = -gain * (excess / scale if size_is_open else self.measurements.lengths.T)
+        cables[..., 7] = -gain * (excess / scale if size_is_open else y)
         cables[..., 8] = by_length[..., 0] * run.by_geometry[..., 6]
+        cables[..., 9] = -gain * y**2
+        by_strain = -gain * stretch**2 * run.lengths
+        cables[..., 10] = by_strain * tensions
+        cables[..., 11:] = (by_strain * table[:, 10:11])[..., None] * by_tensions
         by_pose = np.concatenate([along, np.cross(arms, along)], axis=2)
-        others = np.zeros((m, len(position), 1 + len(parameters.slips)))
+        others = np.zeros((m, len(position), OF_ROBOT + len(parameters.slips)))
         if velocity is not None and rate is not None:
-            others[..., 0] = np.einsum("mni,ni->mn", by_pose, np.concatenate([velocity, rate], axis=1))
-        for column, (cable, first) in enumerate(parameters.slips, start=1):
+            twist = np.concatenate([velocity, rate], axis=1)
+            others[..., 0] = np.einsum("mni,ni->mn", by_pose, twist)
+            if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
+                forces.by_parameters[..., parameters.clock] = (forces.by_pose @ twist[..., None])[..., 0]
+        for column, (cable, first) in enumerate(parameters.slips, start=OF_ROBOT):
             others[cable, first:, column] = -gain[cable, first:]
-        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths)
+        if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
+            kept = weighs[:, None, None]
+            forces = Balanced(in_balance, forces.by_parameters * kept, forces.by_pose * kept)
+        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces)
 
     def slips(self, x: np.ndarray) -> np.ndarray:
         """Return the sum of each cable's slips so far, (m, N) [m]."""
         result = np.zeros((self.robot.m, len(self.measurements)))
-        for (cable, first), size in zip(self.parameters.slips, x[self.parameters.clock + 1 :], strict=True):
+        for (cable, first), size in zip(self.parameters.slips, x[self.parameters.clock + OF_ROBOT :], strict=True):
             result[cable, first:] += size
         return result
 
     def lengths(self, state: State) -> np.ndarray:
         """Convert the readings to cable lengths, (N, m) [m]."""
         table = self.parameters.table(state.x)
-        unstrained = table[:, 6:7] + self.slips(state.x) + table[:, 7:8] * self.measurements.lengths.T
-        return (unstrained / self._stretch).T
+        y = self.measurements.lengths.T
+        unstrained = table[:, 6:7] + self.slips(state.x) + (table[:, 7:8] + table[:, 9:10] * y) * y
+        return (unstrained / self._stretch(state.x)[0]).T
 
     def moved(self, state: State, dx: np.ndarray, dq: np.ndarray | None) -> State:
         """Return the state after changes of parameters (P,) and of poses (N, 6), or None if no pose varies."""

@@ -8,7 +8,7 @@ With J and G the derivatives of all residuals by parameters and by the pose of e
 
 with prior standard deviations as residuals of their own. With L_k L_k' = C_k, the sum is one product Y'Y of the matrix
 Y of all L_k^-1 E_k on top of each other. Parameters are multiplied by `metric`, so that each is a length [m]. Damping
-adds to the diagonals of J'J and of C_k.
+adds to the diagonals of J'J and of C_k. Rows of the balance of forces have derivatives by the parameters of all cables.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ SLOWEST = 1e-3  # [m/s]; a platform that moves less makes a clock offset no bett
 
 
 def metric(model: Model) -> np.ndarray:
-    """Return what each parameter is multiplied by to be a length, (P,): 1, of scales a length, of clocks a speed."""
+    """Return what each parameter is multiplied by to be a length, (P,).
+
+    It is 1 for lengths, a length for scales, a speed for clocks, and a length for errors of forces as large as these.
+    """
     parameters, measurements = model.parameters, model.measurements
     scale0 = parameters.table(parameters.first)[:, 7]
     lengths = np.sqrt((measurements.lengths**2).mean(axis=0))
@@ -41,7 +44,12 @@ def metric(model: Model) -> np.ndarray:
     speed = SLOWEST
     if model.track is not None:
         speed = max(SLOWEST, float(np.sqrt((model.track.at(0.0)[2] ** 2).sum(axis=1).mean())))
-    return np.concatenate([table.ravel(), [speed], np.ones(len(parameters.slips))])
+    strong = measurements.tensions
+    force = max(float(np.sqrt((strong**2).mean())) if strong is not None else model.robot.force_scale, 1e-9)
+    length = float(np.linalg.norm(model.robot.home_anchors - model.robot.home_attachments, axis=1).mean())
+    table[:, 9], table[:, 10], table[:, 11:] = spread**2, force * length, (length, length / force, length)
+    of_robot = (speed, length / model.robot.platform.mass, 1.0, 1.0, 1.0)
+    return np.concatenate([table.ravel(), of_robot, np.ones(len(parameters.slips))])
 
 
 class Diagonals(NamedTuple):
@@ -99,6 +107,12 @@ class NormalEquations(Displayed):
         right[m * width :] = inner(flat, e.reshape(-1, 1))[:, 0]
         S, b = full[np.ix_(keep, keep)], right[keep]
         sigma = model.prior_sigmas[varies] * scale[varies]
+        H = None
+        forces = derivatives.balance
+        if forces is not None and forces.by_parameters is not None:
+            H = forces.by_parameters[..., varies] / scale[varies]  # (N, 6, p)
+            flat = H.reshape(6 * count, -1)
+            S, b = S + inner(flat, flat), b + inner(flat, residuals.balance.reshape(-1, 1))[:, 0]
         S[np.diag_indices(len(b))] += 1 / sigma**2
         b += residuals.parameters[varies] / sigma
         own = np.diag(S).copy()
@@ -110,7 +124,10 @@ class NormalEquations(Displayed):
         E = np.empty((count, 6, size))
         E[..., : m * width] = (G[..., None] * np.swapaxes(J, 0, 1)[:, None]).reshape(count, 6, m * width)
         E[..., m * width :] = G @ np.swapaxes(others, 0, 1)
-        Y = np.matmul(inverse_root, E if keep.all() else E[..., keep])
+        E = E if keep.all() else E[..., keep]
+        if H is not None and forces is not None and forces.by_pose is not None:
+            E = E + np.swapaxes(forces.by_pose * model.poses_vary[:, None], 1, 2) @ H
+        Y = np.matmul(inverse_root, E)
         y = np.matmul(inverse_root, g[..., None])[..., 0]
         stacked = Y.reshape(6 * count, -1)
         S, b = S - inner(stacked, stacked), b - inner(stacked, y.reshape(-1, 1))[:, 0]
@@ -142,6 +159,9 @@ def _poses(
     G = np.ascontiguousarray(derivatives.poses.transpose(1, 2, 0)) * vary[..., None]
     C = G @ np.swapaxes(G, 1, 2)
     g = (G @ np.ascontiguousarray(residuals.readings.T)[..., None])[..., 0]
+    if derivatives.balance is not None and derivatives.balance.by_pose is not None:
+        K = np.swapaxes(derivatives.balance.by_pose * vary[:, None], 1, 2)
+        C, g = C + K @ np.swapaxes(K, 1, 2), g + (K @ residuals.balance[..., None])[..., 0]
     inverse = np.divide(1.0, sigmas, out=np.zeros_like(sigmas), where=vary)
     g += residuals.poses * inverse
     diagonal = np.arange(6)

@@ -15,7 +15,7 @@ import numpy as np
 from ...base.display import Displayed
 from .fit import unobservable_below
 from .model import State
-from .parameters import OF_CABLE, WORDS, Parameters
+from .parameters import OF_CABLE, OF_ROBOT, WORDS, Parameters
 
 INSIDE = 0.999  # of a generator's length that must lie in the open directions
 SAME = 1e-6  # of a direction's length, left after others are taken away: it is one of theirs
@@ -121,10 +121,16 @@ def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.
                 moved = np.tile(unit, (len(arms), 1)) if word == "along" else np.cross(unit, arms)
                 both = (moved, still) if what == "anchors" else (still, moved)
                 yield f"all {what} together {word} {axis} of {frame}", change(*both)
-    size = state.x.copy()
-    size[parameters.clock] = 0.0
+    size, of_tensions = state.x.copy(), parameters.table(state.x)[:, 10:]
+    size[parameters.clock : parameters.clock + 2] = 0.0
+    size[parameters.clock + 2 : parameters.clock + OF_ROBOT] *= "com" in parameters.groups
     parameters.table(size)[:, :3] = np.einsum("mji,mj->mi", turned, anchors - middle)
+    parameters.table(size)[:, 10:] = 0.0
     yield "the overall scale: no length is known for certain", size
+    force = np.zeros(parameters.count)
+    force[parameters.clock + 1] = state.x[parameters.clock + 1]
+    parameters.table(force)[:, 10:] = of_tensions * [-1.0, 0.0, 1.0, 1.0]
+    yield "mass and gains together: no force is known for certain", force
     for i in range(len(anchors)):
         for axis, unit in zip(AXES, np.eye(3), strict=True):
             rows = np.zeros_like(anchors)

@@ -28,6 +28,7 @@ WINDOW = 25  # samples on each side, over which a slip must be visible as a step
 VISIBLE = 0.5  # share of it that must be
 BLOCKS = 25  # of the record, of at least so many samples each, to see whether residuals are alike
 SHORTEST_BLOCK = 8
+UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
 BY_CHANCE = 0.3  # of which the ratio of variances may exceed 1 where residuals are independent
 
 
@@ -95,9 +96,55 @@ def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess:
     for i, row in enumerate(found.residuals):
         scores = without_poses(model, found, i) * row[:, None]
         total += np.add.reduceat(scores, edges, axis=0)
+    total += np.add.reduceat(_of_balance(model, state, found), edges, axis=0)
     # The sums add up to 0 in a minimum, which takes one of them away.
     ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
     return ratio if ratio > 1 + BY_CHANCE else 1.0
+
+
+def _of_balance(model: Model, state: State, found: _Projected) -> np.ndarray:
+    """Return J'e of each sample's balance of forces, minus the part of its pose, (N, p) [1/m]."""
+    forces, varies = found.derivatives.balance, model.parameters.varies
+    count = found.residuals.shape[1]
+    if forces is None or forces.by_parameters is None or forces.by_pose is None:
+        return np.zeros((count, int(varies.sum())))
+    rows = forces.by_parameters[..., varies] / found.scale[varies]
+    if found.equations.inverse_root is not None and found.equations.Y is not None:
+        K = forces.by_pose * model.poses_vary[:, None]
+        rows = rows - K @ np.swapaxes(found.equations.inverse_root, 1, 2) @ found.equations.Y
+    return np.einsum("nip,ni->np", rows, forces.residuals)
+
+
+def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | None:
+    """Return by what factor errors of forces exceed those assumed, and the samples with far larger ones, (N,) of bool.
+
+    None without redundant forces.
+    """
+    model = replace(model, unbalanced=None)
+    forces = model.balanced
+    if forces is None:
+        return None
+    residuals, derivatives = model.linearised(state)
+    equations = NormalEquations.at(model, residuals, derivatives, metric(model))
+    spare = np.full(len(state.shift), float(forces.freedoms))
+    if (
+        equations.inverse_root is not None
+        and derivatives.balance is not None
+        and derivatives.balance.by_pose is not None
+    ):
+        K = derivatives.balance.by_pose * model.poses_vary[:, None]
+        spare -= ((K @ np.swapaxes(equations.inverse_root, 1, 2)) ** 2).sum(axis=(1, 2))
+    tested = model.inside(state) & (spare > SMALLEST_REDUNDANCY)
+    if not tested.any():
+        return None
+    from scipy.special import gammaincinv
+
+    squares = (residuals.balance**2).sum(axis=1)
+    usual, most = (2 * gammaincinv(np.maximum(spare, SMALLEST_REDUNDANCY) / 2, share) for share in (0.5, UNBALANCED))
+    noise = float(np.median(squares[tested] / usual[tested]))
+    certain = BY_CHANCE / 3 + 3 / np.sqrt(2 * float(spare[tested].sum()))
+    factor = np.sqrt(noise) if abs(np.log(max(noise, 1e-12))) > certain else 1.0
+    return float(factor), tested & (squares > max(noise, 1e-12) * most)
 
 
 def find_outliers(model: Model, state: State) -> list[Outlier]:

@@ -1,8 +1,12 @@
 """Parameters of a calibration: their names, and conversion from and to a robot.
 
-The vector x has nine numbers for each cable, in this order, then the clock offset, then one number for each slip:
+The vector x has fourteen numbers for each cable, in this order, then five of the robot, then one for each slip:
 
-    anchor x y z  attachment x y z  offset  scale  radius
+    anchor x y z  attachment x y z  offset  scale  radius  build-up  compliance  capstan  friction  gain
+    clock  mass  com x y z
+
+With the measured tension y of a cable and the sign s of its speed (1: paid out), the platform feels the tension
+exp(capstan s) gain y + friction s, and compliance is 1 / (E A).
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,10 +22,20 @@ from ...base.inputs import number, shown
 from ...models import points
 from ...models.robot import Robot
 
-OF_CABLE = 9  # parameters of a cable
-GROUPS = ("anchors", "attachments", "offsets", "scales", "radii", "clock")
+OF_CABLE = 14  # parameters of a cable
+OF_ROBOT = 5  # clock offset, mass and CoM
+GEOMETRY = ("anchors", "attachments", "offsets", "scales", "radii", "build-up", "clock")
+IN_BALANCE = ("mass", "com", "capstan", "friction", "gains")  # groups that only the balance of forces determines
+GROUPS = (*GEOMETRY, "stiffness", *IN_BALANCE)
 COLUMNS = {"anchors": (0, 1, 2), "attachments": (3, 4, 5), "offsets": (6,), "scales": (7,), "radii": (8,)}
-WORDS = (*(f"{end}.{axis}" for end in ("anchor", "attachment") for axis in "xyz"), "offset", "scale", "pulley.radius")
+COLUMNS |= {"build-up": (9,), "stiffness": (10,), "capstan": (11,), "friction": (12,), "gains": (13,)}
+ROBOT_COLUMNS = {"clock": (0,), "mass": (1,), "com": (2, 3, 4)}
+WORDS = (
+    *(f"{end}.{axis}" for end in ("anchor", "attachment") for axis in "xyz"),
+    *("offset", "scale", "pulley.radius", "build-up", "compliance", "capstan", "friction", "gain"),
+)
+UNITS = (*("m",) * 7, "1", "m", "1/m", "1/N", "1", "N", "1")
+STIFFEST = 1e-12  # [1/N]; less compliance is none
 LARGEST_PRIOR = 1e3
 SMALLEST_PRIOR = 1e-9
 
@@ -47,7 +61,7 @@ class Parameters(Displayed):
     @property
     def count(self) -> int:
         """Return the number of all parameters, free and fixed."""
-        return OF_CABLE * self.robot.m + 1 + len(self.slips)
+        return self.clock + OF_ROBOT + len(self.slips)
 
     @property
     def clock(self) -> int:
@@ -61,30 +75,35 @@ class Parameters(Displayed):
         for group in self.groups:
             flags[:, COLUMNS.get(group, ())] = True
         flags[:, 8] &= self.robot.pulley_radii > 0
-        return np.concatenate([flags.ravel(), ["clock" in self.groups], np.ones(len(self.slips), dtype=bool)])
+        robot = np.repeat([group in self.groups for group in ROBOT_COLUMNS], list(map(len, ROBOT_COLUMNS.values())))
+        return np.concatenate([flags.ravel(), robot, np.ones(len(self.slips), dtype=bool)])
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Return the names of all parameters."""
         cables = [f"cables[{i}].{word}" for i in range(self.robot.m) for word in WORDS]
-        return (*cables, "clock", *(f"cables[{i}].slip at sample {k}" for i, k in self.slips))
+        robot = ("clock", "mass", *(f"com.{axis}" for axis in "xyz"))
+        return (*cables, *robot, *(f"cables[{i}].slip at sample {k}" for i, k in self.slips))
 
     @cached_property
     def units(self) -> tuple[str, ...]:
-        """Return the units of all parameters: m, 1 of scales, s of the clock offset."""
-        cable = ("m",) * 7 + ("1", "m")
-        return (*(cable * self.robot.m), "s", *("m" for _ in self.slips))
+        """Return the units of all parameters."""
+        return (*(UNITS * self.robot.m), "s", "kg", *("m",) * 3, *("m" for _ in self.slips))
 
     @cached_property
     def first(self) -> np.ndarray:
         """Return the values of the robot's file, (count,) [m, 1, s]."""
         robot = self.robot
         encoders = [cable.encoder for cable in robot.cables]
-        table = np.empty((robot.m, OF_CABLE))
+        table = np.zeros((robot.m, OF_CABLE))
         table[:, :3], table[:, 3:6], table[:, 8] = robot.anchors, robot.attachments, robot.pulley_radii
         table[:, 6] = [encoder.offset if encoder else 0.0 for encoder in encoders]
         table[:, 7] = [encoder.scale if encoder else 1.0 for encoder in encoders]
-        return np.concatenate([table.ravel(), np.zeros(1 + len(self.slips))])
+        table[:, 9] = [encoder.build_up if encoder else 0.0 for encoder in encoders]
+        table[:, 10] = [1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables]
+        table[:, 13] = 1.0
+        of_robot = (0.0, robot.platform.mass, *robot.platform.com)
+        return np.concatenate([table.ravel(), of_robot, np.zeros(len(self.slips))])
 
     @cached_property
     def carriers(self) -> tuple[np.ndarray, np.ndarray]:
@@ -93,8 +112,8 @@ class Parameters(Displayed):
         return points.rotations(pose[:, 3:]), pose[:, :3]
 
     def table(self, x: np.ndarray) -> np.ndarray:
-        """Return the parameters of the cables, a row for each, (m, 9) [m, 1]."""
-        return x[: OF_CABLE * self.robot.m].reshape(self.robot.m, OF_CABLE)
+        """Return the parameters of the cables, a row for each, (m, 14)."""
+        return x[: self.clock].reshape(self.robot.m, OF_CABLE)
 
     def calibrated(self, x: np.ndarray, covariance: np.ndarray | None = None) -> Robot:
         """Return the robot with the values `x`; an encoder is written where offset or scale differ from the file.
@@ -109,15 +128,22 @@ class Parameters(Displayed):
             cable["anchor"], cable["attachment"] = row[:3], row[3:6]
             if cable["pulley"] is not None:
                 cable["pulley"]["radius"] = row[8]
-            if cable["encoder"] is not None or row[6:8] != before[i, 6:8].tolist():
-                cable["encoder"] = {"offset": row[6], "scale": row[7]}
+            reading = [row[k] for k in (6, 7, 9)]
+            if cable["encoder"] is not None or reading != before[i, [6, 7, 9]].tolist():
+                cable["encoder"] = dict(zip(("offset", "scale", "build_up"), reading, strict=True))
+            if row[10] != before[i, 10]:
+                cable["stiffness"] = 1 / row[10] if row[10] > STIFFEST else None
+            if "friction" in self.groups and cable["winch"] is not None:
+                cable["winch"]["friction"] = max(row[12], 0.0)
+        _, mass, *com = x[self.clock : self.clock + OF_ROBOT].tolist()
+        data["platform"] |= {"mass": mass, "com": com}
         data["uncertainty"] = None if covariance is None else self._uncertainty(covariance)
         return Robot.model_validate(data)
 
     def _uncertainty(self, covariance: np.ndarray) -> dict[str, Any] | None:
         """Return the part of a covariance (p, p) that belongs to anchors, attachments and pulleys, for a robot file."""
         where = np.flatnonzero(self.varies)
-        kept = [row for row, i in enumerate(where) if i < self.clock and i % OF_CABLE not in (6, 7)]
+        kept = [row for row, i in enumerate(where) if i < self.clock and i % OF_CABLE in (*range(6), 8)]
         if not kept:
             return None
         return {
@@ -156,6 +182,7 @@ def prior_sigmas(parameters: Parameters, prior: Mapping[str, float]) -> np.ndarr
     table = np.full((parameters.robot.m, OF_CABLE), np.inf)
     for group, columns in COLUMNS.items():
         table[:, columns] = prior.get(group, np.inf)
-    others = np.full(1 + len(parameters.slips), np.inf)
-    others[0] = prior.get("clock", np.inf)
+    others = np.full(OF_ROBOT + len(parameters.slips), np.inf)
+    for group, columns in ROBOT_COLUMNS.items():
+        others[list(columns)] = prior.get(group, np.inf)
     return np.concatenate([table.ravel(), others])

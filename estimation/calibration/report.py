@@ -107,7 +107,8 @@ def _of_parameters(result: CalibrationData) -> list[Part]:
     lines: list[Part] = []
     length = length_of(result.file)  # on which a scale acts
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))
-    shown = {one.name for one in by_size[:MOST_LISTED]} | {one.name for one in result.parameters if one.unit == "s"}
+    always = [one.name for one in result.parameters if "[" not in one.name]  # of the robot
+    shown = {one.name for one in by_size[:MOST_LISTED]} | set(always)
     rows = [_one(one) for one in result.parameters if one.name in shown]
     columns = ("parameter", "value", "standard deviation", "change from the file")
     lines.append(Table("Parameters", columns, rows, (1, 2, 3)))
@@ -125,10 +126,11 @@ def _of_parameters(result: CalibrationData) -> list[Part]:
 
 def _one(one: Parameter) -> tuple[str, str, str, str]:
     """Return name, value, standard deviation and change of a parameter."""
-    factor, unit = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e6, "ppm")}[one.unit]
+    usual = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e6, "ppm"), "1/N": (1e6, "1/MN"), "1/m": (1e6, "ppm/m")}
+    factor, unit = usual.get(one.unit, (1.0, one.unit))
     sigma = quantity(factor * one.sigma, unit, digits=2) if np.isfinite(one.sigma) else "not determined"
     change = quantity(factor * one.correction, unit, digits=4)
-    return one.name, f"{one.value:.6f} {one.unit}", sigma, change
+    return one.name, f"{one.value:.6g} {one.unit}" if "/" in one.unit else f"{one.value:.6f} {one.unit}", sigma, change
 
 
 def _of_exceptions(result: CalibrationData) -> list[str]:

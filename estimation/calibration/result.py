@@ -19,8 +19,9 @@ from ..logs.measurements import Measurements
 from .cross_validation import HeldOut, compare, poses_fitted
 from .normal_equations import metric, state_equations
 from .outliers import Outlier, Slip
+from .parameters import OF_ROBOT
 from .plausibility import Mistake
-from .solving import Solved, cleaned, covariance_of, inflation_of, lengths_of, noise_of
+from .solving import Solved, covariance_of, inflation_of, lengths_of, noise_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
@@ -136,7 +137,7 @@ class CalibrationData(Displayed):
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """Return the covariance of the parameters, (p, p), in their order and units [m, 1, s].
+        """Return the covariance of the parameters, (p, p), in their order and units.
 
         It is zero along unobservable directions. It is scaled up if residuals are larger than stated or autocorrelated
         (`noise`, `alike`).
@@ -232,7 +233,7 @@ class CalibrationData(Displayed):
         of, x = self._solved.model.parameters, self._solved.fit.state.x
         sigmas = {parameter.name: parameter.sigma for parameter in self.parameters}
         return tuple(
-            Slip(cable, sample, float(x[of.clock + 1 + i]), sigmas[of.names[of.clock + 1 + i]])
+            Slip(cable, sample, float(x[of.clock + OF_ROBOT + i]), sigmas[of.names[of.clock + OF_ROBOT + i]])
             for i, (cable, sample) in enumerate(of.slips)
         )
 
@@ -244,10 +245,10 @@ class CalibrationData(Displayed):
     @cached_property
     def held_out(self) -> HeldOut:
         """Return the cross-validation of these parameters and of smaller sets."""
-        return compare(self._solved.model.robot, *cleaned(self._solved), self.free, dict(self.prior), self.clock)
+        return compare(self._solved, self.free, dict(self.prior))
 
     def lengths(self, readings: ArrayLike) -> np.ndarray:
-        """Convert winch readings (..., m) to cable lengths [m], (..., m), with the offsets after the last slip.
+        """Convert winch readings (..., m) to unstrained lengths [m], (..., m), with the offsets after the last slip.
 
         Raises `InputError` if the readings have another number of cables.
         """
@@ -256,7 +257,7 @@ class CalibrationData(Displayed):
         table = model.parameters.table(x)
         if values.ndim < 1 or values.shape[-1] != len(table):
             raise InputError(f"readings must have the shape (..., {len(table)}), got {values.shape}")
-        return table[:, 6] + model.slips(x)[:, -1] + table[:, 7] * values
+        return table[:, 6] + model.slips(x)[:, -1] + (table[:, 7] + table[:, 9] * values) * values
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as plain data, the output of `towline calibrate --json`."""

@@ -24,7 +24,8 @@ def calibrate(
     """Estimate the robot parameters that best explain measured cable lengths.
 
     Exactly measured poses are fixed, poses measured with an error may move within it, and unmeasured poses are
-    estimated along with the parameters. Carriers are at home.
+    estimated along with the parameters, by lengths and, with tensions or fewer cables than coordinates, by the balance
+    of forces on the platform. Carriers are at home.
 
     Parameters
     ----------
@@ -34,11 +35,13 @@ def calibrate(
         `Measurements` of the robot, or from `read_measurements`.
     free
         Parameters to estimate, some of anchors, attachments, offsets (of the lengths), scales (of the lengths), radii
-        (of the pulleys) and clock (time by which the clock of the poses is ahead of the clock of the lengths). Default:
-        anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the smallest set
-        whose cross-validation error is close to the best (`select`), which may be empty.
+        (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is ahead of the
+        clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan (friction as the
+        logarithm of a ratio of tensions), friction (as a force) and gains (of the tensions, as of motor currents).
+        Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the
+        smallest set whose cross-validation error is close to the best (`select`), which may be empty.
     prior
-        Standard deviations of the file's values [m] (scales [1], clock [s]), by the names of `free`, such as
+        Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
         {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
     outliers
         True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after the slip.

@@ -9,13 +9,14 @@ from ...base.errors import InputError
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
 from ..logs.pose_track import PoseTrack
+from .balance import Balance
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
 from .model import Model, State
 from .normal_equations import metric, state_equations
 from .observability import Observability, observability
-from .outliers import Outlier, Slip, alike, find_outliers, find_slip
-from .parameters import Parameters
+from .outliers import Outlier, Slip, alike, find_outliers, find_slip, find_unbalanced
+from .parameters import IN_BALANCE, Parameters
 from .starts import LARGEST_SHARE, fit_from, level_poses
 
 EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
@@ -23,6 +24,8 @@ EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
 ROUNDS = 30  # of fits, each without the wrong readings of those before
 FEW = 0.02  # of the samples
 MOST_SLIPS = 8
+ROUNDS_OF_WEIGHTS = 4
+NOISE_OF_FORCES = 0.05, 1e4  # factors of the stated errors of forces
 
 
 class Solved(NamedTuple):
@@ -58,7 +61,9 @@ def solve(
     model = model_of(robot, measurements, groups, prior)
     length = length_of(robot)
     state = begin_with_clock(model, length) if "clock" in groups else model.begin()
+    model = replace(model, ahead=float(state.x[model.parameters.clock]))
     result, fitted = fit_from(model, state, length, outliers)
+    model, result = _weighed(model, result, length)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
     limit = LARGEST_SHARE * model.weights.size
@@ -87,9 +92,27 @@ def solve(
             weights[one.cable, one.sample] = 0.0
         model = replace(model, weights=weights)
         result, fitted = fit(model, result.state, length), model.weights
+    model, result = _weighed(model, result, length)
     S = state_equations(model, result.state, scale := metric(model)).S
     seen = observability(S, model.parameters, result.state, scale, length)
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen)
+
+
+def _weighed(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
+    """Return the model with errors of forces as large as they turn out to be, and its fit."""
+    for _ in range(ROUNDS_OF_WEIGHTS):
+        found = find_unbalanced(model, result.state)
+        if found is None:
+            break
+        factor, unbalanced = found
+        known = model.unbalanced if model.unbalanced is not None else np.zeros_like(unbalanced)
+        if factor == 1.0 and np.array_equal(unbalanced, known):
+            break
+        noise = float(np.clip(model.noise * factor, *NOISE_OF_FORCES))
+        clock = float(result.state.x[model.parameters.clock])
+        model = replace(model, noise=noise, unbalanced=unbalanced, ahead=clock)
+        result = fit(model, result.state, length)
+    return model, result
 
 
 def model_of(
@@ -102,7 +125,7 @@ def model_of(
     """Return the model of checked arguments; `start` are initial poses (N, 6), default: level ones."""
     parameters = Parameters(robot, groups)
     weights = np.ones((robot.m, len(measurements)))
-    model = Model(parameters, measurements, prior, weights)
+    model = Model(parameters, measurements, prior, weights, forces=Balance(robot, measurements))
     if "clock" in groups:
         position, rotation, known = measured_poses(robot, measurements)
         assert measurements.times is not None
@@ -137,9 +160,15 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
                 f"measurements.times must span more than {CLOCK_RANGE / 5:g} s to estimate a clock offset, got "
                 f"{measurements.times[-1] - measurements.times[0]:g} s"
             )
+    of_forces = [name for name in groups if name in (*IN_BALANCE, "stiffness")]
+    if measurements.tensions is None and of_forces not in ([], ["com"]):
+        raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}, got none")
     model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements))))
+    if not set(IN_BALANCE).isdisjoint(groups) and (robot.weight == 0.0 or model.balanced is None):
+        needed = "gravity" if robot.weight == 0.0 else "fewer cables than coordinates, or tensions"
+        raise InputError(f"free must not have {', '.join(of_forces)} without {needed}, got robot {robot.name}")
     unknown = np.isinf(model.pose_sigmas) & ("clock" not in groups)
-    spare = robot.m - unknown.sum(axis=1)
+    spare = robot.m + (model.balanced.freedoms if model.balanced else 0) - unknown.sum(axis=1)
     equations = int(np.maximum(spare, 0).sum())
     wanted = int((parameters.varies & np.isinf(model.prior_sigmas)).sum())
     if equations < wanted or equations == 0:
@@ -160,6 +189,9 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     sigmas = model.pose_sigmas[model.poses_vary]
     priors = np.isfinite(model.prior_sigmas[model.parameters.varies])
     found = int(np.isfinite(solved.observability.sigmas).sum())
+    if model.balanced:
+        rests = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
+        used += model.balanced.freedoms * int(rests.sum())
     redundancy = used + int(np.isfinite(sigmas).sum()) - sigmas.size + int(priors.sum()) - found
     if redundancy <= 0:
         return np.nan, 1.0, redundancy

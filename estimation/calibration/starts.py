@@ -36,16 +36,19 @@ MOST_SEARCHES = 5
 LARGEST_SHARE = 0.1  # of readings that may be left out; more are no exceptions
 
 
-def fit_from(model: Model, state: State, length: float, outliers: bool = False) -> tuple[Fit, np.ndarray]:
+def fit_from(
+    model: Model, state: State, length: float, outliers: bool = False, enough: float = 0.0
+) -> tuple[Fit, np.ndarray]:
     """Minimise the sum of squares, from level poses if none were measured; `length` is the length of the cables [m].
 
     It returns the fit and the weights (m, N) of its readings. With `outliers`, readings that look wrong in the first
-    fit are excluded, because parameters and poses that adapt to them would hide them.
+    fit are excluded, because parameters and poses that adapt to them would hide them. `enough` is that of `fit`.
 
     The state has initial parameters, and the poses of `model.begin()`.
     """
     if not np.isinf(model.pose_sigmas).any():
-        return fit(model, state, length), model.weights
+        return fit(model, state, length, enough=enough), model.weights
+    state = _by_forces(model, state, length)
     rough, begin = _rough(model, state, length)
     state = fit(rough, begin, length, enough=ENOUGH).state
     for _ in range(MOST_SEARCHES if outliers else 0):
@@ -59,12 +62,12 @@ def fit_from(model: Model, state: State, length: float, outliers: bool = False) 
         state = fit(rough, state, length, enough=ENOUGH).state
     clean = replace(model, weights=rough.weights)
     state = _elsewhere(clean, state) or state
-    result = fit(clean, state, length)
+    result = fit(clean, state, length, enough=enough)
     for _ in range(MOST_SEARCHES):
         other = _elsewhere(clean, result.state)
         if other is None:
             break
-        result = fit(clean, other, length)
+        result = fit(clean, other, length, enough=enough)
     return result, clean.weights
 
 
@@ -85,6 +88,24 @@ def level_poses(robot: Robot, lengths: np.ndarray, offsets: bool) -> np.ndarray:
         if smaller < misfit:
             return other
     return poses
+
+
+def _by_forces(model: Model, state: State, length: float) -> State:
+    """Return poses and offsets that measured tensions suggest, which need no lengths; else the state as it is."""
+    if model.balanced is None or model.measurements.tensions is None or "offsets" not in model.parameters.groups:
+        return state
+    sigma = model.measurements.sigma._asdict() | {"lengths": FAR * length}
+    fixed = replace(model.parameters, groups=())
+    loose = replace(model, parameters=fixed, measurements=model.measurements.with_sigma(sigma), upright=UPRIGHT)
+    at_home = np.where(np.isinf(model.pose_sigmas[:, :1]), model.robot.home[:3] - model.poses(state)[0], state.shift)
+    level, home = (fit(loose, start, length).state for start in (state, state._replace(shift=at_home)))
+    nearer = loose.residuals(level).of_samples <= loose.residuals(home).of_samples
+    shift, turn = (np.where(nearer, a.T, b.T).T for a, b in zip(level[1:], home[1:], strict=True))
+    state = State(state.x, shift, turn)
+    misfit = np.median(model.residuals(state).readings, axis=1) * model.measurements.sigma.lengths
+    x = state.x.copy()
+    model.parameters.table(x)[:, 6] += misfit
+    return state._replace(x=x)
 
 
 def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:

@@ -20,7 +20,8 @@ from ...models.part import COORDINATES, LARGEST
 from ...models.robot import Robot
 
 SIGMA = 1e-3  # [m] of lengths
-LARGEST_SIGMA = 100.0  # [m] or [rad]
+LARGEST_SIGMA = 100.0  # [m], [rad] or [-]
+OF_TENSIONS = 0.02  # of tensions, relative
 MOST = 10_000_000  # samples
 
 
@@ -35,11 +36,14 @@ class Sigma(NamedTuple):
         Standard deviation of measured positions, along each axis [m]; 0: exact.
     rotation
         Standard deviation of measured orientations, about each axis [rad]; 0: exact.
+    tensions
+        Standard deviation of each tension, relative to it [-].
     """
 
     lengths: float = SIGMA
     position: float = 0.0
     rotation: float = 0.0
+    tensions: float = OF_TENSIONS
 
 
 class Measurements(Displayed):
@@ -56,13 +60,13 @@ class Measurements(Displayed):
         Orientations of the platform, unless `poses` includes them: (roll, pitch, yaw) [rad], (N, 3), or quaternions
         (x, y, z, w), (N, 4). Rows of nan were not measured.
     tensions
-        Cable tensions [N], (N, m), used to correct elastic elongation of cables with a stiffness. Default: not
-        measured, no elongation.
+        Cable tensions at the winches [N], (N, m), for elastic elongation and the balance of forces on the platform.
+        Default: not measured, no elongation.
     times
         Times of the samples [s], (N,), increasing; a clock offset requires them.
     sigma
-        Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m] and `rotation` [rad].
-        Default: 1 mm, and poses that are exact.
+        Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m], `rotation` [rad] and
+        `tensions` (relative). Default: 1 mm, poses that are exact, and 2 % of tensions.
 
     Attributes
     ----------
@@ -73,7 +77,7 @@ class Measurements(Displayed):
     tensions, times
         As given, or None.
     sigma
-        `Sigma`: of lengths, positions and rotations.
+        `Sigma`: of lengths, positions, rotations and tensions.
 
     Raises
     ------
@@ -269,9 +273,9 @@ def _sigma(sigma: Any) -> Sigma:
         f"{name}": number(
             f"sigma.{name}" if isinstance(sigma, Mapping) else "sigma",
             value,
-            1e-9 if name == "lengths" else 0.0,
+            {"lengths": 1e-9, "tensions": 1e-6}.get(name, 0.0),
             LARGEST_SIGMA,
-            "" if isinstance(sigma, Mapping) else ", or a mapping of lengths, position and rotation",
+            "" if isinstance(sigma, Mapping) else ", or a mapping of lengths, position, rotation and tensions",
         )
         for name, value in given.items()
     }

@@ -132,7 +132,8 @@ def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None =
     scale = np.array([one.scale if one else 1.0 for one in encoders])
     by = np.array([1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables])
     stretch = 1.0 if tensions is None else 1 + np.maximum(tensions, 0.0) * by
-    return (offset + scale * readings) * stretch
+    build_up = np.array([one.build_up if one else 0.0 for one in encoders])
+    return (offset + (scale + build_up * readings) * readings) * stretch
 
 
 def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = SIGMA, begin: float = 0.0) -> LogPoses:

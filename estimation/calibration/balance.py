@@ -1,0 +1,185 @@
+"""`Balance`: forces and moments on the platform, which cables, weight and inertia balance at each sample.
+
+With the tensions t of the measured ones, of covariance V (large where none were measured), the wrench matrix A with
+moments about the platform frame and the wrench w of weight and inertia, the residual is
+
+    r = A t + w        e = L^-1 r        L L' = A V A' + W
+
+with the covariance W of errors of the model. It is least squares over tensions as further unknowns, eliminated sample
+by sample: these are t - V A' (L L')^-1 r, and the derivatives of r at them give the exact gradient (variable
+projection). r is divided by the mean gain, as forces of zero would fit best otherwise.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import columns_by_geometry, lines, wrench_by_axes
+from ...models import points
+from ...models.record import record_of
+from ...models.robot import Robot
+from ..logs.measurements import Measurements, measured_poses
+from .motion import Motion, cross, motion_of
+from .parameters import Parameters
+
+OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
+LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
+UNMEASURED = 3.0  # times the weight: standard deviation of a tension that was not measured
+
+
+class Balanced(NamedTuple):
+    """Residuals (N, 6), and their derivatives by parameters (N, 6, P) and by shift and rotation (N, 6, 6), if wanted.
+
+    Coordinates that are locked have zeros.
+    """
+
+    residuals: np.ndarray
+    by_parameters: np.ndarray | None = None
+    by_pose: np.ndarray | None = None
+
+
+class Balance:
+    """The balance of forces on a robot's platform at the samples of a log; measured tensions are at the winches."""
+
+    def __init__(self, robot: Robot, measurements: Measurements):
+        self._robot, self._measurements = robot, measurements
+        self._chosen: np.ndarray | None = None
+        self._rows = np.flatnonzero(robot.dof_mask)
+        self._scale = robot.wrench_scale[self._rows]
+
+    def only(self, rows: np.ndarray) -> Balance:
+        """Return the balance at some samples (k,), whose motion is that of the whole log."""
+        other = copy(self)
+        other._chosen = rows if self._chosen is None else self._chosen[rows]
+        other.__dict__["_of_log"] = self._of_log
+        return other
+
+    @property
+    def freedoms(self) -> int:
+        """Return the number of equations for each sample beside unknown tensions."""
+        few = 0 if self._measurements.tensions is not None else self._robot.m
+        return max(len(self._rows) - few, 0)
+
+    @cached_property
+    def _of_log(self) -> tuple[Motion, np.ndarray, np.ndarray]:
+        """Return the motion, and what capstan, friction and gain multiply, as measured and smoothed, (3, N, m).
+
+        That is y s, s and y, with tensions y and signs s of the cable speeds.
+        """
+        motion, y = motion_of(self._robot, self._measurements), self._measurements.tensions
+        terms = np.zeros((3, len(self._measurements), self._robot.m))
+        if y is not None:
+            terms = np.stack([y * motion.signs, motion.signs, y])
+        smooth = terms if y is None or motion.smooth is None else motion.smooth.values(terms)
+        return motion, terms, smooth
+
+    def tensions(self, table: np.ndarray, smooth: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Return the tensions that the platform feels [N], and their derivatives by capstan, friction, gain, (N, m, 3).
+
+        Those of elastic cables are smoothed: noise of a tension makes a cable seem stiffer. `table` is that of
+        `Parameters`, (m, 14).
+        """
+        _, terms, smoothed = self._of_log
+        terms = smoothed if smooth else terms
+        terms = terms if self._chosen is None else terms[:, self._chosen]
+        gain = table[:, 13]
+        even, odd = np.cosh(table[:, 11]), np.sinh(table[:, 11])  # of exp(capstan s), whose s is -1 or 1
+        by_gain = even * terms[2] + odd * terms[0]
+        by = np.stack([gain * (odd * terms[2] + even * terms[0]), terms[1], by_gain], axis=2)
+        return gain * by_gain + table[:, 12] * terms[1], by
+
+    @cached_property
+    def _variances(self) -> np.ndarray:
+        """Return the variances of the felt tensions over the mean gain, (N, m) [N^2], which no parameter changes."""
+        given, weight = self._measurements.tensions, self._robot.weight
+        if given is None:
+            return np.full((len(self._measurements), self._robot.m), (UNMEASURED * weight) ** 2)
+        size = np.maximum(np.abs(self._of_log[2][2]), LEAST_TENSION * np.abs(given).mean(axis=0))
+        return (self._measurements.sigma.tensions * size) ** 2 + (1e-9 * max(weight, 1.0)) ** 2
+
+    def at(
+        self,
+        of: Parameters,
+        x: np.ndarray,
+        placed: tuple[np.ndarray, np.ndarray],
+        clock: float = 0.0,
+        noise: float = 1.0,
+        derive: bool = True,
+    ) -> Balanced:
+        """Return the balance at positions (N, 3) and rotations (N, 3, 3) with values x (P,) of parameters.
+
+        The platform's acceleration is that `clock` [s] later. `noise` is a factor of all standard deviations of
+        tensions and forces.
+        """
+        (position, rotation), robot, rows, scale = placed, self._robot, self._rows, self._scale
+        table, m, count = of.table(x), robot.m, len(position)
+        mass, com = x[of.clock + 1], x[of.clock + 2 : of.clock + 5]
+        record = record_of(robot).copy()
+        cables = record["cable"][:m]
+        cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
+        record["com"] = 0.0  # moments about the platform frame
+        poses = np.concatenate([position, points.angles(rotation)], axis=1)
+        A, lengths = np.empty((count, 6, m)), np.empty((count, m))
+        lines(record, poses, robot.carrier_home, lengths, A, None, None, None)
+        (tensions, by_tensions), variances = self.tensions(table), noise**2 * self._variances
+        if self._chosen is not None:
+            variances = variances[self._chosen]
+        if self._measurements.tensions is None:
+            tensions = tensions + robot.weight / m
+        motion = self._of_log[0].ahead(self._measurements.times, clock)
+        motion = motion if self._chosen is None else motion.only(self._chosen)
+        arm = rotation @ com
+        by_arm = motion.by_arm
+        pull = motion.gravity + (by_arm @ arm[..., None])[..., 0]
+        force = mass * pull
+        wrench = np.concatenate([force, np.cross(arm, force) - motion.turning], axis=1)
+        r = (A @ tensions[..., None])[..., 0] + wrench
+        inner = A[:, rows] * scale[:, None]
+        M = np.einsum("nim,nm,njm->nij", inner, variances, inner)
+        own = (noise * OWN * robot.weight) ** 2 + (robot.platform.mass * motion.sigma) ** 2
+        M[:, np.arange(len(rows)), np.arange(len(rows))] += np.reshape(own, (-1, 1))
+        if not (np.isfinite(M).all() and np.isfinite(r).all()):
+            return Balanced(np.full((count, 6), np.inf))
+        inverse_root = np.linalg.inv(np.linalg.cholesky(M))
+        gain = float(table[:, 13].mean())
+        reduced = inverse_root @ (r[:, rows] * (scale / gain))[..., None]
+        residuals = np.zeros((count, 6))
+        residuals[:, rows] = reduced[..., 0]
+        if not derive:
+            return Balanced(residuals)
+        behind = (np.swapaxes(inverse_root, 1, 2) @ reduced)[..., 0]
+        tensions = tensions - gain * variances * np.einsum("nim,ni->nm", inner, behind)
+        raw = np.zeros((count, 6, of.count))
+        S = np.empty((count, m, 6, 7))
+        columns_by_geometry(record, poses, robot.carrier_home, S)
+        S *= tensions[..., None, None]
+        felt = np.einsum("nim,nmk->nimk", A, by_tensions)
+        for i in range(m):
+            own = i * (of.clock // m)
+            raw[..., own : own + 6], raw[..., own + 8] = S[:, i, :, :6], S[:, i, :, 6]
+            raw[..., own + 11 : own + 14] = felt[:, :, i]
+        raw[..., of.clock + 1] = np.concatenate([pull, np.cross(arm, pull)], axis=1)
+        by_com = np.concatenate([mass * by_arm, mass * cross(arm) @ by_arm - cross(force)], axis=1)
+        raw[..., of.clock + 2 : of.clock + 5] = by_com @ rotation
+        by_pose = np.empty((count, 6, 6))
+        wrench_by_axes(record, poses, robot.carrier_home, np.ascontiguousarray(tensions), by_pose)
+        by_pose[..., 3:] -= by_com @ cross(arm)
+        raw[..., 13 : of.clock : of.clock // m] -= r[..., None] / (gain * m)
+        weighted = inverse_root * (scale / gain)
+
+        def reduce(derivatives: np.ndarray) -> np.ndarray:
+            result = np.zeros_like(derivatives)
+            result[:, rows] = weighted @ derivatives[:, rows]
+            return result
+
+        return Balanced(residuals, reduce(raw), reduce(by_pose))
+
+
+def needs_balance(robot: Robot, measurements: Measurements) -> bool:
+    """Return whether gravity tells more of unknown poses than lengths do: with tensions, or with few cables."""
+    unknown = not measured_poses(robot, measurements)[2][:, robot.dof_mask > 0].all()
+    return unknown and robot.weight > 0 and (measurements.tensions is not None or robot.m < robot.dof_mask.sum())

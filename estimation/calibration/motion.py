@@ -1,0 +1,139 @@
+"""`motion_of`: accelerations and signs of cable speeds over a log, by parabolas through neighbouring samples."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ...models.robot import Robot
+from ..logs.measurements import Measurements, measured_poses
+from .parameters import Parameters
+
+SPAN = 0.1  # [s] to each side of a sample, over which a motion is a parabola
+FEWEST = 2  # samples to each side
+MOST = 25
+
+
+class Motion(NamedTuple):
+    """Motion at N samples; zeros of a log without times, whose samples are at rest.
+
+    Attributes
+    ----------
+    signs
+        Expected signs of the cable speeds, 1: paid out, 0 where either is as likely, (N, m).
+    gravity
+        Gravity less the acceleration of the platform frame, (N, 3) [m/s^2].
+    rate, spin
+        Angular velocity [rad/s] and acceleration [rad/s^2] in {G}, (N, 3).
+    turning
+        Rate of the angular momentum about the CoM in {G}, (N, 3) [N m].
+    sigma
+        Standard deviation of the acceleration, 0 where the platform rests, (N,) [m/s^2].
+    smooth
+        Smoothing of values (N, d) by the same parabolas, None without times.
+    """
+
+    signs: np.ndarray
+    gravity: np.ndarray
+    rate: np.ndarray
+    spin: np.ndarray
+    turning: np.ndarray
+    sigma: np.ndarray
+    smooth: Parabolas | None = None
+
+    def ahead(self, times: np.ndarray | None, clock: float) -> Motion:
+        """Return the motion with that of the platform at the times (N,) + `clock` [s]; its ends stay as they are."""
+        if times is None or clock == 0.0:
+            return self
+        names = ("gravity", "rate", "spin", "turning")
+        values = np.hstack([getattr(self, name) for name in names])
+        moved = np.stack([np.interp(times + clock, times, column) for column in values.T], axis=1)
+        return self._replace(**dict(zip(names, np.split(moved, 4, axis=1), strict=True)))
+
+    def only(self, rows: np.ndarray) -> Motion:
+        """Return the motion at some samples, (k,)."""
+        names = ("signs", "gravity", "rate", "spin", "turning", "sigma")
+        return self._replace(**{name: getattr(self, name)[rows] for name in names}, smooth=None)
+
+    @property
+    def by_arm(self) -> np.ndarray:
+        """Return the derivative of gravity less acceleration by the arm from the platform frame, (N, 3, 3) [1/s^2]."""
+        return -cross(self.spin) - cross(self.rate) @ cross(self.rate)
+
+
+def motion_of(robot: Robot, measurements: Measurements) -> Motion:
+    """Return the motion of a log: of the cables by their readings, of the platform by its poses if these are known."""
+    count, times = len(measurements), measurements.times
+    gravity, zero = np.tile(robot.gravity, (count, 1)), np.zeros((count, 3))
+    rest = Motion(np.zeros((count, robot.m)), gravity, zero, zero, zero, np.zeros(count))
+    if times is None or count < 2 * FEWEST + 1 or np.median(np.diff(times)) > SPAN / FEWEST:
+        return rest
+    from scipy.special import erf
+
+    of, local = Parameters(robot, ()), Parabolas(times)
+    lengths = local.fitted(measurements.lengths * of.table(of.first)[:, 7])
+    signs = erf(lengths.slopes / np.maximum(np.sqrt(2) * lengths.noise[1], 1e-12))
+    rest = rest._replace(signs=signs, smooth=local)
+    position, rotation, known = measured_poses(robot, measurements)
+    if not known[:, robot.dof_mask > 0].all():
+        return rest._replace(sigma=np.abs(lengths.bends).max(axis=1))
+    placed = local.fitted(position)
+    quaternions = Rotation.from_matrix(rotation).as_quat()
+    flips = np.where(np.einsum("ni,ni->n", quaternions[1:], quaternions[:-1]) < 0, -1.0, 1.0)
+    quaternions[1:] *= np.cumprod(flips)[:, None]
+    turned, inverse = local.fitted(quaternions), quaternions * [-1, -1, -1, 1]
+    rate, spin = (2 * _vector_of_product(part, inverse) for part in (turned.slopes, turned.bends))
+    sigma = np.full(count, placed.noise[2].max())
+    if robot.platform.inertia is not None:
+        inertia = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
+        momentum, change = (np.einsum("nij,nj->ni", inertia, part) for part in (rate, spin))
+        rest = rest._replace(turning=change + np.cross(rate, momentum))
+    return rest._replace(gravity=gravity - placed.bends, rate=rate, spin=spin, sigma=sigma)
+
+
+class Fitted(NamedTuple):
+    """Values, first and second derivatives, (N, d), and the standard deviation of each, (3, d)."""
+
+    values: np.ndarray
+    slopes: np.ndarray
+    bends: np.ndarray
+    noise: np.ndarray
+
+
+class Parabolas:
+    """Parabolas by least squares through the neighbours of each sample, at times (N,) [s]."""
+
+    def __init__(self, times: np.ndarray):
+        count = len(times)
+        each = int(np.clip(SPAN / np.median(np.diff(times)), FEWEST, min(MOST, (count - 1) // 2)))
+        width = 2 * each + 1
+        self._rows = np.clip(np.arange(count) - each, 0, count - width)[:, None] + np.arange(width)  # (N, width)
+        apart = times[self._rows] - times[:, None]
+        self._unit = np.abs(apart).max(axis=1, keepdims=True)
+        basis = np.stack([np.ones_like(apart), apart / self._unit, (apart / self._unit) ** 2], axis=2)
+        transposed = np.swapaxes(basis, 1, 2)
+        self._shares = np.linalg.solve(transposed @ basis, transposed)  # (N, 3, width)
+
+    def values(self, values: np.ndarray) -> np.ndarray:
+        """Return smoothed values (k, N, d)."""
+        return np.stack([(self._shares[:, :1] @ one[self._rows])[:, 0] for one in values])
+
+    def fitted(self, values: np.ndarray) -> Fitted:
+        """Return values (N, d) as the parabolas have them."""
+        parts = self._shares @ values[self._rows]  # (N, 3, d)
+        noise = np.sqrt(((values - parts[:, 0]) ** 2).mean(axis=0))
+        units = (1.0, self._unit, self._unit**2 / 2)
+        spread = [np.median(np.linalg.norm(self._shares[:, k], axis=1) / np.ravel(units[k])) for k in range(3)]
+        return Fitted(parts[:, 0], parts[:, 1] / units[1], parts[:, 2] / units[2], np.outer(spread, noise))
+
+
+def _vector_of_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return the vector part of the products p q of quaternions (x, y, z, w), (N, 3)."""
+    return p[:, 3:] * q[:, :3] + q[:, 3:] * p[:, :3] + np.cross(p[:, :3], q[:, :3])
+
+
+def cross(vectors: np.ndarray) -> np.ndarray:
+    """Return the matrices (N, 3, 3) whose product with v is the cross product of vectors (N, 3) and v."""
+    return np.cross(vectors[:, None], np.eye(3)).swapaxes(1, 2)

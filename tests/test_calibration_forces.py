@@ -1,0 +1,218 @@
+"""Calibration by the balance of forces, against platforms at rest and in motion that plain NumPy computes."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from towline.base.errors import InputError
+from towline.estimation.calibration import Measurements, calibrate
+from towline.estimation.calibration.model import Model
+from towline.estimation.calibration.parameters import GROUPS, OF_CABLE, Parameters
+from towline.models import Robot, load
+
+from .warm import towline as run
+
+CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
+ANCHORS = np.column_stack([CORNERS * [2.9, 2.5], [4.0, 4.1, 3.9, 4.0]])
+ATTACHMENTS = np.column_stack([CORNERS * [0.28, 0.25], np.full(4, 0.05)])
+COM, MASS, GRAVITY = np.array([0.02, -0.01, -0.06]), 12.0, np.array([0, 0, -9.81])
+AHRS = np.radians(0.5)
+
+
+def robot_file(anchors, attachments, com, mass, home, dof=("x", "y", "z", "roll", "pitch", "yaw"), stiffness=None):
+    return Robot.model_validate(
+        {
+            "name": "as-drawn",
+            "source": "a test",
+            "platform": {
+                "mass": mass,
+                "com": list(com),
+                "inertia": [0.1, 0.1, 0.1, 0, 0, 0],
+                "home": home,
+                "dof": list(dof),
+            },
+            "carriers": [{"name": "frame", "kind": "ground"}],
+            "cables": [
+                {"carrier": "frame", "anchor": a, "attachment": b, "t_min": 0, "t_max": 900, "stiffness": stiffness}
+                for a, b in zip(anchors.tolist(), attachments.tolist(), strict=True)
+            ],
+        }
+    )
+
+
+def lines(pose, anchors=ANCHORS, attachments=ATTACHMENTS):
+    """Unit vectors to the anchors, (m, 3), arms of the attachments, (m, 3), and lengths, (m,)."""
+    arms = attachments @ Rotation.from_euler("xyz", pose[3:]).as_matrix().T
+    along = anchors - pose[:3] - arms
+    lengths = np.linalg.norm(along, axis=1)
+    return along / lengths[:, None], arms, lengths
+
+
+def at_rest(position):
+    """A pose in which four cables hold the platform at a position, and their tensions."""
+
+    def out_of_balance(z):
+        u, arms, _ = lines(np.concatenate([position, z[:3]]))
+        com = Rotation.from_euler("xyz", z[:3]).as_matrix() @ COM
+        pulls = z[3:, None] * MASS * 9.81 * u
+        moments = np.cross(arms, pulls).sum(axis=0) + np.cross(com, MASS * GRAVITY)
+        return np.concatenate([pulls.sum(axis=0) + MASS * GRAVITY, moments])
+
+    z = least_squares(out_of_balance, np.array([0, 0, 0, *np.full(4, 0.3)]), xtol=1e-12, ftol=1e-12, gtol=1e-12).x
+    assert np.abs(out_of_balance(z)).max() < 1e-5
+    assert z[3:].min() > 0
+    return np.concatenate([position, z[:3]]), z[3:] * MASS * 9.81
+
+
+@cache
+def rests(seed):
+    """27 poses at rest, readings, orientations and tensions of four cables, and the offsets of the readings."""
+    draw = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [0.8, 1.4, 2.0], indexing="ij"), axis=-1).reshape(-1, 3)
+    both = [at_rest(place + draw.normal(0, 0.05, 3)) for place in grid]
+    poses, tensions = (np.array(part) for part in zip(*both, strict=True))
+    offsets = draw.normal(0, 0.3, 4)
+    readings = np.array([lines(pose)[2] for pose in poses]) - offsets + draw.normal(0, 1e-3, (27, 4))
+    errors = Rotation.from_rotvec(draw.normal(0, AHRS, (27, 3)))
+    angles = (errors * Rotation.from_euler("xyz", poses[:, 3:])).as_euler("xyz")
+    return poses, readings, angles, tensions * (1 + draw.normal(0, 0.02, tensions.shape)), offsets
+
+
+def drawn(com=COM):
+    return robot_file(ANCHORS, ATTACHMENTS, com, MASS, [0, 0, 1.4, 0, 0, 0])
+
+
+def test_four_cables_calibrate_without_a_camera():
+    """Lengths up to offsets, an inertial sensor and tensions: poses to 10 mm, and a CoM 30 mm off to 3 mm."""
+    ratios, errors, wrong_com = [], [], COM + 0.03 * np.array([0.6, -0.64, 0.48])
+    for seed in range(3):
+        poses, readings, angles, tensions, offsets = rests(seed)
+        sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
+        log = Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma)
+        result = calibrate(drawn(wrong_com), log, ("offsets", "com"))
+        assert result.converged
+        assert not result.not_identifiable
+        assert np.sqrt(((result.poses - poses)[:, :3] ** 2).sum(axis=1).mean()) < 0.01
+        found = np.array([one.value for one in result.parameters])
+        errors.append(np.abs(found[4:] - COM).max())
+        np.testing.assert_array_equal(result.robot.platform.com, found[4:])
+        error = found - np.concatenate([offsets, COM])
+        ratios.append(error @ np.linalg.solve(result.covariance, error))
+    assert np.median(errors) < 0.003
+    assert chi2.ppf(1e-3, 21) < sum(ratios) < chi2.ppf(1 - 1e-3, 21)
+
+
+def test_without_tensions_gravity_still_adds_two_equations():
+    """Four cables at known offsets, and an inertial sensor: the balance across the cables finds the CoM."""
+    _, readings, angles, _, offsets = rests(0)
+    log = Measurements(readings + offsets, orientations=angles, sigma={"lengths": 1e-3, "rotation": AHRS})
+    result = calibrate(drawn(COM + np.array([0.03, 0, 0])), log, "com")
+    assert abs(result.parameters[0].value - COM[0]) < 4 * result.parameters[0].sigma < 0.02
+    with pytest.raises(InputError, match="tensions must be given to estimate mass, got none"):
+        calibrate(drawn(), log, "mass")
+
+
+def moving(seed, friction=0.05, elasticity=2e-5):
+    """15 s of a planar robot with pulleys, elastic cables, wrong drums and another clock, sampled at 50 Hz."""
+    draw, robot = np.random.default_rng(seed), load("planar-4")
+    t = np.arange(0, 15, 0.02)
+    arg = 2 * np.pi * draw.uniform(0.15, 0.4, (3, 3, 1)) * t + draw.uniform(0, 6, (3, 3, 1))
+    curve = CubicSpline(t, np.sin(arg).sum(axis=1).T * [0.17, 0.08, 0.04] + np.array([0, 0.75, 0]))
+
+    def poses(at):
+        full = np.zeros((len(at), 6))
+        full[:, [0, 2, 4]] = curve(at)
+        return full
+
+    a, b = robot.anchors, robot.attachments
+    now, acceleration = poses(t), curve(t, 2)
+    tensions, lengths = np.empty((len(t), 4)), np.empty((len(t), 4))
+    for k, pose in enumerate(now):
+        u, arms, lengths[k] = lines(pose, a, b)
+        A = np.vstack([u.T, np.cross(arms, u).T])[[0, 2, 4]]
+        inertia = [4.0, 4.0, robot.platform.inertia[1]] * acceleration[k]
+        wanted = inertia - [0, -4 * 9.81, 0]
+        tensions[k] = 90 + np.linalg.pinv(A) @ (wanted - A @ np.full(4, 90.0))
+    sign = np.sign(np.gradient(lengths, axis=0))
+    scales, offsets = 1 + draw.normal(0, 0.02, 4), draw.normal(0, 0.1, 4)
+    readings = (lengths / (1 + elasticity * tensions) - offsets) / scales + draw.normal(0, 1e-3, lengths.shape)
+    measured = tensions * np.exp(-friction * sign) * (1 + draw.normal(0, 0.02, sign.shape))
+    later = poses(t - 0.034) + draw.normal(0, 3e-4, (len(t), 6)) * (robot.dof_mask > 0)
+    sigma = {"lengths": 1e-3, "position": 3e-4, "rotation": 3e-4, "tensions": 0.02}
+    return Measurements(readings, later, tensions=measured, times=t, sigma=sigma), scales
+
+
+def test_friction_stiffness_and_mass_of_a_motion(tmp_path):
+    log, scales = moving(0)
+    heavy = load("planar-4").model_dump(mode="json")
+    heavy["platform"]["mass"] = 4.4
+    file = Robot.model_validate(heavy).save(tmp_path / "heavy.yaml")
+    free = ("anchors", "offsets", "scales", "clock", "mass", "capstan", "stiffness")
+    data = tmp_path / "log.nc", "--free", ",".join(free), "--json", "--out", tmp_path / "built.yaml"
+    log.save(data[0])
+    done = run("calibrate", file, *data)
+    assert done.returncode == 0, done.stderr
+    found = {one["name"]: one["value"] for one in json.loads(done.stdout)["parameters"]}
+    built = load(tmp_path / "built.yaml")
+    assert built.platform.mass == pytest.approx(4.0, rel=0.01)
+    assert found["clock"] == pytest.approx(0.034, abs=1e-3)
+    for i in range(4):
+        assert found[f"cables[{i}].capstan"] == pytest.approx(0.05, rel=0.1)
+        assert found[f"cables[{i}].scale"] == pytest.approx(scales[i], abs=5e-3)
+    assert np.mean([1 / cable.stiffness for cable in built.cables]) == pytest.approx(2e-5, rel=0.1)
+
+
+def test_a_log_does_not_tell_mass_from_gains():
+    log, _ = moving(1)
+    result = calibrate("planar-4", log, ("anchors", "offsets", "clock", "mass", "gains"))
+    assert "mass and gains together: no force is known for certain" in result.not_identifiable
+    assert "mass" not in result.identifiable
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "planar-4", "cogiro"])
+def test_gradients_are_slopes_of_the_cost(name):
+    robot, draw, count = load(name), np.random.default_rng(0), 9
+    poses = robot.home + draw.uniform(-1, 1, (count, 6)) * 0.2 * robot.dof_mask
+    tensions = draw.uniform(0.5, 2, (count, robot.m)) * robot.weight / robot.m
+    sigma = {"lengths": 1e-2, "position": 1e-2, "rotation": 1e-2}
+    lengths = draw.uniform(1, 2, (count, robot.m))
+    log = Measurements(lengths, poses, tensions=tensions, times=0.05 * np.arange(count), sigma=sigma)
+    groups = tuple(group for group in GROUPS if group != "clock" and (group != "radii" or robot.pulley_radii.any()))
+    model = Model(Parameters(robot, groups), log, {}, np.ones((robot.m, count)))
+    state = model.begin()
+    model.parameters.table(state.x)[:, 10:13] = 1e-6, 0.05, 1.0
+    residuals, derivatives = model.linearised(state)
+    exact = np.einsum("nip,ni->p", derivatives.balance.by_parameters, residuals.balance)
+    for i in range(robot.m):
+        exact[i * OF_CABLE : (i + 1) * OF_CABLE] += residuals.readings[i] @ derivatives.cables[i]
+    for column in np.flatnonzero(model.parameters.varies):
+        step = 1e-6 * np.eye(len(state.x))[column] * (1e-6 if column % OF_CABLE == 10 else 1.0)
+        more, less = (model.residuals(state._replace(x=state.x + sign * step)).cost for sign in (1, -1))
+        assert (more - less) / (4 * step.max()) == pytest.approx(exact[column], rel=1e-3, abs=1e-4 * abs(exact).max())
+    of_pose = np.einsum("mnc,mn->nc", derivatives.poses, residuals.readings)
+    of_pose += np.einsum("nic,ni->nc", derivatives.balance.by_pose, residuals.balance)
+    for axis in np.flatnonzero(robot.dof_mask):
+        move = 1e-6 * np.outer(np.ones(count), np.eye(6)[axis])
+        more, less = (model.residuals(model.moved(state, 0 * state.x, sign * move)) for sign in (1, -1))
+        slope = (more.balance**2).sum(axis=1) + (more.readings**2).sum(axis=0)
+        slope -= (less.balance**2).sum(axis=1) + (less.readings**2).sum(axis=0)
+        np.testing.assert_allclose(slope / 4e-6, of_pose[:, axis], rtol=1e-3, atol=1e-5 * abs(of_pose).max())
+
+
+def test_wrong_requests_are_one_line():
+    _, readings, angles, tensions, _ = rests(0)
+    weightless = drawn().model_copy(update={"gravity": (0.0, 0.0, 0.0)})
+    with pytest.raises(InputError, match="free must not have mass without gravity"):
+        calibrate(weightless, Measurements(readings, orientations=angles, tensions=tensions), "mass")
+    with pytest.raises(InputError, match="without fewer cables than coordinates, or tensions"):
+        calibrate("cogiro", Measurements(np.full((30, 8), 9.0)), "com")
+    with pytest.raises(InputError, match="tensions must be given to estimate stiffness"):
+        calibrate("cogiro", Measurements(np.full((30, 8), 9.0)), "stiffness")
+    with pytest.raises(InputError, match=r"sigma.tensions must be a number from 1e-06 to 100, got 0"):
+        Measurements(readings, sigma={"tensions": 0})
