@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from towline import load
-from towline.figures import calibration, flight, limits, plan, robot, sweep, workspace
+from towline.figures import calibration, flight, limits, phase_plane, plan, robot, sweep, workspace
 from towline.figures.animation import Scene
 from towline.figures.convergence import convergence
 from towline.figures.curve_in_space import curve_in_space
@@ -264,6 +264,11 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "sweep-3": lambda: swept((6, 8, 4)),
     "projections": lambda: workspace.projections({"W1": _ball(500, 1.0), "W2": _ball(500, 0.5)}, 2 * SQUARE),
     "cross-sections": lambda: workspace.cross_sections(_ball(3000, 1.0), [-0.5, 0.0, 0.5], 0.02),
+    "law": lambda: phase_plane.phase_plane(
+        np.linspace(0, 1, 21),
+        np.sqrt(np.minimum(np.linspace(0, 20, 21), np.linspace(20, 0, 21))),
+        [(0.0, 0.4, "t_max of cables 2, 5"), (0.4, 0.6, "speed of platform"), (0.6, 1.0, "t_max of cables 2, 5")],
+    ),
     "reached": lambda: workspace.reached(sampled((20, 20, 10))),
     "reached-flat": lambda: workspace.reached(sampled((20, 20, 1))),
     "reached-line": lambda: workspace.reached(sampled((20, 1, 1))),

@@ -10,6 +10,7 @@ from ...figures import plan as plan_figures
 from ...figures.convergence import convergence
 from ...figures.drawing import Drawing
 from ...figures.limits import limits
+from ...figures.phase_plane import phase_plane
 from ...figures.views import views
 from ...statics.scene import scene
 from ..result import PlanData
@@ -29,6 +30,11 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
         "views": Drawing("From above and from the side", views(scene(plan.scenario.robot, trajectory, times))),
         "tensions": Drawing("Tensions against their limits", plan_figures.tensions(trajectory)),
     }
+    if plan.law is not None and plan.law.exists:
+        active = [(each.start, each.end, each.limit) for each in plan.law.bottlenecks]
+        drawn["law"] = Drawing(
+            "The fastest time law and its active limits", phase_plane(plan.law.s, plan.law.sd, active)
+        )
     if trajectory["carrier_moves"].any():
         drawn["path"] = Drawing("Path of the platform and positions of the carriers", plan_figures.path(trajectory))
         drawn["base"] = Drawing("Carriers relative to the platform", plan_figures.base_offset(trajectory))
