@@ -5,7 +5,7 @@ Plans without a value are marked by their status.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 MARKS = {"infeasible": "x", "not-found": "o", "failed": "^"}  # by status; feasible plans have a value
 MOST_TICKS = 6
 MOST_COLUMNS = 3  # of maps side by side
+MOST_NUMBERS, SMALL = (9, 14), 6.0  # cells across and up in which numbers fit, and their size [points]
 NOTHING = "#eeeeee"  # behind marks in a map
 
 
@@ -35,7 +36,9 @@ class Axis(NamedTuple):
         return [value if isinstance(value, str) else f"{value:g}" for value in self.values]
 
 
-def sweep(axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> Figure:
+def sweep(
+    axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray], lower: Collection[str] = ()
+) -> Figure:
     """Draw each quantity over one, two or three varied fields.
 
     Parameters
@@ -44,8 +47,10 @@ def sweep(axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.
         Word for each plan, an axis for each varied field.
     quantities
         By their labels, shaped like `status`, nan where a plan has none.
+    lower
+        Labels of those of which less is better; of the others more is (default: none). Maps ring the best plan.
     """
-    canvas = _curves(axes[0], status, quantities) if len(axes) == 1 else _maps(axes, status, quantities)
+    canvas = _curves(axes[0], status, quantities) if len(axes) == 1 else _maps(axes, status, quantities, lower)
     style.legend_below(canvas, *canvas.axes)
     return canvas
 
@@ -74,14 +79,18 @@ def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]
     return canvas
 
 
-def _maps(axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> Figure:
+def _maps(
+    axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray], lower: Collection[str]
+) -> Figure:
     """Draw the maps of all quantities side by side; over three fields a row of maps for each quantity."""
     if len(axes) == 2:
         canvas = style.figure(height=0.7 + 2.0 * len(quantities))
         panels = style.panels_below(canvas, axes[0].label, [axes[1].label] * len(quantities))
         for ax, (label, values) in zip(panels, quantities.items(), strict=True):
             image = _map(ax, axes, values, status, _range(values))
-            style.colour_bar(canvas, image, ax, label)
+            _number(ax, image, values)
+            _ring_best(ax, values if label in lower else -values)
+            style.colour_bar(canvas, image, ax, f"{label}, {'lower' if label in lower else 'higher'} is better")
         return canvas
     third = axes[2]
     columns = min(len(third.values), MOST_COLUMNS)
@@ -125,6 +134,25 @@ def _map(
         shown = range(0, len(texts), -(-len(texts) // MOST_TICKS))
         set_ticks(list(shown), [texts[index] for index in shown])
     return image
+
+
+def _number(ax: Axes, image: ScalarMappable, values: np.ndarray) -> None:
+    """Write the values into the cells of a map that are large enough."""
+    if values.shape[0] > MOST_NUMBERS[0] or values.shape[1] > MOST_NUMBERS[1]:
+        return
+    for (x, y), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            dark = sum(image.to_rgba(value)[:3]) < 1.5
+            ax.text(x, y, f"{value:.3g}", color="w" if dark else "k", fontsize=SMALL, ha="center", va="center")
+
+
+def _ring_best(ax: Axes, values: np.ndarray) -> None:
+    """Draw a frame around the cell of the smallest value, unless several have it."""
+    known = np.isfinite(values)
+    if known.any() and (values[known] == values[known].min()).sum() == 1:
+        x, y = np.unravel_index(int(np.where(known, values, np.inf).argmin()), values.shape)
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) / 2 + [x, y]
+        ax.plot(*corners.T, color=style.colour(1), linewidth=1.5, label="best")
 
 
 def _mark(ax: Axes, x: np.ndarray, y: np.ndarray, word: str, mark: str, **options: Any) -> None:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_LINES = 60  # of the table in a report
+SAME = 1e-3  # [N], of a margin that is as large as asked
 
 
 class _Result(NamedTuple):
@@ -212,10 +213,10 @@ class Sweep(Displayed, Reported):
         quantities = {}
         for name, unit, _ in _RESULTS:
             values = np.where(feasible, self._values(name), np.nan) if name in ("cost", "margin", "duration") else None
-            if values is not None and not (name == "duration" and _is_known(self.cases, values)):
+            if values is not None and not (name != "cost" and _is_known(self.cases, name, values)):
                 title = "tension margin" if name == "margin" else name  # the task's margin may be a varied field
                 quantities[title if unit == "1" else f"{title} [{unit}]"] = values
-        return sweep(axes, self._values("status"), quantities)
+        return sweep(axes, self._values("status"), quantities, [name for name in quantities if "margin" not in name])
 
     def _report(self) -> Report:
         about, _, summary = self._headline().partition(": ")
@@ -257,8 +258,13 @@ class Sweep(Displayed, Reported):
         return Table("", [*heads, "status", *named, "reason"], list(zip(*columns, strict=True)), numeric)
 
 
-def _is_known(cases: Cases, durations: np.ndarray) -> bool:
-    """Return whether the durations of feasible plans are those that were varied, or all the same."""
-    known = durations[np.isfinite(durations)]
-    varied = any(axis.field.key == "duration" and axis.numeric for axis in cases.axes)
-    return varied or not known.size or np.ptp(known) == 0
+def _is_known(cases: Cases, name: str, values: np.ndarray) -> bool:
+    """Return whether the values of feasible plans are those that were varied, or durations that are all the same."""
+    known = np.isfinite(values)
+    varied = next((axis for axis in cases.axes if axis.field.key == name and axis.numeric), None)
+    if varied is not None:
+        shape = [1] * values.ndim
+        shape[cases.axes.index(varied)] = -1
+        apart = np.abs(values - np.asarray(varied.values, dtype=float).reshape(shape))[known]
+        return name == "duration" or bool(known.any() and (apart < SAME).all())
+    return name == "duration" and (not known.any() or np.ptp(values[known]) == 0)
