@@ -124,3 +124,14 @@ def test_wrong_readings_do_not_hide_in_poses_and_parameters():
     result = calibrate(robot, Measurements(readings), prior=PRIOR)
     assert {one.sample for one in result.outliers} == set(np.flatnonzero(wrong.any(axis=1)).tolist())
     assert distance(result, built, offsets) < 1
+
+
+def test_the_winch_that_slipped_is_named():
+    """A slip moves the unknown poses, so that the residuals of another cable may show it more clearly."""
+    robot = load("caroca")
+    for seed, (cable, sample, size) in enumerate([(6, 81, 0.034), (1, 40, -0.05), (3, 60, 0.04)]):
+        _, _, _, readings = a_log(robot, seed, 0.2)
+        readings[sample:, cable] -= size
+        (found,) = calibrate(robot, Measurements(readings), prior=PRIOR).slips
+        assert (found.cable, found.sample) == (cable, sample)
+        assert found.size == pytest.approx(size, abs=2e-3)

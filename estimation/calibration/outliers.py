@@ -24,6 +24,8 @@ LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distri
 SMALLEST_REDUNDANCY = 0.02  # a reading with less hardly shows its own errors
 SHORTEST = 5  # samples on each side of a slip
 CLEAR = 3.0  # a slip is at least this many times the other residuals of its cable
+NEARLY = 0.3  # of the clearest slip's statistic, of another cable's that may be the true one
+MOST_CANDIDATES = 3
 WINDOW = 25  # samples on each side, over which a slip must be visible as a step
 VISIBLE = 0.5  # share of it that must be
 BLOCKS = 25  # of the record, of at least so many samples each, to see whether residuals are alike
@@ -198,15 +200,18 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
     return Outlier(cable, sample, float(-model.measurements.sigma.lengths * excess))
 
 
-def find_slip(model: Model, state: State, length: float) -> Slip | None:
-    """Return the clearest slip of a winch, or None if no cable has one."""
+def find_slips(model: Model, state: State, length: float) -> list[Slip]:
+    """Return the clearest slip of a winch, and with unknown poses others nearly as clear, which only a fit can exclude.
+
+    Unknown poses spread a slip over the residuals of all cables.
+    """
     found = project(model, state)
     m, count = found.residuals.shape
     if count < 4 * SHORTEST:
-        return None
+        return []
     seen = found.redundancy > SMALLEST_REDUNDANCY
     if not seen.any():
-        return None
+        return []
     normalised = np.where(seen, found.residuals / np.sqrt(np.maximum(found.redundancy, SMALLEST_REDUNDANCY)), 0.0)
     spread = 1.4826 * float(np.median(np.abs(normalised[seen])))
     limit = _threshold(m * count) * max(1.0, spread)
@@ -226,15 +231,17 @@ def find_slip(model: Model, state: State, length: float) -> Slip | None:
         candidates.append((float(statistic[k]), i, k, float(sums[k] / information[k]), float(information[k] ** -0.5)))
     unit = model.measurements.sigma.lengths
     # A wrong reading disturbs a cable's parameters, and so all its residuals: the clearest may be no step.
+    slips: list[Slip] = []
+    most = MOST_CANDIDATES if np.isinf(model.pose_sigmas).any() else 1
     for statistic, cable, sample, size, sigma in sorted(candidates, reverse=True):
-        if statistic <= limit**2:
+        if statistic <= max(limit**2, NEARLY * max(candidates)[0] * bool(slips)) or len(slips) == most:
             break
         flat = found.residuals[cable].copy()
         for part in (slice(None, sample), slice(sample, None)):
             flat[part] -= flat[part].mean()
         if statistic > limit**2 * _correlation(flat) and _is_a_step(found, cable, sample, size):
-            return Slip(cable, sample, unit * size, unit * sigma)
-    return None
+            slips.append(Slip(cable, sample, unit * size, unit * sigma))
+    return slips
 
 
 def _correlation(residuals: np.ndarray) -> float:

@@ -15,8 +15,8 @@ from .fit import Fit, fit
 from .model import Model, State
 from .normal_equations import metric, state_equations
 from .observability import Observability, observability
-from .outliers import Outlier, Slip, alike, find_outliers, find_slip, find_unbalanced
-from .parameters import IN_BALANCE, Parameters
+from .outliers import LEAST_THRESHOLD, Outlier, Slip, alike, find_outliers, find_slips, find_unbalanced
+from .parameters import IN_BALANCE, OF_ROBOT, Parameters
 from .starts import LARGEST_SHARE, fit_from, level_poses
 
 EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
@@ -71,14 +71,14 @@ def solve(
         found = find_outliers(model, result.state)
         # Where more than a few readings look wrong, something lasts: they are looked at only if it is no slip.
         many = len(found) > max(2, FEW * len(measurements))
-        slip = find_slip(model, result.state, length) if (many or not found) and len(slips) < MOST_SLIPS else None
-        if slip is not None:
+        sought = (many or not found) and len(slips) < MOST_SLIPS
+        candidates = find_slips(model, result.state, length) if sought else []
+        if candidates:
             wrong, model = {}, replace(model, weights=np.ones_like(model.weights))
-            slips.append(slip)
-            parameters = replace(model.parameters, slips=(*model.parameters.slips, (slip.cable, slip.sample)))
-            model = replace(model, parameters=parameters)
-            result = fit(model, result.state._replace(x=np.append(result.state.x, slip.size)), length)
-            fitted = model.weights
+            tried = [_with_slip(model, result, one, length) for one in candidates]
+            best = min(range(len(tried)), key=lambda i: _surprise(*tried[i][1:]))
+            slips.append(candidates[best])
+            model, result, fitted = tried[best]
             continue
         if not found or len(wrong) + len(found) > limit:
             if np.array_equal(fitted, model.weights):
@@ -96,6 +96,27 @@ def solve(
     S = state_equations(model, result.state, scale := metric(model)).S
     seen = observability(S, model.parameters, result.state, scale, length)
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen)
+
+
+def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Model, Fit, np.ndarray]:
+    """Return the model with a further slip, its fit, and the weights of the fit.
+
+    Unknown poses, which the slip has moved, are found again.
+    """
+    parameters = replace(model.parameters, slips=(*model.parameters.slips, (slip.cable, slip.sample)))
+    model = replace(model, parameters=parameters)
+    state = result.state._replace(x=np.append(result.state.x, slip.size))
+    near = fit(model, state, length), model.weights
+    if not np.isinf(model.pose_sigmas).any():
+        return model, *near
+    begin = model.begin()
+    begin.x[model.parameters.clock + OF_ROBOT :] = state.x[model.parameters.clock + OF_ROBOT :]
+    return model, *min(near, fit_from(model, begin, length, True), key=lambda one: _surprise(*one))
+
+
+def _surprise(result: Fit, weights: np.ndarray) -> float:
+    """Return the sum of squares of a fit; a reading that it leaves out counts as much as one that is left out must."""
+    return result.cost + LEAST_THRESHOLD**2 * float((weights == 0).sum())
 
 
 def _weighed(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
