@@ -64,8 +64,8 @@ def test_the_limit_is_in_report_and_figure(example):
     (curve,) = [each for each in limited(result, np.arange(10)) if each.name == "com_from_line"]
     assert (curve.unit, curve.high, curve.labels) == ("m", BOUND, ["platform"])
     np.testing.assert_allclose(curve.values[:, 0], from_line(result.audit.motion.pose[:10]), atol=1e-12)
-    titles = [axes.get_title(loc="left") for axes in result.figures()["limits"].axes]
-    assert any(title.startswith("com_from_line") for title in titles)
+    names = [text.get_text() for text in result.figures()["limits"].legends[0].get_texts()]
+    assert any(name.startswith("com from line (at most ") for name in names)
 
 
 def test_a_plan_with_the_limit_is_saved_and_its_page_written(example, tmp_path):
