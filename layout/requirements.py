@@ -16,7 +16,7 @@ Wrench = Pose  # six finite numbers
 NO_WRENCH: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 Axis = Literal["x", "y", "z"]
 Count = Annotated[Whole, Field(ge=1, le=100)]
-CableNumber = Annotated[Whole, Field(ge=0)]
+CableNumber = Annotated[Whole, Field(ge=1)]
 MOST_PAIRED = 8  # cables: 40 320 pairings
 MOST_ROWS = 20_000  # poses times wrenches of all requirements, of each of which the search computes a margin
 LEAST_MARGIN = 1.0  # [N]: a flat available wrench set has the margin 0, and a rounding error makes that positive
@@ -28,7 +28,7 @@ class Free(Part):
 
     part: Literal["anchor", "attachment", "t_min", "t_max"] = Field(description="kind of the numbers")
     cables: tuple[CableNumber, ...] | None = Field(
-        default=None, min_length=1, description="cables, counted from 0; default: all"
+        default=None, min_length=1, description="cables, counted from 1; default: all"
     )
     box: Box | None = Field(
         default=None,

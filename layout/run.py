@@ -95,7 +95,7 @@ def design(
             impossible, len(grid.pose_of), 0, 0, False,
         )  # fmt: skip
     if wanted.free[0].pairing:
-        cables = wanted.free[0].cables or tuple(range(chosen.m))
+        cables = tuple(number - 1 for number in wanted.free[0].cables or range(1, chosen.m + 1))
         attachment_of, count = best_pairing(chosen, grid, cables, wanted.clearance)
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
         return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)

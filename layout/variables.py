@@ -77,13 +77,13 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
         if free.copy_of is not None or free.pairing:
             continue
         bounds = _bounds(free)
-        for number, cable in enumerate(free.cables or range(robot.m)):
+        for number, cable in enumerate(free.cables or range(1, robot.m + 1)):
             rows = _rows(free.part, cable, robot.m)
             if number == 0 or not free.equal:
                 start = len(low)
                 low += [bound[0] for bound in bounds]
                 high += [bound[1] for bound in bounds]
-                names += [f"cables[{cable}].{free.part}{suffix}" for suffix in _suffixes(free)]
+                names += [f"cables[{cable - 1}].{free.part}{suffix}" for suffix in _suffixes(free)]
                 points.append(np.arange(start, len(low)))
             column_of |= {row: (column, 1.0) for row, column in zip(rows, points[-1], strict=True)}
     for free in requirements.free:
@@ -104,7 +104,7 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
     if not (t_min < lowest).all():
         cable = int(np.argmin(lowest - t_min))
         raise InputError(
-            f"free must keep t_min of cable {cable} below its t_max, got up to {t_min[cable]:g} and from "
+            f"free must keep t_min of cable {cable + 1} below its t_max, got up to {t_min[cable]:g} and from "
             f"{lowest[cable]:g} [N]"
         )
     return found
@@ -119,11 +119,9 @@ def _check(robot: Robot, requirements: Requirements) -> None:
             raise InputError(f"{where}.cables must be at most {MOST_PAIRED} for a pairing, got {count}")
         for name in ("cables", "copy_of"):
             for cable in getattr(free, name) or ():
-                if cable >= robot.m:
-                    raise InputError(
-                        f"{where}.{name} must be cables of the robot, 0 to {robot.m - 1}, got {shown(cable)}"
-                    )
-        for cable in free.cables or range(robot.m):
+                if cable > robot.m:
+                    raise InputError(f"{where}.{name} must be cables of the robot, 1 to {robot.m}, got {shown(cable)}")
+        for cable in free.cables or range(1, robot.m + 1):
             if (free.part, cable) in taken:
                 first = taken[free.part, cable]
                 raise InputError(f"{where} must not free {free.part} of cable {cable}, as free[{first}] does")
@@ -151,8 +149,8 @@ def _suffixes(free: Free) -> list[str]:
 
 
 def _rows(part: str, cable: int, m: int) -> list[int]:
-    """Return the rows of a layout that a number of a cable has."""
+    """Return the rows of a layout that a number of a cable has; cables are counted from 1."""
     if part in POINTS:
-        start = 3 * (m * POINTS.index(part) + cable)
+        start = 3 * (m * POINTS.index(part) + cable - 1)
         return [start, start + 1, start + 2]
-    return [(6 if part == "t_min" else 7) * m + cable]
+    return [(6 if part == "t_min" else 7) * m + cable - 1]

@@ -109,11 +109,11 @@ def test_derivatives_are_those_of_differences(name, seed):
     tilted = [[0.1, -0.2, 0.3]] if robot.dof_mask.all() else [[0, 0, 0]]
     requirements = {
         "free": [
-            {"part": "anchor", "cables": list(range(m - 1)), "box": box(robot.anchors)},
-            {"part": "anchor", "cables": [m - 1], "copy_of": [0], "mirrored": "x"},
+            {"part": "anchor", "cables": list(range(1, m)), "box": box(robot.anchors)},
+            {"part": "anchor", "cables": [m], "copy_of": [1], "mirrored": "x"},
             {"part": "attachment", "box": box(robot.attachments)},
             {"part": "t_max", "range": {"min": 300, "max": 900}, "equal": True},
-            {"part": "t_min", "cables": [0, 1], "range": {"min": 1, "max": 9}},
+            {"part": "t_min", "cables": [1, 2], "range": {"min": 1, "max": 9}},
         ],
         "require": [
             {"box": {"min": low.tolist(), "max": high.tolist()}, "grid": [2, 2, 2], "attitudes": tilted,
@@ -247,7 +247,7 @@ def test_the_best_pairing_is_that_of_brute_force(name, clearance):
     own[cables[0]], own[cables[1]], own[cables[2]] = cables[1], cables[2], cables[0]
     spoilt = with_attachments(robot, np.array(own))
     poses = robot.home + 0.1 * np.random.default_rng(2).normal(size=(12, 6)) * robot.dof_mask * [1, 1, 1, 0, 0, 0]
-    free = [{"part": "attachment", "cables": cables, "pairing": True}]
+    free = [{"part": "attachment", "cables": [cable + 1 for cable in cables], "pairing": True}]
     result = design(spoilt, free, [{"poses": poses.tolist()}], clearance=clearance)
     kept = np.flatnonzero(robot.dof_mask)
     w = (Dynamics(robot).required_wrench(poses[0], np.zeros(6), np.zeros(6)) * robot.wrench_scale)[kept]
@@ -290,8 +290,8 @@ def test_from_random_layouts_and_for_equal_and_mirrored_points():
     assert result.margin > result.margin_before
     box = around(robot.anchors)
     box["min"][0] = 0.5
-    right = [i for i in range(8) if robot.anchors[i, 0] > 0]
-    left = [i for i in range(8) if robot.anchors[i, 0] <= 0]
+    right = [i + 1 for i in range(8) if robot.anchors[i, 0] > 0]
+    left = [i + 1 for i in range(8) if robot.anchors[i, 0] <= 0]
     free = [
         {"part": "anchor", "cables": right, "box": box},
         {"part": "anchor", "cables": left, "copy_of": right, "mirrored": "x"},
@@ -299,7 +299,7 @@ def test_from_random_layouts_and_for_equal_and_mirrored_points():
     ]
     mirrored = design(robot, requirements=wanted(robot, time_limit=0.5) | {"free": free})
     anchors = mirrored.robot.anchors
-    np.testing.assert_allclose(anchors[left], anchors[right] * [-1, 1, 1], atol=1e-12)
+    np.testing.assert_allclose(anchors[np.array(left) - 1], anchors[np.array(right) - 1] * [-1, 1, 1], atol=1e-12)
     assert np.ptp(mirrored.robot.t_max) == 0
     np.testing.assert_array_equal(mirrored.robot.attachments, robot.attachments)
 
@@ -312,12 +312,13 @@ HOSTILE = [
     ({"free": [{"part": "anchor", "range": {"min": 0, "max": 1}}]}, "range must be left out"),
     ({"free": [{"part": "t_max", "range": {"min": -3, "max": 1}}]}, "negative"),
     ({"free": [{"part": "t_max", "range": {"min": 3, "max": 1}}]}, "min must be at most max"),
-    ({"free": [{"part": "t_min", "range": {"min": 100, "max": 900}}]}, "t_min of cable 0 below its t_max"),
+    ({"free": [{"part": "t_min", "range": {"min": 100, "max": 900}}]}, "t_min of cable 1 below its t_max"),
     ({"free": [{"part": "t_max", "cables": [9], "range": {"min": 50, "max": 60}}]}, "cables must be cables"),
-    ({"free": [{"part": "t_max", "cables": [0, 0], "range": {"min": 50, "max": 60}}]}, "each cable once"),
+    ({"free": [{"part": "t_max", "cables": [0], "range": {"min": 50, "max": 60}}]}, "greater than or equal to 1"),
+    ({"free": [{"part": "t_max", "cables": [1, 1], "range": {"min": 50, "max": 60}}]}, "each cable once"),
     ({"free": 2 * [{"part": "t_max", "range": {"min": 50, "max": 60}}]}, "as free.0. does"),
-    ({"free": [{"part": "anchor", "cables": [1], "copy_of": [0, 2]}]}, "as many cables"),
-    ({"free": [{"part": "anchor", "cables": [1], "copy_of": [0]}, {"part": "anchor", "cables": [2], "copy_of": [1]}]},
+    ({"free": [{"part": "anchor", "cables": [1], "copy_of": [2, 3]}]}, "as many cables"),
+    ({"free": [{"part": "anchor", "cables": [2], "copy_of": [1]}, {"part": "anchor", "cables": [3], "copy_of": [2]}]},
      "not copies themselves"),
     ({"free": [{"part": "anchor", "box": {"min": [0, 0, 0], "max": [-1, 1, 1]}}]}, "min must not exceed max"),
     ({"free": [{"part": "anchor", "box": {"min": [0, 0, 0], "max": [float("nan"), 1, 1]}}]}, "box.max"),
