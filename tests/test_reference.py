@@ -130,7 +130,7 @@ def test_every_row_of_reports_is_explained():
     flown = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 2, "base": {"kind": "free"}}
     motions = [(robot, {**rest, "wind": [1, 0, 0]}), (robot, side), (robot, turns), (team, flown)]
     plans = [plan(who, task) for who, task in motions]
-    assert len({found.status for found in plans}) > 1
+    assert [found.status for found in plans] == ["feasible", "infeasible", "feasible", "feasible"]
     runs = [simulate(robot, plans[0], duration=0.1), simulate(robot, plans[0], duration=0.1, events=["cut 1 at 0.02"])]
     names = {carrier.name for who in (robot, team) for carrier in who.carriers} | {""}
     for results, section in ((plans, "Plans"), (runs, "Simulations")):
