@@ -15,7 +15,9 @@ analysis", 2006, for the split; the derivative is CasADi's.
 
 import casadi as ca
 import numpy as np
+from numpy.typing import ArrayLike
 
+from . import points
 from .cables.elastic import axial_stiffness, unstrained_length
 from .cables.pulley import exit_points
 from .robot import Robot
@@ -53,22 +55,38 @@ def cable_stiffness(robot: Robot, A: Matrix, lengths: Matrix, tensions: Matrix) 
 
 
 def spatial_inertia(robot: Robot, pose: np.ndarray) -> np.ndarray:
-    """Return blockdiag(m, I) about the CoM in {G}, (6, 6) [kg, kg m^2]."""
-    from scipy.linalg import block_diag
+    """Return blockdiag(m, I) about the CoM in {G}, (..., 6, 6) [kg, kg m^2], at poses (..., 6)."""
+    R = points.rotations(pose[..., 3:])
+    M = np.zeros((*pose.shape[:-1], 6, 6))
+    M[..., :3, :3] = robot.platform.mass * np.eye(3)
+    M[..., 3:, 3:] = R @ robot.inertia @ R.swapaxes(-1, -2)
+    return M
 
-    R = rotation(ca.DM(pose)[3:6]).full()
-    return np.asarray(block_diag(robot.platform.mass * np.eye(3), R @ robot.inertia @ R.T))
+
+def whitening(robot: Robot, pose: np.ndarray) -> np.ndarray:
+    """Return C with C M C^T = 1 in the coordinates that move, (..., k, k), at poses (..., 6).
+
+    The eigenvalues of C K C^T are the squares of the natural frequencies [rad^2/s^2].
+    """
+    rows = np.flatnonzero(robot.dof_mask)
+    M = spatial_inertia(robot, pose)[..., rows[:, None], rows]
+    return np.linalg.inv(np.linalg.cholesky(M))
 
 
-def frequencies(K: np.ndarray, M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return natural frequencies [Hz], ascending, and modes (6, k) as twists, of motions in the span of `free` (6, k).
+def frequency(square: ArrayLike) -> np.ndarray:
+    """Return frequencies [Hz] from squares of angular ones [rad^2/s^2], negative for negative squares.
 
     An unstable motion has a negative frequency: minus the rate of growth over 2 pi.
     """
+    return np.sign(square) * np.sqrt(np.abs(square)) / (2 * np.pi)
+
+
+def frequencies(K: np.ndarray, M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return natural frequencies [Hz], ascending, and modes as twists, (6, k), of motions in the span of `free`."""
     from scipy.linalg import eigh
 
     if free.shape[1] == 0:
         return np.zeros(0), np.zeros((6, 0))
     symmetric = (K + K.T) / 2  # at an equilibrium K is symmetric; rounding and residual wrenches are cut off here
     squares, modes = eigh(free.T @ symmetric @ free, free.T @ M @ free)
-    return np.sign(squares) * np.sqrt(np.abs(squares)) / (2 * np.pi), free @ modes
+    return frequency(squares), free @ modes

@@ -43,7 +43,9 @@ PACKAGES = (
     "towline.control",
     "towline.simulation",
     "towline.viewer",
+    "towline.statics.natural_frequencies",
     "towline.statics.robust",
+    "towline.statics.stiffest",
 )
 EACH = 6  # wrong values for each parameter
 LONGEST = 500  # characters of a message; the lists of robots and of keys are long
@@ -79,6 +81,7 @@ NOT_CALLED = {
     "Parameter",
     "Sigma",
     "Slip",
+    "StiffestTensions",
     "ANSWERS",
     "Command",  # what an author of a controller gets and writes
     "Reference",
