@@ -31,7 +31,7 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
         *_of_exceptions(result),
         *_of_open(result),
     ]
-    return Report(about, "", summary, parts, drawings, [("The robot's file", to_yaml(result.robot))])
+    return Report(about, "", summary, parts, drawings, files=[("The robot's file", to_yaml(result.robot))])
 
 
 def headline(result: CalibrationData) -> str:
