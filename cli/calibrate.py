@@ -83,7 +83,7 @@ def calibrate(
     not converge, or validation samples fit worse than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
-    from ..estimation.calibration import mended
+    from ..estimation.calibration import corrected
     from ..estimation.logs import read_log
     from ..figures.style import FORMATS
     from ..models import load
@@ -102,7 +102,7 @@ def calibrate(
     read = read_log(log, stated, poses, loaded, fields)
     measurements = read.measurements
     if fix:
-        measurements, texts = mended(loaded, measurements)
+        measurements, texts = corrected(loaded, measurements)
         read.notes.extend(f"corrected: {text}" for text in texts)
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     text = result.report()  # before anything is written
@@ -116,7 +116,7 @@ def calibrate(
             typer.echo(f"  {note}")
     print_result(as_json, data, lambda: text, [*written.values(), *pictures])
     if result.refused:
-        hint = "; --fix corrects it" if result.doubt and result.mistake and result.mistake.mended else ""
+        hint = "; --fix corrects it" if result.doubt and result.mistake and result.mistake.corrected else ""
         typer.echo(f"towline: {target} is not written: {result.refused}{hint}", err=True)
         raise typer.Exit(1)
 

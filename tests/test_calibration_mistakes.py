@@ -1,4 +1,4 @@
-"""Mistakes of users: each is named by the file's robot and mended; a sound log draws no remark."""
+"""Mistakes of users: each is named by the file's robot and corrected; a sound log draws no remark."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import InputError
-from towline.estimation.calibration import Measurements, calibrate, mended, mistake
+from towline.estimation.calibration import Measurements, calibrate, corrected, mistake
 from towline.models import Dynamics, load, points
 
 from .recorded import motion, quaternions
@@ -91,13 +91,13 @@ def test_mistakes_are_named_and_mended(name):
         assert found is not None, what
         assert found.text.isprintable()
         assert found.severe or what.startswith("markers"), what
-        assert found.mended is not None, (what, found.text)
-        assert np.abs(found.mended.poses - poses)[:, :3].max() < 0.03 * length, (what, found.text)
-        apart = points.rotations(found.mended.poses[:, 3:]) - points.rotations(poses[:, 3:])
+        assert found.corrected is not None, (what, found.text)
+        assert np.abs(found.corrected.poses - poses)[:, :3].max() < 0.03 * length, (what, found.text)
+        apart = points.rotations(found.corrected.poses[:, 3:]) - points.rotations(poses[:, 3:])
         assert np.abs(apart).max() < 0.15, (what, found.text)
         # The factor of a drum is estimated, from anchors of the file.
-        np.testing.assert_allclose(found.mended.lengths, y, rtol=0.02 if "drum" in what else 1e-9, err_msg=what)
-        assert mistake(robot, found.mended) is None, what
+        np.testing.assert_allclose(found.corrected.lengths, y, rtol=0.02 if "drum" in what else 1e-9, err_msg=what)
+        assert mistake(robot, found.corrected) is None, what
 
 
 def test_sound_logs_draw_no_remark():
@@ -125,7 +125,7 @@ def test_sound_logs_draw_no_remark():
 def test_two_mistakes_at_once():
     robot, poses, y = a_log("cogiro", 1)
     given = poses * [1e3, 1e3, 1e3, 1, 1, 1]
-    measurements, texts = mended(robot, Measurements(1e3 * y[:, ::-1], given))
+    measurements, texts = corrected(robot, Measurements(1e3 * y[:, ::-1], given))
     assert len(texts) in (1, 2)
     np.testing.assert_allclose(measurements.poses, poses, atol=1e-9)
     np.testing.assert_allclose(measurements.lengths, y, atol=1e-9)
@@ -136,9 +136,9 @@ def test_equally_probable_errors_are_not_mended():
     turned = Rotation.from_euler("xyz", poses[:, 3:])
     log = Measurements(y, np.hstack([poses[:, :3], points.angles(turned.inv().as_matrix())]))
     found = mistake(robot, log)
-    if found is not None and found.mended is None:
-        with pytest.raises(InputError, match="must have one probable error to be mended, got several"):
-            mended(robot, log)
+    if found is not None and found.corrected is None:
+        with pytest.raises(InputError, match="must have one probable error to be corrected, got several"):
+            corrected(robot, log)
 
 
 def test_a_body_off_is_a_hint_in_the_report():

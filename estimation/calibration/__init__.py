@@ -6,7 +6,7 @@ from .calibration import Calibration
 from .cross_validation import Compared, HeldOut
 from .design import next_poses
 from .outliers import Outlier, Slip
-from .plausibility import Mistake, mended, mistake
+from .plausibility import Mistake, corrected, mistake
 from .result import Parameter
 from .run import calibrate
 
@@ -21,7 +21,7 @@ __all__ = [
     "Sigma",
     "Slip",
     "calibrate",
-    "mended",
+    "corrected",
     "mistake",
     "next_poses",
     "read_measurements",

@@ -52,14 +52,14 @@ class Mistake(NamedTuple):
     ----------
     text
         The error, in one line.
-    mended
+    corrected
         Measurements without it, or None if several errors are equally probable.
     severe
         True if a calibration would be wrong, False if it would only mean another frame than the file's.
     """
 
     text: str
-    mended: Measurements | None
+    corrected: Measurements | None
     severe: bool = True
 
 
@@ -131,17 +131,17 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
         lengths, y = _parts(log._replace(position=moved[0][rows], rotation=moved[1][rows]), Interpretation(""))
         size = _rms(_medians(lengths - y[order, order], len(rows)))
         if VERY_CLEARLY * size < min(as_given, best.size) and size < EXPLAINED * change:
-            return Mistake(_better(str(frames), as_given, size), _mended(given, *moved, order, 1.0))
+            return Mistake(_better(str(frames), as_given, size), _corrected(given, *moved, order, 1.0))
     if named:
         whole = log._replace(position=position, rotation=rotation, angles=angles)
-        mended = (
-            None if best.several else _mended(given, *whole.at(best.way), best.columns, best.signs * best.way.factor)
+        corrected = (
+            None if best.several else _corrected(given, *whole.at(best.way), best.columns, best.signs * best.way.factor)
         )
-        return Mistake(_better(best.text, as_given, best.size), mended)
+        return Mistake(_better(best.text, as_given, best.size), corrected)
     return None if far else _displaced(log, given, noise)
 
 
-def mended(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
+def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
     """Return measurements without their probable input errors, and these, one line each.
 
     Raises
@@ -154,10 +154,10 @@ def mended(robot: Robot, measurements: Measurements) -> tuple[Measurements, list
         found = mistake(robot, measurements)
         if found is None:
             break
-        if found.mended is None:
-            raise InputError(f"measurements must have one probable error to be mended, got several: {found.text}")
+        if found.corrected is None:
+            raise InputError(f"measurements must have one probable error to be corrected, got several: {found.text}")
         texts.append(found.text)
-        measurements = found.mended
+        measurements = found.corrected
     return measurements, texts
 
 
@@ -166,7 +166,7 @@ def _better(text: str, before: float, after: float) -> str:
     return f"{text}: with this corrected, lengths and poses agree {times} times better"
 
 
-def _mended(
+def _corrected(
     given: Measurements, position: np.ndarray, rotation: np.ndarray, columns: np.ndarray, factors: np.ndarray | float
 ) -> Measurements:
     poses = given.poses
@@ -186,8 +186,8 @@ def _displaced(log: _Log, given: Measurements, noise: float) -> Mistake | None:
         return None
     frames, before = found
     position, rotation, _ = measured_poses(log.robot, given)
-    mended = _mended(given, *frames.of(position, rotation), np.arange(log.robot.m), 1.0)
-    return Mistake(_better(str(frames), before, frames.size), mended, severe=False)
+    corrected = _corrected(given, *frames.of(position, rotation), np.arange(log.robot.m), 1.0)
+    return Mistake(_better(str(frames), before, frames.size), corrected, severe=False)
 
 
 def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], float]:
@@ -281,7 +281,7 @@ def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mista
         f"{robot.name} is about {quantity(length, 'm', digits=3)} long"
     )
     position, rotation, _ = measured_poses(robot, given)
-    return Mistake(text, _mended(given, position, rotation, np.arange(robot.m), 1e-3))
+    return Mistake(text, _corrected(given, position, rotation, np.arange(robot.m), 1e-3))
 
 
 def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
