@@ -150,6 +150,27 @@ INLINE num reserve(const gale_dual *g, int others, num *square) {
     return smaller(most, -least) / square_root(size);
 }
 
+/* The least reserve of the facets that decide, and of those whose columns nearly depend on each other. */
+typedef struct {
+    num sure, doubtful;
+} least_reserves;
+
+INLINE void start_least(least_reserves *least) { least->sure = least->doubtful = number(INFINITY); }
+
+/* Compute the reserve of a facet, and keep it if it is the least. */
+INLINE void take_reserve(const gale_dual *g, int others, num *value, least_reserves *least) {
+    num square;
+    *value = reserve(g, others, &square);
+    *value = where(square > DEPENDENT, *value, number(INFINITY));
+    least->sure = smaller(least->sure, where(square > DOUBTFUL, *value, number(INFINITY)));
+    least->doubtful = smaller(least->doubtful, where(square > DOUBTFUL, number(INFINITY), *value));
+}
+
+INLINE void refuse_unsure(const gale_dual *g, least_reserves *least) {
+    const num nearly = least->doubtful - 0.01 * magnitude(least->doubtful);
+    least->sure = where(g->singular | (nearly < least->sure), number(NAN), least->sure);
+}
+
 /* Compute the margins, and where `reserves` is not NULL those along all normals, in the order of `facets_of_rows`. */
 void FORM(margins_of_rows)(const towline_matrices *matrices, const double *w, ptrdiff_t w_per, const double *low,
                            const double *high, double *margins, double *reserves) {
@@ -167,23 +188,21 @@ void FORM(margins_of_rows)(const towline_matrices *matrices, const double *w, pt
         gather(demand, w, w_per, first, matrices->count, n);
         take_dual(&g, A, demand, low, high);
         take_minors(&g);
-        num sure = number(INFINITY), doubtful = number(INFINITY), square;
+        num value;
+        least_reserves least;
+        start_least(&least);
         for (ptrdiff_t k = 0; k < facets; k++) {
             int others = (1 << m) - 1;
             for (int i = 0; i < n - 1; i++) {
                 others &= ~(1 << columns[i]);
             }
-            num value = reserve(&g, others, &square);
-            value = where(square > DEPENDENT, value, number(INFINITY));
-            sure = smaller(sure, where(square > DOUBTFUL, value, number(INFINITY)));
-            doubtful = smaller(doubtful, where(square > DOUBTFUL, number(INFINITY), value));
+            take_reserve(&g, others, &value, &least);
             if (reserves) {
                 put(reserves + first * facets + k, &value, lanes, facets, 1);
             }
             next_subset(columns, n - 1, m);
         }
-        const mask unsure = g.singular | (doubtful - 0.01 * magnitude(doubtful) < sure);
-        sure = where(unsure, number(NAN), sure);
-        put(margins + first, &sure, lanes, 1, 1);
+        refuse_unsure(&g, &least);
+        put(margins + first, &least.sure, lanes, 1, 1);
     }
 }

@@ -144,7 +144,7 @@ INLINE num wrench_error(const demands *p, const matrices *M) {
 }
 
 /* Make tensions of s, inside their limits; return where their wrench is the one required, and the error. */
-INLINE mask judge(demands *p, const matrices *M, num *error) {
+INLINE void judge(demands *p, const matrices *M, mask *met, num *error) {
     num terms = number(0);
     for (int c = 0; c < M->m; c++) {
         const num moved = where(M->norm[c] > 0, p->s[c], number(0)); /* what does not pull stays at its reference */
@@ -153,7 +153,7 @@ INLINE mask judge(demands *p, const matrices *M, num *error) {
     }
     *error = wrench_error(p, M);
     const num rounded = p->rounded + smaller(terms, CANCELLED * p->required + p->rounded);
-    return *error <= FEASIBILITY * p->required + ROUNDING * rounded;
+    *met = *error <= FEASIBILITY * p->required + ROUNDING * rounded;
 }
 
 #endif

@@ -11,8 +11,9 @@ INLINE void put(double *to, const num *from, ptrdiff_t row, int lane, int size, 
 }
 
 /* Write what was found of the row of a lane, or nothing: it stays unsure. */
-INLINE void put_row(const towline_batch *batch, const demands *p, mask met, num error, ptrdiff_t row, int lane) {
-    const int soft = batch->rho > 0, good = p->good[lane] != 0, optimal = good && met[lane] != 0;
+INLINE void put_row(const towline_batch *batch, const demands *p, const mask *met, const num *error, ptrdiff_t row,
+                    int lane) {
+    const int soft = batch->rho > 0, good = p->good[lane] != 0, optimal = good && (*met)[lane] != 0;
     const int proven = p->proven[lane] != 0 && !optimal, solved = optimal || (soft && good);
     if (!solved && !proven) {
         return;
@@ -20,7 +21,7 @@ INLINE void put_row(const towline_batch *batch, const demands *p, mask met, num 
     const num info[2] = {p->support, p->shortfall};
     batch->status[row] = optimal ? TOWLINE_OPTIMAL : soft ? TOWLINE_INACCURATE : TOWLINE_INFEASIBLE;
     put(batch->tensions, p->s, row, lane, batch->m, solved);
-    put(batch->residual, &error, row, lane, 1, solved);
+    put(batch->residual, error, row, lane, 1, solved);
     put(batch->direction, p->d, row, lane, batch->n, proven);
     put(batch->info, info, row, lane, 2, proven);
 }
@@ -43,6 +44,7 @@ void FORM(solve_in_lanes)(const towline_batch *batch, ptrdiff_t rows) {
     const int shared = batch->A.per == 0 && batch->weights.per == 0 && batch->length.per == 0;
     matrices M;
     demands p;
+    mask met;
     num error;
     ptrdiff_t row[LANES], next = 0;
     int count, ready = 0;
@@ -60,9 +62,9 @@ void FORM(solve_in_lanes)(const towline_batch *batch, ptrdiff_t rows) {
         } else {
             solve_by_newton(&p, &M, batch->rho > 0 ? 1 / batch->rho : 0);
         }
-        const mask met = judge(&p, &M, &error);
+        judge(&p, &M, &met, &error);
         for (int lane = 0; lane < count; lane++) {
-            put_row(batch, &p, met, error, row[lane], lane);
+            put_row(batch, &p, &met, &error, row[lane], lane);
         }
     }
 }

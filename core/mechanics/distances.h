@@ -24,4 +24,13 @@ INLINE num segment_distance(const num *p, const num *p_end, const num *q, const 
     return square_root(dot(gap, gap));
 }
 
+/* The distances of all pairs of m cables from starts to ends, (m, 3) each, from the first and second to the last two. */
+INLINE void distances_of_pairs(int m, const num *starts, const num *ends, num *distance) {
+    for (int i = 0; i < m; i++) {
+        for (int j = i + 1; j < m; j++) {
+            *distance++ = segment_distance(ends + 3 * i, starts + 3 * i, ends + 3 * j, starts + 3 * j);
+        }
+    }
+}
+
 #endif

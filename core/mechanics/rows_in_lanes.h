@@ -67,11 +67,7 @@ void FORM(cable_distances_of_rows)(const towline_robot *robot, towline_places at
     for (ptrdiff_t first = 0; first < at.rows; first += LANES) {
         gather_places(robot, at, first, pose, carrier);
         ends_at(robot, pose, carrier, starts, ends);
-        for (int i = 0, pair = 0; i < m; i++) {
-            for (int j = i + 1; j < m; j++) {
-                distance[pair++] = segment_distance(ends + 3 * i, starts + 3 * i, ends + 3 * j, starts + 3 * j);
-            }
-        }
+        distances_of_pairs(m, starts, ends, distance);
         scatter(distances, distance, first, at.rows, pairs);
     }
 }

@@ -1,7 +1,9 @@
 /* Include this first in a file whose functions serve processors with AVX2. */
 #include "numbers/processor.h"
 
-#ifdef __clang__ /* makes instructions of vectors after inlining, GCC before */
+/* Clang makes instructions of vectors after inlining, GCC before. With Clang only pointers to vectors may be passed to
+ * functions by one of `FORM`, since these functions are not compiled for the processor by themselves. */
+#ifdef __clang__
 #define FORM(name) __attribute__((target("avx2"))) name##_avx2
 #elif defined(TOWLINE_X86)
 #pragma GCC target("avx2")
