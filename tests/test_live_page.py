@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from towline.errors import InputError
+from towline.figures.tension_colours import shades
 from towline.models import Dynamics, load
 from towline.solvers import capacity_margin, solve
 from towline.statics.distribution import pose_problem
@@ -166,6 +168,19 @@ def test_a_pose_without_tensions_says_why(opened):
     assert page.locator("#cables td:nth-child(2)").all_inner_texts() == ["none"] * robot.m
     page.click("#home")
     assert page.inner_text("#verdict") == "Tensions inside the limits hold the platform here."
+
+
+def test_a_saved_picture_is_twice_as_fine_with_verdict_and_scale(opened, tmp_path):
+    page = opened("cogiro")
+    with page.expect_download() as download:
+        page.click("#save")
+    download.value.save_as(tmp_path / "cogiro.png")
+    picture, box = Image.open(tmp_path / "cogiro.png").convert("RGB"), page.locator("canvas").bounding_box()
+    assert picture.size == (2 * box["width"], 2 * box["height"])
+    darkest = picture.getpixel((2 * (12 + 3 * 64 + 1), picture.height - 2 * 29))
+    assert darkest == pytest.approx(shades(np.array(1.0)), abs=5)
+    above = np.asarray(picture)[: 2 * 24, : 2 * 300]
+    assert (above.min(axis=2) < 100).sum() > 200  # the verdict
 
 
 def test_an_instant_takes_less_than_a_frame(opened):

@@ -191,9 +191,9 @@ function run({ at, rest }) {
     return { to, eye, right, up, scale, width, height };
   }
 
-  function draw() {
+  function draw(ratio = window.devicePixelRatio || 1) {
     drawing = false;
-    const ratio = window.devicePixelRatio || 1, style = getComputedStyle(document.documentElement);
+    const style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(`--${name}`).trim();
     if (canvas.width !== Math.round(canvas.clientWidth * ratio) || canvas.height !== Math.round(canvas.clientHeight * ratio)) {
       canvas.width = Math.round(canvas.clientWidth * ratio), canvas.height = Math.round(canvas.clientHeight * ratio);
@@ -306,7 +306,7 @@ function run({ at, rest }) {
   }
 
   function redraw() {
-    if (!drawing) drawing = true, requestAnimationFrame(draw);
+    if (!drawing) drawing = true, requestAnimationFrame(() => draw());
   }
 
   // ---- pointer ----
@@ -406,11 +406,18 @@ function run({ at, rest }) {
   $("hang").checked = DATA.few && DATA.weight;
   $("hang").onchange = () => update(false);
   $("home").onclick = () => go(home.pose, home.carriers);
+  // Twice as fine as the screen, with the verdict and the scale of the colours.
   $("save").onclick = () => {
-    draw();
+    draw(2);
+    const { height } = projection;
+    ink.textAlign = "left", ink.fillText(`${DATA.name}: ${$("verdict").textContent} ${$("margins").textContent}`, 12, 16);
+    DATA.shades.forEach((hue, i) => { ink.fillStyle = hue, ink.fillRect(12 + 3 * i, height - 34, 3, 10); });
+    ink.fillStyle = getComputedStyle(document.body).color;
+    ink.fillText("t_min", 12, height - 12), ink.fillText("t_max", 12 + 3 * DATA.shades.length - 30, height - 12);
     const link = document.createElement("a");
     link.href = canvas.toDataURL("image/png"), link.download = `${DATA.name}.png`;
     link.click();
+    redraw();
   };
   new ResizeObserver(redraw).observe(canvas);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
