@@ -18,6 +18,7 @@ LABELS = {
     "tensions": ("tension [N]", 1.0),
     "lengths": ("length [mm]", 1e3),
 }
+VECTORS = ("position", "rotation")
 
 
 def replay(
@@ -51,8 +52,8 @@ def replay(
         for values, index, label in curves:
             for k, (at, window) in enumerate(zip(times, values, strict=True)):
                 look: dict[str, Any] = style.look(index) | {"linewidth": 0.9}
-                ax.plot(at, scale * _size(window), **look, label=label if k == 0 else None)
-        usual = np.sqrt(part.shape[-1]) if name in ("position", "rotation") else 1.0
+                ax.plot(at, scale * _size(name, window), **look, label=label if k == 0 else None)
+        usual = np.sqrt(np.isfinite(part).any(axis=(0, 1)).sum()) if name in VECTORS else 1.0
         ax.axhline(scale * usual * noise[name], color="#444444", linewidth=0.8, linestyle=":", label="noise, rms")
         ax.set_ylim(bottom=0.0)
     style.heading(panels[0], title)
@@ -60,7 +61,10 @@ def replay(
     return canvas
 
 
-def _size(values: np.ndarray) -> np.ndarray:
-    """Return the length of vectors (S, 3), or the root mean square over the cables (S, m)."""
-    squares = np.square(values)
-    return np.sqrt(np.sum(squares, axis=-1) if values.shape[-1] == 3 else np.mean(squares, axis=-1))
+def _size(name: str, values: np.ndarray) -> np.ndarray:
+    """Return the length of vectors (S, 3), or the root mean square over the cables (S, m).
+
+    Coordinates that do not move are nan and are left out; samples without any number stay nan.
+    """
+    squares, known = np.nan_to_num(np.square(values)).sum(axis=-1), np.isfinite(values).any(axis=-1)
+    return np.sqrt(np.where(known, squares / (1 if name in VECTORS else values.shape[-1]), np.nan))

@@ -28,6 +28,7 @@ BELOW = 0.03  # of the robot's size: how far the floor is below its lowest point
 CELLS = 10  # of the floor along the robot's size, about
 PARTS = 8  # of a cable, so that it is before one body and behind another
 HIGH, BARS, AIR = 2.7, 0.9, 0.04  # inches, of which title, scale and legend; share of the picture around the robot
+NARROW = 0.2  # of the picture: an axis with one number
 FLAT = 1e-6  # of the robot's size
 IN_ORDER = 3  # above the floor
 FLOOR, POST, BODY = "#e2e2e2", "#8a8a8a", "#b4b4b4"
@@ -170,16 +171,18 @@ def _draw_floor(ax: Axes, seen: Any, low: np.ndarray, high: np.ndarray, floor: f
 
 def _fit(ax: Axes, shown: np.ndarray, flat: bool) -> None:
     """Leave air around the robot, and, in space, no axes."""
-    from matplotlib.ticker import MaxNLocator
+    from matplotlib.ticker import FixedLocator, MaxNLocator
 
     ax.set_aspect("equal", adjustable="box")
     low, high = shown.min(axis=0), shown.max(axis=0)
-    air = AIR * float((high - low).max())
+    size = float((high - low).max())
+    air = AIR * size
     ax.set_xlim(low[0] - air, high[0] + air)
     ax.set_ylim(low[1] - air, high[1] + air)
     if flat:
-        for axis in (ax.xaxis, ax.yaxis):
-            axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+        for axis, start, end in zip((ax.xaxis, ax.yaxis), low, high, strict=True):
+            narrow = end - start < NARROW * size  # several numbers would overlap
+            axis.set_major_locator(FixedLocator([start]) if narrow else MaxNLocator(5, steps=[1, 2, 5, 10]))
     else:
         ax.set_axis_off()
         ax.set_xticks([])

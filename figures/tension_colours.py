@@ -23,6 +23,7 @@ FINEST = 0.01  # of t_max
 PALEST = 0.12  # of the colour map: paler lines cannot be seen on white
 NO_TENSION = "#999999"
 APART = 0.11  # of the scale: labels that are closer overlap
+LETTER = 0.012  # of the scale: half the width of a letter of a label
 
 
 def place(tensions: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> np.ndarray:
@@ -64,8 +65,10 @@ def mark(bar: Colorbar, t_min: np.ndarray, t_max: np.ndarray, size: float) -> No
         exponents = range(int(np.floor(np.log10(FINEST * t_max[0]))), int(np.ceil(np.log10(t_max[0]))) + 1)
         for tension in (step * 10.0**exponent for exponent in exponents for step in (1, 2, 5)):
             at = float(place(np.array([tension]), t_min[:1], t_max[:1])[0])
-            if t_min[0] < tension < t_max[0] and min(abs(at - other) for other in places) > APART:
-                places[at] = quantity(tension, digits=3)
+            text = quantity(tension, digits=3)
+            near = (abs(at - other) < max(APART, LETTER * (len(text) + len(name))) for other, name in places.items())
+            if t_min[0] < tension < t_max[0] and not any(near):
+                places[at] = text
     bar.set_ticks(list(places), labels=list(places.values()))
     bar.ax.tick_params(labelsize=size)
 

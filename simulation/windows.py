@@ -78,7 +78,7 @@ class Windows:
         self.usual = Parameters(friction=friction_of(self.robot))
         self._known = np.asarray(np.isfinite(recorded.pose).all(axis=1))
         if self._known.sum() < FEWEST:
-            raise InputError(f"must have a pose at {FEWEST} times or more, got {int(self._known.sum())}")
+            raise InputError(f"log must have a pose at {FEWEST} times or more, got {int(self._known.sum())}")
         self._track, neighbours = track_of(times, recorded.pose)
         self._rotation = points.rotations(np.where(self._known[:, None], recorded.pose[:, 3:], 0.0))  # (N, 3, 3)
         self._carriers = self._carrier_tracks()
@@ -112,10 +112,12 @@ class Windows:
             wanted = [drive] if drive in kinds else [*(["lengths"] if elastic else []), "tensions", "lengths"]
             found = [(name, values) for name in wanted if (values := kinds[name]) is not None]
             if not found:
-                raise InputError(f"must have {' or '.join(dict.fromkeys(wanted))} of the cables for a replay, got none")
+                raise InputError(f"log must have {' or '.join(dict.fromkeys(wanted))} of the cables, got none")
             (self.drive, self._command), self.measured_command = found[0], True
         if drive == "forces" and self.drive != drive:
-            raise InputError("must have commanded tensions, and the robot a winch for each cable, for the drive forces")
+            raise InputError(
+                "drive forces must have commanded tensions, and the robot a winch for each cable, got others"
+            )
 
     def _carrier_tracks(self) -> dict[int, PoseTrack]:
         tracks, of = {}, self.recorded
@@ -123,7 +125,7 @@ class Windows:
             if carrier.free_coordinates(of.robot.drive):
                 known, name = int(np.isfinite(of.carrier_pose[:, index]).all(axis=1).sum()), carrier.name
                 if known < FEWEST:
-                    raise InputError(f"must have poses of carrier {name} ({name}_x, ..., {name}_qw), got {known}")
+                    raise InputError(f"log must have poses of carrier {name} ({name}_x, ..., {name}_qw), got {known}")
                 tracks[index] = track_of(of.times, of.carrier_pose[:, index])[0]
         return tracks
 
@@ -135,7 +137,7 @@ class Windows:
         gaps = np.concatenate([[0], np.cumsum(np.diff(times) > max(GAP * apart, MARGIN))])
         starts = starts[(last - first >= FEWEST) & (gaps[last - 1] == gaps[np.maximum(first - 1, 0)])]
         if not len(starts):
-            raise InputError(f"must have poses without a gap for a window of {self.window:g} s or longer, got none")
+            raise InputError(f"log must have poses without a gap for {self.window:g} s (window) or longer, got none")
         if len(starts) > MOST_WINDOWS:
             self.notes.append(f"{MOST_WINDOWS} of {len(starts)} windows are used, evenly spread")
             starts = starts[np.linspace(0, len(starts) - 1, MOST_WINDOWS).astype(int)]
@@ -162,7 +164,9 @@ class Windows:
         left_out |= set() if of.measured[3:].any() else {"rotation"}
         noise = {name: value for name, value in noise.items() if name not in left_out}
         if not noise:
-            raise InputError("must have poses, tensions or lengths that are not commanded to compare with, got none")
+            raise InputError(
+                "log must have poses, or tensions or lengths that do not drive the plant, to compare, got none"
+            )
         return noise
 
     def shaken(self) -> Windows:

@@ -200,6 +200,34 @@ def test_a_link_with_another_pose_opens_at_home(opened, after):
     assert page.evaluate("towline.state.pose") == robot.home.tolist()
 
 
+@pytest.mark.parametrize(
+    ("size", "force", "limits", "z"), [(1e-3, 1e-5, "mN", "0.00075 m"), (100, 1e6, "MN", "75.000 m")]
+)
+def test_robots_of_other_sizes_have_numbers_that_can_be_read(browser, tmp_path, size, force, limits, z):
+    robot = load("planar-4")
+    data = robot.model_dump(mode="json")
+    data["platform"] |= {
+        "mass": force * robot.platform.mass,
+        "inertia": [force * size**2 * one for one in data["platform"]["inertia"]],
+        "home": [size * one for one in robot.home[:3]] + [0, 0, 0],
+    }
+    for cable in data["cables"]:
+        cable |= {name: [size * one for one in cable[name]] for name in ("anchor", "attachment")}
+        cable |= {name: force * cable[name] for name in ("t_min", "t_max")}
+    page = browser.new_page()
+    page.goto(save_page(Subject("sized", type(robot).model_validate(data)), tmp_path / "sized.html").as_uri())
+    page.wait_for_function("window.towline")
+    prefix, wanted = limits[0], solve(pose_problem(Dynamics(robot), robot.home)).tensions
+    unit = {"m": 1e-3, "M": 1e6}[prefix]
+    assert page.locator("#cables td:nth-child(2)").all_inner_texts() == [
+        f"{force / unit * t:.2f} {limits}" for t in wanted
+    ]
+    assert page.inner_text("#limits") == f"limits [{limits}]"
+    assert page.locator("#cables td:last-child").first.inner_text() == f"{5 * force / unit:g} to {200 * force / unit:g}"
+    assert z in page.locator("output").all_inner_texts()
+    page.close()
+
+
 def test_names_from_files_stay_text(tmp_path):
     robot = load("planar-4").model_copy(update={"name": "</script><b>"})
     page = save_page(Subject("</script><b>&", robot), tmp_path / "page.html").read_text()

@@ -114,6 +114,28 @@ def test_the_right_model_leaves_the_noise(kind, logs):
     assert all(rms[name] < 1.5 * noise[name] for name in rms)
     assert rms["position"] < 2 * NOISE["pose"]
     assert "the model does what the robot did" in result.report()
+    assert "input error" not in result.report()
+    # Of a robot in a plane, x and z are drawn, and its pitch.
+    position, rotation = result.figures()["replay"].axes[:2]
+    first, line = position.lines[0].get_ydata(), position.lines[-1].get_ydata()
+    np.testing.assert_allclose(first, 1e3 * np.hypot(*result.residuals["position"][0][:, [0, 2]].T))
+    assert line[0] == pytest.approx(1e3 * np.sqrt(2) * noise["position"])
+    np.testing.assert_allclose(rotation.lines[0].get_ydata(), 1e3 * abs(result.residuals["rotation"][0][:, 1]))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        (lambda lengths: {name: 1e3 * one for name, one in lengths.items()}, "millimetres"),
+        (lambda lengths: dict(zip(lengths, [lengths[f"l{i} [m]"] for i in (1, 0, 2, 3)], strict=True)), "l0 and l1 look exchanged"),
+    ],
+)
+def test_an_input_error_of_the_log_is_named(wrong, text, tmp_path):
+    found = columns("tensions", every("tensions", 50))
+    found |= wrong({name: one for name, one in found.items() if name.startswith("l")})
+    report = replay("planar-4", written(tmp_path / "wrong.csv", found)).report()
+    assert "the log probably has an input error: " in report
+    assert text in report
 
 
 CASES = [

@@ -14,6 +14,7 @@ from ...base.errors import InputError
 from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
+from ..calibration.plausibility import mistake
 from ..pose.from_log import lengths_of, poses_from_log
 from .mapping import Field, Fields, LogMap, carrier_fields, command_fields, read_map
 from .reading import Log, Paths, Reader, at_times, read_log
@@ -121,6 +122,9 @@ def read_recorded(
         if found.commands and found.commands == read.fields.tensions:
             tensions = None
         pose, known_part = _poses(known, read, notes)
+        if lengths is not None and not any(carrier.moves for carrier in known.carriers):
+            wrong = mistake(known, measured)
+            notes.extend([f"the log probably has an input error: {wrong.text}"] if wrong and wrong.severe else [])
         carrier_pose, thrusts = _carriers(known, read.recordings, given, times)
         flying = [i for i, carrier in enumerate(known.carriers) if carrier.actuators]
         if found.thrusts and not np.isfinite(thrusts).any():

@@ -25,14 +25,17 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
 const norm = (a) => Math.sqrt(dot(a, a));
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 const triple = (numbers, i) => Array.from(numbers.slice(3 * i, 3 * i + 3));
+const PREFIXES = [["G", 1e9], ["M", 1e6], ["m", 1e-3], ["u", 1e-6], ["n", 1e-9]];
 const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 
-// Four digits, no exponent, as base/text.py writes numbers in this range.
+// Four digits, or two of a very small number, no exponent, as base/text.py writes numbers.
 function quantity(value, unit) {
   if (!Number.isFinite(value)) return "-";
-  const [whole, part] = String(Number(value.toPrecision(4))).split(".");
+  const size = Math.abs(value), small = size > 0 && size < 1e-3;
+  const [prefix, scale] = small || size >= 1e7 ? PREFIXES.find(([, one]) => size >= (small ? 0.1 : 1) * one) || ["", Infinity] : ["", 1];
+  const [whole, part] = String(Number((value / scale).toPrecision(small ? 2 : 4))).split(".");
   const grouped = whole.replace(/^-?\d{5,}$/, (all) => all.replace(/\B(?=(\d{3})+$)/g, "\u00a0"));
-  return `${grouped}${part ? "." + part : ""} ${unit}`;
+  return `${grouped}${part ? "." + part : ""} ${prefix}${unit}`;
 }
 
 // Where a body's frame at a pose has its points, R = Rz(yaw) Ry(pitch) Rx(roll).
@@ -122,10 +125,13 @@ function run({ at, rest }) {
   const owner = (slider) => (slider.carrier === null ? state.pose : state.carriers[slider.carrier]);
 
   // ---- panel ----
+  const strongest = Math.max(...DATA.t_max);
+  const [prefix, newton] = strongest < 1 || strongest >= 1e7 ? PREFIXES.find(([, one]) => strongest >= one) || ["", 1] : ["", 1];
+  $("limits").textContent = `limits [${prefix}N]`;
   const rows = DATA.t_min.map((low, i) => {
     const row = $("cables").insertRow();
     row.innerHTML = `<td>${i + 1}</td><td></td><td><div class="track"><div class="bar"></div></div></td>` +
-      `<td>${Number(low.toPrecision(4))} to ${Number(DATA.t_max[i].toPrecision(4))}</td>`;
+      `<td>${Number((low / newton).toPrecision(4))} to ${Number((DATA.t_max[i] / newton).toPrecision(4))}</td>`;
     return { text: row.cells[1], bar: row.querySelector(".bar") };
   });
   const sliders = DATA.sliders.map((slider, i) => {
@@ -167,14 +173,15 @@ function run({ at, rest }) {
     $("proof").textContent = instant && instant.certificate ? described(instant.certificate) : "";
     tensions.forEach((t, i) => {
       const there = place(t, DATA.t_min[i], DATA.t_max[i]);
-      rows[i].text.textContent = Number.isNaN(t) ? "none" : `${t.toFixed(2)} N`;
+      rows[i].text.textContent = Number.isNaN(t) ? "none" : `${(t / newton).toFixed(2)} ${prefix}N`;
       rows[i].bar.style.width = `${Number.isNaN(t) ? 0 : 100 * there}%`;
       rows[i].bar.style.background = shade(there);
     });
     for (const { slider, input, shown } of sliders) {
       const value = owner(slider)[slider.coordinate];
       if (document.activeElement !== input || Number(input.value) !== value) input.value = value;
-      shown.textContent = `${(Math.round(1000 * value) / 1000 + 0).toFixed(3)} ${slider.coordinate < 3 ? "m" : "rad"}`;
+      const digits = Math.max(3, -Math.round(Math.log10(slider.step)));
+      shown.textContent = `${(Number(value.toFixed(digits)) + 0).toFixed(digits)} ${slider.coordinate < 3 ? "m" : "rad"}`;
     }
   }
 
