@@ -15,10 +15,12 @@ from ..base.inputs import number
 from . import film, style
 from .cut_cables import drawn_ends
 from .hull import faces
-from .robot import box_edges
+from .perspective import Perspective
+from .robot import BODY, POST, box_edges
 from .tension_colours import mark, place, scale, shades
 
 SIZE = (7.0, 5.2)  # [inches]
+AIR = 0.03  # share of the picture around the robot
 DPI = 100  # an even number of pixels in each direction, which MP4 requires
 MOST_FRAMES = 3000
 TORN = 0.6  # the grey of a cable that has been cut
@@ -105,7 +107,10 @@ class _Stage:
         self._figure = style.figure(*SIZE)
         self._figure.set_dpi(DPI)
         self._canvas = FigureCanvasAgg(self._figure)
-        self._axes = style.axes_in_space(self._figure, text=10.0)
+        corners = [np.array(box) for box in scene.boxes]
+        parts = (scene.anchors, scene.attachments, scene.platform, scene.path, scene.carriers, scene.rotors, *corners)
+        self._seen = Perspective(np.vstack([np.reshape(part, (-1, 3)) for part in parts]), standing=not scene.names)
+        self._ax = style.axes(self._figure, "x [m]", "z [m]") if self._seen.flat else self._figure.add_subplot()
         self._draw_surroundings()
         self._make_actors()
         self._canvas.draw()
@@ -113,109 +118,84 @@ class _Stage:
 
     def frame(self, k: int) -> np.ndarray:
         """Return the k-th frame, (height, width, 3) of bytes."""
-        scene = self._scene
+        scene, seen = self._scene, self._seen
         self._canvas.restore_region(self._still)
-        self._trail.set_data_3d(*scene.path[scene.path_times <= self._when.times[k] + 1e-9].T)
-        self._platform.set_points(scene.platform[k])
-        for body, cables in zip(self._bodies, scene.bodies, strict=True):
-            body.set_points(scene.anchors[k, cables])
+        self._trail.set_data(*seen(scene.path[scene.path_times <= self._when.times[k] + 1e-9]).T)
+        bodies = [(scene.platform[k], style.colour(4), self._faces[0])]
+        bodies += [
+            (scene.anchors[k, cables], BODY, found) for cables, found in zip(scene.bodies, self._faces[1:], strict=True)
+        ]
+        sides = [(corners[face], colour) for corners, colour, found in bodies for face in found]
+        sides.sort(key=lambda side: -seen.depth(side[0]))  # nearer ones cover farther ones
+        self._bodies.set_verts([seen(corners) for corners, _ in sides])
+        self._bodies.set_facecolor([colour for _, colour in sides])
         for label, at in zip(self._labels, scene.carriers[k], strict=True):
-            label.set_position_3d(at)
-        self._rotors.set_segments(scene.rotors[min(k, len(scene.rotors) - 1)])
+            label.set_position(tuple(seen(at)))
+        self._rotors.set_segments(list(seen(scene.rotors[min(k, len(scene.rotors) - 1)])))
         gone = None if scene.cut is None else scene.cut[k]
-        ends = drawn_ends(scene.anchors[k], scene.attachments[k], gone)
-        self._cables.set_segments(np.stack([scene.anchors[k], ends], axis=1))
+        ends = seen(drawn_ends(scene.anchors[k], scene.attachments[k], gone))
+        self._cables.set_segments(list(np.stack([seen(scene.anchors[k]), ends], axis=1)))
         there = np.isfinite(scene.tensions[k]).all()
         tensions = scene.tensions[k] if there else np.full_like(scene.tensions[k], np.nan)
         colours = shades(place(tensions, scene.t_min, scene.t_max)) / 255.0
         self._cables.set_color(colours if gone is None else np.where(gone[:, None], TORN, colours))
         self._cables.set_linestyle("-" if there else "--")
+        self._dots.set_data(*np.vstack([seen(scene.anchors[k]), ends]).T)
         self._clock.set_text(f"t = {self._when.times[k]:.2f} s" + ("" if there else "\nno tensions\ninside the limits"))
-        shapes = [artist for body in (*self._bodies, self._platform) for artist in body.artists]
-        for artist in (self._trail, *shapes, self._rotors, self._cables, *self._labels):
-            if hasattr(artist, "do_3d_projection"):
-                artist.do_3d_projection()
-            self._axes.draw_artist(artist)
+        for artist in (self._trail, self._bodies, self._rotors, self._cables, self._dots, *self._labels):
+            self._ax.draw_artist(artist)
         self._figure.draw_artist(self._clock)
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _draw_surroundings(self) -> None:
-        """Draw axes, paths of platform and carriers, boxes, and the colour bar with the limits."""
-        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+        """Draw floor, posts, paths of platform and carriers, boxes, and the colour bar with the limits."""
+        from matplotlib.collections import LineCollection
 
-        scene, ax = self._scene, self._axes
-        (path,) = ax.plot(*scene.path.T, color="#bbbbbb", linewidth=1.0, label="path of the platform")
-        named = [path]
+        scene, ax, seen = self._scene, self._ax, self._seen
+        seen.fit(ax, AIR)
+        (path,) = ax.plot(*seen(scene.path).T, color="#bbbbbb", linewidth=1.2, label="path of the platform")
+        named: list[Any] = [path]
         for index in range(len(scene.names)):
-            (dotted,) = ax.plot(*scene.carriers[:, index].T, color="#999999", linewidth=0.8, linestyle=":")
+            (dotted,) = ax.plot(*seen(scene.carriers[:, index]).T, color="#999999", linewidth=0.8, linestyle=":")
             dotted.set_label("path of a carrier")
             if len(named) == 1 and np.ptp(scene.carriers[:, index], axis=0).max() > 1e-9:
                 named.append(dotted)
         resting = np.setdiff1d(np.arange(scene.anchors.shape[1]), np.concatenate([*scene.bodies, np.array([], int)]))
-        if resting.size:
-            ax.plot(*scene.anchors[0, resting].T, "o", color="#000000", markersize=3.5)
+        for anchor in scene.anchors[0, resting]:
+            if anchor[2] > seen.floor:
+                ax.plot(*seen(np.array([anchor, [*anchor[:2], seen.floor]])).T, color=POST, linewidth=1.0)
         edges = [edge for low, high in scene.boxes for edge in box_edges(low, high)]
         if edges:
-            reach = Line3DCollection(edges, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
-            named.append(ax.add_collection3d(reach))
-        corners = [corner for box in scene.boxes for corner in box]
-        shown = (
-            scene.anchors,
-            scene.attachments,
-            scene.platform,
-            scene.path,
-            scene.carriers,
-            scene.rotors,
-            np.array(corners),
-        )
-        style.equal_scales(ax, np.vstack([points.reshape(-1, 3) for points in shown]), zoom=1.0)
-        outlines = _inside(scene.obstacles, np.array([ax.get_xlim(), ax.get_ylim(), ax.get_zlim()]).T)
+            lines = [seen(edge) for edge in edges]
+            reach = LineCollection(lines, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
+            named.append(ax.add_collection(reach, autolim=False))
+        outlines = _inside(scene.obstacles, np.array([seen.low, seen.high]))
         if outlines:
-            keep_out = Line3DCollection(outlines, colors=style.colour(1), linewidths=0.8, label="keep out")
-            named.append(ax.add_collection3d(keep_out, autolim=False))
-        ax.legend(handles=named, fontsize="x-small", loc="upper left")
+            lines = [seen(line) for line in outlines]
+            keep_out = LineCollection(lines, colors=style.colour(1), linewidths=0.8, label="keep out")
+            named.append(ax.add_collection(keep_out, autolim=False))
+        self._figure.legend(handles=named, fontsize="x-small", loc="outside lower left", ncols=4, frameon=False)
         speed = "real time" if self._when.speed == 1 else f"{self._when.speed:g} x real time"
         ax.set_title(f"{scene.title} ({speed})", fontsize=10)
-        bar = self._figure.colorbar(scale(), ax=ax, shrink=0.7, pad=0.12, label="tension [N] from t_min to t_max")
+        bar = self._figure.colorbar(scale(), ax=ax, shrink=0.7, pad=0.04, label="tension [N] from t_min to t_max")
         mark(bar, scene.t_min, scene.t_max, 8)
 
     def _make_actors(self) -> None:
-        from mpl_toolkits.mplot3d.art3d import Line3DCollection
+        from matplotlib.collections import LineCollection, PolyCollection
 
-        scene, ax = self._scene, self._axes
-        (self._trail,) = ax.plot(*scene.path[:1].T, color=style.colour(0), linewidth=1.8, animated=True)
-        self._platform = _Body(ax, scene.platform[0], style.colour(4), style.colour(0))
-        self._bodies = [_Body(ax, scene.anchors[0, cables], "#dddddd", "#000000") for cables in scene.bodies]
-        circles = Line3DCollection(scene.rotors[0], colors="#000000", linewidths=0.8, animated=True)
-        self._rotors: Any = ax.add_collection3d(circles, autolim=False)
-        segments = np.stack([scene.anchors[0], scene.attachments[0]], axis=1)
-        self._cables: Any = ax.add_collection3d(Line3DCollection(segments, linewidths=2.2, animated=True))
-        self._labels = [
-            ax.text(*at, f" {name}", fontsize=8, animated=True)
-            for at, name in zip(scene.carriers[0], scene.names, strict=True)
-        ]
+        scene, ax = self._scene, self._ax
+        (self._trail,) = ax.plot([], [], color=style.colour(0), linewidth=1.8, animated=True)
+        (self._dots,) = ax.plot([], [], "o", color="#000000", markersize=2.5, animated=True)
+        self._faces = [faces(scene.platform[0]), *(faces(scene.anchors[0, cables]) for cables in scene.bodies)]
+        self._bodies: Any = ax.add_collection(
+            PolyCollection([], edgecolor="#444444", linewidths=0.6, alpha=0.85, animated=True), autolim=False
+        )
+        self._rotors: Any = ax.add_collection(
+            LineCollection([], colors="#000000", linewidths=0.9, animated=True), autolim=False
+        )
+        self._cables: Any = ax.add_collection(LineCollection([], linewidths=2.2, animated=True), autolim=False)
+        self._labels = [ax.text(0.0, 0.0, f" {name}", fontsize=8, animated=True) for name in scene.names]
         self._clock = self._figure.text(0.98, 0.03, "", fontsize=10, ha="right", animated=True)
-
-
-class _Body:
-    """Points that move together: dots, and the faces of their hull where they have one."""
-
-    def __init__(self, ax: Any, points: np.ndarray, face: str, edge: str):
-        from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-        self._faces = faces(points)
-        (self._dots,) = ax.plot(*points.T, "o", color=edge, markersize=3.5, animated=True)
-        self.artists: list[Any] = [self._dots]
-        if self._faces:
-            corners = [points[face_of] for face_of in self._faces]
-            self._hull = Poly3DCollection(corners, facecolor=face, edgecolor=edge, alpha=0.6, animated=True)
-            self.artists.insert(0, ax.add_collection3d(self._hull))
-
-    def set_points(self, points: np.ndarray) -> None:
-        """Move the points."""
-        self._dots.set_data_3d(*points.T)
-        if self._faces:
-            self._hull.set_verts([points[face] for face in self._faces])
 
 
 def _inside(places: list[list[np.ndarray]], corners: np.ndarray) -> list[np.ndarray]:

@@ -1,7 +1,6 @@
 """Draw a robot: floor, posts, carriers, platform, and cables with their numbers and tensions.
 
-In space it is seen in perspective from the front, a little from the side and above; a robot in a vertical plane is
-drawn flat, with coordinates. Farther parts are drawn first, so that nearer ones cover them.
+Farther parts are drawn first, so that nearer ones cover them. A robot in a vertical plane has coordinates.
 """
 
 from __future__ import annotations
@@ -16,22 +15,18 @@ import numpy as np
 from ..base.text import quantity
 from . import style
 from .hull import faces, outline
+from .perspective import Perspective
 from .tension_colours import mark, place, scale, shades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
-AWAY = 2.2  # of the robot's size: distance of the camera
-BELOW = 0.03  # of the robot's size: how far the floor is below its lowest point, if it has no post
-CELLS = 10  # of the floor along the robot's size, about
 PARTS = 8  # of a cable, so that it is before one body and behind another
 HIGH, BARS, AIR = 2.7, 0.9, 0.04  # inches, of which title, scale and legend; share of the picture around the robot
 NARROW = 0.2  # of the picture: an axis with one number
-FLAT = 1e-6  # of the robot's size
 IN_ORDER = 3  # above the floor
-FLOOR, POST, BODY = "#e2e2e2", "#8a8a8a", "#b4b4b4"
+POST, BODY = "#8a8a8a", "#b4b4b4"
 LETTERS = 6.0  # [points]: numbers and tensions of cables
 # A letter's width and the height of a line [letters].
 LETTER, LINE = 0.58, 1.25
@@ -66,30 +61,29 @@ def draw(sketch: RobotSketch) -> Figure:
     """Draw a robot."""
     corners = [np.array(box) for box in sketch.boxes]
     points = np.vstack([sketch.anchors, sketch.attachments, *sketch.rotors, *corners])
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = max(float(np.linalg.norm(high - low)), 1e-6)
-    flat = high[1] - low[1] < FLAT * size
-    floor = low[2] - (0.0 if sketch.fixed is not None and sketch.fixed.any() and low[2] > 0 else BELOW) * size
-    floor = min(floor, 0.0) if sketch.fixed is not None and sketch.fixed.any() and low[2] < size else floor
+    fixed = np.zeros(len(sketch.anchors), bool) if sketch.fixed is None else sketch.fixed
+    seen = Perspective(points, bool(fixed.any()))
+    flat, floor = seen.flat, seen.floor
     canvas = style.figure(height=HIGH)
     ax = style.axes(canvas, "x [m]", "z [m]") if flat else canvas.add_subplot()
-    seen = _flat if flat else _perspective((low + high) / 2, size)
     pieces: list[tuple[float, Callable[[], Any]]] = []
 
     def line(ends: np.ndarray, **look: Any) -> None:
-        shown, depth = seen(ends)
-        pieces.append((depth, lambda: ax.plot(*shown.T, solid_capstyle="round", **look)))
+        shown = seen(ends)
+        pieces.append((seen.depth(ends), lambda: ax.plot(*shown.T, solid_capstyle="round", **look)))
 
     def body(corners: np.ndarray, colour: str) -> None:
         for face in faces(corners):
-            shown, depth = seen(corners[face])
-            pieces.append((depth, lambda shown=shown: ax.fill(*shown.T, facecolor=colour, edgecolor="#444444", lw=0.4)))
+            shown = seen(corners[face])
+            pieces.append(
+                (
+                    seen.depth(corners[face]),
+                    lambda shown=shown: ax.fill(*shown.T, facecolor=colour, edgecolor="#444444", lw=0.4),
+                )
+            )
         if not faces(corners) and len(corners) > 1:
             line(corners, color=colour, linewidth=3.0)
 
-    cell = _cell(size)
-    if not flat:
-        _draw_floor(ax, seen, low, high, floor, cell)
     if len(sketch.resting):
         on_floor = (
             sketch.resting if flat else np.column_stack([sketch.resting[:, :2], np.full(len(sketch.resting), floor)])
@@ -98,8 +92,8 @@ def draw(sketch: RobotSketch) -> Figure:
         if len(edge) > 2:
             around = np.insert(edge, 1, 0.0, axis=1) if flat else np.column_stack([edge, np.full(len(edge), floor)])
             label = "can rest here (outline)" if flat else "can rest above here (outline)"
-            ax.fill(*seen(around)[0].T, color=style.colour(2), alpha=0.18, linewidth=0, label=label)
-    for anchor in sketch.anchors[sketch.fixed] if sketch.fixed is not None else ():
+            ax.fill(*seen(around).T, color=style.colour(2), alpha=0.18, linewidth=0, label=label)
+    for anchor in sketch.anchors[fixed]:
         if anchor[2] > floor:
             line(np.array([anchor, [*anchor[:2], floor]]), color=POST, linewidth=0.8)
     tensions = sketch.tensions
@@ -120,13 +114,15 @@ def draw(sketch: RobotSketch) -> Figure:
     for _, paint in sorted(pieces, key=lambda piece: -piece[0]):
         for artist in paint():
             artist.set_zorder(IN_ORDER)  # otherwise lines are before faces
-    ax.plot(*seen(sketch.anchors)[0].T, "o", color="#000000", markersize=1.8, zorder=IN_ORDER)
-    ground = np.array([[x, y, floor] for x in (low[0], high[0]) for y in (low[1], high[1])])
-    _fit(ax, seen(np.vstack([points] if flat else [points, ground]))[0], flat)
-    _number(ax, seen(sketch.anchors)[0], seen(sketch.attachments)[0], tensions)
+    ax.plot(*seen(sketch.anchors).T, "o", color="#000000", markersize=1.8, zorder=IN_ORDER)
+    seen.fit(ax, AIR)
+    if flat:
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_locator(style.few_ticks(5))
+    _number(ax, seen(sketch.anchors), seen(sketch.attachments), tensions)
     for position, name in zip(sketch.carriers, sketch.names, strict=True):
-        ax.annotate(name, seen(position[None])[0][0], (0, 5), textcoords="offset points", ha="center", fontsize=LETTERS)
-    style.heading(ax, sketch.title if flat else f"{sketch.title}; cells of the floor: {quantity(cell, 'm')}")
+        ax.annotate(name, tuple(seen(position)), (0, 5), textcoords="offset points", ha="center", fontsize=LETTERS)
+    style.heading(ax, sketch.title if flat else f"{sketch.title}; cells of the floor: {quantity(seen.cell, 'm')}")
     if len(sketch.resting):
         style.legend_below(canvas, ax)
     if tensions is not None:
@@ -135,58 +131,6 @@ def draw(sketch: RobotSketch) -> Figure:
         )
         mark(bar, sketch.t_min, sketch.t_max, LETTERS)
     return canvas
-
-
-def _flat(points: np.ndarray) -> tuple[np.ndarray, float]:
-    return points[:, [0, 2]], 0.0
-
-
-def _perspective(centre: np.ndarray, size: float) -> Callable[[np.ndarray], tuple[np.ndarray, float]]:
-    """Return the function from points (k, 3) to their places in the picture (k, 2) and their mean depth [m]."""
-    right = np.cross([0.0, 0.0, 1.0], ALONG)
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(ALONG, right)])
-
-    def seen(points: np.ndarray) -> tuple[np.ndarray, float]:
-        arms = points - centre
-        depth = np.maximum(AWAY * size - arms @ ALONG, 0.1 * size)
-        return arms @ axes.T * (AWAY * size / depth)[:, None], float(depth.mean())
-
-    return seen
-
-
-def _cell(size: float) -> float:
-    power = 10.0 ** np.floor(np.log10(size / CELLS))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= size / CELLS * (1 + 1e-9)))
-
-
-def _draw_floor(ax: Axes, seen: Any, low: np.ndarray, high: np.ndarray, floor: float, cell: float) -> None:
-    first, last = np.floor(low[:2] / cell) * cell, np.ceil(high[:2] / cell) * cell
-    for axis in (0, 1):
-        for at in np.arange(first[axis], last[axis] + 0.5 * cell, cell):
-            ends = np.array([[*first, floor], [*last, floor]])
-            ends[:, axis] = at
-            ax.plot(*seen(ends)[0].T, color=FLOOR, linewidth=0.5)
-
-
-def _fit(ax: Axes, shown: np.ndarray, flat: bool) -> None:
-    """Leave air around the robot, and, in space, no axes."""
-    from matplotlib.ticker import FixedLocator, MaxNLocator
-
-    ax.set_aspect("equal", adjustable="box")
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    size = float((high - low).max())
-    air = AIR * size
-    ax.set_xlim(low[0] - air, high[0] + air)
-    ax.set_ylim(low[1] - air, high[1] + air)
-    if flat:
-        for axis, start, end in zip((ax.xaxis, ax.yaxis), low, high, strict=True):
-            narrow = end - start < NARROW * size  # several numbers would overlap
-            axis.set_major_locator(FixedLocator([start]) if narrow else MaxNLocator(5, steps=[1, 2, 5, 10]))
-    else:
-        ax.set_axis_off()
-        ax.set_xticks([])
-        ax.set_yticks([])
 
 
 def _number(ax: Axes, starts: np.ndarray, ends: np.ndarray, tensions: np.ndarray | None) -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.errors import InputError
+from ..figures.perspective import cell_of
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.points import placed
@@ -15,8 +16,6 @@ from ..workspace.region import reach_boxes, surrounding_box
 FARTHEST = 1e6  # [m] from the origin of {G}: pictures have seven digits
 SMALLEST = 1e-6  # [m]
 FIELD_OF_VIEW = 0.75  # [rad]
-ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
-CELLS = 10  # of the grid along the robot's size, about
 
 
 class Points(NamedTuple):
@@ -52,9 +51,7 @@ class Extent(NamedTuple):
     @property
     def cell(self) -> float:
         """Return the edge of the grid's cells [m]: 1, 2 or 5 times a power of ten."""
-        wanted = self.size / CELLS
-        power = 10.0 ** np.floor(np.log10(wanted))
-        return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+        return cell_of(self.size)
 
     @property
     def floor(self) -> float:

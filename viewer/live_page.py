@@ -15,12 +15,13 @@ import numpy as np
 
 from ..figures import style
 from ..figures.hull import faces
+from ..figures.perspective import ALONG
 from ..figures.robot import box_edges
 from ..figures.tension_colours import NO_TENSION, rgb, shades
 from ..models import Robot
 from ..models.body import surface
 from ..models.record import record_of
-from .geometry import ALONG, Geometry
+from .geometry import Geometry
 from .posing import few_cables, opening_pose
 from .shapes import posts, rotors
 from .sliders import sliders

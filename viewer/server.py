@@ -16,9 +16,10 @@ from ..base.errors import InputError
 from ..base.inputs import file_path, required, shown, whole_number
 from ..base.quiet import quiet
 from ..base.writing import whole_file
+from ..figures.perspective import ALONG
 from .access import guarded
 from .frames import Frames, with_script
-from .geometry import ALONG, Geometry
+from .geometry import Geometry
 from .live_page import live_page
 from .page import aside, camera
 from .panel import Panel

@@ -13,11 +13,12 @@ from ..base.text import quantity
 from ..figures import style
 from ..figures.cut_cables import drawn_ends
 from ..figures.hull import faces
+from ..figures.perspective import ALONG
 from ..figures.robot import box_edges
 from ..figures.tension_colours import place, rgb, shades
 from ..models.body import surface
 from . import labels
-from .geometry import ALONG, FIELD_OF_VIEW, Extent, Geometry
+from .geometry import FIELD_OF_VIEW, Extent, Geometry
 from .shapes import posts, rotors, sheaves
 from .snapshot import Snapshot, arrow
 
