@@ -50,6 +50,8 @@ def sweep(
     lower
         Labels of those of which less is better; of the others more is (default: none). Maps ring the best plan.
     """
+    known = {label: values for label, values in quantities.items() if np.isfinite(values).any()}
+    quantities = known or {"no plan is feasible": np.full(status.shape, np.nan)}
     canvas = _curves(axes[0], status, quantities) if len(axes) == 1 else _maps(axes, status, quantities, lower)
     style.legend_below(canvas, *canvas.axes)
     return canvas
@@ -76,6 +78,10 @@ def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]
         ax.margins(y=0.18)
         if words:
             ax.set_xticks(x, axis.texts)
+        else:
+            ax.xaxis.set_major_locator(style.few_ticks(MOST_TICKS))
+        if not np.isfinite(values).any():
+            ax.set_yticks([])
     return canvas
 
 
@@ -90,7 +96,8 @@ def _maps(
             image = _map(ax, axes, values, status, _range(values))
             _number(ax, image, values)
             _ring_best(ax, values if label in lower else -values)
-            style.colour_bar(canvas, image, ax, f"{label}, {'lower' if label in lower else 'higher'} is better")
+            if np.isfinite(values).any():
+                style.colour_bar(canvas, image, ax, f"{label}, {'lower' if label in lower else 'higher'} is better")
         return canvas
     third = axes[2]
     columns = min(len(third.values), MOST_COLUMNS)
@@ -109,7 +116,8 @@ def _maps(
             drawn[ax] = _map(ax, axes, values[..., place], status[..., place], _range(values))
             ax.tick_params(labelleft=leftmost, labelbottom=lowest)
             style.heading(ax, text, 1 / columns)
-        style.colour_bar(canvas, next(iter(drawn.values())), list(drawn), label)
+        if np.isfinite(values).any():
+            style.colour_bar(canvas, next(iter(drawn.values())), list(drawn), label)
     return canvas
 
 

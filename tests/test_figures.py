@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
 from towline import InputError
-from towline.figures import limits, style
+from towline.figures import limits, style, sweep
 from towline.figures.curves import Panel, curves
 
 from .figure_cases import FIGURES
@@ -141,6 +141,15 @@ def test_shares_of_limits():
     thrust = limits.Limited("thrust", "N", ["a"], np.array([[10.0], [20.0], [5.0], [25.0]]), 0.0, 20.0)
     np.testing.assert_allclose(thrust.used(), [0.5, 1.0, 0.75, 1.25])
     assert limits.Limited("force", "N", ["a"], np.zeros((2, 1)), 0.0, 0.0).used() is None
+
+
+@pytest.mark.parametrize("shape", [(3,), (3, 2), (3, 2, 2)])
+def test_a_sweep_without_a_feasible_plan_is_drawn_once_and_without_a_scale(shape):
+    axes = [sweep.Axis(f"field {k} [s]", [0.01 * (i + 1) for i in range(n)]) for k, n in enumerate(shape)]
+    nothing = np.full(shape, np.nan)
+    drawn = sweep.sweep(axes, np.full(shape, "infeasible"), {"cost": nothing, "margin [N]": nothing}, {"cost"})
+    assert len(drawn.axes) == (shape[2] if len(shape) == 3 else 1)
+    check_texts(drawn, renderer_of(drawn))
 
 
 def test_units_are_typeset():

@@ -127,7 +127,10 @@ def test_the_right_model_leaves_the_noise(kind, logs):
     ("wrong", "text"),
     [
         (lambda lengths: {name: 1e3 * one for name, one in lengths.items()}, "millimetres"),
-        (lambda lengths: dict(zip(lengths, [lengths[f"l{i} [m]"] for i in (1, 0, 2, 3)], strict=True)), "l0 and l1 look exchanged"),
+        (
+            lambda lengths: dict(zip(lengths, [lengths[f"l{i} [m]"] for i in (1, 0, 2, 3)], strict=True)),
+            "l0 and l1 look exchanged",
+        ),
     ],
 )
 def test_an_input_error_of_the_log_is_named(wrong, text, tmp_path):

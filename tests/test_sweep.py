@@ -314,7 +314,7 @@ def test_figures_of_one_and_three_fields():
     assert [ax.get_title(loc="left") for ax in maps[:3]] == ["1", "2", "3"]
     np.testing.assert_array_equal(maps[1].images[0].get_array(), [[1, 7], [4, 10]])  # margin upwards, duration across
     none = made_up({"margin": [1, 2]}, lambda number: "failed").figure()
-    assert [ax.lines[1].get_xdata().tolist() for ax in none.axes] == [[1, 2]] * 2
+    assert [ax.lines[1].get_xdata().tolist() for ax in none.axes] == [[1, 2]]  # marks, once
     with pytest.raises(InputError, match="at most 3 varied fields, got 4"):
         made_up({"duration": [1], "margin": [1], "steps": [50], "scheme": ["linear"]}).figure()
     with pytest.raises(InputError, match="at most 6 values of the third varied field, got 7 of steps"):

@@ -29,6 +29,7 @@ from .parameters import Parameters
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
 UNMEASURED = 3.0  # times the weight: standard deviation of a tension that was not measured
+MOST_CAPSTAN = 30.0  # of which exp is no overflow
 
 
 class Balanced(NamedTuple):
@@ -87,7 +88,8 @@ class Balance:
         terms = smoothed if smooth else terms
         terms = terms if self._chosen is None else terms[:, self._chosen]
         gain = table[:, 13]
-        even, odd = np.cosh(table[:, 11]), np.sinh(table[:, 11])  # of exp(capstan s), whose s is -1 or 1
+        capstan = np.clip(table[:, 11], -MOST_CAPSTAN, MOST_CAPSTAN)  # a step of the fit may be far too long
+        even, odd = np.cosh(capstan), np.sinh(capstan)  # of exp(capstan s), whose s is -1 or 1
         by_gain = even * terms[2] + odd * terms[0]
         by = np.stack([gain * (odd * terms[2] + even * terms[0]), terms[1], by_gain], axis=2)
         return gain * by_gain + table[:, 12] * terms[1], by

@@ -90,13 +90,13 @@ def _of_noise(result: CalibrationData) -> list[str]:
     lines = []
     if np.isfinite(result.noise) and result.noise > 1.05 * stated:
         lines.append(
-            f"lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the sigmas below are larger "
-            f"by {quantity(result.noise / stated, digits=3)}"
+            f"lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the standard deviations "
+            f"below are multiplied by {quantity(result.noise / stated, digits=3)}"
         )
     if result.alike > 1:
         lines.append(
-            "residuals are autocorrelated, because the model is incomplete: the sigmas below are larger "
-            f"by {quantity(result.alike**0.5, digits=2)}"
+            "residuals are autocorrelated, because the model is incomplete: the standard deviations "
+            f"below are multiplied by {quantity(result.alike**0.5, digits=2)}"
         )
     return lines
 
