@@ -78,6 +78,18 @@ static void wrench(void) {
     }
 }
 
+static towline_problem problem_of_pose(void) {
+    return (towline_problem){
+        .n = ROWS,
+        .m = robot.cables,
+        .A = page.A,
+        .w = page.w,
+        .t_min = page.t_min,
+        .t_max = page.t_max,
+        .length = page.length,
+    };
+}
+
 static void column(int c, double *a) {
     for (int i = 0; i < ROWS; i++) {
         a[i] = row_scale(i) * page.A[i * robot.cables + c];
@@ -187,15 +199,7 @@ static void capacity_margin(void) {
 EXPORT("solve") int page_solve(void) {
     geometry();
     wrench();
-    const towline_problem problem = {
-        .n = ROWS,
-        .m = robot.cables,
-        .A = page.A,
-        .w = page.w,
-        .t_min = page.t_min,
-        .t_max = page.t_max,
-        .length = page.length,
-    };
+    const towline_problem problem = problem_of_pose();
     towline_answer answer;
     const towline_status status = towline_solve(&problem, &answer);
     for (int c = 0; c < robot.cables; c++) {
@@ -259,15 +263,7 @@ EXPORT("hang") int page_hang(void) {
     towline_answer start;
     geometry();
     wrench();
-    const towline_problem problem = {
-        .n = ROWS,
-        .m = m,
-        .A = page.A,
-        .w = page.w,
-        .t_min = page.t_min,
-        .t_max = page.t_max,
-        .length = page.length,
-    };
+    const towline_problem problem = problem_of_pose();
     towline_solve_soft(&problem, 1e8, &start);
     for (int c = 0; c < m; c++) {
         pull[c] = start.tensions[c];
