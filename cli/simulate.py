@@ -134,7 +134,7 @@ def simulate(
     drive: Annotated[
         str | None,
         typer.Option(
-            help="With a recording: what drives the plant: lengths, tensions or forces (default: by the log)."
+            help="With a recording: what drives the plant: lengths, tensions or forces (default: depends on the log)."
         ),
     ] = None,
     delay: Annotated[
@@ -155,8 +155,8 @@ def simulate(
 
     A run passes if it does not diverge, its position error stays within --tolerance, no tension exceeds t_max by more
     than 0.1 % of the cable's range, and no cable with t_min above zero goes slack. The exit code is 0 if all runs pass,
-    otherwise 1. A recording is repeated in windows, from the recorded state on, by its commands; it passes if 95 % of
-    the position residuals are within --tolerance.
+    otherwise 1. A recording is replayed by its commands, in windows that each start from the recorded state; it passes
+    if 95 % of the position residuals are within --tolerance.
     """
     from ..figures.style import FORMATS
 

@@ -28,7 +28,8 @@ def view(
         str | None, typer.Argument(metavar="[OTHER]", help="A second plan or simulation file, for comparison.")
     ] = None,
     html: Annotated[
-        Path | None, typer.Option("--html", help="HTML file to write instead; it plays without a server.")
+        Path | None,
+        typer.Option("--html", help="HTML file to write instead; it needs no server, and that of a robot no extra."),
     ] = None,
     robot: Annotated[
         str | None, typer.Option("--robot", help="Robot file of a workspace whose robot is not in the library.")

@@ -36,7 +36,7 @@ def replay(
     times
         Times of the samples of each window, (W, S) [s].
     residuals, explained
-        Measured less simulated by kind, (W, S, k), with the model and with the parameter that explains most.
+        Measured minus simulated by kind, (W, S, k), with the model and with the parameter that explains most.
     noise
         Standard deviation of each kind.
     title

@@ -141,7 +141,7 @@ class Requirement(Part):
 
     @property
     def size(self) -> int:
-        """Return the number of poses times wrenches."""
+        """Return the number of pairs of pose and wrench."""
         poses = len(self.attitudes) * int(np.prod(self.grid)) if self.poses is None else len(self.poses)
         return poses * len(self.wrenches) * len(self.accelerations) * len(self.winds or (0,))
 
@@ -175,7 +175,7 @@ class Requirements(Part):
             raise ValueError(f"free must have no item besides a pairing, got {len(self.free) - 1} more")
         size = sum(each.size for each in self.require)
         if size > MOST_ROWS:
-            raise ValueError(f"require must have at most {MOST_ROWS} poses times wrenches, got {size}")
+            raise ValueError(f"require must have at most {MOST_ROWS} pairs of pose and wrench, got {size}")
         return self
 
 

@@ -42,7 +42,7 @@ class Design(Reported, Displayed):
     reasons
         What binds and what would help; None if the requirements are impossible.
     poses, audited
-        Number of poses times wrenches of the requirements, and of random ones in the last audit.
+        Number of pairs of pose and wrench in the requirements, and of random ones in the last audit.
     starts
         Number of layouts from which it searched, or of pairings that it compared.
     stopped
@@ -94,12 +94,13 @@ class Design(Reported, Displayed):
         about = f"{self.before.name}, {self.requirements.name}"
         parts: list[Part] = []
         if self.impossibility is not None:
-            parts.append(f"proof for one pose and wrench: {self.impossibility.certificate.describe(self._up())}")
+            proof = self.impossibility.certificate.describe(self._up()).replace("\n", " ")
+            parts.append(f"proof for one pose and wrench: {proof}")
             return Report(about, self.status, self._summary(), parts)
         pairing = self.requirements.free[0].pairing
         searched = quantity(self.starts) + (" pairings" if pairing else f" start{'s' * (self.starts != 1)}")
-        searched += f", {self.poses} poses times wrenches"
-        facts = [("searched", f"{searched}, audited at {quantity(self.audited)} random ones")]
+        searched += f", {quantity(self.poses)} pairs of pose and wrench"
+        facts = [("searched", f"{searched}, audited at {quantity(self.audited)} random pairs")]
         if self.stopped:
             facts.append(("", "INTERRUPTED: this is the best layout so far"))
         if self.status == "not-found":

@@ -65,7 +65,7 @@ class Match(NamedTuple):
     parameters
         The parameters.
     drift
-        Measured less simulated over the noise, from the starts on, (W, R).
+        Measured minus simulated over the noise, from the starts on, (W, R).
     left
         The same without what other starts would explain, and corrections of starts over their deviations, (W, R + P).
     """

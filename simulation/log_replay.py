@@ -47,7 +47,7 @@ class Replay(Drawn, Reported, Displayed):
     matching
         The recording, compared with its plant.
     found
-        What each parameter alone explains, that which explains most first.
+        What each parameter alone explains, the largest share first.
     explained
         Residuals with the first one fitted, None if it explains nothing.
     fitted
@@ -72,7 +72,7 @@ class Replay(Drawn, Reported, Displayed):
 
     @cached_property
     def residuals(self) -> dict[str, np.ndarray]:
-        """Return measured less simulated by kind, (W, S, 3) or (W, S, m) in SI units, nan where not measured."""
+        """Return measured minus simulated by kind, (W, S, 3) or (W, S, m) in SI units, nan where not measured."""
         return _by_kind(self.matching)
 
     def rms(self) -> dict[str, float]:
@@ -84,7 +84,7 @@ class Replay(Drawn, Reported, Displayed):
 
     @cached_property
     def error(self) -> float:
-        """Return what 95 % of the position residuals do not exceed [m]; without positions, of those of lengths."""
+        """Return the 95 % quantile of the position residuals, or without positions of the lengths [m]."""
         parts = {name: part[self.matching.kept] for name, part in self.residuals.items()}
         if "position" in parts:
             return float(np.nanquantile(np.sqrt(np.nansum(parts["position"] ** 2, axis=-1)), 0.95))
@@ -160,7 +160,7 @@ class Replay(Drawn, Reported, Displayed):
         variables = {"time": Variable(("window", "sample"), times, {"units": "s"})}
         for name, part in self.residuals.items():
             last = "axis" if name in ("position", "rotation") else "cable"
-            about = {"units": UNITS[name][1].removeprefix("m") or "m", "long_name": "measured less simulated"}
+            about = {"units": UNITS[name][1].removeprefix("m") or "m", "long_name": "measured minus simulated"}
             variables[f"{name}_residual"] = Variable(("window", "sample", last), part, about)
         attributes = {"title": self._headline(), "report": json.dumps(self.to_dict())}
         return save_netcdf(Contents(variables, {}, attributes), path)
@@ -243,7 +243,7 @@ class Replay(Drawn, Reported, Displayed):
             for (name, value), noise in zip(self.rms().items(), self.matching.noise.values(), strict=True)
         ]
         columns = ["", "rms", "noise", "ratio", *([f"with {self.found[0].name} fitted"] if after else [])]
-        return Table("Residuals, measured less simulated", columns, rows, (1, 2, 3, 4))
+        return Table("Residuals, measured minus simulated", columns, rows, (1, 2, 3, 4))
 
     def _explanation_table(self) -> Table:
         rows = []
@@ -268,7 +268,7 @@ def replay(
     tolerance: float = 0.05,
     fit: bool = False,
 ) -> Replay:
-    """Repeat a recording with the plant, in windows from the recorded state on, driven by the recorded commands.
+    """Replay a recording: simulate it by its commands, in windows that each start from the recorded state.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def _fitted(matching: Matching) -> tuple[Parameters, tuple[float, float]]:
 
 
 def _by_kind(matching: Matching) -> dict[str, np.ndarray]:
-    """Return measured less simulated by kind, (W, S, 3) or (W, S, m) in SI units, nan where not measured."""
+    """Return measured minus simulated by kind, (W, S, 3) or (W, S, m) in SI units, nan where not measured."""
     windows, whole = matching.windows, matching.first.drift.reshape(*matching.windows.rows.shape, -1)
     parts = zip(windows.noise.items(), np.split(whole, np.cumsum(windows.widths)[:-1], axis=-1), strict=True)
     return {name: np.where(part == 0, np.nan, part * noise) for (name, noise), part in parts}

@@ -285,7 +285,7 @@ class Windows:
         return states, (lengths[:, 0] / stretch).reshape(*shift.shape[:2], m)
 
     def predict(self, with_: Parameters, nudged: bool = False) -> np.ndarray:
-        """Return measured less simulated over the noise, (V, W, R), 0 where not measured.
+        """Return measured minus simulated over the noise, (V, W, R), 0 where not measured.
 
         V = 1; with `nudged` 1 + P: then come the derivatives by the corrections of the start.
         """
@@ -340,7 +340,7 @@ class Windows:
         return plant.command(np.ones(self.robot.m), actuation, *self._carried), cables
 
     def _residuals(self, out: np.ndarray, plant: Plant) -> np.ndarray:
-        """Return measured less simulated over noise, (V, W, R), from what `_seen` returns, (V, W, S, 7 + 2 m)."""
+        """Return measured minus simulated over noise, (V, W, R), from what `_seen` returns, (V, W, S, 7 + 2 m)."""
         of, rows, inside, parts = self.recorded, self.rows, self.inside[..., None], {}
         position, quaternion, tensions, lengths = np.split(out, [3, 7, 7 + self.robot.m], axis=-1)
         known = inside & self._known[rows][..., None]

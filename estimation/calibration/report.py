@@ -31,7 +31,14 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
         *_of_exceptions(result),
         *_of_open(result),
     ]
-    return Report(about, "", summary, parts, drawings, files=[("The robot's file", to_yaml(result.robot))])
+    return Report(
+        about,
+        "" if result.refused is None else "not usable",
+        summary,
+        parts,
+        drawings,
+        files=[("The robot's file", to_yaml(result.robot))],
+    )
 
 
 def headline(result: CalibrationData) -> str:
@@ -130,7 +137,8 @@ def _one(one: Parameter) -> tuple[str, str, str, str]:
     factor, unit = usual.get(one.unit, (1.0, one.unit))
     sigma = quantity(factor * one.sigma, unit, digits=2) if np.isfinite(one.sigma) else "not determined"
     change = quantity(factor * one.correction, unit, digits=4)
-    return one.name, f"{one.value:.6g} {one.unit}" if "/" in one.unit else f"{one.value:.6f} {one.unit}", sigma, change
+    value = f"{one.value:.6g} {one.unit}" if "/" in one.unit else f"{one.value:.6f} {one.unit}".removesuffix(" 1")
+    return one.name, value, sigma, change
 
 
 def _of_exceptions(result: CalibrationData) -> list[str]:
