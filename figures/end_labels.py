@@ -13,11 +13,12 @@ if TYPE_CHECKING:
 
 GAP = 0.065  # of a panel's height, between the names of curves at its edge
 HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
+MOST_NAMES = 5  # of a curve: more would leave it no room
 SAME = 1e-3  # of the panel's height: curves that are nowhere farther apart share a name
 
 
 def together(values: np.ndarray, names: list[str], height: float) -> tuple[np.ndarray, list[str]]:
-    """Return the curves (n, k) that differ somewhere, and the names of each: "1, 6"."""
+    """Return the curves (n, k) that differ somewhere, and the names of each: "1, 6", or "1, 2, 3 + 5"."""
     groups: list[list[int]] = []
     for index in range(values.shape[1]):
         for group in groups:
@@ -27,7 +28,12 @@ def together(values: np.ndarray, names: list[str], height: float) -> tuple[np.nd
                 break
         else:
             groups.append([index])
-    return values[:, [group[0] for group in groups]], [", ".join(names[index] for index in group) for group in groups]
+    texts = []
+    for group in groups:
+        shown = group if len(group) <= MOST_NAMES else group[: MOST_NAMES - 2]
+        more = f" + {len(group) - len(shown)}" if len(group) > len(shown) else ""
+        texts.append(", ".join(names[index] for index in shown) + more)
+    return values[:, [group[0] for group in groups]], texts
 
 
 def name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
@@ -35,22 +41,23 @@ def name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
     low, high = ax.get_ylim()
     places = (np.clip(values, low, high) - low) / (high - low)
     order = np.argsort(places)
-    for cable, place in zip(order, _spread(places[order]), strict=True):
+    gap = min(GAP, HIGHEST / max(len(order) - 1, 1))
+    for cable, place in zip(order, _spread(places[order], gap), strict=True):
         ax.annotate(
             f"cable {names[cable]}" if cable == order[-1] else names[cable],
             (1.0, places[cable]),
             xytext=(1.05, place),
             xycoords="axes fraction",
             va="center",
-            fontsize=style.NOTE,
+            fontsize=style.NOTE * gap / GAP,
             arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0},
             annotation_clip=False,
         )
 
 
-def _spread(places: np.ndarray) -> np.ndarray:
-    """Return increasing places with distances of at least `GAP`, moved as much up as down."""
-    gaps = GAP * np.arange(len(places))
+def _spread(places: np.ndarray, gap: float = GAP) -> np.ndarray:
+    """Return increasing places with distances of at least `gap`, moved as much up as down."""
+    gaps = gap * np.arange(len(places))
     up = np.maximum.accumulate(places - gaps) + gaps
     down = np.minimum.accumulate((places - gaps)[::-1])[::-1] + gaps
     apart = (up + down) / 2

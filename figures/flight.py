@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import style
-from .end_labels import name_at_the_end
+from .end_labels import name_at_the_end, together
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,7 +88,9 @@ def tensions(trajectory: xr.Dataset) -> Figure:
         style.far_limit(ax, f"{', '.join(far)}, outside the plot")
     ax.set_xlim(time[0], _end(time))
     left = ~gone[-1]
-    name_at_the_end(ax, real[-1, left], [str(cable) for cable in trajectory["cable"].values[left]])
+    names = [str(cable) for cable in trajectory["cable"].values[left]]
+    shown, names = together(real[:, left], names, float(np.diff(ax.get_ylim())[0]))
+    name_at_the_end(ax, shown[-1], names)
     _mark_events([ax], trajectory)
     style.legend_below(canvas, ax)
     return canvas

@@ -70,11 +70,12 @@ def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
         if used is not None and np.isfinite(used).any() and np.nanmax(used) >= SHOWN:
             drawn.append((limited.text(), 100 * used))
         else:
-            small.append(limited.text() if used is None else f"{limited.text()}: {100 * np.nanmax(used):.2g} %")
+            shown = "" if used is None or not np.isfinite(used).any() else f": {100 * np.nanmax(used):.2g} %"
+            small.append(limited.text() + shown)
     for index, (label, used) in enumerate(drawn):
         ax.plot(times, used, **style.look(index), label=label)
     ax.axhline(100.0, **style.LIMIT)
-    ax.margins(x=0.0)
+    ax.set_xlim(times[0], times[-1])
     highest = max([100.0, *(float(np.nanmax(used[np.isfinite(used)], initial=0.0)) for _, used in drawn)])
     ax.set_ylim(0.0, 1.08 * min(highest, 200.0))
     for label in small:

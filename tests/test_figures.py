@@ -10,6 +10,7 @@ from matplotlib.colors import to_rgb
 from towline import InputError
 from towline.figures import limits, style, sweep
 from towline.figures.curves import Panel, curves
+from towline.figures.end_labels import together
 
 from .figure_cases import FIGURES
 from .legible import COLUMN_MM, LEAST_STEP, check_grey, check_size, check_texts, lightness, renderer_of
@@ -150,6 +151,24 @@ def test_a_sweep_without_a_feasible_plan_is_drawn_once_and_without_a_scale(shape
     drawn = sweep.sweep(axes, np.full(shape, "infeasible"), {"cost": nothing, "margin [N]": nothing}, {"cost"})
     assert len(drawn.axes) == (shape[2] if len(shape) == 3 else 1)
     check_texts(drawn, renderer_of(drawn))
+
+
+def test_limits_of_which_nothing_is_used_or_known_have_their_times():
+    idle = limits.Limited("speed", "m/s", ["a"], np.zeros((3, 1)), -2.0, 2.0)
+    unknown = limits.Limited("thrust", "N", ["a"], np.full((3, 1), np.nan), 0.0, 20.0)
+    drawn = limits.limits(np.array([0.0, 1.0, 2.0]), [idle, unknown])
+    assert drawn.axes[0].get_xlim() == (0.0, 2.0)
+    names = [text.get_text() for text in drawn.legends[0].get_texts()]
+    assert [name.split(")")[1] for name in names] == [": 0 %", ""]
+
+
+def test_a_curve_of_many_cables_has_a_short_name():
+    """The names of 16 cables would leave their curves no room."""
+    values = np.tile([[1.0, 2.0]], (3, 16))
+    shown, names = together(values, [str(i + 1) for i in range(32)], 1.0)
+    np.testing.assert_array_equal(shown, np.tile([[1.0, 2.0]], (3, 1)))
+    assert names == ["1, 3, 5 + 13", "2, 4, 6 + 13"]
+    assert together(values[:, :10], [str(i + 1) for i in range(10)], 1.0)[1] == ["1, 3, 5, 7, 9", "2, 4, 6, 8, 10"]
 
 
 def test_units_are_typeset():
