@@ -268,7 +268,7 @@ def _summary(result: xr.Dataset) -> dict[str, Any]:
 def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reason: str | None) -> None:
     import math
 
-    from ..base.text import quantity
+    from ..base.text import quantity, quantity_range
 
     accepted, samples = summary["accepted"], summary["samples"]
     typer.echo(
@@ -278,7 +278,7 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reaso
         typer.echo(f"  why: {reason}")
     low, high = summary["volume_interval"]
     unit = summary["volume_unit"].replace("1", "")
-    between = f", from {quantity(low, digits=6)} to {quantity(high, unit, digits=6)}"
+    between = f", from {quantity_range((low, high), unit, digits=6)}"
     about = "" if math.isnan(low) else f"{between} ({result['volume_interval'].long_name})"
     typer.echo(f"  volume {quantity(summary['volume'], unit, digits=6)}{about}")
     if "cell_edges" in result:

@@ -183,6 +183,13 @@ def test_a_saved_picture_is_twice_as_fine_with_verdict_and_scale(opened, tmp_pat
     assert (above.min(axis=2) < 100).sum() > 200  # the verdict
 
 
+def test_cables_without_a_tension_are_grey_whatever_their_limits(opened):
+    page = opened("planar-4")
+    assert page.evaluate(
+        "[[5, 200], [50, 50]].map(([low, high]) => shade(place(NaN, low, high)) === DATA.noTension)"
+    ) == [True, True]
+
+
 def test_an_instant_takes_less_than_a_frame(opened):
     page, robot = opened("cogiro"), load("cogiro")
     many = [pose.tolist() for pose in poses(robot, 200, seed=1)]

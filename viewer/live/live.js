@@ -49,6 +49,7 @@ function placed(pose, points) {
 // Where a tension is between its limits, from 0 to 1.
 function place(tension, low, high) {
   const step = FINEST * high, span = Math.log((high + step) / (low + step));
+  if (Number.isNaN(tension)) return NaN;
   return span > 0 ? Math.log((clamp(tension, low, high) + step) / (low + step)) / span : 1;
 }
 
@@ -299,14 +300,14 @@ function run({ at, rest }) {
 
   // Moving the platform gives the cables the lengths of its pose; on these it hangs.
   function update(lengthen) {
-    instant = at(state.pose, state.carriers);
-    if (lengthen && instant) lengths = instant.lengths;
+    const here = instant = at(state.pose, state.carriers);
+    if (lengthen && here) lengths = here.lengths;
     if (hangs() && lengths) {
       const pose = rest(state.pose, state.carriers, lengths);
       state.pose = pose || state.pose;
       instant = pose && at(pose, state.carriers);
     }
-    last = instant || last;
+    last = instant || here || last;
     tell();
     history.replaceState(null, "", `#${[state.pose, ...state.carriers].flat().map((x) => Number(x.toFixed(5))).join(",")}`);
     redraw();
