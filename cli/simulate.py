@@ -171,18 +171,23 @@ def simulate(
     from ..estimation.logs.opening import is_recording
 
     if replay or is_recording(plan):
-        of_plan = {"--controller": controller != CONTROLLERS[0], "--wind": wind, "--gusts": gusts, "--noise": noise}
+        of_plan = {
+            "--controller": controller if controller != CONTROLLERS[0] else None,
+            "--wind": wind,
+            "--gusts": gusts,
+            "--noise": noise,
+        }
         of_plan |= {"--event": event, "--duration": duration, "--seed": seed, "--runs": runs, "--animate": animate}
         for name, value in of_plan.items():
             if value:
-                raise InputError(f"{name} must be left out with a recording, got {shown(value)}")
+                raise InputError(f"{name} must be left out with a recording, got {printable(str(value))}")
         options = {"poses": poses, "fields": fields, "drive": drive, "delay": delay, "window": window}
         outputs = {"--out": out, "--fit": fit, "--report": report}
         replay_log(robot, plan, options | {"tolerance": tolerance}, outputs, figures, form, as_json)
         return
     for name, value in of_log.items():
         if value:
-            raise InputError(f"{name} must be left out without a recording, got {shown(value)}")
+            raise InputError(f"{name} must be left out without a recording, got {printable(str(value))}")
     stored = checkpoint_of(checkpoint, resume)
     for name, file in (("--animate", animate), ("--report", report)):
         if runs is not None and file is not None:
