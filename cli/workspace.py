@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 # Each has a file of its own; to load them takes longer than help may.
 _FILES = (Path(__file__).parent.parent / "workspace" / "conditions").glob("[a-z]*.py")
 CONDITIONS = ", ".join(sorted(["all", "any", *(file.stem.replace("_", "-") for file in _FILES)]))
+METRICS = (
+    "margin, natural_frequency, translational_stiffness, rotational_stiffness, condition_number, dexterity, "
+    "tension_factor, payload, acceleration, cable_distance"
+)
 
 
 def workspace(
@@ -40,6 +44,14 @@ def workspace(
     ] = None,
     define: Annotated[
         list[Path] | None, typer.Option(metavar="FILE.py", help="Python file with conditions of your own.")
+    ] = None,
+    metric: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help=f"Metric to compute at the samples in the file and to draw as --figure: {METRICS}. May be repeated. "
+            "Default: none.",
+        ),
     ] = None,
     robust: Annotated[
         float | None,
@@ -125,10 +137,11 @@ def workspace(
     surface = None if mesh is None else _boundary(loaded, required, region)
     with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as show:
         where = Execution(workers, scheduler, stored, resume is not None, resumable(show, stored, "samples"))
-        result = sample(loaded, required, region, _count(samples), method, seed, size=size, keep=keep, execution=where)
+        kept = {"size": size, "keep": keep, "metrics": metric or ()}
+        result = sample(loaded, required, region, _count(samples), method, seed, execution=where, **kept)
     add_to_message("")
-    written = _write(result, loaded, target, figure, mesh, surface)
-    summary = _summary(result)
+    written = _write(result, loaded, metric or [], target, figure, mesh, surface)
+    summary = _summary(result, metric or [])
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
     if as_json:
         print_json({**summary, "reason": reason, "file": target, "figure": figure, "mesh": mesh})
@@ -157,16 +170,25 @@ def _check_files(
 
 
 def _write(
-    result: xr.Dataset, robot: Robot, target: Path, figure: Path | None, mesh: Path | None, surface: Mesh | None
+    result: xr.Dataset,
+    robot: Robot,
+    metrics: list[str],
+    target: Path,
+    figure: Path | None,
+    mesh: Path | None,
+    surface: Mesh | None,
 ) -> list[Path]:
     """Write the samples, their picture and the boundary, and return the files."""
     from ..figures import style
+    from ..figures.metric_map import metric_map
     from ..figures.workspace import reached
     from ..workspace import save
 
     written = [save(result, target)]
     if figure is not None:
-        written.append(style.save(reached(result, robot.home_anchors), figure))
+        anchors = robot.home_anchors
+        drawn = metric_map(result, metrics, anchors) if metrics else reached(result, anchors)
+        written.append(style.save(drawn, figure))
     if mesh is not None and surface is not None:
         written.append(surface.save(mesh))
     return written
@@ -253,7 +275,7 @@ def _count(samples: float) -> int:
     return int(samples)
 
 
-def _summary(result: xr.Dataset) -> dict[str, Any]:
+def _summary(result: xr.Dataset, metrics: list[str]) -> dict[str, Any]:
     low, high = result["bounds"].values.tolist()
     return {
         **{name: result.attrs[name] for name in ("robot", "samples", "accepted")},
@@ -261,8 +283,18 @@ def _summary(result: xr.Dataset) -> dict[str, Any]:
         "volume_interval": result["volume_interval"].values.tolist(),
         "volume_unit": result["volume"].attrs["units"],
         "bounds": {name: [low[i], high[i]] for i, name in enumerate("xyz")},
+        **({"metrics": {name: _range(result[name]) for name in metrics}} if metrics else {}),
         **{name: result.attrs[name] for name in ("seconds", "poses_per_s", "method", "seed", "condition", "region")},
     }
+
+
+def _range(values: xr.DataArray) -> dict[str, Any]:
+    """Return the smallest, the median and the largest value, None where there is none, and the unit."""
+    import numpy as np
+
+    some = values.values[~np.isnan(values.values)]
+    low, middle, high = np.quantile(some, (0, 0.5, 1), method="nearest").tolist() if some.size else (None,) * 3
+    return {"min": low, "median": middle, "max": high, "unit": values.attrs["units"]}
 
 
 def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reason: str | None) -> None:
@@ -289,4 +321,9 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reaso
     if accepted:
         for name, (least, most) in summary["bounds"].items():
             typer.echo(f"  {name} from {quantity(least)} to {quantity(most, 'm')}")
+    for name, of in summary.get("metrics", {}).items():
+        unit = of["unit"].replace("1", "")
+        text = "no value" if of["min"] is None else " to ".join(quantity(of[end], digits=4) for end in ("min", "max"))
+        middle = "" if of["min"] is None else f", median {quantity(of['median'], unit, digits=4)}"
+        typer.echo(f"  {name.replace('_', ' ')} {text}{middle}")
     typer.echo(f"  {quantity(summary['seconds'], 's', digits=3)} in total, start-up included")

@@ -68,9 +68,17 @@ def whitening(robot: Robot, pose: np.ndarray) -> np.ndarray:
 
     The eigenvalues of C K C^T are the squares of the natural frequencies [rad^2/s^2].
     """
-    rows = np.flatnonzero(robot.dof_mask)
-    M = spatial_inertia(robot, pose)[..., rows[:, None], rows]
-    return np.linalg.inv(np.linalg.cholesky(M))
+    moves = np.flatnonzero(robot.dof_mask[:3]).size
+    turns = np.flatnonzero(robot.dof_mask[3:])
+    C = np.zeros((*pose.shape[:-1], moves + turns.size, moves + turns.size))
+    C[..., :moves, :moves] = np.eye(moves) / np.sqrt(robot.platform.mass)
+    if turns.size == 3:  # the factor of R I R^T is a turned one, at a third of the cost
+        whitened = np.linalg.inv(np.linalg.cholesky(robot.inertia))
+        C[..., moves:, moves:] = whitened @ points.rotations(pose[..., 3:]).swapaxes(-1, -2)
+    elif turns.size:
+        R = points.rotations(pose[..., 3:])[..., turns, :]
+        C[..., moves:, moves:] = np.linalg.inv(np.linalg.cholesky(R @ robot.inertia @ R.swapaxes(-1, -2)))
+    return C
 
 
 def frequency(square: ArrayLike) -> np.ndarray:

@@ -14,6 +14,7 @@ from towline.figures.animation import Scene
 from towline.figures.convergence import convergence
 from towline.figures.curve_in_space import curve_in_space
 from towline.figures.curves import Panel, curves
+from towline.figures.metric_map import metric_map
 from towline.figures.views import views
 from towline.studies.flying.pairing import from_above
 
@@ -163,6 +164,19 @@ def sampled(sizes: tuple[int, int, int]) -> xr.Dataset:
     return xr.Dataset(counts, centres, {"robot": "wang-ctmrts", "accepted": 12345, "samples": 60000})
 
 
+def mapped(sizes: tuple[int, int, int]) -> Figure:
+    """Draw two metrics at samples of a ball, some of which have no value."""
+    points = np.random.default_rng(0).uniform(-2, 2, (4000, 3)) * (np.array(sizes) > 1)
+    points = points[np.linalg.norm(points, axis=1) < 1.7]
+    payload = np.where(points[:, 0] < 1.2, 25 - 4 * (points**2).sum(axis=1), np.nan)
+    result = sampled(sizes).assign(
+        position=(("point", "axis"), points),
+        payload=("point", payload, {"units": "kg"}),
+        condition_number=("point", np.where(points[:, 0] > -1, 3 + points[:, 1], np.inf), {"units": "1"}),
+    )
+    return metric_map(result, ["payload", "condition_number"], 2 * SQUARE)
+
+
 def swept(shape: tuple[int, ...]) -> Figure:
     """Draw a sweep over as many fields as `shape` has entries."""
     labels = ("duration [s]", "robot.platform.mass [kg]", "scheme")
@@ -272,4 +286,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "reached": lambda: workspace.reached(sampled((20, 20, 10))),
     "reached-flat": lambda: workspace.reached(sampled((20, 20, 1))),
     "reached-line": lambda: workspace.reached(sampled((20, 1, 1))),
+    "metrics": lambda: mapped((20, 20, 10)),
+    "metrics-flat": lambda: mapped((20, 20, 1)),
+    "metrics-line": lambda: mapped((20, 1, 1)),
 }

@@ -10,11 +10,13 @@ from .condition import AllOf, AnyOf, Condition, TensionCondition, condition_from
 from .conditions import *  # noqa: F403  the only list of them is there
 from .dataset import save
 from .first_look import hints
+from .metrics import METRICS, metric_values
 from .places import Places
 from .region import Region
 from .run import sample
 
 __all__ = [
+    "METRICS",
     "AllOf",
     "AnyOf",
     "Condition",
@@ -24,6 +26,7 @@ __all__ = [
     "boundary",
     "condition_from",
     "hints",
+    "metric_values",
     "sample",
     "save",
 ]

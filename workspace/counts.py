@@ -16,6 +16,7 @@ from ..base import processors
 from ..base.display import Displayed
 from .condition import Condition
 from .domain import THINNEST, Domain
+from .metrics import metric_values
 from .places import Places
 from .sampling import Sampler
 
@@ -35,7 +36,8 @@ class Counts:
     low, high
         Bounds of the accepted positions, (3,) [m]; infinite if there are none.
     samples, flags
-        Arrays of the samples that are kept, (n, k) as returned by `Domain.numbers`, and True for each accepted one.
+        Arrays of the samples that are kept, (n, k) as returned by `Domain.numbers` and their metrics, and True for each
+        accepted one.
     left
         Number of further samples that may be kept.
     """
@@ -100,6 +102,7 @@ class Counter(Displayed):
     sampler: Sampler | None  # none if the points of each chunk are given
     keep: str  # samples that are kept: accepted, all or none
     samples: int  # maximum number of samples of the run
+    metrics: tuple[str, ...] = ()  # of the samples that are kept
 
     def count(
         self, first: int, known: Sequence[bytes | None], points: Sequence[np.ndarray] | None, keep: bool
@@ -137,6 +140,8 @@ class Counter(Displayed):
                 counts.count(self.domain, places, exists, held)
                 if keep and self.keep != "none":
                     rows = slice(None) if self.keep == "all" else held
-                    counts.keep(self.domain.numbers(places.only(rows)), held[rows])
+                    kept = places.only(rows)
+                    values = [metric_values(name, self.domain.robot, kept) for name in self.metrics]
+                    counts.keep(np.column_stack([self.domain.numbers(kept), *values]), held[rows])
                 flags.append(np.packbits(held).tobytes())
         return counts, flags

@@ -15,6 +15,7 @@ from ..base.netcdf import Contents, save_netcdf
 from ..base.writing import whole_folder
 from .counts import Counts
 from .domain import Domain
+from .metrics import METRICS
 from .refinement import Refinement
 from .sampling import CHUNK
 from .volume import LEVEL, share_interval
@@ -26,7 +27,9 @@ METRES = {"units": "m"}
 OF_THIS_RUN = ("seconds", "poses_per_s", "workers")  # left out of files, which are equal whatever computed them
 
 
-def dataset(counts: Counts, domain: Domain, keep: str, method: str, refinement: Refinement | None) -> xr.Dataset:
+def dataset(
+    counts: Counts, domain: Domain, keep: str, method: str, refinement: Refinement | None, metrics: tuple[str, ...]
+) -> xr.Dataset:
     """Return the results of a run as a dataset, which `sample` documents."""
     import xarray as xr
 
@@ -41,7 +44,7 @@ def dataset(counts: Counts, domain: Domain, keep: str, method: str, refinement: 
     for name, low, high, count in zip("xyz", *domain.box, counts.cells.shape[1:], strict=True):
         coordinates[name] = ((name,), low + (np.arange(count) + 0.5) * (high - low) / count, METRES)
     if keep != "none":
-        variables |= _kept(counts, domain, keep)
+        variables |= _kept(counts, domain, keep, metrics)
         coordinates |= {"angle": ["roll", "pitch", "yaw"]} if domain.attitude_varies else {}
         names = [carrier.name for carrier in domain.robot.carriers]
         coordinates |= {"carrier": names} if domain.carriers_vary else {}
@@ -81,14 +84,17 @@ def _save_zarr(result: xr.Dataset, path: Path) -> Path:
     return path
 
 
-def _kept(counts: Counts, domain: Domain, keep: str) -> dict[str, Any]:
-    rows = np.vstack([np.empty((0, domain.numbers_kept)), *counts.samples])
+def _kept(counts: Counts, domain: Domain, keep: str, metrics: tuple[str, ...]) -> dict[str, Any]:
+    rows = np.vstack([np.empty((0, domain.numbers_kept + len(metrics))), *counts.samples])
+    values, rows = rows[:, domain.numbers_kept :], rows[:, : domain.numbers_kept]
     kept: dict[str, Any] = {"position": (("point", "axis"), rows[:, :3], METRES)}
     if domain.attitude_varies:
         kept["attitude"] = (("point", "angle"), rows[:, 3:6], {"units": "rad"})
     if domain.carriers_vary:
         where = rows[:, 6 if domain.attitude_varies else 3 :].reshape(len(rows), len(domain.robot.carriers), 3)
         kept["carrier_position"] = (("point", "carrier", "axis"), where, METRES)
+    for name, column in zip(metrics, values.T, strict=True):
+        kept[name] = (("point",), column, {"units": METRICS[name].unit, "long_name": METRICS[name].about})
     if keep == "all":
         flags = np.concatenate([np.empty(0, dtype=bool), *counts.flags])
         kept["accepted"] = (("point",), flags, {"long_name": "whether the condition holds"})

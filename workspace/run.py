@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from .condition import Condition, condition_from, for_robots
 from .counts import Counter, Counts
 from .dataset import dataset
 from .domain import Domain
+from .metrics import metric_names, metric_values
 from .refinement import Refinement
 from .region import Region
 from .sampling import CHUNK, Sampler, check_sampling, chunks_of
@@ -47,6 +48,7 @@ def sample(
     size: float | None = None,
     keep: str = "accepted",
     points_max: int = 1_000_000,
+    metrics: str | Sequence[str] = (),
     robust: float | None = None,
     execution: Execution | None = None,
     **options: Unpack[ExecutionOptions],
@@ -76,6 +78,8 @@ def sample(
         Samples in the dataset: accepted, all or none.
     points_max
         Maximum number of samples in the dataset; the first ones are kept.
+    metrics
+        Names of metrics to compute at the samples in the dataset, any of `METRICS` (default: none).
     robust
         Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the conditions about
         tension limits hold at all accepted configurations, to first order. It sets the key `robust` of these
@@ -92,6 +96,8 @@ def sample(
         position (point, axis) [m]
             Positions of the samples kept; attitude (point, angle) [rad] and carrier_position (point, carrier, axis) [m]
             if they vary; accepted (point) if all samples are kept.
+        margin, natural_frequency, payload, ... (point)
+            The `metrics`, in their units; nan where they need tensions and there are none.
         tried, reached (x, y, z)
             Samples in each of 32 x 32 x 32 cells of the box of positions, and those of them that were accepted.
         bounds (end, axis) [m]
@@ -124,13 +130,19 @@ def sample(
     (where,) = with_fields("sample", dict(options), where)
     whole_number("points_max", points_max, 0, MOST_POINTS)
     one_of("keep", keep, KEEP)
+    metrics = metric_names(metrics)
+    if metrics and keep == "none":
+        raise InputError("keep must be accepted or all with metrics, got 'none'")
     if size is not None and method != "adaptive":
         raise InputError(f"size must be None unless method is adaptive, got {shown(size)}")
     domain = Domain.of(robot, region)
     refinement = Refinement(domain, samples, size) if method == "adaptive" else None
     sampler = None if refinement else Sampler(method, samples, seed, tuple(domain.extent.tolist()))
     # At one place, for wrong input that only the condition can detect, before there is a file or a worker.
-    condition.holds(robot, domain.places(np.full((1, len(domain.extent)), 0.5))[0])
+    middle = domain.places(np.full((1, len(domain.extent)), 0.5))[0]
+    condition.holds(robot, middle)
+    for name in metrics:
+        metric_values(name, robot, middle)
     requested = {
         "robot": robot.name,
         "condition": json.dumps(condition.model_dump(mode="json"), sort_keys=True),
@@ -139,7 +151,7 @@ def sample(
         "seed": int(seed),
     }
     total = int(samples) if sampler is None else sampler.samples
-    counter = Counter(condition, domain, sampler, keep, total)
+    counter = Counter(condition, domain, sampler, keep, total, metrics)
     counts = Counts(domain, points_max if keep != "none" else 0)
     opened = nullcontext()
     if where.checkpoint is not None:
@@ -147,7 +159,7 @@ def sample(
         opened = open_checkpoint(Path(where.checkpoint), KIND, header, where.resume)
     with start_workers(where.workers, where.scheduler) as started, opened as stored:
         _Run(counter, counts, started, stored, where.progress).count(refinement)
-    result = dataset(counts, domain, keep, method, refinement)
+    result = dataset(counts, domain, keep, method, refinement, metrics)
     seconds = time.perf_counter() - start
     result.attrs = {
         **requested,

@@ -7,6 +7,7 @@ from .force_balance import ForceBalance
 from .interference import Interference
 from .lengths import Lengths
 from .margin import Margin
+from .metric import MetricInRange
 from .static_equilibrium import StaticEquilibrium
 from .wrench_closure import WrenchClosure
 from .wrench_feasible import WrenchFeasible
@@ -20,6 +21,7 @@ __all__ = [
     "Interference",
     "Lengths",
     "Margin",
+    "MetricInRange",
     "StaticEquilibrium",
     "WrenchClosure",
     "WrenchFeasible",

@@ -50,9 +50,7 @@ class Interference(Condition):
         starts, ends = anchors(robot, places.carriers), attachments(robot, places.pose)
         free = np.ones(len(places), dtype=bool)
         if self.between_cables is not None:
-            for i, j in _separate(robot):
-                distance = segment_distance(starts[:, i], ends[:, i], starts[:, j], ends[:, j])
-                free &= distance >= self.between_cables
+            free &= least_distance(robot, starts, ends) >= self.between_cables
         if self.platform is not None:
             low, high = np.array(self.platform.min), np.array(self.platform.max)
             for cable in range(robot.m):
@@ -87,14 +85,17 @@ def nearest_points(
     return between + s[..., None] * along - t[..., None] * across, s, t
 
 
-def _separate(robot: Robot) -> list[tuple[int, int]]:
-    """Return the pairs of cables without a common end."""
-    ends = (robot.home_anchors, robot.home_attachments)
-    return [
-        (i, j)
-        for i, j in combinations(range(robot.m), 2)
-        if all(np.linalg.norm(points[i] - points[j]) > 1e-9 for points in ends)
-    ]
+def least_distance(robot: Robot, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Return the smallest distance of two cables without a common end at home, (n,) [m]; inf if there are none.
+
+    The cables run from `starts` to `ends`, (n, m, 3) each.
+    """
+    least = np.full(len(starts), np.inf)
+    homes = robot.home_anchors, robot.home_attachments
+    for i, j in combinations(range(robot.m), 2):
+        if all(np.linalg.norm(points[i] - points[j]) > 1e-9 for points in homes):
+            least = np.minimum(least, segment_distance(starts[:, i], ends[:, i], starts[:, j], ends[:, j]))
+    return least
 
 
 def _outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:

@@ -1,0 +1,110 @@
+"""Draw maps of metrics over a slice of a workspace, or over three layers of one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import style
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.contour import QuadContourSet
+    from matplotlib.figure import Figure
+
+CELLS = 32  # along each axis, at most
+IN_A_CELL = 4  # samples that a cell should have
+LAYERS = 3  # of a volume, along z
+LEVELS = 8
+SHARE = 2.0  # [%] of the values below the lowest level, and above the highest one
+
+
+def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray | None = None) -> Figure:
+    """Draw contours of metrics, one row of panels each: the mean of the samples in each cell of the positions.
+
+    A region without extent along one axis has one panel, a volume three: the lower, middle and upper third of its
+    heights. Along a line, the samples themselves are drawn.
+
+    Parameters
+    ----------
+    result
+        From `workspace.sample`, with the variables `metrics` and `position`.
+    anchors
+        Anchors to mark, (m, 3) in {G} [m] (default: none).
+    """
+    thick = [k for k, name in enumerate("xyz") if result.sizes[name] > 1]
+    position = result["position"].values
+    layers, headings = [np.ones(len(position), dtype=bool)], [""]
+    if len(thick) == 3:
+        ends = np.linspace(*_ends(result["z"].values), LAYERS + 1)
+        between = list(pairwise(ends))
+        layers = [(position[:, 2] >= low) & (position[:, 2] <= high) for low, high in between]
+        headings = [f"z = {low:.3g} to\n{high:.3g} m" for low, high in between]
+    marks = np.empty((0, 3)) if anchors is None else anchors
+    axes = thick[:2]
+    box = np.array([_ends(result["xyz"[k]].values) for k in axes])
+    extent = np.ptp(np.vstack([box.T, marks[:, axes]]), axis=0)
+    columns, rows = len(layers), len(metrics)
+    tall = (style.COLUMN - 0.8) / columns * extent[-1] / extent[0]  # of panels at equal scales [inches]
+    tall = 2.5 if len(thick) == 1 else 1.0 + 0.2 * columns + float(np.clip(tall, 0.6, 3.5))
+    canvas = style.figure(height=rows * tall)
+    for row, name in enumerate(metrics):
+        values, unit = result[name].values, style.typeset(result[name].attrs["units"])
+        label = name.replace("_", " ") + ("" if unit == "1" else f" [{unit}]")
+        if len(thick) == 1:
+            ax = style.axes(canvas, f"{'xyz'[axes[0]]} [m]", label, (rows, 1, row + 1))
+            ax.plot(position[:, axes[0]], values, ".", color=style.colour(0), markersize=2, rasterized=True)
+            continue
+        finite = np.isfinite(values)
+        levels, panels, shades = _levels(values[finite]), [], None
+        for column, (layer, heading) in enumerate(zip(layers, headings, strict=True)):
+            labels = f"{'xyz'[axes[0]]} [m]", "" if column else f"{'xyz'[axes[1]]} [m]"
+            ax = style.axes(canvas, *labels, (rows, columns, row * columns + column + 1), panels[0] if panels else None)
+            panels.append(ax)
+            ax.grid(False)
+            ax.set_aspect("equal", adjustable="box")
+            ax.tick_params(labelleft=not column)
+            for axis in (ax.xaxis, ax.yaxis):
+                axis.set_major_locator(style.few_ticks(5 - columns))
+            style.heading(ax, heading, 1 / columns)
+            some = layer & finite
+            count = int(np.clip(np.sqrt(some.sum() / IN_A_CELL), 2, CELLS))
+            cells = [np.linspace(low, high, count + 1) for low, high in box]
+            shades = _contours(ax, position[some][:, axes], values[some], cells, levels) or shades
+            ax.plot(*marks[:, axes].T, "^", color="#000000", markersize=3, clip_on=False)
+        if shades is not None:
+            style.colour_bar(canvas, shades, panels, label, location="bottom", aspect=40)
+    return canvas
+
+
+def _contours(
+    ax: Axes, position: np.ndarray, values: np.ndarray, cells: list[np.ndarray], levels: np.ndarray
+) -> QuadContourSet | None:
+    """Fill contours of the means of values in cells, given by their edges, if some neighbouring cells have samples."""
+    count, *_ = np.histogram2d(*position.T, bins=cells)
+    total, *_ = np.histogram2d(*position.T, bins=cells, weights=values)
+    if not ((count[1:, 1:] > 0) & (count[:-1, :-1] > 0) & (count[1:, :-1] > 0) & (count[:-1, 1:] > 0)).any():
+        return None
+    mean = np.ma.masked_array(total / np.maximum(count, 1), count == 0).T
+    centres = [(edges[1:] + edges[:-1]) / 2 for edges in cells]
+    shades = ax.contourf(*centres, mean, levels=levels, extend="both", cmap="viridis")
+    ax.contour(*centres, mean, levels=levels, colors="#ffffff", linewidths=0.4)
+    return shades
+
+
+def _levels(values: np.ndarray) -> np.ndarray:
+    """Return round levels that most values are between."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = np.percentile(values, (SHARE, 100 - SHARE)) if len(values) else (0.0, 1.0)
+    return np.array(MaxNLocator(LEVELS).tick_values(low, high if high > low else low + max(abs(low), 1.0) * 1e-6))
+
+
+def _ends(centres: np.ndarray) -> tuple[float, float]:
+    """Return the outer edges of equal cells, from their centres."""
+    half = 0.5 * float(centres[1] - centres[0])
+    return float(centres[0]) - half, float(centres[-1]) + half
