@@ -16,16 +16,7 @@ from scipy.optimize import least_squares
 from ..base import processors
 from ..estimation import pose_from_lengths
 from ..models import Dynamics, Robot, load, points
-from ..workspace import (
-    Condition,
-    Lengths,
-    Margin,
-    MetricInRange,
-    Places,
-    StaticEquilibrium,
-    WrenchClosure,
-    WrenchFeasible,
-)
+from ..workspace import Condition, Lengths, Margin, Places, StaticEquilibrium, WrenchClosure, WrenchFeasible
 from .harness import head, machine, row, timed
 
 ROBOTS = ("wang-flying", "nist-robocrane", "ipanema-1", "ipanema-2", "cogiro", "caroca-pulleys")
@@ -36,7 +27,6 @@ CONDITIONS: dict[str, tuple[Condition, int]] = {  # and the part of the poses th
     "equilibrium and lengths": (StaticEquilibrium() & Lengths(max=5.0), 1),
     "wrench feasible, 8 pushes": (WrenchFeasible(box=PUSH), 4),
     "margin above 1 N": (Margin(above=1.0), 8),
-    "condition number below 5": (MetricInRange(metric="condition_number", max=5.0), 1),
 }
 FEW = 100  # poses of a reference that takes milliseconds
 

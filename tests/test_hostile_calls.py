@@ -43,9 +43,8 @@ PACKAGES = (
     "towline.control",
     "towline.simulation",
     "towline.viewer",
-    "towline.statics.natural_frequencies",
     "towline.statics.robust",
-    "towline.statics.stiffest",
+    "towline.statics.stiffness",
 )
 EACH = 6  # wrong values for each parameter
 LONGEST = 500  # characters of a message; the lists of robots and of keys are long

@@ -17,7 +17,7 @@ from ..models.dynamics import dynamics_of
 from ..models.points import anchors, attachments
 from ..solvers import solve_batch
 from ..solvers.available_wrench import facets
-from ..statics.natural_frequencies import natural_frequencies
+from ..statics.stiffness import natural_frequencies
 from .conditions.interference import least_distance
 from .conditions.margin import Margin
 from .feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
@@ -135,56 +135,38 @@ def _stiffness(robot: Robot, places: Places, turning: bool) -> np.ndarray:
     return found
 
 
-class _Walls(NamedTuple):
-    """The facets of available wrench sets about the wrench at rest; N configurations, K normals."""
+def _largest(robot: Robot, places: Places, basis: np.ndarray) -> np.ndarray:
+    """Return how much the wrench at rest can change, (n,) [N]; nan where it is not available.
 
-    part: slice
-    normals: np.ndarray  # (N, K, rows)
-    ahead: np.ndarray  # (N, K) [N], from the wrench to the facet along the normal
-    behind: np.ndarray  # (N, K) [N], the same against the normal
-    outside: np.ndarray  # (N, rows, rows), projection on wrenches that no tensions give
-    held: np.ndarray  # (N,), where the wrench is available
-
-
-def _walls(robot: Robot, places: Places) -> Iterator[_Walls]:
-    w = scaled(robot, rest_wrench(robot), wrench_rows(robot))
+    Along `basis` if that is one direction, (rows,), or in every direction of the space of several, (k, rows).
+    """
+    w, found = scaled(robot, rest_wrench(robot), wrench_rows(robot)), np.empty(len(places))
     near = _NONE * max(float(np.linalg.norm(w)), _NONE)
     for part, A in _some_matrices(robot, places):
         walls = facets(A, robot.t_min, robot.t_max)
-        along = walls.normals @ w
-        ahead, behind = walls.high - along, along - walls.low
-        beside = np.linalg.norm(np.einsum("nij,nj->ni", walls.outside, w - walls.offset), axis=1)
-        held = (np.minimum(ahead, behind).min(axis=1) >= -near) & (beside <= near)
-        yield _Walls(part, walls.normals, ahead, behind, walls.outside, held)
+        along, pulls = walls.normals @ w, walls.normals @ basis.T
+        held = np.linalg.norm(np.einsum("nij,nj->ni", walls.outside, w - walls.offset), axis=1) <= near
+        most = np.full(len(A), np.inf)
+        for sign, reserve in ((1.0, walls.high - along), (-1.0, along - walls.low)):
+            needed = sign * pulls if basis.ndim == 1 else np.linalg.norm(pulls, axis=2)
+            held &= reserve.min(axis=1) >= -near
+            possible = np.divide(reserve, needed, out=np.full_like(reserve, np.inf), where=needed > _NONE)
+            most = np.minimum(most, possible.min(axis=1))
+        flat = np.abs(walls.outside @ basis.T).reshape(len(A), -1).max(axis=1) > _NONE
+        found[part] = np.where(held, np.where(flat, 0.0, np.maximum(most, 0.0)), np.nan)
+    return found
 
 
 def _payload(robot: Robot, places: Places) -> np.ndarray:
     if robot.weight == 0:
         raise InputError(f"metric must be another one for robot {robot.name!r} without gravity, got 'payload'")
-    found = np.empty(len(places))
-    rows = wrench_rows(robot)
-    by_mass = scaled(robot, rest_wrench(robot), rows) / robot.platform.mass  # [N/kg]
-    for walls in _walls(robot, places):
-        along = walls.normals @ by_mass
-        some = np.abs(along) > _NONE * np.linalg.norm(by_mass)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            most = np.where(some, np.where(along > 0, walls.ahead, walls.behind) / np.abs(along), np.inf).min(axis=1)
-        flat = np.linalg.norm(walls.outside @ by_mass, axis=1) > _NONE * np.linalg.norm(by_mass)
-        found[walls.part] = np.where(walls.held, np.where(flat, 0.0, np.maximum(most, 0.0)), np.nan)
-    return found
+    w = scaled(robot, rest_wrench(robot), wrench_rows(robot))
+    return _largest(robot, places, w / np.linalg.norm(w)) * robot.platform.mass / np.linalg.norm(w)
 
 
 def _acceleration(robot: Robot, places: Places) -> np.ndarray:
-    found = np.empty(len(places))
-    forces = np.flatnonzero(wrench_rows(robot) < 3)
-    for walls in _walls(robot, places):
-        share = np.linalg.norm(walls.normals[:, :, forces], axis=2)
-        reserve = np.minimum(walls.ahead, walls.behind)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            most = np.where(share > _NONE, reserve / (robot.platform.mass * share), np.inf).min(axis=1)
-        flat = np.abs(walls.outside[:, :, forces]).max(axis=(1, 2)) > _NONE
-        found[walls.part] = np.where(walls.held, np.where(flat, 0.0, np.maximum(most, 0.0)), np.nan)
-    return found
+    rows = wrench_rows(robot)
+    return _largest(robot, places, np.eye(rows.size)[rows < 3]) / robot.platform.mass
 
 
 def _cable_distance(robot: Robot, places: Places) -> np.ndarray:
