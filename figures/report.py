@@ -14,7 +14,7 @@ from ..base.writing import whole_file
 from .drawing import Drawing
 
 # The colour of each status in `style.colour`; distinct with any kind of colour vision, and the word stands beside it.
-COLOURS = {"feasible": 0, "passed": 0, "infeasible": 1, "failed": 1}
+COLOURS = {"feasible": 0, "passed": 0, "file confirmed": 0, "infeasible": 1, "failed": 1}
 OTHER = 5
 
 

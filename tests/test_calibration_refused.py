@@ -131,6 +131,8 @@ def test_what_predicts_worse_than_the_file_is_not_written(tmp_path):
     automatic = calibrate(robot, Measurements(readings, poses, sigma=0.02), "auto")
     assert automatic.free == ()
     assert automatic.refused.startswith("the file predicts validation samples as well")
+    assert "FILE CONFIRMED" in automatic.report()
+    assert "DO NOT USE" not in automatic.report()
     np.testing.assert_array_equal(automatic.robot.anchors, robot.anchors)
     assert "the file as it is" in automatic.report()
 

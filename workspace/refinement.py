@@ -64,8 +64,7 @@ class Refinement:
             flags = yield np.stack(np.unravel_index(new, self._count + 1), axis=1) / self._count
             order = np.argsort(merged := np.concatenate([self._known, new]))
             self._known, self._flags = merged[order], np.concatenate([self._flags, flags])[order]
-            accepted = (self._flags[np.searchsorted(self._known, self._keys(some))] for some in _pieces(cells))
-            hits = np.concatenate([flags.sum(axis=1, dtype=np.int8) for flags in accepted])  # corners of each cell
+            hits = np.concatenate([self._hits(some) for some in _pieces(cells)])
             share = float(1.0 / self._count.prod())
             differ = (hits > 0) & (hits < len(self._corners))
             self.inside += share * int((hits == len(self._corners)).sum())
@@ -86,6 +85,10 @@ class Refinement:
         """Return the numbers on the lattice of the corners of cells (n, d), (n, 2^d)."""
         corners = cells[:, None, :] + self._corners
         return np.asarray(np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), tuple(self._count + 1)))
+
+    def _hits(self, cells: np.ndarray) -> np.ndarray:
+        """Return the number of accepted corners of cells (n, d), (n,)."""
+        return self._flags[np.searchsorted(self._known, self._keys(cells))].sum(axis=1, dtype=np.int8)
 
     def _halve(self, cells: np.ndarray) -> np.ndarray:
         """Return the halves of cells (n, d) on the next, finer lattice; flags that are known move to it."""

@@ -21,9 +21,10 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
     """Return the residuals, the parameters and the unobservable directions."""
     residual = f"{_mm(result.residual_before)} before, {_mm(result.residual_after)} after (rms)"
     about, _, summary = headline(result).partition(": ")
+    status, warning = ("file confirmed", "") if result.confirms_file else ("not usable", "DO NOT USE THIS RESULT: ")
     parts: list[Part] = [
         f"residual of the lengths {residual}",
-        *([] if result.refused is None else [f"DO NOT USE THIS RESULT: {result.refused}"]),
+        *([] if result.refused is None else [f"{warning}{result.refused}"]),
         *([f"CHECK THE LOG: {result.mistake.text}"] if result.mistake and not result.mistake.severe else []),
         *_of_held_out(result),
         *_of_noise(result),
@@ -33,7 +34,7 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
     ]
     return Report(
         about,
-        "" if result.refused is None else "not usable",
+        "" if result.refused is None else status,
         summary,
         parts,
         drawings,

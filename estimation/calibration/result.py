@@ -97,6 +97,11 @@ class CalibrationData(Displayed):
         return None
 
     @property
+    def confirms_file(self) -> bool:
+        """Return whether the log shows no reason to change anything: the file predicts it as well as any parameters."""
+        return self.doubt is None and self.converged and not self.free
+
+    @property
     def beyond_prior(self) -> tuple[tuple[str, float], ...]:
         """Return parameters that moved by more than 5 standard deviations of the prior, and by how many, most first."""
         of, state = self._solved.model.parameters, self._solved.fit.state

@@ -33,6 +33,7 @@ AUDIT_RATE = 1000.0  # [1/s]: the audit looks at every millisecond
 LEAST_INTERVALS = 200  # of the audit: short motions are audited between their ends too
 START_BAND = 1e-4  # of the force scale: how far planned tensions may start from the measured ones
 MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
+FEW = 20  # intervals of the saved trajectory of a motion that is shorter than two of its samples
 
 
 @dataclass(frozen=True)
@@ -137,8 +138,9 @@ class Scenario(Displayed):
 
     @property
     def output_samples(self) -> int:
-        """Return how many intervals the saved trajectory has."""
-        return max(round(self.duration * self.task.output_rate), 1)
+        """Return how many intervals the saved trajectory has: `FEW` where its rate would leave both ends alone."""
+        samples = round(self.duration * self.task.output_rate)
+        return samples if samples > 1 else FEW
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the tension limits less the task's margin if that is hard, and tightened, (m,) each [N]."""
