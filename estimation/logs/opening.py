@@ -49,8 +49,8 @@ def is_recording(path: str | os.PathLike[str]) -> bool:
     """Return whether a path is an existing log by its kind, and no NetCDF file of a plan or a simulation."""
     file = file_path("log", path)
     try:
-        if file.is_dir():
-            return True
+        if not file.is_file():  # a pipe would keep whoever opens it waiting
+            return file.is_dir()
         with file.open("rb") as stream:
             begin = stream.read(16)
         kind = next((kind for magic, kind in BEGINS.items() if begin.startswith(magic)), file.suffix.lower())
