@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 AIR = 0.05  # of an extent, beyond its ends
 FLAT = 0.22  # of the largest extent: thinner objects have panels so thick
-BESIDE, BETWEEN, ROW = 0.55, 0.45, 0.55  # inches: labels left of panels, between two, and below and above one
+BESIDE, BETWEEN, ROW = 0.55, 0.45, 0.6  # inches: labels left of panels, between two, and below and above one
 APART = 0.25  # inches from tick to tick, at least
 TALLEST = 4.6  # inches, of the panels together: higher objects are drawn smaller
 
@@ -28,9 +28,9 @@ class View(NamedTuple):
     up: int
 
 
-ABOVE = View("from above", 0, 1)
-FRONT = View("from the front", 0, 2)
-SIDE = View("from the side", 1, 2)
+ABOVE = View("top view", 0, 1)
+FRONT = View("front view", 0, 2)
+SIDE = View("side view", 1, 2)
 
 
 def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> tuple[Figure, list[Axes]]:
