@@ -84,16 +84,22 @@ class Replay(Drawn, Reported, Displayed):
 
     @cached_property
     def error(self) -> float:
-        """Return the 95 % quantile of the position residuals, or without positions of the lengths [m]."""
-        parts = {name: part[self.matching.kept] for name, part in self.residuals.items()}
-        if "position" in parts:
-            return float(np.nanquantile(np.sqrt(np.nansum(parts["position"] ** 2, axis=-1)), 0.95))
-        return float(np.nanquantile(np.abs(parts["lengths"]), 0.95)) if "lengths" in parts else 0.0
+        """Return the 95 % quantile of the position residuals, or without positions of the lengths [m].
+
+        Outlying windows are included. It is nan if neither positions nor lengths were compared.
+        """
+        if "position" in self.residuals:
+            part = self.residuals["position"]
+            sizes = np.sqrt(np.nansum(part**2, axis=-1))[np.isfinite(part).any(axis=-1)]
+        else:
+            sizes = np.abs(self.residuals.get("lengths", np.full(1, np.nan)))
+            sizes = sizes[np.isfinite(sizes)]
+        return float(np.quantile(sizes, 0.95)) if sizes.size else float("nan")
 
     @property
     def passed(self) -> bool:
-        """Return whether 95 % of the position residuals are within the tolerance."""
-        return self.error <= self.tolerance
+        """Return whether 95 % of the position residuals are within the tolerance, and the log has no input error."""
+        return self.error <= self.tolerance and self.windows.recorded.doubt is None
 
     @property
     def named(self) -> list[str]:

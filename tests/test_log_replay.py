@@ -136,9 +136,21 @@ def test_the_right_model_leaves_the_noise(kind, logs):
 def test_an_input_error_of_the_log_is_named(wrong, text, tmp_path):
     found = columns("tensions", every("tensions", 50))
     found |= wrong({name: one for name, one in found.items() if name.startswith("l")})
-    report = replay("planar-4", written(tmp_path / "wrong.csv", found)).report()
+    result = replay("planar-4", written(tmp_path / "wrong.csv", found))
+    report = result.report()
+    assert not result.passed
     assert "the log probably has an input error: " in report
     assert text in report
+
+
+def test_positions_that_were_not_measured_are_no_small_errors(tmp_path):
+    """With three of four poses missing the quantile is that of the measured ones."""
+    found = replay("planar-4", written(tmp_path / "log.csv", columns("tensions", every("tensions", 50))))
+    part = found.residuals["position"]
+    known = np.isfinite(part).any(axis=-1)
+    expected = np.quantile(np.sqrt(np.nansum(part**2, axis=-1))[known], 0.95)
+    found.residuals["position"] = np.concatenate([part, *3 * [np.full_like(part, np.nan)]])
+    assert found.error == pytest.approx(expected, rel=1e-12)
 
 
 CASES = [

@@ -32,7 +32,7 @@ class Recorded(Displayed):
     times
         (N,) [s], increasing.
     pose
-        Of the platform frame in {G}, (N, 6) [m, rad], nan where not measured.
+        Poses of the platform frame in {G}, (N, 6) [m, rad], nan where not measured.
     measured
         Which coordinates of the pose are measured, (6,) of bool; the others are computed from the lengths.
     lengths
@@ -50,6 +50,8 @@ class Recorded(Displayed):
         Thrust of each carrier, (N, c) [N], nan where not recorded.
     notes
         Remarks, one line each.
+    doubt
+        Probable input error of the log, in one line, or None.
     """
 
     robot: Robot
@@ -63,6 +65,7 @@ class Recorded(Displayed):
     carrier_pose: np.ndarray
     thrusts: np.ndarray
     notes: Sequence[str]
+    doubt: str | None = None
 
 
 def read_recorded(
@@ -122,9 +125,10 @@ def read_recorded(
         if found.commands and found.commands == read.fields.tensions:
             tensions = None
         pose, known_part = _poses(known, read, notes)
+        doubt = None
         if lengths is not None and not any(carrier.moves for carrier in known.carriers):
             wrong = mistake(known, measured)
-            notes.extend([f"the log probably has an input error: {wrong.text}"] if wrong and wrong.severe else [])
+            doubt = f"the log probably has an input error: {wrong.text}" if wrong and wrong.severe else None
         carrier_pose, thrusts = _carriers(known, read.recordings, given, times)
         flying = [i for i, carrier in enumerate(known.carriers) if carrier.actuators]
         if found.thrusts and not np.isfinite(thrusts).any():
@@ -142,6 +146,7 @@ def read_recorded(
             carrier_pose=carrier_pose,
             thrusts=thrusts,
             notes=notes,
+            doubt=doubt,
         )
     except InputError as error:
         text = str(error)
