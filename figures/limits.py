@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN = 0.2  # of a limit: what uses less is only named
-MOST = 10.0  # of a limit, of what should not fall below it
+MOST = 10.0  # of a limit: more is not told apart
 
 
 class Limited(NamedTuple):
@@ -29,7 +29,7 @@ class Limited(NamedTuple):
     def used(self) -> np.ndarray | None:
         """Return how much of the limit is used at each time, (n,), 1 at a limit; None if a share has no meaning.
 
-        Of a range that is not symmetric, half is used in its middle.
+        In the middle of a range that is not symmetric, half of it is used.
         """
         low, high, values = self.low, self.high, self.values
         if np.isfinite(low) and np.isfinite(high):
@@ -42,8 +42,8 @@ class Limited(NamedTuple):
             share = low / np.maximum(values, low / MOST)  # a clearance may be negative
         else:
             return None
-        known = np.isfinite(share).any(axis=1)
-        return np.where(known, np.max(share, axis=1, where=np.isfinite(share), initial=0.0), np.nan)
+        known = ~np.isnan(share)
+        return np.where(known.any(axis=1), np.max(share, axis=1, where=known, initial=0.0).clip(max=MOST), np.nan)
 
     def text(self) -> str:
         """Return the name with its limits."""
@@ -68,7 +68,7 @@ def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
     for limited in quantities:
         used = limited.used()
         if used is not None and np.isfinite(used).any() and np.nanmax(used) >= SHOWN:
-            drawn.append((limited.text(), 100 * used))
+            drawn.append((f"{limited.text()}: {100 * np.nanmax(used):.3g} %", 100 * used))
         else:
             shown = "" if used is None or not np.isfinite(used).any() else f": {100 * np.nanmax(used):.2g} %"
             small.append(limited.text() + shown)

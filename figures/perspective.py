@@ -28,7 +28,7 @@ class Perspective:
     low, high, size
         Corners and diagonal of the box around what is shown, in {G} [m].
     flat
-        Whether it is in a vertical plane.
+        True if it is in a vertical plane.
     floor, cell
         Height of the floor, and edge of its cells [m].
     """

@@ -332,7 +332,7 @@ def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cabl
     offsets, axes
         From anchors to attachments, (m, 3) [m], and the swivel axes, (m, 3) [-], in {G} at home.
     radii
-        Of the sheaves, (m,) [m]; 0 for a cable without.
+        Radii of the sheaves, (m,) [m]; 0 for a cable without.
 
     Raises `ValueError` that names the attachment.
     """

@@ -22,7 +22,7 @@ STEPS, HALVINGS = 4, 3  # of Gauss and Newton, and of a step that is too long
 REMOVED = 0.01  # of the sum of squares, from which on a parameter is named
 NOTHING = 0.5  # of the sum of squares that noise has: less needs no explanation
 DOUBT = 5e-4  # probability, on each side, that a parameter is named which only the scatter of the windows changes
-TIED = 0.1  # of what the best explains: others that explain as much, up to this, cannot be told apart from it
+TIED = 0.1  # of what the best explains: others that explain as much, up to this, are not distinguished from it
 SHOWN = 0.1  # of a parameter (of 0.1 s, of a tenth of the tensions): its deviation where a recording does not show it
 BLURRED = 0.2  # of the squares of the derivative by the stiffness: what may be noise of lengths
 FARTHEST = 5.0  # standard deviations of a start
@@ -43,9 +43,9 @@ class Explanation(NamedTuple):
     explained
         Share of the squared residuals beyond the noise that it removes.
     shown
-        Whether the recording shows it well enough to be found.
+        True if the recording shows it well enough to be found.
     named
-        Whether it certainly explains something.
+        True if it certainly explains something.
     """
 
     name: str

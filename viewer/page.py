@@ -33,7 +33,7 @@ def aside(subject: Subject, frames: list[Snapshot], cell: float) -> str:
     # What follows the clock is replaced by the script; of the rest only the first instant is known.
     table = labels.table(start, subject.robot)
     status = f'<b class="towline-status">{escape(start.status)}</b>'
-    clock = "" if start.time is None else f'<div class="towline-time">t = {start.time:.2f} s</div>'
+    clock = f'<div class="towline-time">t = {start.time or 0.0:.2f} s</div>'
     data = json.dumps(_data(subject.robot, frames)).replace("<", "\\u003c")
     return (
         '<aside style="position:fixed;left:8px;bottom:52px;max-width:280px;max-height:80%;overflow:auto;z-index:1;'

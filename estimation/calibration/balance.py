@@ -69,7 +69,7 @@ class Balance:
     def _of_log(self) -> tuple[Motion, np.ndarray, np.ndarray]:
         """Return the motion, and what capstan, friction and gain multiply, as measured and smoothed, (3, N, m).
 
-        That is y s, s and y, with tensions y and signs s of the cable speeds.
+        These are y s, s and y, with tensions y and signs s of the cable speeds.
         """
         motion, y = motion_of(self._robot, self._measurements), self._measurements.tensions
         terms = np.zeros((3, len(self._measurements), self._robot.m))

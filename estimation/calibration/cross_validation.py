@@ -156,8 +156,8 @@ def _forces(solved: Solved, free: tuple[str, ...]) -> tuple[str, ...]:
     given = solved.model.measurements
     words = ("com",) if given.tensions is None else FORCES
     model = replace(solved.model, weighs=True)
-    told = given.tensions is not None or needs_balance(model.robot, given)
-    if not (told and model.robot.weight and model.balanced):
+    has_forces = given.tensions is not None or needs_balance(model.robot, given)
+    if not (has_forces and model.robot.weight and model.balanced):
         return ()
     chosen: tuple[str, ...] = ()
     best = _compare(solved, [free], {}, True).sets[0].balance

@@ -26,7 +26,7 @@ def into_places(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.nd
     Parameters
     ----------
     limits, limited
-        Those of the task, and what they bound at the instants, (n, k) each.
+        Limits of the task, and what they bound at the instants, (n, k) each.
     """
     robot, meetings = seen.robot, []
     for limit, values in zip(limits, limited, strict=True):
@@ -72,7 +72,7 @@ def between_points(seen: Instants, limits: Sequence[Limit], limited: Sequence[np
     Parameters
     ----------
     limits, limited
-        Those of the task, and what they bound at the instants, (n, k) each.
+        Limits of the task, and what they bound at the instants, (n, k) each.
     """
     robot = seen.robot
     kept = [
