@@ -115,7 +115,7 @@ def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Mo
 
 
 def _surprise(result: Fit, weights: np.ndarray) -> float:
-    """Return the sum of squares of a fit; a reading that it leaves out adds the smallest square for which readings are left out."""
+    """Return the sum of squares of a fit, where each reading that is left out adds the least square of such a one."""
     return result.cost + LEAST_THRESHOLD**2 * float((weights == 0).sum())
 
 
