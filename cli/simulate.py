@@ -75,6 +75,14 @@ def simulate(
             metavar="FILE", help="Errors and delay of the sensors (YAML), such as {position: 0.001, delay: 0.002}."
         ),
     ] = None,
+    mismatch: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="How the simulated robot and its drives differ from the file (YAML), such as {mass: [0.9, 1.1], "
+            "winch_lag: 0.02}; from a range each run draws a number.",
+        ),
+    ] = None,
     event: Annotated[
         list[str] | None,
         typer.Option(
@@ -176,6 +184,7 @@ def simulate(
             "--wind": wind,
             "--gusts": gusts,
             "--noise": noise,
+            "--mismatch": mismatch,
         }
         of_plan |= {"--event": event, "--duration": duration, "--seed": seed, "--runs": runs, "--animate": animate}
         for name, value in of_plan.items():
@@ -197,7 +206,7 @@ def simulate(
         from ..control import ComputedTorque, LengthControl, OpenLoop, Predictive
         from ..models import load
         from ..models.parsing import read_yaml
-        from ..simulation import Conditions, Execution, Noise, simulate
+        from ..simulation import Conditions, Execution, Mismatch, Noise, simulate
 
         loaded = load(robot)
         if not os.path.isfile(plan):  # `Path.is_file` raises where the name is too long
@@ -208,12 +217,15 @@ def simulate(
         )
         outputs = {"the checkpoint": stored, "--out": target, "--animate": animate, "--report": report}
         outputs["--figures"] = figures and figures / f"error{end}.{form}"
-        check_outputs(outputs, {"the plan": plan, "--noise": noise})
+        check_outputs(outputs, {"the plan": plan, "--noise": noise, "--mismatch": mismatch})
         kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop)
         pilot = dict(zip(CONTROLLERS, kinds, strict=True))[controller](loaded)
         air = None if wind is None else numbers("--wind", wind, 3)
         sensors = None if noise is None else read_yaml(noise, Noise)
-        conditions = Conditions(air, gusts, sensors, events=event or (), duration=duration, tolerance=tolerance)
+        differs = None if mismatch is None else read_yaml(mismatch, Mismatch)
+        conditions = Conditions(
+            air, gusts, sensors, events=event or (), duration=duration, tolerance=tolerance, mismatch=differs
+        )
         run = partial(simulate, loaded, plan, pilot, seed=seed, conditions=conditions)
         if runs is None:
             film = None if animate is None else (animate, speed, fps)

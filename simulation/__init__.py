@@ -7,6 +7,7 @@ from ..base.former_names import moved_name
 from .conditions import Conditions
 from .events import Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
 from .log_replay import Replay, replay
+from .mismatch import Mismatch
 from .own_run import simulation_of
 from .sensors import Noise
 from .simulate import simulate
@@ -19,6 +20,7 @@ __all__ = [
     "Execution",
     "Follow",
     "Lose",
+    "Mismatch",
     "Miss",
     "Noise",
     "Push",

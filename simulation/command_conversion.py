@@ -9,6 +9,7 @@ from ..control import Command
 from ..control.trajectory import moved_on
 from ..core import winch_lengths
 from ..plant import Plant, layout
+from .drives import Drives
 from .experiment import Experiment, Wind
 
 FASTEST = 1e3  # [m/s], of the air
@@ -28,7 +29,7 @@ class Orders:
     conditions
         Conditions of the runs.
     seeds
-        Seed of the wind, one for each run.
+        Seed of the wind and of the drives, one for each run.
     """
 
     def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int]):
@@ -39,6 +40,9 @@ class Orders:
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)
         row = plant.command(np.ones(robot.m), wind=calm, wrench=conditions.disturbance)
+        differ, self._imperfect = conditions.mismatch, None
+        if differ.of_drives:
+            self._imperfect = Drives([differ.drawn(robot, seed) for seed in seeds], conditions.period)
         self._moves, count = any(carrier.moves for carrier in robot.carriers), len(robot.carriers)
         self._rows = np.tile(row, (len(seeds), 1 + self._moves, 1))  # a second, of the next period, has only carriers
         m, first = robot.m, layout.REFERENCE_POSE
@@ -51,6 +55,7 @@ class Orders:
         self._accelerations = carriers[..., first + 12 : first + 18]
         self._actuation = carriers[..., : max(len(carrier.actuators) for carrier in robot.carriers)]
         if self._moves:
+            self._starts = carriers[..., first:].reshape(len(seeds), count, 3, 6)
             self._ends = blocks[:, 1, :, first:].reshape(len(seeds), count, 3, 6)
             # What a constant acceleration misses of the next reference: pose, velocity and acceleration, (K, 3, c, 6).
             motion = np.array([reference[3:6] for reference in conditions.references])
@@ -68,28 +73,33 @@ class Orders:
 
         Where carriers move, the second has their references at the end. Each call overwrites the rows of the last.
         """
-        rows = self._rows[:, 0]
+        rows, drives = self._rows[:, 0], self._imperfect
         if self.wind is not None:
             rows[:, layout.WIND : layout.WRENCH] = self.wind[k]
         if command.lengths is not None:
             if self._drive != "lengths":
                 raise InputError(f"drive must be 'lengths' for a controller that commands lengths, got {self._drive!r}")
-            self._cables[:] = command.lengths
-        elif self._drive != "lengths":
-            self._cables[:] = command.tensions
-        elif self._fixed is not None:
+            self._cables[:] = command.lengths if drives is None else drives.lengths(command.lengths)
+        elif self._drive == "lengths" and self._fixed is not None:
             self._cables[:] = self._fixed
         else:
             tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._last_rates.shape)
-            winch_lengths(self._record, states, lengths, tensions, self._last_rates, self._rows, self._period)
+            if drives is not None:
+                tensions = drives.tensions(tensions, lengths[:, 1])
+            if self._drive != "lengths":
+                self._cables[:] = tensions
+            else:
+                winch_lengths(self._record, states, lengths, tensions, self._last_rates, self._rows, self._period)
         if self._moves:
             self._poses[:], self._velocities[:] = command.carrier_pose, command.carrier_velocity
             self._accelerations[:] = command.carrier_acceleration
             motion = self._poses, self._velocities, self._accelerations
             for order, end in enumerate(moved_on(motion, self._period)):
                 np.add(end, self._missed[k, order], out=self._ends[:, :, order])
+            if drives is not None:
+                drives.follow(self._starts, self._ends)
         if command.actuation is not None:
-            self._actuation[:] = command.actuation
+            self._actuation[:] = command.actuation if drives is None else drives.actuation(command.actuation)
         return self._rows
 
 

@@ -10,6 +10,7 @@ from ..base.display import Displayed
 from ..base.inputs import finite_array, number, one_of, whole_number
 from ..models.parsing import validate
 from ..plant.plant import DRIVES
+from .mismatch import Mismatch
 from .sensors import Noise
 
 
@@ -46,6 +47,8 @@ class Conditions(Displayed):
         elastic or of fixed length, otherwise "tensions".
     tolerance
         Largest position error allowed for a pass [m].
+    mismatch
+        How the simulated robot and its drives differ from the file, a `Mismatch` or a mapping (default: not at all).
 
     Raises
     ------
@@ -63,6 +66,7 @@ class Conditions(Displayed):
     substeps: int | None = None
     drive: str | None = None
     tolerance: float = 0.05
+    mismatch: Mismatch | dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         """Check everything that does not depend on the robot."""
@@ -75,7 +79,8 @@ class Conditions(Displayed):
             whole_number("substeps", self.substeps, 1, 1000)
         if self.drive is not None:
             one_of("drive", self.drive, DRIVES)
-        if not isinstance(self.noise, Noise):
-            object.__setattr__(self, "noise", validate({} if self.noise is None else self.noise, Noise, "noise"))
+        for name, kind in (("noise", Noise), ("mismatch", Mismatch)):
+            if not isinstance(given := getattr(self, name), kind):
+                object.__setattr__(self, name, validate({} if given is None else given, kind, name))
         push = finite_array("disturbance", np.zeros(6) if self.disturbance is None else self.disturbance, (6,))
         object.__setattr__(self, "disturbance", push)

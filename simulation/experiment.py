@@ -8,6 +8,7 @@ import numpy as np
 from ..base.display import record
 from ..control import Reference
 from .events import Cut, Event
+from .mismatch import Mismatch
 from .sensors import Noise
 
 Wind = Callable[[np.ndarray, int], np.ndarray]  # the wind at times (K,) [s] for a seed, (K, 3) [m/s]
@@ -25,6 +26,7 @@ class Experiment(NamedTuple):
     events: tuple[Event, ...]  # events in order of time
     keep_out: Sequence[Sequence[np.ndarray]]  # outlines of the keep-out regions of the reference, see `Trajectory`
     doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit, see `Trajectory`
+    mismatch: Mismatch = Mismatch()  # as in `Conditions`
 
     __repr__ = record
 
@@ -50,5 +52,6 @@ class Experiment(NamedTuple):
             "substeps": self.substeps,
             "disturbance": self.disturbance.tolist(),
             "noise": self.noise.model_dump(exclude_defaults=True),
+            "mismatch": self.mismatch.model_dump(exclude_defaults=True),
             "events": [event.model_dump(mode="json") for event in self.events],
         }

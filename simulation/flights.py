@@ -28,6 +28,10 @@ from .run_statistics import Extremes
 if TYPE_CHECKING:
     import xarray as xr
 
+DOUBT = 0.05  # probability that an interval does not have the true value
+ROUNDING = 1e-9  # of the duration
+FAILED = {"error": "position error", "tension": "tension", "slack": "slack", "diverged": "divergence"}
+
 
 def copies(controller: Controller, count: int) -> list[Controller]:
     """Return a controller for each of `count` runs, or the given one if it accepts batches.
@@ -46,9 +50,17 @@ def copies(controller: Controller, count: int) -> list[Controller]:
         ) from None
 
 
+def plant_of(plant: Plant, conditions: Experiment, seed: int) -> Plant:
+    """Return the plant of a run, which may differ from that of the robot's file."""
+    robot = conditions.mismatch.robot(plant.robot, seed)
+    return plant if robot is plant.robot else Plant(robot, drive=plant.drive)
+
+
 def fly_block(plant: Plant, controller: Controller, conditions: Experiment, seeds: Sequence[int]) -> np.ndarray:
     """Simulate a block of runs in parallel, and return the statistics of each, (N,) of `FIGURES`."""
-    kept = Extremes(conditions, plant.robot, len(seeds))
+    if conditions.mismatch.varies and len(seeds) > 1:
+        return np.concatenate([fly_block(plant, controller, conditions, [seed]) for seed in seeds])
+    kept, plant = Extremes(conditions, plant.robot, len(seeds)), plant_of(plant, conditions, seeds[0])
     lasted, _ = fly(plant, copies(controller, len(seeds)), conditions, seeds, kept.take)
     return kept.figures(lasted)
 
@@ -57,6 +69,18 @@ def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:
     """Return which runs passed, (N,), from their statistics: complete, near the reference, with tensions in range."""
     lasted_near = (of["lasted"] == periods) & (of["error_max"] <= tolerance)
     return lasted_near & (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
+
+
+def share_interval(successes: int, count: int) -> tuple[float, float]:
+    """Return the interval of a probability with a confidence of 95 %, after so many successes.
+
+    Source: C. J. Clopper and E. S. Pearson, Biometrika 26, 1934.
+    """
+    from scipy.special import betaincinv
+
+    fails = count - successes
+    low = 0.0 if successes == 0 else float(betaincinv(successes, fails + 1, DOUBT / 2))
+    return low, 1.0 if fails == 0 else float(betaincinv(successes + 1, fails, 1 - DOUBT / 2))
 
 
 def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], tolerance: float, of: np.ndarray) -> xr.Dataset:
@@ -69,13 +93,15 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
         "error_max": over(("seed",), of["error_max"], "m", "largest position error"),
         "tension_min": over(("seed",), of["tension_min"], "N", "smallest tension"),
         "tension_max": over(("seed",), of["tension_max"], "N", "largest tension"),
+        "tension_excess": over(("seed",), of["exceeded"], "1", "largest excess over t_max, of the cable's range"),
         "slack_s": over(("seed",), of["slack"] * period, "s", "time with a slack cable whose t_min is above zero"),
         "answered": Variable(
             ("seed", "answer"), of["answered"], {"long_name": "number of control steps with each status"}
         ),
     }
     coordinates = {"seed": Variable(("seed",), np.array(seeds)), "answer": Variable(("answer",), np.array(ANSWERS))}
-    attributes = {"title": f"towline simulations of {robot.name}", "robot": to_yaml(robot), "tolerance_m": tolerance}
+    attributes: dict[str, Any] = {"title": f"towline simulations of {robot.name}", "robot": to_yaml(robot)}
+    attributes |= {"tolerance_m": tolerance, "duration_s": periods * period}
     if conditions.doubt:
         attributes["reference"] = conditions.doubt
     return Contents(variables, coordinates, attributes).dataset()
@@ -83,17 +109,33 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
 
 def summary(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the output of `towline simulate --runs N --json`, ready for JSON."""
-    worst = dataset["error_max"].values
+    worst, passes, count = dataset["error_max"].values, dataset["passed"].values, int(dataset.sizes["seed"])
+    likely = dict(zip(("low", "high"), share_interval(int(passes.sum()), count), strict=True))
     return {
-        "runs": int(dataset.sizes["seed"]),
-        "passed": int(dataset["passed"].values.sum()),
+        "runs": count,
+        "passed": int(passes.sum()),
+        "share_passed": {"share": float(passes.mean()), **likely},
+        "failed": _failed(dataset),
         "error_max": {
             "median": float(np.median(worst)),
             "p95": float(np.percentile(worst, 95)),
             "worst": float(worst.max()),
         },
-        "worst_seed": int(dataset["seed"].values[int(worst.argmax())]),
+        "worst_seed": int(dataset["seed"].values[int(np.where(passes & ~passes.all(), -1.0, worst).argmax())]),
+        "worst_cause": dataset.attrs.get("worst"),
     }
+
+
+def _failed(dataset: xr.Dataset) -> dict[str, int]:
+    """Return how many runs failed by each condition; a run may fail by several."""
+    ended = dataset["duration"].values >= (1 - ROUNDING) * float(dataset.attrs["duration_s"])
+    holds = {
+        "error": dataset["error_max"].values <= float(dataset.attrs["tolerance_m"]),
+        "tension": dataset["tension_excess"].values <= TENSION_TOLERANCE,
+        "slack": dataset["slack_s"].values == 0,
+        "diverged": ended,
+    }
+    return {name: int((~rows).sum()) for name, rows in holds.items()}
 
 
 def report(dataset: xr.Dataset) -> Report:
@@ -104,10 +146,15 @@ def report(dataset: xr.Dataset) -> Report:
     counts = dataset["answered"].values.sum(axis=0)
     largest, slack = short["error_max"], dataset["slack_s"].values
     doubt = dataset.attrs.get("reference")
-    rows = ({"reference": doubt} if doubt else {}) | {
+    likely, failed = short["share_passed"], {FAILED[name]: n for name, n in short["failed"].items() if n}
+    rows = {"reference": doubt} if doubt else {}
+    rows["probability of a pass"] = f"{100 * likely['low']:.3g} to {100 * likely['high']:.3g} % (95 % confidence)"
+    if failed:
+        rows["failed"] = ", ".join(f"{quantity(n)} by {name}" for name, n in failed.items())
+    rows["worst run"] = f"seed {short['worst_seed']}" + (f": {cause}" if (cause := short["worst_cause"]) else "")
+    rows |= {
         "largest error": f"median {quantity(1e3 * largest['median'], 'mm')}, 95 % below "
-        f"{quantity(1e3 * largest['p95'], 'mm')}, worst {quantity(1e3 * largest['worst'], 'mm')} "
-        f"(seed {short['worst_seed']})",
+        f"{quantity(1e3 * largest['p95'], 'mm')}, worst {quantity(1e3 * largest['worst'], 'mm')}",
         "tolerance": quantity(1e3 * float(dataset.attrs["tolerance_m"]), "mm"),
         "tensions": f"{quantity(float(dataset['tension_min'].values.min()), 'N')} to "
         f"{quantity(float(dataset['tension_max'].values.max()), 'N')}",

@@ -15,6 +15,7 @@ from ..base.display import Fact, tensions_over_time
 from ..base.netcdf import Contents, Variable
 from ..base.text import at_most, quantity
 from ..control import ANSWERS
+from ..control.command import SOFT
 from ..figures.drawn import Filmed
 from ..figures.outlines import outline_variables
 from ..figures.report import Report, Reported, Section
@@ -173,6 +174,7 @@ class Simulation(SimulationData, Filmed, Reported):
         merit, happened = self.figures_of_merit(), occurrences(self)
         rows = {"reference": self.conditions.doubt} if self.conditions.doubt else {}
         rows |= {"events": sentence(happened)} if happened else {}
+        rows |= {"differs from file": differs} if (differs := self._differs()) else {}
         rows |= {
             "position error": f"{quantity(1e3 * merit['error_rms'], 'mm', digits=3)} rms, "
             f"{quantity(1e3 * merit['error_max'], 'mm', digits=3)} at most",
@@ -190,6 +192,19 @@ class Simulation(SimulationData, Filmed, Reported):
         if merit["shortfall_max"] is not None:
             rows["wrench shortfall"] = f"up to {quantity(merit['shortfall_max'], 'N')}"
         return list(rows.items())
+
+    def cause(self) -> str:
+        """Return what led to the result, in order of time, and how the robot differed from its file."""
+        happened, lacking = occurrences(self), np.flatnonzero(self.record.answered[: self._recorded] == SOFT)
+        if lacking.size:
+            happened.append(Occurrence(float(self.times[lacking[0]]), "soft", "tensions lacked some of the wrench"))
+        text = sentence(sorted(happened, key=lambda event: event.at))
+        return "; ".join(filter(None, [text, (differs := self._differs()) and f"differs from its file by {differs}"]))
+
+    def _differs(self) -> str:
+        """Return how the robot of this run differed from its file, in words; empty if it did not."""
+        mismatch = self.conditions.mismatch
+        return mismatch.drawn(self.robot, self.seed).describe(mismatch)
 
     def _picture(self) -> str:
         tensions = self.record.tensions[: self._recorded]

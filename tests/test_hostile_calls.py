@@ -347,6 +347,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "Conditions.duration": lambda: 0.01,
     "controller": lambda: None,
     "noise": lambda: None,
+    "mismatch": lambda: None,
     "events": lambda: ["cut 1 at 0.005"],
     "faults": lambda: None,
     "gusts": lambda: 0.5,
@@ -474,6 +475,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "Margin": {},
     "MetricInRange": {"metric": "margin", "min": 0.0},
     "Noise": {},
+    "Mismatch": {},
     **EVENTS,
     "StaticEquilibrium": {},
     "WrenchClosure": {},
@@ -566,7 +568,7 @@ def subjects() -> dict[str, Subject]:
     objects |= {
         name: getattr(workspace, name)(**MODELS[name])
         for name in MODELS
-        if name not in objects and name not in {"Noise", "Uncertainty", *EVENTS}
+        if name not in objects and name not in {"Noise", "Mismatch", "Uncertainty", *EVENTS}
     }
     for name, value in objects.items():
         for method, bound in public_methods(value):
