@@ -66,6 +66,32 @@ def test_exact_waypoints_are_passed_though_the_tube_is_used():
     assert found.tracking_error_max > 1e-3
 
 
+STATIONS = [[0, 0, 1], [2, -1, 1], [2, 1, 1.5], [-2, 1, 1.5], [-2, -1, 1.2], [0, 0, 1]]
+TOUR = {"duration": {"min": 0.5, "max": 20}, "objective": {"time": 0.1, "jerk": 1000}, "steps": 32}
+
+
+@pytest.mark.parametrize(("tube", "points"), [(0.15, [[-2, 1, 1.5], *STATIONS[:3]]), ("free", STATIONS)])
+def test_points_are_passed_when_it_is_best(tube, points):
+    """No other times that are tried are better, those of the path least; and the points are passed as they must."""
+    path = {"kind": "waypoints", "points": points}
+    task = {"path": path, "tube": {"position": tube, "waypoints": "exact"}, **TOUR}
+    found = plan("cogiro", task)
+    chosen = found.scenario.path
+    assert found.feasible
+    there, _ = found.scenario.motion(chosen.knots(found.duration), found.deviation)
+    np.testing.assert_allclose(there.pose[:, :3], points, atol=1e-6)
+    tried = [found.scenario.task.path.knots(1.0).tolist()]
+    for off in (0.04, -0.04)[: 6 - len(points)]:
+        tried += [[*chosen.shares[:2], chosen.shares[2] + off, *chosen.shares[3:]]]
+    others = [plan("cogiro", task | {"path": path | {"shares": shares}}) for shares in tried]
+    assert all(other.scenario.path.shares == tuple(shares) for other, shares in zip(others, tried, strict=True))
+    assert min(other.objective for other in others) > found.objective
+    assert others[0].duration > 1.03 * found.duration
+    again = plan("cogiro", task, start=found)
+    assert again.scenario.path == chosen
+    assert again.objective == pytest.approx(found.objective, rel=1e-3)
+
+
 @pytest.mark.parametrize("duration", [{"min": 1, "max": 1.2}, 1.0], ids=["open", "fixed"])
 def test_margin_is_the_largest_that_there_is(duration):
     """At a resting pose a linear program knows it: max s with A t = w and t at least s inside its limits."""

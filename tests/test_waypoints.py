@@ -6,6 +6,7 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 from scipy.interpolate import PPoly, make_interp_spline
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from towline import load, plan, read_task
@@ -213,6 +214,24 @@ def test_times_and_dwells_are_kept():
     assert dwelling.knots(8.0)[1] - 0.5 == pytest.approx(path_of(points, dwell=(0, 0, 1e-9, 0)).knots(6.0)[1])
 
 
+@pytest.mark.parametrize("shape", ["legs", "spline"])
+def test_shares_of_the_duration_change_the_times_and_not_the_way(shape):
+    """With those that a path has by default it is the same; with others its legs, only faster and slower."""
+    path = WaypointPath(kind="waypoints", points=[[0, 0, 1], [1, 0, 1], [1, 2, 1], [0, 2, 2]], shape=shape)
+    own = WaypointPath(**{**path.model_dump(), "shares": path.knots(1.0).tolist()})
+    times = np.linspace(0, 3, 301)
+    for mine, its in zip(path.at(times, 3.0), own.at(times, 3.0), strict=True):
+        np.testing.assert_allclose(mine, its, atol=1e-9)
+    other = WaypointPath(**{**path.model_dump(), "shares": [0, 0.2, 0.7, 1]})
+    np.testing.assert_allclose(other.knots(3.0), [0, 0.6, 2.1, 3])
+    pose, velocity, acceleration = other.at(times, 3.0)
+    if shape == "legs":
+        np.testing.assert_allclose(other.missed(3.0), path.missed(3.0), atol=0.01)
+        assert KDTree(path.at(np.linspace(0, 3, 9001), 3.0).pose).query(pose)[0].max() < 2e-3
+    np.testing.assert_allclose(np.gradient(pose, times, axis=0)[2:-2], velocity[2:-2], atol=0.02)
+    np.testing.assert_allclose(np.gradient(velocity, times, axis=0)[2:-2], acceleration[2:-2], atol=0.3)
+
+
 def test_a_low_lift_stays_low():
     """A lift of 5 cm, a move of 2 m, a lowering of 5 cm, with nothing but points and a duration."""
     points = [[-1, 0, 2], [-1, 0, 2.05], [1, 0, 2.05], [1, 0, 2]]
@@ -324,6 +343,12 @@ REFUSED = {
     "long dwell": ({"dwell": [1, 2, 1]}, "duration must be more than the 4 s for which path dwells, got 2 s"),
     "dwell past times": ({"dwell": [1, 0, 0], "times": [0, 1, 2]}, r"dwell\[0\] must be less than the 1 s"),
     "spline that dwells": ({"shape": "spline", "dwell": [0, 1, 0]}, "dwell must be left out with the shape spline"),
+    "shares and times": ({"shares": [0, 0.5, 1], "times": [0, 1, 2]}, "times must be left out with shares"),
+    "few shares": ({"shares": [0, 1]}, "shares must have one number for each of the 3 points, got 2"),
+    "shares back": ({"shares": [0, 0, 1]}, r"shares must increase, got shares\[1\] = 0 after 0"),
+    "late shares": ({"shares": [0.1, 0.5, 1]}, "shares must start at 0, got 0.1"),
+    "shares of more": ({"shares": [0, 0.5, 1.1]}, "shares must end at 1, got 1.1"),
+    "nan share": ({"shares": [0, float("nan"), 1]}, r"path.shares\[1\]"),
     "gimbal": ({"points": [[0, 0, 1], [0, 1, 1, 0, 1.57, 0]]}, r"points\[0\] to points\[1\] must keep the pitch"),
 }
 

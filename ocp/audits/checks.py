@@ -186,7 +186,7 @@ def _end_step(audited: Instants, end: int) -> float:
 
 def _waypoints(audited: Instants) -> list[Excess]:
     """Check that the platform passes through the task's points where it has to."""
-    scenario, path = audited.scenario, audited.scenario.task.path
+    scenario, path = audited.scenario, audited.scenario.path
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath):
         return []
     if audited.deviation is None:

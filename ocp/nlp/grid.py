@@ -1,4 +1,4 @@
-"""`Grid`: the points of a program in time. Phases begin and end at nodes, and share the steps by their durations."""
+"""`Grid`: the points of a program in time. Phases and legs begin and end at nodes, with steps by their durations."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.display import Displayed
+from ..tasks.paths import WaypointPath
 from ..tasks.scenario import Scenario
 
 LEAST = 4  # steps of a phase, where there are enough
@@ -26,8 +27,11 @@ class Grid(Displayed):
     def of(scenario: Scenario, steps: int) -> Grid:
         """Return the grid of so many steps."""
         scheme, phases = scenario.scheme, scenario.phases
-        boundaries = phases.boundaries / phases.boundaries[-1] if phases.all else np.array([0.0, 1.0])
-        durations, rests = np.diff(boundaries) * scenario.duration, [phase.rests for phase in phases.all] or [False]
+        boundaries = (
+            phases.boundaries / phases.boundaries[-1] if phases.all else np.array([0.0, *passed(scenario), 1.0])
+        )
+        durations = np.diff(boundaries) * scenario.duration
+        rests = [phase.rests for phase in phases.all] or [False] * len(durations)
         counts = _counts(durations, steps)
         starts = np.append(0, np.cumsum(counts))
         shares = np.interp(scheme.shares(steps), starts / steps, boundaries)
@@ -40,6 +44,13 @@ class Grid(Displayed):
     def intervals(self) -> np.ndarray:
         """Return what an interval's rows need to know of it: its length and `take_up`, (2, n) [s]."""
         return np.stack([self.steps, self.take_up])
+
+
+def passed(scenario: Scenario) -> list[float]:
+    """Return the shares of the duration at which a leg ends and the next one begins, if their durations are free."""
+    path = scenario.path
+    knots = path.knots(scenario.duration) / scenario.duration if isinstance(path, WaypointPath) else []
+    return [float(share) for share in knots[1:-1]] if scenario.passing else []
 
 
 def _counts(durations: np.ndarray, steps: int) -> np.ndarray:

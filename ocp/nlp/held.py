@@ -116,7 +116,7 @@ def _held(scenario: Scenario, needed: Iterable[_Coordinate], chooses: bool, near
     if {column for column, _ in free} <= of_platform:
         lasts = scenario.duration
         spans += [(phase.start / lasts, phase.end / lasts) for phase in scenario.phases.all if phase.rests]
-        path = scenario.task.path
+        path = scenario.path
         if scenario.task.tube.waypoints == "exact" and isinstance(path, WaypointPath) and not any(k for _, k in free):
             spans += [(share, share) for share in (path.knots(lasts) / lasts).tolist()]
     return tuple(spans)

@@ -12,7 +12,7 @@ from ..limits import Rate
 from ..tasks import bernstein
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
-from .layout import Layout
+from .layout import DURATION, Layout
 from .part import Constraints, Part, part_of
 from .rows import (
     OTHER_COSTS,
@@ -58,14 +58,14 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     x, x_end = ca.SX.sym("x", layout.width * scheme.size), ca.SX.sym("x_end", layout.width)
     parameters, given_references = reference_symbols("p", np.tile(references, (scheme.size, 1)))
     parameters_end, given_end = reference_symbols("p_end", references)
-    columns = [*ca.vertsplit(x, layout.width), x_end]
+    columns = [*ca.vertsplit(x, layout.width), _of_leg(scenario, layout, x, x_end, given_end)]
     referred = [*ca.vertsplit(given_references, wide), given_end]
     numbers, varying = reference_symbols("grid", grid)
     step, take_up = ca.vertsplit(varying)
     given = scenario.duration / mesh.steps
     h = step * stretch(layout, x)
     own = points(scenario, layout, h, given, columns)
-    constraints = [_chain_rows(layout, h, given, columns, own), *_inner_rows(scenario, layout, h, columns, own)]
+    constraints = [_chain_rows(layout, h, given, columns, x_end, own), *_inner_rows(scenario, layout, h, columns, own)]
     moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
     whole = [
         [ca.vertcat(*body) for body in (in_world(scenario, bodies[0], bodies[1:]), *bodies[1:])] for bodies in moving
@@ -96,6 +96,18 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     return part_of("interval", unknowns, known, cost, constraints, scenario.limits, of_limits)
 
 
+def _of_leg(scenario: Scenario, layout: Layout, x: ca.SX, x_end: ca.SX, reference: ca.SX) -> ca.SX:
+    """Return the end column of an interval about the references of its own leg, which the next leg may have slower."""
+    if not scenario.passing or (place := layout.at(DURATION)) is None:
+        return x_end
+    seen = ca.SX(x_end)
+    for k, part in ((1, layout.v), (2, layout.a)):
+        change = 1 / x_end[place] ** k - 1 / x[place] ** k
+        seen[part] += spread(scenario, None).T @ reference[6 * k : 6 * k + 6] * change
+    seen[place] = x[place]
+    return seen
+
+
 def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX]) -> tuple[ca.SX, ca.SX]:
     """Return acceleration and jerk at the end, the jerk as in its column: the integrals of a linear snap."""
     first, last = columns[0], columns[-1]
@@ -105,17 +117,19 @@ def _smooth_end(layout: Layout, h: ca.SX | float, given: float, columns: list[ca
     return a, first[layout.jerk] + share / 2 * (snap + snap_end)
 
 
-def _chain_rows(layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], own: Points) -> Constraints:
+def _chain_rows(
+    layout: Layout, h: ca.SX | float, given: float, columns: list[ca.SX], x_end: ca.SX, own: Points
+) -> Constraints:
     """Return values and rows: the end is the result of the integration, with equal shared unknowns."""
-    x_end, n = columns[-1], layout.n
-    values = [x_end[layout.q] - own.position[-1], (x_end[layout.v] - own.speed[-1]) * h]
+    n = layout.n
+    values = [x_end[layout.q] - own.position[-1], (columns[-1][layout.v] - own.speed[-1]) * h]
     names = ["position"] * n + ["velocity"] * n
     if layout.derivatives > 3:
         a, jerk = _smooth_end(layout, h, given, columns)
         values += [x_end[layout.a] - a, x_end[layout.jerk] - jerk]
         names += ["acceleration"] * n + ["jerk"] * n
     values.append(x_end[layout.shared] - columns[0][layout.shared])
-    return values, [Row(name, 0.0, 0.0) for name in names + ["shared"] * len(layout.carried)]
+    return values, [Row(name, 0.0, 0.0) for name in (*names, *layout.carried)]
 
 
 def _inner_rows(

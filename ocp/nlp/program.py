@@ -33,7 +33,7 @@ from ..tasks.paths import RestPath, WaypointPath
 from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
 from .derivatives import Block, Columns, Mapped, derivatives
-from .grid import Grid
+from .grid import Grid, passed
 from .held import eased, held_wrench
 from .interval import interval_of, points
 from .layout import DURATION, MARGIN, Layout
@@ -42,6 +42,9 @@ from .near import Near, parts
 from .node import node_of
 from .part import Part
 from .rows import Mesh, Row, stretch
+
+LEGS = 0.3, 3.0  # times its duration in the motion before: what one of a leg may be
+SAME = 1e-9  # of the duration: rounding of where a leg ends
 
 
 @dataclass(frozen=True)
@@ -82,10 +85,15 @@ class Program(Displayed):
         """Return the unknowns of each point, one row per point."""
         return x.reshape(-1, self.layout.width)
 
-    def duration(self, x: np.ndarray) -> float:
-        """Return the duration of a solution x [s]."""
-        place = self.layout.at(DURATION)
-        return self.scenario.duration if place is None else float(self.columns(x)[0, place] * self.scenario.duration)
+    def times(self, x: np.ndarray) -> np.ndarray:
+        """Return the times of the points of a solution x, (k,) [s]."""
+        place, nominal = self.layout.at(DURATION), self.shares * self.scenario.duration
+        if place is None:
+            return nominal
+        factors = self.columns(x)[:, place]
+        if self.scenario.passing:
+            return np.append(0.0, np.cumsum(np.diff(nominal) * factors[:-1]))
+        return nominal * factors[0]
 
     def read(self, x: np.ndarray) -> Deviation:
         """Return the deviation of a solution x."""
@@ -93,7 +101,7 @@ class Program(Displayed):
         tensions = columns[:, layout.tensions] * self.scenario.robot.force_scale
         q, v, a = (columns[:, part] for part in (layout.q, layout.v, layout.a))
         jerk = columns[:, layout.jerk] / self._step if scheme.smooth else None
-        return Deviation(self.shares * self.duration(x), q, v, a, tensions, scheme, jerk)
+        return Deviation(self.times(x), q, v, a, tensions, scheme, jerk)
 
     @property
     def _step(self) -> float:
@@ -174,11 +182,11 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         *local,
         Block(everywhere.values, node.rows, np.arange(len(times)) // scheme.size, everywhere),
         Block(between.values, interval.rows, np.arange(steps), between),
-        *_single_rows(scenario, layout, X, grid.steps),
+        *_single_rows(scenario, layout, X, grid),
         *([] if movable else leaving_rows(scenario, layout, references, columns)),
     ]
     starts = np.concatenate([[0.0], np.cumsum(grid.steps)]) / grid.steps.sum()
-    bounds = np.concatenate([block.bounds(starts) for block in blocks])
+    bounds = np.concatenate([_bounds_of(block, starts, scenario) for block in blocks])
     g = ca.vertcat(*(ca.vec(block.values) for block in blocks))
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
     return Program(
@@ -256,9 +264,23 @@ def _carried(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
     return np.hstack([phases.loads_at(nodes), columns]).T
 
 
-def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, lengths: np.ndarray) -> list[Block]:
-    """Return the rows that occur once: periodic ends, waypoints, start and end of the acceleration."""
-    blocks = _waypoint_rows(scenario, layout, X, lengths)
+def _bounds_of(block: Block, starts: np.ndarray, scenario: Scenario) -> np.ndarray:
+    """Return the bounds of a block; what a point has of the duration may change where a leg ends."""
+    bounds = block.bounds(starts)
+    ends = np.searchsorted(starts, np.array(passed(scenario)) - SAME) - 1
+    for index, row in enumerate(block.rows):
+        if row.name == DURATION and len(ends):
+            bounds.reshape(len(block.stages), len(block.rows), 2)[ends, index] = -np.inf, np.inf
+    return bounds
+
+
+def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> list[Block]:
+    """Return the rows that occur once: periodic ends, waypoints, legs' durations, start and end of the acceleration."""
+    blocks, lengths = _waypoint_rows(scenario, layout, X, grid), grid.steps
+    if (place := layout.at(DURATION)) is not None and scenario.passing and (span := scenario.duration_range):
+        whole = ca.dot(X[place, :-1], ca.DM(np.diff(grid.shares)).T)
+        its = Row("legs", span.min / scenario.duration, span.max / scenario.duration)
+        blocks.append(Block(whole, [its], np.array([0])))
     carriers: list[int] = []
     if carrier_ends(scenario.task) == "periodic":
         carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
@@ -274,22 +296,23 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, lengths: np.ndarr
     return blocks
 
 
-def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, lengths: np.ndarray) -> list[Block]:
+def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> list[Block]:
     """Return rows that lead the platform through the waypoints, by the polynomial of the interval of each."""
-    path = scenario.task.path
+    path = scenario.path
     platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
     if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
         return []
-    blocks, steps, size = [], len(lengths), scenario.scheme.size  # of equal lengths: phases have no exact waypoints
-    given = scenario.duration / steps
+    blocks, lengths, size = [], grid.steps, scenario.scheme.size
+    starts, given = grid.shares[::size], scenario.duration / len(lengths)
     coordinates = [coordinate for owner, coordinate in scenario.owners() if owner is None]
     shares, missed = path.knots(scenario.duration) / scenario.duration, path.missed(scenario.duration)[:, coordinates]
     for share, off in zip(shares[1:-1], missed[1:-1], strict=True):
-        k = min(int(share * steps), steps - 1)
+        k = min(int(np.searchsorted(starts, share, side="right")), len(lengths)) - 1
         its = [X[:, k * size + i] for i in range(size + 1)]
         position = points(scenario, layout, float(lengths[k]) * stretch(layout, its[0]), given, its).position
         rows = [Row("waypoint", float(value), float(value)) for value in off]
-        blocks.append(Block(bernstein.value(position, share * steps - k)[platform], rows, np.array([k])))
+        into = float((share - starts[k]) / (starts[k + 1] - starts[k]))
+        blocks.append(Block(bernstein.value(position, into)[platform], rows, np.array([k])))
     return blocks
 
 
@@ -310,7 +333,8 @@ def _simple_bounds(scenario: Scenario, mesh: Mesh, layout: Layout, nodes: np.nda
         upper[:, part] = np.tile((high - reserve) / scenario.robot.force_scale, count)
     lower[:, layout.slacks] = 0.0
     if (place := layout.at(DURATION)) is not None and (span := scenario.duration_range) is not None:
-        lower[:, place], upper[:, place] = span.min / scenario.duration, span.max / scenario.duration
+        least, most = span.min / scenario.duration, span.max / scenario.duration
+        lower[:, place], upper[:, place] = LEGS if scenario.passing else (least, most)
     if (place := layout.at(MARGIN)) is not None:
         lower[:, place] = 0.0
     turn = scenario.task.tube.turn

@@ -177,9 +177,10 @@ class Solver:
     def _outcome(self, x: np.ndarray, objective: float, success: bool, message: str, iterations: int) -> Outcome:
         """Return a run that ended at the unknowns x."""
         program = self.program
+        deviation = program.read(x)
         return Outcome(
-            deviation=program.read(x),
-            duration=program.duration(x),
+            deviation=deviation,
+            duration=float(deviation.nodes[-1]),
             success=success and bool(np.isfinite(x).all()),
             message=message,
             iterations=iterations,

@@ -70,6 +70,12 @@ class Search:
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
 
+    def take(self, scenario: Scenario) -> None:
+        """Go on with another scenario, without what is known of the one before."""
+        self.scenario = scenario
+        self._solvers.clear()
+        self._audited.clear()
+
     @contextmanager
     def stage(self, name: str) -> Iterator[RunningStage]:
         """Record what happens inside as a stage."""

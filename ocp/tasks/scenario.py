@@ -51,6 +51,7 @@ class Scenario(Displayed):
     carrier_paths: dict[int, AnyPath] = field(repr=False)
     duration: float  # [s]; of a task that leaves it free: where the planner starts, then what it chose
     phases: Phases = field(default_factory=Phases, repr=False)  # those of the task, if it has some
+    passing: bool = False  # whether each leg of the path has its own duration (`search.passing_times`)
     # By how much the tension limits are tightened for the uncertain robots, (m,) [N]; default: not.
     tightened: np.ndarray | None = None
 

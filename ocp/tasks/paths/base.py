@@ -101,12 +101,12 @@ class PathBase(Part):
         return Motion(motion.pose, motion.velocity * whole, motion.acceleration * whole**2)
 
 
-def check_times(times: tuple[float, ...], count: int) -> None:
+def check_times(times: tuple[float, ...], count: int, name: str = "times", unit: str = " s") -> None:
     """Refuse times that are not one for each point, from 0 on and increasing."""
     if len(times) != count:
-        raise ValueError(f"times must have one number for each of the {count} points, got {len(times)}")
+        raise ValueError(f"{name} must have one number for each of the {count} points, got {len(times)}")
     if times[0] != 0:
-        raise ValueError(f"times must start at 0 s, got {times[0]:g} s")
+        raise ValueError(f"{name} must start at 0{unit}, got {times[0]:g}{unit}")
     for index, (before, after) in enumerate(pairwise(times)):
         if after <= before:
-            raise ValueError(f"times must increase, got times[{index + 1}] = {after:g} s after {before:g} s")
+            raise ValueError(f"{name} must increase, got {name}[{index + 1}] = {after:g}{unit} after {before:g}{unit}")

@@ -46,6 +46,8 @@ class Legs:
         peak acceleration.
     dwell
         (n,), dwell time at each [s]; default: none.
+    shares
+        Whether `times` are shares of the duration, from 0 to 1: the way is then the same one as without.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class Legs:
         blend: float | None,
         times: Sequence[float] | None,
         dwell: Sequence[float] | None,
+        shares: bool = False,
     ):
         self._points, self._times = np.array(points), None if times is None else np.array(times)
         self._dwell = np.zeros(len(points)) if dwell is None else np.array(dwell)
@@ -66,8 +69,8 @@ class Legs:
         last, share = np.sqrt(size(steps)), lengths
         if self._times is not None:
             share = np.diff(self._times) - self._dwell[:-1]
-            last = 2 * share  # at most: a quarter of it longer at each end
-        most = MOST * np.minimum(last[1:], last[:-1]) / (1 if self._times is None else 2)
+            last = last if shares else 2 * share  # at most: a quarter of it longer at each end
+        most = MOST * np.minimum(last[1:], last[:-1]) / (1 if self._times is None or shares else 2)
         left = np.where(self._dwell[1:-1] > 0, 0.0, largest_left(steps, last, most, blend))
         early, late = shares_of_time(left, lengths)
         alone = 1 - early - late

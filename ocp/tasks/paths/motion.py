@@ -26,7 +26,7 @@ class Motion(NamedTuple):
         """Add a deviation of pose, velocity and acceleration, coordinate by coordinate."""
         return Motion(*(mine + its for mine, its in zip(self, deviation, strict=True)))
 
-    def timed(self, sd: np.ndarray, sdd: np.ndarray) -> Motion:
+    def timed(self, sd: np.ndarray | float, sdd: np.ndarray | float) -> Motion:
         """Return the motion over time of a curve by s, from ds/dt [1/s] and d2s/dt2 [1/s^2] at its points, (n,)."""
         shape = (-1, *[1] * (self.pose.ndim - 1))
         sd, sdd = np.reshape(sd, shape), np.reshape(sdd, shape)

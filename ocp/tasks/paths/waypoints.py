@@ -25,7 +25,7 @@ GONE = {
 }
 _legs, _spline = lru_cache(maxsize=64)(Legs), lru_cache(maxsize=64)(WaypointSpline)
 MOST = 12  # inner points, for which all subsets are 4096
-SHORTER = 1e-9  # relative: of two orders with so little between them the given one stays
+SHORTER = 1e-9  # relative: of two orders with so little between them the given one stays; of shares: rounding
 
 
 class WaypointPath(PathBase):
@@ -64,6 +64,11 @@ class WaypointPath(PathBase):
         "duration so that all legs have the same peak acceleration; for a spline by the square roots of "
         "the distances",
     )
+    shares: tuple[Finite, ...] | None = Field(
+        default=None,
+        description="instead of times: share of the duration after which the path passes each point, from 0 to 1, "
+        "increasing",
+    )
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
         json_schema_extra=or_number,
@@ -87,6 +92,13 @@ class WaypointPath(PathBase):
             self._sort()
         if self.times is not None:
             check_times(self.times, len(self.points))
+        if self.shares is not None:
+            for name in ("times", "dwell"):
+                if getattr(self, name) is not None:
+                    raise ValueError(f"{name} must be left out with shares")
+            check_times(self.shares, len(self.points), "shares", "")
+            if abs(self.shares[-1] - 1) > SHORTER:
+                raise ValueError(f"shares must end at 1, got {self.shares[-1]:.10g}")
         if self.shape == "spline":
             for name in ("blend", "dwell"):
                 if getattr(self, name) is not None:
@@ -95,7 +107,7 @@ class WaypointPath(PathBase):
             return self
         for index, (before, after) in enumerate(pairwise(self.points)):
             turned = [abs(remainder(b - a, 2 * np.pi)) for a, b in zip(before[3:], after[3:], strict=True)]
-            if before[:3] == after[:3] and max(turned) < SAME and self.times is None:
+            if before[:3] == after[:3] and max(turned) < SAME and self.times is self.shares is None:
                 raise ValueError(
                     f"points[{index + 1}] must differ from points[{index}] unless there are times; to stop at a "
                     f"point, write dwell; full turns are ignored"
@@ -107,8 +119,9 @@ class WaypointPath(PathBase):
 
     def _sort(self) -> None:
         """Put points and dwell into the order of the shortest path."""
-        if self.times is not None:
-            raise ValueError("order must be given with times")
+        for name in ("times", "shares"):
+            if getattr(self, name) is not None:
+                raise ValueError(f"order must be given with {name}")
         if len(self.points) > MOST + 2:
             raise ValueError(f"order must be given for more than {MOST} points between two, got {len(self.points) - 2}")
         order = shortest_order(np.array(self.points))
@@ -141,11 +154,11 @@ class WaypointPath(PathBase):
 
     @property
     def _legs(self) -> Legs:
-        return _legs(self.points, self.blend, self.times, self.dwell)
+        return _legs(self.points, self.blend, self.times or self.shares, self.dwell, self.shares is not None)
 
     @property
     def _spline(self) -> WaypointSpline:
-        return _spline(self.points, self.times)
+        return _spline(self.points, self.times or self.shares)
 
     @property
     @override
@@ -159,11 +172,17 @@ class WaypointPath(PathBase):
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        shape = self._spline if self.shape == "spline" else self._legs
-        return shape.at(np.asarray(times, dtype=float), duration)
+        shape, times = self._spline if self.shape == "spline" else self._legs, np.asarray(times, dtype=float)
+        return (
+            shape.at(times, duration)
+            if self.shares is None
+            else shape.at(times / duration, 1.0).timed(1 / duration, 0.0)
+        )
 
     def knots(self, duration: float) -> np.ndarray:
         """Return the times at which the path passes its points [s]; the arrival times for points with dwell."""
+        if self.shares is not None:
+            return duration * np.array(self.shares)
         return self._spline.knots(duration) if self.shape == "spline" else self._legs.knots(duration)
 
     @property
