@@ -15,12 +15,13 @@ from ..models.record import record_of
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
-from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
+from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
 from .boxes import boxes, stay_inside
 from .command import HOLD, NOTHING, NOWHERE, PLANNED, SOFT, Command
 from .command_delay import Pending
 from .controllability import uncontrolled
 from .controller import Controller
+from .lag import RotorLead
 from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
 from .reference import Reference
@@ -84,6 +85,8 @@ class ComputedTorque(Controller):
     tension_lag
         Time constant with which winches follow a command [s], at least 5 ms: the loop compares measurements with the
         desired tensions of that time.
+    rotor_lag
+        Known time constant with which actuators of flying carriers follow commands [s], of which 15 ms are left.
 
     Raises
     ------
@@ -109,6 +112,7 @@ class ComputedTorque(Controller):
         patience: float = 0.05,
         tension_loop: float = 0.0,
         tension_lag: float = 0.005,
+        rotor_lag: float = 0.0,
     ):
         self.robot, self._alone = as_robot(robot), OneAtATime()
         few = self._few = self.robot.m < len(self.robot.platform.dof)
@@ -128,6 +132,7 @@ class ComputedTorque(Controller):
         self._robot = record_of(self.robot)
         self._flies = bool(self._settings["by_wrench"].any())
         self._moves_carriers = self._flies or bool(far.any())
+        self._lead = RotorLead(self.robot, lag) if (lag := number("rotor_lag", rotor_lag, 0.0, 0.1)) else None
         self._is_plain = not self._moves_carriers and self._loop is None
         self._negligible = NEGLIGIBLE * self.robot.force_scale
         self._begin(1)
@@ -188,6 +193,8 @@ class ComputedTorque(Controller):
         self._arrays = self._measured, self._wanted, orders, *memory, problems.memory
         if self._loop is not None:
             self._loop.reset()
+        if self._lead is not None:
+            self._lead.reset()
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
         self._paused = False  # whether the integral of a row does
         self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
@@ -327,20 +334,22 @@ class ComputedTorque(Controller):
             own = own[0] if alone else own
             carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
         ordered = carriers[2]
-        self._accelerations = (ordered if self._moves_carriers else _for_all(ordered, rows)).tobytes()
+        self._accelerations = (ordered if self._moves_carriers else for_all(ordered, rows)).tobytes()
         actuation = None
         if self._flies:
             memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation
             given = self._measured, self._carriers, tensions, *memory
+            if self._lead is not None:
+                self._lead.pass_time(self._elapsed, self._actuation)
             lacking = control_thrusts(self._elapsed, self._robot, self._settings, *given)
-            actuation = self._actuation.copy()
+            actuation = self._actuation.copy() if self._lead is None else self._lead.sent(self._actuation)
             if lacking > self._negligible:
                 answered, proof = self._with_thrust_lacking(answered, proof)
         tensions = self._sent(tensions)
         if alone:
             own = None if actuation is None else actuation[0]
             return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)
-        pose, velocity, acceleration = (_for_all(part, rows) for part in carriers)
+        pose, velocity, acceleration = (for_all(part, rows) for part in carriers)
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
 
     def _with_thrust_lacking(
@@ -389,9 +398,3 @@ class ComputedTorque(Controller):
             target = np.where(np.isfinite(reference), reference, last)
             problems.tensions[row] = np.clip(target, *problems.bounds[:, row])
         return answered
-
-
-def _for_all(value: np.ndarray, rows: int) -> np.ndarray:
-    """Return the motion of carriers for each row, (rows, c, 6), from one for each or one for all, (c, 6)."""
-    value = np.asarray(value, dtype=float)
-    return value if value.ndim == 3 else value[None].repeat(rows, axis=0)

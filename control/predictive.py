@@ -87,7 +87,7 @@ class Predictive(ComputedTorque):
         enforce tube and bodies wherever the tensions allow. The reference may pass through a body.
     observer
         Bandwidth of the estimates of disturbances [rad/s], 0: none. Default: 60, but 20 if carriers correct errors.
-    rate, place, attitude, patience, tension_loop, tension_lag
+    rate, place, attitude, patience, tension_loop, tension_lag, rotor_lag
         See `ComputedTorque`.
 
     Attributes
@@ -121,6 +121,7 @@ class Predictive(ComputedTorque):
         patience: float = 0.05,
         tension_loop: float = 0.0,
         tension_lag: float = 0.005,
+        rotor_lag: float = 0.0,
     ):
         the_robot = as_robot(robot)
         correct = the_robot.fixed_lengths is not None or the_robot.m < len(the_robot.platform.dof)
@@ -143,6 +144,7 @@ class Predictive(ComputedTorque):
         self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
         observer = usual.observer if observer is None else observer
         loops: dict[str, Any] = {"rate": rate, "place": place, "attitude": attitude, "patience": patience}
+        loops["rotor_lag"] = rotor_lag
         self._beside = ComputedTorque(the_robot, reach=given, **loops)
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag}
         super().__init__(the_robot, observer=observer, reach=reach, **loops)
@@ -303,6 +305,8 @@ class Predictive(ComputedTorque):
         other._last, other._accelerations = sender._last, sender._accelerations
         other._platform["attitude"] = sender._platform["attitude"]
         other._of_carriers["ordered"] = sender._of_carriers["ordered"]
+        if sender._lead is not None and other._lead is not None:
+            other._lead.agree(sender._lead)
 
     @property
     @override

@@ -4,27 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..control.lag import Lag
 from ..control.trajectory import moved_on
 from .mismatch import LAGS, TENSIONS, Drawn
 
 SLOW = 0.01  # [m/s] of a cable: slower, dry friction is less, without which it would chatter at rest
 SHORTEST = 1e-3  # of a period: of lags, which divide
-
-
-class Lag:
-    """Let commands, (N, k, ...), be followed with time constants tau, (N, k): tau dy/dt = u - y."""
-
-    def __init__(self, lag: np.ndarray, period: float):
-        self._over = np.maximum(lag / period, SHORTEST)  # of a period
-        self._left = np.exp(-1 / self._over)
-        self._last: np.ndarray | None = None
-
-    def follow(self, command: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the mean over a period in which a command is held, and the value at its end."""
-        start = command if self._last is None else self._last
-        over, left = (one.reshape(one.shape + (1,) * (command.ndim - 2)) for one in (self._over, self._left))
-        self._last = command + (start - command) * left
-        return command + (start - command) * over * (1 - left), self._last
 
 
 class Drives:
@@ -42,25 +27,28 @@ class Drives:
         self._period = period
         self._gain, self._friction = (np.array([getattr(one, name) for one in drawn]) for name in TENSIONS)
         lags = [np.array([getattr(one, name) for one in drawn]) for name in LAGS]
-        self._winches, self._rotors = (Lag(lag, period) if lag.any() else None for lag in lags[:2])
+        self._winches, self._rotors = (Lag(lag) if lag.any() else None for lag in (lags[0], lags[1][..., None]))
         self._carriers = np.maximum(lags[2], SHORTEST * period)[..., None] if lags[2].any() else None  # (N, c, 1)
         self._poses: np.ndarray | None = None  # of the carriers, (N, c, 6)
 
     def tensions(self, command: np.ndarray, rates: np.ndarray) -> np.ndarray:
         """Return the tensions that winches give in a period, (N, m) [N], for the rates of cable lengths then."""
         given = self._gain * np.asarray(command, dtype=float)
-        given = given if self._winches is None else self._winches.follow(given)[0]
+        given = given if self._winches is None else self._winches.follow(given, self._period)
         return np.maximum(given + self._friction * np.tanh(rates / SLOW), 0.0)
 
     def lengths(self, command: np.ndarray) -> np.ndarray:
         """Return the unstrained lengths that winches have reached at the end of a period, (N, m) [m]."""
-        return command if self._winches is None else self._winches.follow(np.broadcast_to(command, self._gain.shape))[1]
+        if self._winches is None:
+            return command
+        self._winches.follow(np.broadcast_to(command, self._gain.shape), self._period)
+        return self._winches.value
 
     def actuation(self, command: np.ndarray) -> np.ndarray:
         """Return what actuators give on average in a period, (N, c, a)."""
         if self._rotors is None:
             return command
-        return self._rotors.follow(command.reshape(len(self._gain), *command.shape[-2:]))[0]
+        return self._rotors.follow(command.reshape(len(self._gain), *command.shape[-2:]), self._period)
 
     def follow(self, starts: np.ndarray, ends: np.ndarray) -> None:
         """Replace the motion that carriers should have as a period begins and ends, (N, c, 3, 6) each, by their own.

@@ -193,6 +193,16 @@ def test_an_attitude_loop_is_slowed_down_before_late_rotors_make_it_unstable():
     assert controller._platform["attitude"][0] == 40
 
 
+@pytest.mark.parametrize(("told", "kind", "most"), [(0.06, ComputedTorque, 0.045), (0.08, Predictive, 0.01)])
+def test_a_known_lag_of_rotors_is_made_up_for(load_on_three, told, kind, most):
+    """60 ms, at which both leave the plan otherwise, also where the lag is told wrong by a third."""
+    task = shorter(load_on_three, 500)
+    controller = kind(task.robot, rotor_lag=told)
+    assert fly(task, controller, **TEAMS["rotor lag 60 ms"]).rms < most
+    assert getattr(controller, "handed_over", None) is None
+    assert controller._platform["attitude"][0] == 40
+
+
 def hooked_below(depth):
     """Return flycrane with its anchors `depth` [m] below the quadrotors' CoM, where its cables end as before."""
     data = load("flycrane").model_dump(mode="json")
