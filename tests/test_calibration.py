@@ -230,7 +230,7 @@ def test_the_schur_complement_finds_what_a_sparse_solver_finds():
         x = model.parameters.first.copy()
         x[varies] += z[:p]
         q = z[p:].reshape(count, 6)
-        return State(x, q[:, :3], Rotation.from_rotvec(q[:, 3:]).as_matrix())
+        return State(x, q[:, :3], Rotation.from_rotvec(q[:, 3:]).as_matrix(), np.zeros((count, 0)))
 
     def residuals(z):
         own = model.residuals(state(z))

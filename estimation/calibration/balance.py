@@ -29,6 +29,7 @@ from .parameters import Parameters
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
 UNMEASURED = 3.0  # times the weight: standard deviation of a tension that was not measured
+SMALL = 0.01  # of the largest mean variance of tensions, of directions whose errors are none
 MOST_CAPSTAN = 30.0  # of which exp is no overflow
 
 
@@ -41,6 +42,33 @@ class Balanced(NamedTuple):
     residuals: np.ndarray
     by_parameters: np.ndarray | None = None
     by_pose: np.ndarray | None = None
+
+
+class FeltTensions(NamedTuple):
+    """Tensions that stretch cables, (N, m) [N], with errors along directions of unit variance, (N, m, d) [N]."""
+
+    tensions: np.ndarray
+    errors: np.ndarray
+
+    def only(self, rows: np.ndarray) -> FeltTensions:
+        """Return the tensions of some samples (k,)."""
+        return FeltTensions(*(part[rows] for part in self))
+
+
+class _Forces(NamedTuple):
+    """Forces on the platform at samples: what `Balance.at` and `Balance.felt` share, with their names there."""
+
+    record: np.ndarray
+    poses: np.ndarray
+    tensions: np.ndarray
+    by_tensions: np.ndarray
+    A: np.ndarray
+    r: np.ndarray
+    inner: np.ndarray
+    variances: np.ndarray
+    inverse_root: np.ndarray | None
+    pull: np.ndarray
+    by_arm: np.ndarray
 
 
 class Balance:
@@ -81,8 +109,7 @@ class Balance:
     def tensions(self, table: np.ndarray, smooth: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the tensions that the platform feels [N], and their derivatives by capstan, friction, gain, (N, m, 3).
 
-        Those of elastic cables are smoothed: noise of a tension makes a cable seem stiffer. `table` is that of
-        `Parameters`, (m, 14).
+        `table` is that of `Parameters`, (m, 14).
         """
         _, terms, smoothed = self._of_log
         terms = smoothed if smooth else terms
@@ -103,6 +130,75 @@ class Balance:
         size = np.maximum(np.abs(self._of_log[2][2]), LEAST_TENSION * np.abs(given).mean(axis=0))
         return (self._measurements.sigma.tensions * size) ** 2 + (1e-9 * max(weight, 1.0)) ** 2
 
+    def _forces(
+        self,
+        of: Parameters,
+        x: np.ndarray,
+        placed: tuple[np.ndarray, np.ndarray],
+        clock: float,
+        noise: float,
+        smooth: bool = False,
+    ) -> _Forces:
+        (position, rotation), robot, rows = placed, self._robot, self._rows
+        table, m, count = of.table(x), robot.m, len(position)
+        mass, com = x[of.clock + 1], x[of.clock + 2 : of.clock + 5]
+        record = record_of(robot).copy()
+        cables = record["cable"][:m]
+        cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
+        record["com"] = 0.0  # moments about the platform frame
+        poses = np.concatenate([position, points.angles(rotation)], axis=1)
+        A, lengths = np.empty((count, 6, m)), np.empty((count, m))
+        lines(record, poses, robot.carrier_home, lengths, A, None, None, None)
+        (tensions, by_tensions), variances = self.tensions(table, smooth), noise**2 * self._variances
+        motion = self._of_log[0]
+        if smooth and motion.smooth is not None:
+            variances = variances * motion.smooth.share[:, None]
+        motion = motion.ahead(self._measurements.times, clock)
+        if self._chosen is not None:
+            variances, motion = variances[self._chosen], motion.only(self._chosen)
+        if self._measurements.tensions is None:
+            tensions = tensions + robot.weight / m
+        arm = rotation @ com
+        pull = motion.gravity + (motion.by_arm @ arm[..., None])[..., 0]
+        force = mass * pull
+        wrench = np.concatenate([force, np.cross(arm, force) - motion.turning], axis=1)
+        r = (A @ tensions[..., None])[..., 0] + wrench
+        inner = A[:, rows] * self._scale[:, None]
+        M = np.einsum("nim,nm,njm->nij", inner, variances, inner)
+        own = (noise * OWN * robot.weight) ** 2 + (robot.platform.mass * motion.sigma) ** 2
+        M[:, np.arange(len(rows)), np.arange(len(rows))] += np.reshape(own, (-1, 1))
+        finite = np.isfinite(M).all() and np.isfinite(r).all()
+        inverse_root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
+        return _Forces(record, poses, tensions, by_tensions, A, r, inner, variances, inverse_root, pull, motion.by_arm)
+
+    def felt(
+        self,
+        of: Parameters,
+        x: np.ndarray,
+        placed: tuple[np.ndarray, np.ndarray],
+        clock: float,
+        noise: float,
+        balances: np.ndarray | None,
+    ) -> FeltTensions:
+        """Return the most likely tensions, by the measured ones, smoothed, and the balance of forces.
+
+        Arguments are those of `at`; `balances` marks the samples that are in balance, (N,) of bool, or is None if the
+        balance is not part of the fit. Noise of tensions would make a cable seem stiffer, so errors that the balance
+        does not correct have to be unknowns: one force of a platform in a plane on four cables, two of one on eight.
+        """
+        of_log = self._forces(of, x, placed, clock, noise, smooth=True)
+        tensions, P = of_log.tensions, of_log.variances[..., None] * np.eye(self._robot.m)
+        if balances is not None and of_log.inverse_root is not None:
+            known = of_log.inverse_root @ of_log.inner * balances[:, None, None]  # L^-1 A
+            K = of_log.variances[..., None] * np.swapaxes(known, 1, 2)
+            reduced = of_log.inverse_root @ (of_log.r[:, self._rows] * self._scale)[..., None]
+            tensions = tensions - (K @ reduced)[..., 0]
+            P = P - K @ np.swapaxes(K, 1, 2)
+        values, vectors = np.linalg.eigh(P)
+        mean = values.mean(axis=0)
+        kept = mean > SMALL * mean.max()
+        return FeltTensions(tensions, vectors[..., kept] * np.sqrt(np.maximum(values[:, None, kept], 0.0)))
+
     def at(
         self,
         of: Parameters,
@@ -117,36 +213,12 @@ class Balance:
         The platform's acceleration is that `clock` [s] later. `noise` is a factor of all standard deviations of
         tensions and forces.
         """
-        (position, rotation), robot, rows, scale = placed, self._robot, self._rows, self._scale
-        table, m, count = of.table(x), robot.m, len(position)
-        mass, com = x[of.clock + 1], x[of.clock + 2 : of.clock + 5]
-        record = record_of(robot).copy()
-        cables = record["cable"][:m]
-        cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
-        record["com"] = 0.0  # moments about the platform frame
-        poses = np.concatenate([position, points.angles(rotation)], axis=1)
-        A, lengths = np.empty((count, 6, m)), np.empty((count, m))
-        lines(record, poses, robot.carrier_home, lengths, A, None, None, None)
-        (tensions, by_tensions), variances = self.tensions(table), noise**2 * self._variances
-        if self._chosen is not None:
-            variances = variances[self._chosen]
-        if self._measurements.tensions is None:
-            tensions = tensions + robot.weight / m
-        motion = self._of_log[0].ahead(self._measurements.times, clock)
-        motion = motion if self._chosen is None else motion.only(self._chosen)
-        arm = rotation @ com
-        by_arm = motion.by_arm
-        pull = motion.gravity + (by_arm @ arm[..., None])[..., 0]
-        force = mass * pull
-        wrench = np.concatenate([force, np.cross(arm, force) - motion.turning], axis=1)
-        r = (A @ tensions[..., None])[..., 0] + wrench
-        inner = A[:, rows] * scale[:, None]
-        M = np.einsum("nim,nm,njm->nij", inner, variances, inner)
-        own = (noise * OWN * robot.weight) ** 2 + (robot.platform.mass * motion.sigma) ** 2
-        M[:, np.arange(len(rows)), np.arange(len(rows))] += np.reshape(own, (-1, 1))
-        if not (np.isfinite(M).all() and np.isfinite(r).all()):
+        robot, rows, scale, rotation = self._robot, self._rows, self._scale, placed[1]
+        table, m, count = of.table(x), robot.m, len(rotation)
+        of_log = self._forces(of, x, placed, clock, noise)
+        inverse_root, A, r, inner = of_log.inverse_root, of_log.A, of_log.r, of_log.inner
+        if inverse_root is None:
             return Balanced(np.full((count, 6), np.inf))
-        inverse_root = np.linalg.inv(np.linalg.cholesky(M))
         gain = float(table[:, 13].mean())
         reduced = inverse_root @ (r[:, rows] * (scale / gain))[..., None]
         residuals = np.zeros((count, 6))
@@ -154,21 +226,23 @@ class Balance:
         if not derive:
             return Balanced(residuals)
         behind = (np.swapaxes(inverse_root, 1, 2) @ reduced)[..., 0]
-        tensions = tensions - gain * variances * np.einsum("nim,ni->nm", inner, behind)
+        tensions = of_log.tensions - gain * of_log.variances * np.einsum("nim,ni->nm", inner, behind)
+        mass, arm = x[of.clock + 1], rotation @ x[of.clock + 2 : of.clock + 5]
+        pull, by_arm = of_log.pull, of_log.by_arm
         raw = np.zeros((count, 6, of.count))
         S = np.empty((count, m, 6, 7))
-        columns_by_geometry(record, poses, robot.carrier_home, S)
+        columns_by_geometry(of_log.record, of_log.poses, robot.carrier_home, S)
         S *= tensions[..., None, None]
-        felt = np.einsum("nim,nmk->nimk", A, by_tensions)
+        felt = np.einsum("nim,nmk->nimk", A, of_log.by_tensions)
         for i in range(m):
             own = i * (of.clock // m)
             raw[..., own : own + 6], raw[..., own + 8] = S[:, i, :, :6], S[:, i, :, 6]
             raw[..., own + 11 : own + 14] = felt[:, :, i]
         raw[..., of.clock + 1] = np.concatenate([pull, np.cross(arm, pull)], axis=1)
-        by_com = np.concatenate([mass * by_arm, mass * cross(arm) @ by_arm - cross(force)], axis=1)
+        by_com = mass * np.concatenate([by_arm, cross(arm) @ by_arm - cross(pull)], axis=1)
         raw[..., of.clock + 2 : of.clock + 5] = by_com @ rotation
         by_pose = np.empty((count, 6, 6))
-        wrench_by_axes(record, poses, robot.carrier_home, np.ascontiguousarray(tensions), by_pose)
+        wrench_by_axes(of_log.record, of_log.poses, robot.carrier_home, np.ascontiguousarray(tensions), by_pose)
         by_pose[..., 3:] -= by_com @ cross(arm)
         raw[..., 13 : of.clock : of.clock // m] -= r[..., None] / (gain * m)
         weighted = inverse_root * (scale / gain)

@@ -185,9 +185,8 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
     wholes = {}
     for clock in {"clock" in one for one in sets} | {False}:
         whole = model_of(of.robot, measurements, ("clock",) if clock else (), {})
-        wholes[clock] = replace(
-            whole, weights=weights, noise=of.noise, unbalanced=of.unbalanced, weighs=weighs, ahead=of.ahead
-        )
+        of_forces = {name: getattr(of, name) for name in ("noise", "unbalanced", "ahead", "felt")}
+        wholes[clock] = replace(whole, weights=weights, weighs=weighs, **of_forces)
     offset = float(solved.fit.state.x[of.parameters.clock])
     if len(measurements) > MOST_COMPARED:
         rows = np.linspace(0, len(measurements) - 1, MOST_COMPARED).astype(int)

@@ -15,7 +15,7 @@ from .model import Derivatives, Residuals
 
 
 def curvature(residuals: Residuals, derivatives: Derivatives) -> np.ndarray:
-    """Return the sum over the cables of residuals times their second derivatives by the pose, (N, 6, 6)."""
+    """Return the sum over the cables of residuals times their second derivatives by the pose, (N, 6 + d, 6 + d)."""
     arms, along = derivatives.arms, derivatives.poses[..., :3]
     M = np.zeros((*arms.shape, 6))  # v = M (d, w), (m, N, 3, 6)
     M[..., :3] = np.eye(3)
@@ -28,4 +28,5 @@ def curvature(residuals: Residuals, derivatives: Derivatives) -> np.ndarray:
     both = np.einsum("mn,mni,mnj->nij", weight / 2, unit, arms)
     both -= np.eye(3) * np.einsum("nii->n", both)[:, None, None]
     result[:, 3:, 3:] += both + np.swapaxes(both, 1, 2)
-    return result
+    more = (0, derivatives.poses.shape[2] - 6)
+    return np.pad(result, ((0, 0), more, more))

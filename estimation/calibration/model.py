@@ -7,7 +7,8 @@ With the reading y of a cable, its length l at the pose, offset o, build-up b, s
 
 The second is in the units of the reading. The first would shrink with the robot, so a robot of zero size would fit
 best. With known poses the first is a linear regression, which readings that hardly change do not determine. f is 1, or
-1 / (1 + t / (E A)) if tensions were measured, because readings refer to the unstrained cable.
+1 / (1 + t / (E A)) if tensions were measured, because readings refer to the unstrained cable. These tensions are given
+(`FeltTensions`), up to errors that are further unknowns of the sample, treated as coordinates of its pose.
 
 Where forces tell more than lengths, or parameters of theirs are free, the balance of the platform (`balance`) is a
 further residual of each sample.
@@ -30,7 +31,7 @@ from ...models import points
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
 from ..logs.pose_track import PoseTrack
-from .balance import Balance, Balanced, needs_balance
+from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .geometry import runs
 from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, prior_sigmas
 
@@ -44,15 +45,21 @@ class State(NamedTuple):
         Parameters, (P,).
     shift, turn
         Increments of the poses from their initial values, in {G}: (N, 3) [m], (N, 3, 3).
+    errors
+        Errors of the tensions that stretch cables, in standard deviations, (N, d).
     """
 
     x: np.ndarray
     shift: np.ndarray
     turn: np.ndarray
+    errors: np.ndarray
 
 
 class Residuals(NamedTuple):
-    """Differences over their standard deviations: readings (m, N), poses (N, 6), parameters (P,), balance (N, 6)."""
+    """Differences over their standard deviations.
+
+    Of readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,), balance of forces (N, 6).
+    """
 
     readings: np.ndarray
     poses: np.ndarray
@@ -82,7 +89,7 @@ class Derivatives(NamedTuple):
     others
         Derivatives by the parameters of the robot and slips, (m, N, 5 + slips).
     poses
-        Derivatives by shift and rotation of the sample itself, (m, N, 6).
+        Derivatives by shift and rotation of the sample itself, and errors of its tensions, (m, N, 6 + d).
     arms, lengths
         R b of each cable (m, N, 3) [m], and its length (m, N) [m].
     """
@@ -117,6 +124,8 @@ class Model(Displayed):
         Forces of the measurements; default: computed.
     weighs
         True if the balance of forces is part of the fit whatever the parameters are.
+    felt
+        Tensions that stretch the cables; default: the measured ones, without errors.
     ahead
         Clock offset of the platform's accelerations, near that of its poses [s].
     """
@@ -132,6 +141,7 @@ class Model(Displayed):
     unbalanced: np.ndarray | None = None
     forces: Balance | None = None
     weighs: bool = False
+    felt: FeltTensions | None = None
     ahead: float = 0.0
 
     @property
@@ -145,7 +155,7 @@ class Model(Displayed):
 
     @cached_property
     def pose_sigmas(self) -> np.ndarray:
-        """Return the standard deviation of each coordinate of each pose, (N, 6) [m, rad].
+        """Return the standard deviation of each coordinate of each pose, and error of tensions, (N, 6 + d) [m, rad, 1].
 
         Inf: not measured; 0: exact, or locked by `platform.dof`.
         """
@@ -153,12 +163,12 @@ class Model(Displayed):
         known = self._given[2] | (self.track is not None)
         unknown = np.repeat([np.inf, self.upright], 3)
         result = np.where(known, np.repeat([sigma.position, sigma.rotation], 3), unknown)
-        result[:, self.robot.dof_mask == 0] = 0.0
-        return result
+        result[:, np.flatnonzero(self.robot.dof_mask == 0)] = 0.0
+        return np.hstack([result, np.ones((len(result), self._open))])
 
     @cached_property
     def poses_vary(self) -> np.ndarray:
-        """Return which coordinates of poses vary, (N, 6) of bool."""
+        """Return which coordinates of poses vary, (N, 6 + d) of bool."""
         return self.pose_sigmas > 0
 
     @cached_property
@@ -187,25 +197,38 @@ class Model(Displayed):
             track=None if self.track is None else self.track.at_samples(rows),
             unbalanced=None if self.unbalanced is None else self.unbalanced[rows],
             forces=self._forces.only(rows),
+            felt=None if self.felt is None else self.felt.only(rows),
         )
 
-    def _stretch(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    @cached_property
+    def felt_tensions(self) -> FeltTensions | None:
+        """Return the tensions that stretch the cables, None if none were measured."""
+        if self.felt is not None or self.measurements.tensions is None:
+            return self.felt
+        tensions, _ = self._forces.tensions(self.parameters.table(self.parameters.first), smooth=True)
+        return FeltTensions(tensions, np.zeros((*tensions.shape, 0)))
+
+    @property
+    def _open(self) -> int:
+        return 0 if self.felt is None else self.felt.errors.shape[2]
+
+    def _stretch(self, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the length without strain for each metre of length, its tensions [N], (m, N), and their derivatives.
 
-        These are by capstan, friction and gain, (m, N, 3).
+        These are by the errors of the tensions, (m, N, d).
         """
-        m, count = self.robot.m, len(self.measurements)
-        if self.measurements.tensions is None:
-            return np.ones((m, 1)), np.zeros((m, 1)), np.zeros((m, count, 3))
-        felt, by = self._forces.tensions(self.parameters.table(x), smooth=True)
-        pull = felt.T > 0
-        tensions = np.where(pull, felt.T, 0.0)
-        return 1 / (1 + tensions * self.parameters.table(x)[:, 10:11]), tensions, by.swapaxes(0, 1) * pull[..., None]
+        if self.felt_tensions is None:
+            return np.ones((self.robot.m, 1)), np.zeros((self.robot.m, 1)), np.zeros((self.robot.m, 1, 0))
+        felt = (self.felt_tensions.tensions + (self.felt_tensions.errors @ state.errors[..., None])[..., 0]).T
+        tensions = np.maximum(felt, 0.0)
+        by_errors = self.felt_tensions.errors.swapaxes(0, 1) * (felt > 0)[..., None]
+        return 1 / (1 + tensions * self.parameters.table(state.x)[:, 10:11]), tensions, by_errors
 
     def begin(self) -> State:
         """Return the parameters of the file, at the initial poses."""
         count = len(self.measurements)
-        return State(self.parameters.first.copy(), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)))
+        errors = np.zeros((count, self._open))
+        return State(self.parameters.first.copy(), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)), errors)
 
     def poses(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (N, 3) [m] and rotations (N, 3, 3) of the platform."""
@@ -252,7 +275,7 @@ class Model(Displayed):
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
         run = runs(robot, table, position, rotation)
         slip, y = self.slips(state.x), self.measurements.lengths.T
-        stretch, tensions, by_tensions = self._stretch(state.x)
+        stretch, tensions, by_errors = self._stretch(state)
         scale0 = parameters.table(parameters.first)[:, 7:8]
         size_is_open = bool(np.isinf(self.pose_sigmas).any())
         scale = table[:, 7:8]
@@ -262,16 +285,17 @@ class Model(Displayed):
         excess = stretch * run.lengths - table[:, 6:7] - slip - table[:, 9:10] * y**2  # scale times reading
         readings = weights * (ratio * excess - own * y)
         sigmas = self.pose_sigmas
-        poses = np.zeros((len(position), 6))
+        poses = np.zeros(sigmas.shape)
         held = (sigmas > 0) & np.isfinite(sigmas)
         if held.any():
-            moved = np.concatenate([state.shift, Rotation.from_matrix(state.turn).as_rotvec()], axis=1)
+            turned = Rotation.from_matrix(state.turn).as_rotvec()
+            moved = np.concatenate([state.shift, turned, state.errors], axis=1)
             poses[held] = moved[held] / sigmas[held]
         forces = self.balanced and self.balanced.at(
             parameters, state.x, (position, rotation), self.ahead, self.noise, derive
         )
         weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
-        in_balance = np.zeros_like(poses) if forces is None else forces.residuals * weighs[:, None]
+        in_balance = np.zeros((len(position), 6)) if forces is None else forces.residuals * weighs[:, None]
         by_prior = (state.x - parameters.first) / self.prior_sigmas
         residuals = Residuals(readings, poses, by_prior, in_balance)
         if not derive:
@@ -287,7 +311,8 @@ class Model(Displayed):
         cables[..., 9] = -gain * y**2
         by_strain = -gain * stretch**2 * run.lengths
         cables[..., 10] = by_strain * tensions
-        cables[..., 11:] = (by_strain * table[:, 10:11])[..., None] * by_tensions
+        cables[..., 11:] = 0.0
+        by_errors = (by_strain * table[:, 10:11])[..., None] * by_errors
         by_pose = np.concatenate([along, np.cross(arms, along)], axis=2)
         others = np.zeros((m, len(position), OF_ROBOT + len(parameters.slips)))
         if velocity is not None and rate is not None:
@@ -299,7 +324,10 @@ class Model(Displayed):
             others[cable, first:, column] = -gain[cable, first:]
         if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
             kept = weighs[:, None, None]
-            forces = Balanced(in_balance, forces.by_parameters * kept, forces.by_pose * kept)
+            by_forces = np.zeros((len(position), 6, sigmas.shape[1]))
+            by_forces[..., :6] = forces.by_pose * kept
+            forces = Balanced(in_balance, forces.by_parameters * kept, by_forces)
+        by_pose = np.concatenate([by_pose, np.broadcast_to(by_errors, (*by_pose.shape[:2], self._open))], axis=2)
         return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces)
 
     def slips(self, x: np.ndarray) -> np.ndarray:
@@ -314,10 +342,11 @@ class Model(Displayed):
         table = self.parameters.table(state.x)
         y = self.measurements.lengths.T
         unstrained = table[:, 6:7] + self.slips(state.x) + (table[:, 7:8] + table[:, 9:10] * y) * y
-        return (unstrained / self._stretch(state.x)[0]).T
+        return (unstrained / self._stretch(state)[0]).T
 
     def moved(self, state: State, dx: np.ndarray, dq: np.ndarray | None) -> State:
-        """Return the state after changes of parameters (P,) and of poses (N, 6), or None if no pose varies."""
+        """Return the state after changes of parameters (P,), and of poses and errors, (N, 6 + d) or None if fixed."""
         if dq is None:
             return state._replace(x=state.x + dx)
-        return State(state.x + dx, state.shift + dq[:, :3], Rotation.from_rotvec(dq[:, 3:]).as_matrix() @ state.turn)
+        turn = Rotation.from_rotvec(dq[:, 3:6]).as_matrix() @ state.turn
+        return State(state.x + dx, state.shift + dq[:, :3], turn, state.errors + dq[:, 6:])

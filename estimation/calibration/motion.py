@@ -116,6 +116,11 @@ class Parabolas:
         transposed = np.swapaxes(basis, 1, 2)
         self._shares = np.linalg.solve(transposed @ basis, transposed)  # (N, 3, width)
 
+    @property
+    def share(self) -> np.ndarray:
+        """Return the share of the variance of noise that smoothed values keep, (N,)."""
+        return (self._shares[:, 0] ** 2).sum(axis=1)
+
     def values(self, values: np.ndarray) -> np.ndarray:
         """Return smoothed values (k, N, d)."""
         return np.stack([(self._shares[:, :1] @ one[self._rows])[:, 0] for one in values])

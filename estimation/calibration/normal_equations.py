@@ -121,15 +121,15 @@ class NormalEquations(Displayed):
         if not model.poses_vary.any():
             return cls(S, b, None, None, None, Diagonals(own, np.zeros((count, 6))))
         inverse_root, G, g, of_poses = _poses(model, residuals, derivatives, damping)
-        E = np.empty((count, 6, size))
-        E[..., : m * width] = (G[..., None] * np.swapaxes(J, 0, 1)[:, None]).reshape(count, 6, m * width)
+        E = np.empty((count, G.shape[1], size))
+        E[..., : m * width] = (G[..., None] * np.swapaxes(J, 0, 1)[:, None]).reshape(*G.shape[:2], m * width)
         E[..., m * width :] = G @ np.swapaxes(others, 0, 1)
         E = E if keep.all() else E[..., keep]
         if H is not None and forces is not None and forces.by_pose is not None:
             E = E + np.swapaxes(forces.by_pose * model.poses_vary[:, None], 1, 2) @ H
         Y = np.matmul(inverse_root, E)
         y = np.matmul(inverse_root, g[..., None])[..., 0]
-        stacked = Y.reshape(6 * count, -1)
+        stacked = Y.reshape(y.size, Y.shape[2])
         S, b = S - inner(stacked, stacked), b - inner(stacked, y.reshape(-1, 1))[:, 0]
         return cls(S, b, inverse_root, Y, y, Diagonals(own, of_poses))
 
@@ -164,7 +164,7 @@ def _poses(
         C, g = C + K @ np.swapaxes(K, 1, 2), g + (K @ residuals.balance[..., None])[..., 0]
     inverse = np.divide(1.0, sigmas, out=np.zeros_like(sigmas), where=vary)
     g += residuals.poses * inverse
-    diagonal = np.arange(6)
+    diagonal = np.arange(C.shape[1])
     C[:, diagonal, diagonal] += inverse**2
     own = C[:, diagonal, diagonal]
     if damping is not None:

@@ -190,7 +190,8 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
         sigma=model.measurements.sigma._asdict(),
     )
     used = np.tile(model.weights[:, sample, None], (1, m))
-    without = Model(parameters, copies, {}, used * (1 - np.eye(m)), np.tile(pose, (m, 1)))
+    felt = model.felt and model.felt.only(np.full(m, sample))
+    without = Model(parameters, copies, {}, used * (1 - np.eye(m)), np.tile(pose, (m, 1)), felt=felt)
     begin = without.begin()._replace(x=state.x[: parameters.count].copy())
     found = fit(without, begin, 1.0).state
     costs = (without.residuals(found).readings ** 2).sum(axis=0)

@@ -25,7 +25,7 @@ def settled(model: Model, state: State, negligible: float) -> State:
         if better.all():
             state, (residuals, derivatives) = tried, after
         else:
-            shift, turn = (np.where(better, a.T, b.T).T for a, b in zip(tried[1:], state[1:], strict=True))
-            state = State(state.x, shift, turn)
+            kept = (np.where(better, a.T, b.T).T for a, b in zip(tried[1:], state[1:], strict=True))
+            state = State(state.x, *kept)
             residuals, derivatives = model.linearised(state)
     return state

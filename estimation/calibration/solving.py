@@ -25,6 +25,7 @@ ROUNDS = 30  # of fits, each without the wrong readings of those before
 FEW = 0.02  # of the samples
 MOST_SLIPS = 8
 ROUNDS_OF_WEIGHTS = 4
+NEGLIGIBLE = 0.02  # of the lengths' noise, by which tensions that change move lengths
 NOISE_OF_FORCES = 0.05, 1e4  # factors of the stated errors of forces
 
 
@@ -120,20 +121,41 @@ def _surprise(result: Fit, weights: np.ndarray) -> float:
 
 
 def _weighed(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
-    """Return the model with errors of forces as large as they turn out to be, and its fit."""
+    """Return the model with errors of forces as large as they turn out to be, and tensions in balance, and its fit."""
     for _ in range(ROUNDS_OF_WEIGHTS):
-        found = find_unbalanced(model, result.state)
-        if found is None:
+        before, state = model, result.state
+        found = find_unbalanced(model, state)
+        known = False if model.unbalanced is None else model.unbalanced
+        if found is not None and (found[0] != 1.0 or (found[1] != known).any()):
+            noise = float(np.clip(model.noise * found[0], *NOISE_OF_FORCES))
+            clock = float(state.x[model.parameters.clock])
+            model = replace(model, noise=noise, unbalanced=found[1], ahead=clock)
+        model = _stretched(model, state, length)
+        if model is before:
             break
-        factor, unbalanced = found
-        known = model.unbalanced if model.unbalanced is not None else np.zeros_like(unbalanced)
-        if factor == 1.0 and np.array_equal(unbalanced, known):
-            break
-        noise = float(np.clip(model.noise * factor, *NOISE_OF_FORCES))
-        clock = float(result.state.x[model.parameters.clock])
-        model = replace(model, noise=noise, unbalanced=unbalanced, ahead=clock)
-        result = fit(model, result.state, length)
+        result = fit(model, state._replace(errors=model.begin().errors), length)
     return model, result
+
+
+def _stretched(model: Model, state: State, length: float) -> Model:
+    """Return the model whose cables are stretched by the most likely tensions, or itself if this changes little.
+
+    Noise of tensions would make a cable seem stiffer, so their errors are unknowns if the stiffness is free.
+    """
+    compliance, known = model.parameters.table(state.x)[:, 10], model.felt_tensions
+    if known is None or model.forces is None or not compliance.any():
+        return model
+    balances = None
+    if model.balanced is not None:
+        balances = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
+    felt = model.forces.felt(model.parameters, state.x, model.poses(state), model.ahead, model.noise, balances)
+    by_newtons = compliance * length / model.measurements.sigma.lengths
+    matters = np.abs(felt.errors * by_newtons[:, None]).max(initial=0.0) > NEGLIGIBLE
+    if "stiffness" not in model.parameters.groups or not matters:
+        felt = felt._replace(errors=felt.errors[..., :0])
+    moved = np.sqrt((((felt.tensions - known.tensions) * by_newtons) ** 2).mean(axis=0)).max()
+    same = felt.errors.shape == known.errors.shape and moved <= NEGLIGIBLE
+    return model if same else replace(model, felt=felt)
 
 
 def model_of(

@@ -100,8 +100,7 @@ def _by_forces(model: Model, state: State, length: float) -> State:
     at_home = np.where(np.isinf(model.pose_sigmas[:, :1]), model.robot.home[:3] - model.poses(state)[0], state.shift)
     level, home = (fit(loose, start, length).state for start in (state, state._replace(shift=at_home)))
     nearer = loose.residuals(level).of_samples <= loose.residuals(home).of_samples
-    shift, turn = (np.where(nearer, a.T, b.T).T for a, b in zip(level[1:], home[1:], strict=True))
-    state = State(state.x, shift, turn)
+    state = State(state.x, *(np.where(nearer, a.T, b.T).T for a, b in zip(level[1:], home[1:], strict=True)))
     misfit = np.median(model.residuals(state).readings, axis=1) * model.measurements.sigma.lengths
     x = state.x.copy()
     model.parameters.table(x)[:, 6] += misfit
@@ -161,4 +160,4 @@ def _elsewhere(model: Model, state: State) -> State | None:
     shift, turn = state.shift.copy(), state.turn.copy()
     shift[rows] += poses[:, :3] - position[rows]
     turn[rows] = points.rotations(poses[:, 3:]) @ np.swapaxes(rotation[rows], 1, 2) @ turn[rows]
-    return State(state.x, shift, turn)
+    return state._replace(shift=shift, turn=turn)
