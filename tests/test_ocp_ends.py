@@ -1,5 +1,7 @@
 """How motions start and end: at rest where the path does; and ends and paths that no choice of the planner frees."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,8 +9,10 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
+from towline import InputError
 from towline.models import Dynamics, load
-from towline.ocp import MotionStatus, plan
+from towline.ocp import MotionStatus, Planner, plan
+from towline.ocp.audits.audit import audit
 
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
 TUBE = {"position": 0.05, "attitude": 0.1}
@@ -52,6 +56,77 @@ def test_rest_can_be_required_on_a_path_that_moves(frame):
     for _, speed, acceleration in list(ends_of(planned))[:2]:
         assert speed < 1e-4
         assert acceleration < 1e-2
+
+
+SQUARE = {"kind": "waypoints", "points": [[0, 0, 1], [0.4, 0, 1.2], [0.4, 0.4, 1], [0, 0.3, 1.1], [0, 0, 1]]}
+CYCLE = {"path": SQUARE, "duration": 3, "tube": {"position": "free", "ends": "periodic", "waypoints": "exact"}}
+
+
+@pytest.mark.parametrize("scheme", ["linear", "spline"])
+def test_a_cycle_ends_as_it_starts_without_a_stop(scheme):
+    """Two rounds joined are one smooth motion, by differences across the joint; and no stop takes less force."""
+    task = CYCLE | {"steps": 40, "scheme": scheme, "objective": {"jerk": 1000}}
+    planned = plan(ROBOT, task)
+    assert planned.feasible
+    times = np.linspace(0, 3, 3001)
+    pose = planned.scenario.motion(times, planned.deviation)[0].pose
+    two = np.vstack([pose[:-1], pose])
+    speed = np.diff(two, axis=0) / 1e-3
+    changes = np.abs(np.diff(speed, n=2, axis=0)) / 1e-3  # of the acceleration, in a millisecond
+    assert changes[2990:3010].max() < 1.2 * changes[100:2900].max()
+    assert np.linalg.norm(speed[3000]) > 0.1
+    knots = planned.scenario.path.knots(3.0)
+    there = planned.scenario.motion(knots, planned.deviation)[0].pose[:, :3]
+    np.testing.assert_allclose(there, SQUARE["points"], atol=1e-7)
+    stopping = plan(ROBOT, task | {"tube": CYCLE["tube"] | {"ends": "rest"}})
+    assert planned.objective < stopping.objective
+
+
+def test_the_audit_sees_a_cycle_that_does_not_close():
+    planned = plan(ROBOT, CYCLE | {"steps": 40})
+    open_ended = planned.deviation.a.copy()
+    open_ended[-1] += 1e-4
+    off = audit(planned.scenario, replace(planned.deviation, a=open_ended))
+    assert "tube.ends" in [excess.limit for excess in off.excess]
+
+
+def test_carriers_of_a_cycle_return_by_default_and_it_can_be_replanned():
+    circle = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.3, "rate": 0.5}
+    task = {"path": circle, "base": {"kind": "free", "acceleration_max": 3}, "steps": 40}
+    planner = Planner("wang-flying", task | {"tube": {"position": 0.05, "ends": "periodic"}})
+    planned = planner.plan()
+    assert planned.feasible
+    for part in (*planned.audit.motion, *planned.audit.carriers):
+        np.testing.assert_allclose(part[0], part[-1], atol=1e-6)
+    here = planned.trajectory.isel(time=50)
+    state = {name: here[name].values.tolist() for name in ("pose", "velocity", "carrier_pose", "carrier_velocity")}
+    assert planner.replan(state, 0.5).feasible
+
+
+NO_CYCLE = {
+    "open": (
+        {"path": LINE},
+        "path must end with the pose with which it starts, since tube.ends is periodic, got .* 0.5",
+    ),
+    "drift": (
+        {"path": {"kind": "circle", "centre": [0, 0, 1], "radius": 0.1, "rate": 1, "drift": [0, 0, 0.1]}},
+        "path must end with the pose",
+    ),
+    "started": (
+        {"initial": {"pose": [0, 0, 1], "velocity": [0] * 6}},
+        "initial must be left out with tube.ends periodic",
+    ),
+    "ended": ({"final": {"velocity": 0}}, "final must be left out with tube.ends periodic"),
+    "in a frame": ({"path": {"kind": "rest", "frame": "quad", "pose": [0, 0, -1]}}, "path.frame must be world"),
+}
+
+
+@pytest.mark.parametrize("case", NO_CYCLE)
+def test_what_is_no_cycle_is_one_line(case):
+    keys, message = NO_CYCLE[case]
+    with pytest.raises(InputError, match=message) as caught:
+        plan("wang-flying" if case == "in a frame" else ROBOT, CYCLE | {"tube": {"ends": "periodic"}} | keys)
+    assert "\n" not in str(caught.value)
 
 
 def test_free_ends_may_move():

@@ -150,6 +150,12 @@ def _tube_ends(audited: Instants) -> list[Excess]:
     """Check that the platform starts and ends on its path and moves as it does there, by differences of position."""
     scenario, exceeded = audited.scenario, []
     word = platform_ends(scenario.task)
+    if word == "periodic":
+        off = [part[-1] - part[0] for part in audited.motion]
+        off[0][3:] -= 2 * np.pi * np.round(off[0][3:] / (2 * np.pi))
+        worst = np.max(np.abs(off))
+        facts = (worst, END_TOLERANCE, "m, m/s, m/s^2", "away from where it started")
+        return _missed("tube.ends", "platform", scenario.duration, *facts)
     if word not in ("rest", "exact"):
         return []
     ends = [(0.0, 1.0)] if scenario.task.initial is None else []

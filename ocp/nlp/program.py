@@ -28,7 +28,7 @@ import numpy as np
 from ...base.display import Displayed
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
-from ..tasks.ends import carrier_ends, fixed_values
+from ..tasks.ends import carrier_ends, fixed_values, platform_ends
 from ..tasks.paths import RestPath, WaypointPath
 from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
@@ -281,13 +281,13 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> li
         whole = ca.dot(X[place, :-1], ca.DM(np.diff(grid.shares)).T)
         its = Row("legs", span.min / scenario.duration, span.max / scenario.duration)
         blocks.append(Block(whole, [its], np.array([0])))
-    carriers: list[int] = []
-    if carrier_ends(scenario.task) == "periodic":
-        carriers = [i for i, owner in enumerate(scenario.owners()) if owner[0] is not None]
-        picked = [block * layout.n + i for block in range(layout.derivatives) for i in carriers]
+    words = platform_ends(scenario.task), carrier_ends(scenario.task)
+    cyclic = [i for i, (owner, _) in enumerate(scenario.owners()) if words[owner is not None] == "periodic"]
+    if cyclic:
+        picked = [block * layout.n + i for block in range(layout.derivatives) for i in cyclic]
         rows: list[Row] = [Row("periodic", 0.0, 0.0)] * len(picked)
         blocks.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
-    if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in carriers]):
+    if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in cyclic]):
         # Values at the nodes leave a cubic spline one freedom at each end, which would be used where nobody looks.
         rows = [Row("snap", 0.0, 0.0)] * len(ending)
         for k in (0, len(lengths) - 1):

@@ -9,7 +9,7 @@ from ...models import Robot
 from ..plan import Plan
 from ..tasks.carrier_paths import carrier_paths
 from ..tasks.deviation import Deviation
-from ..tasks.ends import carrier_ends, platform_ends
+from ..tasks.ends import Word, carrier_ends, platform_ends
 from ..tasks.initial import Final, Initial
 from ..tasks.paths import AnyPath, Motion, RestPath, ReturnPath
 from ..tasks.paths.returning import decay
@@ -26,6 +26,11 @@ class Remainder(NamedTuple):
     )  # the last plan, with what the carriers are off it decaying; None if the task fixes the motion
 
 
+def _open(ends: Word) -> Word:
+    """Return how a remainder ends: that of a cycle does not end where it starts."""
+    return "free" if ends == "periodic" else ends
+
+
 def final_of(plan: Plan) -> Final | None:
     """Return the state in which a plan ends, as far as the task leaves it to the planner; None if it leaves nothing.
 
@@ -36,7 +41,7 @@ def final_of(plan: Plan) -> Final | None:
     platform, carriers = scenario.motion(np.array([scenario.duration]), plan.deviation)
     given: dict[str, Any] = {}
     names = ("pose", "velocity", "acceleration")[: 3 if is_agile(robot) else 2]
-    if scenario.platform_free and platform_ends(scenario.task) == "free":
+    if scenario.platform_free and platform_ends(scenario.task) in ("free", "periodic"):
         given |= {name: tuple(part[0].tolist()) for name, part in zip(names, platform, strict=False)}
     if scenario.carrier_free and carrier_ends(scenario.task) in ("free", "periodic"):
         given |= {f"carrier_{name}": _rows(part[0]) for name, part in zip(names, carriers, strict=False)}
@@ -63,15 +68,14 @@ def remainder(
     if isinstance(base, GivenBase):
         base = base.model_copy(update={"paths": _shifted(base.paths, whole.duration, time)})
     elif isinstance(base, FreeBase):
-        ends = carrier_ends(task)
         around = _shifted(base.around, whole.duration, time)
-        base = base.model_copy(update={"around": around, "ends": "free" if ends == "periodic" else ends})
+        base = base.model_copy(update={"around": around, "ends": _open(carrier_ends(task))})
     task = task.model_copy(
         update={
             "path": path,
             "duration": left,
             "base": base,
-            "tube": task.tube.model_copy(update={"ends": platform_ends(task)}),
+            "tube": task.tube.model_copy(update={"ends": _open(platform_ends(task))}),
             "initial": state,
             "final": final,
         }

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...models import Robot
 from .deviation import Deviation
-from .paths import AnyPath, LinePath, RestPath
+from .paths import AnyPath, LinePath, RestPath, WaypointPath
 from .scenario import POSITION, Scenario
 from .task import FreeBase, GivenBase, Task
 
@@ -34,10 +34,11 @@ def platform_ends(task: Task) -> Word:
 
 
 def carrier_ends(task: Task) -> Word:
-    """Return how free carriers start and end: as the task requires, or else at rest if the platform does."""
+    """Return how free carriers start and end: as the task requires, or else at rest or periodic as the platform."""
     if not isinstance(task.base, FreeBase):
         return "free"
-    return task.base.ends or ("rest" if platform_ends(task) == "rest" else "free")
+    of_platform = platform_ends(task)
+    return task.base.ends or (of_platform if of_platform in ("rest", "periodic") else "free")
 
 
 def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
@@ -51,6 +52,10 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
         orders = [0] * (word == "exact" or (word == "rest" and owner is None and coordinate in POSITION))
         orders += [1] * (word in ("exact", "rest"))
         orders += [2] * (word == "rest" and at_rest_without_acceleration(scenario.robot, owner, coordinate))
+        through = word == "periodic" and owner is None and task.tube.waypoints == "exact"
+        if through and isinstance(scenario.path, WaypointPath):  # the first point; the last one is the same
+            off = scenario.path.missed(scenario.duration)[0, coordinate]
+            yield FixedValue(0, column, 0, float(off))
         for end, state in ((0, task.initial), (-1, task.final)):
             given = [] if state is None else list(state.of(owner))
             for order, value in given:

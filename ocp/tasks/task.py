@@ -39,9 +39,10 @@ class Tube(Part):
         default=0.0,
         description="range of each of roll, pitch, yaw about the path [rad]; 0: followed exactly; free: 1.2 rad",
     )
-    ends: Literal["free", "rest", "exact"] | None = Field(
+    ends: Literal["free", "rest", "periodic", "exact"] | None = Field(
         default=None,
-        description="free: anywhere in the tube; rest: position on the path at start and end, without speed and "
+        description="free: anywhere in the tube; periodic: the end equals the start, without a stop, for a path that "
+        "ends where it starts; rest: position on the path at start and end, without speed and "
         "acceleration (with few cables or fixed lengths angular acceleration is free); exact: no deviation of "
         "position and velocity there, with free acceleration; default: rest if the path (other than kind rest) starts "
         "and ends at rest and no carrier moves as given, otherwise free",
@@ -98,7 +99,7 @@ class FreeBase(Part):
         default=None,
         description="free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
         "cables or fixed lengths it is free); periodic: the end equals the start; exact: start and end as in "
-        "`around`; default: rest if `tube.ends` is rest, given or by default, else free",
+        "`around`; default: rest or periodic if `tube.ends` is that, given or by default, else free",
     )
 
 

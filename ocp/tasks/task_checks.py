@@ -40,6 +40,7 @@ def check_task(robot: Robot, task: Task) -> None:
     _check_robust(robot, task, where)
     _check_times(task, where)
     _check_waypoints(task, where)
+    _check_cycle(task, where)
     if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
         raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
 
@@ -159,6 +160,24 @@ def _check_times(task: Task, where: str) -> None:
         raise InputError(
             f"{where}: duration must be at least {end:g} s, where the times of path end, got {task.seconds:g} s"
         )
+
+
+def _check_cycle(task: Task, where: str) -> None:
+    """Refuse a cycle whose path does not end as it starts, or whose ends are given."""
+    if platform_ends(task) != "periodic":
+        return
+    for name in ("initial", "final"):
+        if getattr(task, name) is not None:
+            raise InputError(f"{where}: {name} must be left out with tube.ends periodic")
+    if task.path.frame != "world":
+        raise InputError(f"{where}: path.frame must be world with tube.ends periodic, got {task.path.frame!r}")
+    ends = task.path.at(np.array([0.0, task.seconds]), task.seconds)
+    pose, *rates = (part[1] - part[0] for part in ends)
+    pose[3:] -= 2 * np.pi * np.round(pose[3:] / (2 * np.pi))
+    for off, what in zip((pose, *rates), ("pose", "velocity", "acceleration"), strict=True):
+        if (worst := float(np.abs(off).max())) > TOLERANCE:
+            must = f"must end with the {what} with which it starts, since tube.ends is periodic"
+            raise InputError(f"{where}: path {must}, got a difference of {worst:.3g}")
 
 
 def _check_waypoints(task: Task, where: str) -> None:
