@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from functools import cached_property, lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -28,12 +27,11 @@ from .world_functions import PUBLISHED, WorldFunctions
 
 def dynamics_of(robot: Robot) -> Dynamics:
     """Return the `Dynamics` of a robot, kept for the next call."""
-    key: Any = required("robot", robot, Robot)  # frozen, so it has a hash, unknown to a type checker
-    return _dynamics_of(key)
+    return _dynamics_of(required("robot", robot, Robot))
 
 
 @lru_cache(maxsize=16)
-def _dynamics_of(robot: Any) -> Dynamics:
+def _dynamics_of(robot: Robot) -> Dynamics:
     return Dynamics(robot)
 
 

@@ -63,18 +63,13 @@ def fits(robot: Robot) -> bool:
     )
 
 
+@lru_cache(maxsize=16)
 def record_of(robot: Robot) -> np.ndarray:
     """Return the record of a robot, of `RECORD`, shape (); it is kept for the next call and cannot be written to.
 
     Stiffness and damping are those of the file, 0 where it has none. Raises `InputError` if the robot has more
     cables, carriers or actuators than the core has room for.
     """
-    key: Any = robot  # frozen, so it has a hash, unknown to a type checker
-    return _record_of(key)
-
-
-@lru_cache(maxsize=16)
-def _record_of(robot: Any) -> np.ndarray:
     for name, most, count in _counts(robot):
         if count > most:
             raise InputError(f"robot {robot.name!r} must have at most {most} {name}, got {count}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 from typing import Any, Self, cast
@@ -211,6 +212,14 @@ class Robot(DisplayedRobot):
         from .parsing import save_yaml
 
         return save_yaml(self, file)
+
+    def __hash__(self) -> int:
+        """Return a hash of the numbers of the robot, the same in each process."""
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:  # a stream of measurements looks up what is known of its robot at each sample
+        return hash((self.platform.mass, *self.t_max, *self.anchors.flat, *self.attachments.flat))
 
     @property
     def m(self) -> int:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.inputs import shown
-from ..core import CABLES, ROWS, solve_packed
+from ..core import solve_packed
 from .box_least_squares import project
 from .certificate import Certificate, certificate_along, sharpest
 from .methods import METHODS
@@ -17,7 +17,7 @@ from .methods.qp import ActiveSet
 from .problem import Array, TensionProblem
 from .solution import TensionSolution
 from .standard_form import StandardForm, standard_forms
-from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES, UNSURE
+from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES
 from .verify import verify
 
 
@@ -54,12 +54,12 @@ def solve(
     start = perf_counter()
     if not isinstance(problem, TensionProblem):
         raise InputError(f"problem must be a TensionProblem, got {shown(problem)}, a {type(problem).__name__}")
-    if isinstance(method, str) and method == "active-set" and backend is None and not options:
-        n, m = problem.A.shape
-        tensions = np.empty(m)
-        code = solve_packed(problem.packed, tensions) if n <= ROWS and m <= CABLES else UNSURE
+    # These few lines decide the time of a step.
+    if type(method) is str and method == "active-set" and backend is None and not options:
+        tensions = np.empty(problem.t_min.size)
+        code = solve_packed(problem.packed, tensions)
         if code == OPTIMAL:
-            return TensionSolution(problem, tensions, STATUSES[OPTIMAL], "active-set", "c", perf_counter() - start)
+            return TensionSolution(problem, tensions, _OPTIMAL, "active-set", "c", perf_counter() - start)
         if code <= SINGULAR:
             spent = perf_counter() - start
             return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _PROOFS[code])
@@ -103,6 +103,7 @@ def _prove(problem: TensionProblem, singular: bool) -> Certificate | None:
     return certificate
 
 
+_OPTIMAL = STATUSES[OPTIMAL]
 _PROOFS = {code: partial(_prove, singular=code == SINGULAR) for code in (INFEASIBLE, SINGULAR)}
 
 

@@ -19,7 +19,6 @@ Source: the energy form of the direct geometrico-static problem of Berti, Merlet
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -194,8 +193,7 @@ def _displaced(pose: np.ndarray, twist: np.ndarray, com: np.ndarray) -> np.ndarr
 
 def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.ndarray) -> Equilibrium | None:
     """Search for the equilibrium pose from `start`, or return None; it leaves saddles along their unstable motion."""
-    key: Any = robot  # frozen, so it has a hash, unknown to a type checker
-    dynamics, solver, rows = dynamics_of(robot), _energy_program(key), np.flatnonzero(robot.dof_mask)
+    dynamics, solver, rows = dynamics_of(robot), _energy_program(robot), np.flatnonzero(robot.dof_mask)
     for _ in range(DESCENTS):
         result = solver(x0=start[rows], p=carriers.T.ravel(), lbg=-np.inf, ubg=longest**2)
         if not solver.stats()["success"]:
@@ -218,7 +216,7 @@ def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.
 
 
 @lru_cache(maxsize=16)
-def _energy_program(robot: Any) -> ca.Function:
+def _energy_program(robot: Robot) -> ca.Function:
     """Return the program of a robot; the carriers' poses are its parameter."""
     dynamics = dynamics_of(robot)
     carriers = ca.SX.sym("carriers", *robot.carrier_home.shape)

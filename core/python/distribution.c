@@ -7,8 +7,11 @@
 
 /* Solve a problem of A, w, t_min, t_max, t_ref, weights and length, one after another; return the status. */
 static int solve(const double *data, Py_ssize_t size, double *t, Py_ssize_t m, double *direction, Py_ssize_t n) {
-    if (m < 1 || m > TOWLINE_CABLES || n < 1 || n > TOWLINE_ROWS || size != n * m + n + 4 * m + 1) {
+    if (m < 1 || n < 1 || size != n * m + n + 4 * m + 1) {
         return -1;
+    }
+    if (m > TOWLINE_CABLES || n > TOWLINE_ROWS) {
+        return (int)TOWLINE_UNSURE; /* the core has no room for it */
     }
     const double *w = data + n * m, *limits = w + n;
     const towline_problem problem = {(int)n,         (int)m,         data,          w, limits, limits + m,

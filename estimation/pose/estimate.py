@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -73,15 +73,18 @@ class PoseEstimate(Displayed):
             *((name, quantity(int(of.sum())) if of.ndim else brief(bool(of))) for name, of in verdicts.items()),
         ]
 
-    def reshaped(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> PoseEstimate:
-        """Return N estimates with the leading dimensions `batch`, and with `carrier_pose` as it was given."""
-        names = ("pose", "residuals", "converged", "ambiguous", "by_gravity", "known_covariance")
-        arrays = {name: value for name in names if isinstance(value := getattr(self, name), np.ndarray)}
-        if batch:
-            shaped = {name: value.reshape((*batch, *value.shape[1:])) for name, value in arrays.items()}
-        else:
-            shaped = {name: value[0] if value.ndim > 1 else bool(value[0]) for name, value in arrays.items()}
-        return replace(self, **shaped, carrier_pose=carrier_pose)
+    def reshape(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> None:
+        """Give N estimates the leading dimensions `batch`, and `carrier_pose` as it was given."""
+        for name in ("pose", "residuals", "converged", "ambiguous", "by_gravity", "known_covariance"):
+            value = getattr(self, name)
+            if not isinstance(value, np.ndarray):
+                continue
+            if batch:
+                shaped = value.reshape((*batch, *value.shape[1:]))
+            else:
+                shaped = value[0] if value.ndim > 1 else bool(value[0])
+            setattr(self, name, shaped)
+        self.carrier_pose = carrier_pose
 
     @property
     def residual(self) -> Any:

@@ -72,7 +72,8 @@ def pose_from_lengths(
     found = estimates(problem, rows, starts, deviations)
     if problem.open:
         found = resting(found, problem, rows, starts)
-    return found.reshaped(batch, carriers)
+    found.reshape(batch, carriers)
+    return found
 
 
 def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
@@ -80,10 +81,7 @@ def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
     array = as_array("lengths", lengths, (robot.m,))
     if not array.min(initial=np.inf) > 0.0:
         raise InputError(f"lengths must be numbers > 0 [m], got {array.min():g}")
-    # No number is larger than the root of the sum of squares.
-    if not np.vdot(array, array) <= LARGEST**2 and not array.max() <= LARGEST:
-        raise InputError(f"lengths must be numbers up to {LARGEST:g} [m], got {array.max():g}")
-    return array
+    return _of_a_size("lengths", "m", array)
 
 
 def one_pose(lengths: ArrayLike, carrier_pose: ArrayLike | None, robot: Robot) -> tuple[np.ndarray, np.ndarray | None]:
@@ -119,10 +117,15 @@ def _equal(sigma: float, m: int) -> np.ndarray:
 
 def _poses(name: str, value: ArrayLike, core: tuple[int, ...]) -> np.ndarray:
     """Return poses, or raise InputError unless they are of a size that can be squared."""
-    poses = as_array(name, value, core)
-    if (largest := np.abs(poses).max(initial=0.0)) > LARGEST:
-        raise InputError(f"{name} must be numbers up to {LARGEST:g} [m, rad], got {largest:g}")
-    return poses
+    return _of_a_size(name, "m, rad", as_array(name, value, core))
+
+
+def _of_a_size(name: str, unit: str, array: np.ndarray) -> np.ndarray:
+    """Return an array, or raise InputError if the square of a number would be too large."""
+    # No number is larger than the root of the sum of squares, which is faster.
+    if not np.vdot(array, array) <= LARGEST**2 and (largest := np.abs(array).max()) > LARGEST:
+        raise InputError(f"{name} must be numbers up to {LARGEST:g} [{unit}], got {largest:g}")
+    return array
 
 
 def _rows(array: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -99,22 +99,14 @@ class Problem(NamedTuple):
 
 def problem_of(robot: Robot, carrier_pose: np.ndarray | None = None) -> Problem:
     """Return the problem of a robot with its carriers at home, or at (c, 6) or (N, c, 6)."""
-    global _last
-    known, problem = _last
-    if known is not robot or problem is None:  # the hash of a robot takes a sixth of a call of a stream
-        key: Any = robot  # frozen, so it has a hash, unknown to a type checker
-        problem = _at_home(key)
-        _last = robot, problem
+    problem = _at_home(robot)
     if carrier_pose is None:
         return problem
     return problem._replace(carriers=np.ascontiguousarray(carrier_pose))
 
 
-_last: tuple[Robot | None, Problem | None] = (None, None)
-
-
 @lru_cache(maxsize=16)
-def _at_home(robot: Any) -> Problem:
+def _at_home(robot: Robot) -> Problem:
     J = gradient(robot, robot.home, None)[:, robot.dof_mask > 0.0]
     values = np.linalg.svd(J * robot.wrench_scale[robot.dof_mask > 0.0], compute_uv=False)
     is_open = robot.m < J.shape[1] or bool(values[-1] < OPEN * values[0])
