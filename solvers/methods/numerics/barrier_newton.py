@@ -12,6 +12,8 @@ Newton steps converge at once. Should they get stuck, a linear program finds a p
 steps cannot fail: the function is self-concordant (Boyd and Vandenberghe 2004, section 9.6).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..method import Array, Proposal, StandardForm
@@ -102,38 +104,50 @@ def _newton_step(form: StandardForm, gradient: Array, hessian: Array, error: Arr
     return root * (along - scaled)
 
 
+class _Iterate(NamedTuple):
+    """A point inside the limits, (k,), and the multipliers of its distances to them, (k,) each."""
+
+    s: Array
+    at_lower: Array
+    at_upper: Array
+
+
 def _primal_dual(form: StandardForm, square: float, mu: float, s: Array, warm: bool) -> tuple[Array | None, int]:
     """Return a point inside the limits and on Q s = b near the minimiser, or None if it does not come near."""
     below, above = s - form.lower, form.upper - s
     limits = int(np.isfinite(below).sum() + np.isfinite(above).sum())
     # Cold, distances and multipliers are taken as those of a much larger mu, from which it falls step by step.
     product = mu if warm or not limits else max(mu, square * float(np.abs(s).max()) ** 2, 1e-2)
-    at_lower, at_upper = product / below, product / above
+    iterate = _Iterate(s, product / below, product / above)
     for iteration in range(_STEPS):
-        left = form.b - form.Q @ s
-        target = max(mu, _REDUCTION * product)
-        gradient = square * s - target / below + target / above
-        with np.errstate(invalid="ignore"):
-            curve_low, curve_high = np.nan_to_num(at_lower / below), np.nan_to_num(at_upper / above)
-        step = _newton_step(form, gradient, square + curve_low + curve_high, left)
-        change_low = target / below - at_lower - curve_low * step
-        change_high = target / above - at_upper + curve_high * step
-        length = min(1.0, _FRACTION * min(_way_to_limits(form, s, step), _way_to_zero(at_lower, change_low)))
-        length = min(length, _FRACTION * _way_to_zero(at_upper, change_high))
-        s = s + length * step
-        at_lower, at_upper = at_lower + length * change_low, at_upper + length * change_high
-        below, above = s - form.lower, form.upper - s
+        iterate = _primal_dual_step(form, square, max(mu, _REDUCTION * product), iterate)
+        below, above = iterate.s - form.lower, form.upper - iterate.s
         space = min(float(below.min(initial=np.inf)), float(above.min(initial=np.inf)))
-        if not (np.abs(s).max(initial=0.0) < _FAR and space > _NO_SPACE):
+        if not (np.abs(iterate.s).max(initial=0.0) < _FAR and space > _NO_SPACE):
             return None, iteration + 1
         with np.errstate(invalid="ignore"):
-            products = np.concatenate([at_lower * below, at_upper * above])
+            products = np.concatenate([iterate.at_lower * below, iterate.at_upper * above])
         products = products[np.isfinite(products)]
         product = float(products.sum() / limits) if limits else mu
-        error = form.b - form.Q @ s
+        error = form.b - form.Q @ iterate.s
         if error @ error <= _ON_PLANE**2 and np.abs(products - mu).max(initial=0.0) <= _CENTRED * mu:
-            return s, iteration + 1
+            return iterate.s, iteration + 1
     return None, _STEPS
+
+
+def _primal_dual_step(form: StandardForm, square: float, target: float, iterate: _Iterate) -> _Iterate:
+    """Take a step towards Q s = b and products of distance and multiplier that are `target`."""
+    s, at_lower, at_upper = iterate
+    below, above = s - form.lower, form.upper - s
+    gradient = square * s - target / below + target / above
+    with np.errstate(invalid="ignore"):
+        curve_low, curve_high = np.nan_to_num(at_lower / below), np.nan_to_num(at_upper / above)
+    step = _newton_step(form, gradient, square + curve_low + curve_high, form.b - form.Q @ s)
+    change_low = target / below - at_lower - curve_low * step
+    change_high = target / above - at_upper + curve_high * step
+    length = min(1.0, _FRACTION * min(_way_to_limits(form, s, step), _way_to_zero(at_lower, change_low)))
+    length = min(length, _FRACTION * _way_to_zero(at_upper, change_high))
+    return _Iterate(s + length * step, at_lower + length * change_low, at_upper + length * change_high)
 
 
 def _damped(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Array | None, int]:
