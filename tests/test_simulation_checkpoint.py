@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -31,6 +32,13 @@ def fly(file, runs=300, **changed):
     return simulate(robot, robot.home, **GIVEN | changed, runs=runs, checkpoint=file, resume=True)
 
 
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """The checkpoint of runs that are finished, and their table."""
+    file = tmp_path_factory.mktemp("flown") / "flights"
+    return file, fly(file)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals are sent otherwise there")
 def test_killed_and_resumed_they_are_the_same(tmp_path, monkeypatch):
     (tmp_path / "script.py").write_text(SCRIPT)
@@ -54,9 +62,8 @@ def test_killed_and_resumed_they_are_the_same(tmp_path, monkeypatch):
     assert files[0] == files[1]
 
 
-def test_what_is_missing_is_flown_again(tmp_path):
-    file = tmp_path / "flights"
-    whole = fly(file)
+def test_what_is_missing_is_flown_again(flown, tmp_path):
+    file, whole = shutil.copy(flown[0], tmp_path / "flights"), flown[1]
     assert whole.identical(fly(file))  # nothing is left to fly
     blocks = stored(file)
     with contextlib.closing(sqlite3.connect(file)) as database, database:
@@ -91,9 +98,8 @@ def stored(file):
         ({"drive": "tensions"}, "robot"),
     ],
 )
-def test_a_checkpoint_of_other_flights_is_refused(tmp_path, changed, name):
-    file = tmp_path / "flights"
-    fly(file)
+def test_a_checkpoint_of_other_flights_is_refused(flown, tmp_path, changed, name):
+    file = shutil.copy(flown[0], tmp_path / "flights")
     content = file.read_bytes()
     with pytest.raises(InputError, match=f"of another run, with {name} "):
         fly(file, **changed)
