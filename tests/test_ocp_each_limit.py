@@ -223,6 +223,13 @@ CASES = {
         lambda b: {"cable_acceleration": b},
         tolerance=5e-3,
     ),
+    "cable_jerk": Case(
+        "ipanema-1",
+        OUT,
+        lambda p: np.abs(rate(p, rate(p, rate(p, lengths(p))))[6:-6]),
+        lambda b: {"cable_jerk": b},
+        tolerance=1e-2,
+    ),
     "winch_power": Case(
         "ipanema-1",
         OUT,

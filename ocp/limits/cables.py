@@ -1,4 +1,4 @@
-"""Limits of the cables: speeds, accelerations, powers, lengths, and distances between cables."""
+"""Limits of the cables: speeds, accelerations, jerks, powers, lengths, and distances between cables."""
 
 from itertools import combinations
 
@@ -46,6 +46,12 @@ class CableAcceleration(EachCable):
     @override
     def values(self, state: State) -> ca.SX:
         return state.rate(state.rate(state.run.lengths))
+
+
+class CableJerk(CableAcceleration, Rate):
+    """Limit the third derivative of each cable's length, that is, the jerk of its winch."""
+
+    name, unit = "cable_jerk", "m/s^3"
 
 
 class WinchPower(EachCable):

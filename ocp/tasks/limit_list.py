@@ -10,7 +10,16 @@ from ...models import Robot
 from ...models.body import AnyBody, skeleton
 from ...models.shapes import Shape
 from ..limits.bodies import LOAD, PLATFORM, body_outside, inside_room
-from ..limits.cables import CableAcceleration, CableClearance, CableLength, CableSpeed, Margin, TensionRate, WinchPower
+from ..limits.cables import (
+    CableAcceleration,
+    CableClearance,
+    CableJerk,
+    CableLength,
+    CableSpeed,
+    Margin,
+    TensionRate,
+    WinchPower,
+)
 from ..limits.carriers import (
     CarrierAcceleration,
     CarrierReach,
@@ -56,7 +65,7 @@ def limit_list(robot: Robot, task: Task) -> Limits:
 
 def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
     given = task.limits
-    for kind in (CableSpeed, CableAcceleration, WinchPower):
+    for kind in (CableSpeed, CableAcceleration, CableJerk, WinchPower):
         if (most := getattr(given, kind.name)) is not None:
             yield kind(robot, most)
     if given.cable_length is not None:

@@ -118,6 +118,9 @@ class TaskLimits(Part):
     cable_acceleration: Positive | None = Field(
         default=None, description="second derivative of every cable's length, the acceleration of its winch [m/s^2]"
     )
+    cable_jerk: Positive | None = Field(
+        default=None, description="third derivative of every cable's length, the jerk of its winch [m/s^3]"
+    )
     winch_power: Positive | None = Field(
         default=None, description="mechanical power of every winch, tension times rate of the length [W]"
     )
