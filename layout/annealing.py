@@ -10,6 +10,7 @@ import time
 import numpy as np
 
 from .evaluation import Evaluation
+from .goal import Goal
 
 MOVES = 8000
 _NEGATIVE = 0.05  # weight of the mean of negative margins
@@ -21,7 +22,12 @@ _CLEARANCE_COSTS = 5.0  # force scales per metre of missing clearance
 
 
 def anneal(
-    evaluation: Evaluation, clearance: float, rng: np.random.Generator, until: float, near: np.ndarray | None = None
+    evaluation: Evaluation,
+    goal: Goal,
+    clearance: float,
+    rng: np.random.Generator,
+    until: float,
+    near: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return the variables of a good layout for the rows of an evaluation, (p,).
 
@@ -29,6 +35,8 @@ def anneal(
     ----------
     evaluation
         An evaluation of few poses, because it is repeated thousands of times.
+    goal
+        What is maximised.
     clearance
         Smallest distance between cables [m].
     until
@@ -43,7 +51,7 @@ def anneal(
 
     def score(y: np.ndarray, least: float) -> float:
         found = evaluation.margins(y)
-        value = float(found.min()) + _NEGATIVE * float(np.minimum(found, 0.0).mean())
+        value = goal.value(float(found.min()), y) + _NEGATIVE * float(np.minimum(found, 0.0).mean())
         if wanted > 0.0 and value > least and evaluation.pairs.size:  # else it is refused without the distances
             value -= _CLEARANCE_COSTS * force * max(0.0, wanted - float(evaluation.distances(y).min()))
         return value

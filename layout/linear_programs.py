@@ -1,4 +1,4 @@
-"""Sequential linear programs: maximise the smallest margin of all rows, inside bounds and with a clearance."""
+"""Sequential linear programs: maximise a goal over all rows, inside bounds and with a clearance."""
 
 import time
 from typing import NamedTuple
@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from .evaluation import Evaluation
+from .goal import Goal
 from .variables import Variables
 
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
@@ -16,21 +17,23 @@ _FOUND = 1e-5  # of the margin, or of 1 N: a smaller improvement ends the search
 
 
 class Multipliers(NamedTuple):
-    """Weights of the rows' reserves at the optimum, which sum to one, and the value of wider bounds."""
+    """Weights of the rows' reserves at the optimum, which sum to at most one, and the value of wider bounds."""
 
     rows: np.ndarray  # (k,), into the rows of the evaluation
     weights: np.ndarray  # (k,)
     pull: np.ndarray  # (k, m), of the cables along the normals
     direction: np.ndarray  # (k, n)
-    by_high: np.ndarray  # (p,), margin gained per unit by which an upper bound rises
-    by_low: np.ndarray  # (p,), margin gained per unit by which a lower bound falls
-    left: float  # improvement of the margin that the linear program still sees within its steps [N]
+    by_high: np.ndarray  # (p,), gained per unit by which an upper bound rises
+    by_low: np.ndarray  # (p,), gained per unit by which a lower bound falls
+    left: float  # improvement of the goal that the linear program still sees within its steps [N]
 
 
 class _Program:
     """The linear program about a point, and its solution."""
 
-    def __init__(self, evaluation: Evaluation, y: np.ndarray, clearance: float, delta: float, every: np.ndarray):
+    def __init__(
+        self, evaluation: Evaluation, goal: Goal, y: np.ndarray, clearance: float, delta: float, every: np.ndarray
+    ):
         variables = evaluation.variables
         span = variables.high - variables.low
         self.scale = np.where(span > 0.0, span, 1.0)
@@ -52,14 +55,14 @@ class _Program:
                 [-near.by_variables * self.scale, np.zeros((len(near.value), 1)), -np.ones((len(near.value), 1))]
             )
             A, b = np.vstack([A, by]), np.r_[b, near.value - clearance]
-        cost = np.r_[np.zeros(variables.size), -1.0, _PER_METRE * variables.robot.force_scale]
+        cost = np.r_[goal.price * self.scale, -1.0, _PER_METRE * variables.robot.force_scale]
         below, above = (variables.low - y) / self.scale, (variables.high - y) / self.scale
         self.low, self.high = np.maximum(below, -delta), np.minimum(above, delta)
         self.at_low, self.at_high = below >= -delta, above <= delta
-        bounds = np.vstack([np.c_[self.low, self.high], [-_LARGEST, _LARGEST], [0.0, _LARGEST]])
+        bounds = np.vstack([np.c_[self.low, self.high], [-_LARGEST, min(goal.enough, _LARGEST)], [0.0, _LARGEST]])
         options = {"presolve": False}  # of which such small dense programs have nothing
         self.solution = linprog(cost, A_ub=A, b_ub=b, bounds=bounds, method="highs", options=options)
-        self.value = -self.solution.fun if self.solution.success else -np.inf
+        self.value = -self.solution.fun - float(goal.price @ y) if self.solution.success else -np.inf
 
     def moved(self, y: np.ndarray, variables: Variables) -> np.ndarray:
         return np.clip(y + self.solution.x[: y.size] * self.scale, variables.low, variables.high)
@@ -73,14 +76,22 @@ def missing(evaluation: Evaluation, y: np.ndarray, clearance: float) -> float:
 
 
 def maximise(
-    evaluation: Evaluation, y: np.ndarray, clearance: float, until: float, delta: float = 0.1, most: int = 60
+    evaluation: Evaluation,
+    goal: Goal,
+    y: np.ndarray,
+    clearance: float,
+    until: float,
+    delta: float = 0.1,
+    most: int = 60,
 ) -> None:
-    """Move the variables to a local maximum of the smallest margin, in place: an interrupt keeps what is reached.
+    """Move the variables to a local maximum of a goal, in place: an interrupt keeps what is reached.
 
     Parameters
     ----------
     evaluation
         Of all rows that count.
+    goal
+        What is maximised.
     y
         Where to start, (p,); it is moved.
     clearance
@@ -96,13 +107,13 @@ def maximise(
 
     def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
         every = evaluation.all_reserves(z)
-        return float(every.min()) - price * missing(evaluation, z, clearance), every
+        return goal.value(float(every.min()), z) - price * missing(evaluation, z, clearance), every
 
     value, every = merit(y)
     for _ in range(most):
         if delta < 1e-6 or time.perf_counter() > until or not np.isfinite(value):
             break
-        program = _Program(evaluation, y, clearance, delta, every)
+        program = _Program(evaluation, goal, y, clearance, delta, every)
         predicted = program.value - value
         if not predicted > _FOUND * max(1.0, abs(value)):
             break
@@ -120,10 +131,12 @@ def maximise(
             delta *= 0.35
 
 
-def multipliers(evaluation: Evaluation, y: np.ndarray, clearance: float, delta: float = 1e-3) -> Multipliers:
+def multipliers(
+    evaluation: Evaluation, goal: Goal, y: np.ndarray, clearance: float, delta: float = 1e-3
+) -> Multipliers:
     """Return the multipliers of the linear program at a point, within small steps."""
     every = evaluation.all_reserves(y)
-    program = _Program(evaluation, y, clearance, delta, every)
+    program = _Program(evaluation, goal, y, clearance, delta, every)
     solution, p = program.solution, y.size
     if not solution.success:
         none = np.zeros(0)
@@ -142,5 +155,5 @@ def multipliers(evaluation: Evaluation, y: np.ndarray, clearance: float, delta: 
         program.found.direction[program.good][keep],
         np.where(program.at_high, upper, 0.0),
         np.where(program.at_low, lower, 0.0),
-        float(solution.x[p] - every.min()),
+        program.value - goal.value(float(every.min()), y),
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..models import Robot
 from .evaluation import Evaluation
+from .goal import PRICE, Goal
 from .linear_programs import multipliers
 from .variables import Variables
 
@@ -29,7 +30,7 @@ class Binding(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """The margin gained per unit of a change, to first order [N per unit]."""
+    """The gain per unit of a change, to first order: of margin, or by which the mean t_max falls [N per unit]."""
 
     change: str
     gain: float
@@ -45,19 +46,20 @@ class Reasons(NamedTuple):
     at_bounds: int
 
 
-def reasons(evaluation: Evaluation, y: np.ndarray, clearance: float) -> Reasons:
-    """Return the reasons why the smallest margin of a layout is not larger."""
+def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray, clearance: float) -> Reasons:
+    """Return the reasons why the goal of a layout is not reached further."""
     variables, rows = evaluation.variables, evaluation.rows
-    robot, found = variables.robot, multipliers(evaluation, y, clearance)
+    robot, found = variables.robot, multipliers(evaluation, goal, y, clearance)
     kept = np.flatnonzero(robot.dof_mask)
     direction = np.zeros((found.rows.size, 6))
     if found.rows.size:
         direction[:, kept] = found.direction * robot.wrench_scale[kept]
+    total = float(found.weights.sum())
     binding = [
         Binding(
             rows.poses[rows.pose_of[row]],
             rows.wrenches[row],
-            float(weight),
+            float(weight / total),
             d,
             tuple(np.flatnonzero(pull > _SMALL).tolist()),
             tuple(np.flatnonzero(pull < -_SMALL).tolist()),
@@ -68,26 +70,23 @@ def reasons(evaluation: Evaluation, y: np.ndarray, clearance: float) -> Reasons:
     margin = float(evaluation.margins(y).min())
     span = variables.high - variables.low
     bound = (span > 0.0) & (np.minimum(y - variables.low, variables.high - y) <= 1e-9 * np.maximum(span, 1.0))
+    least_cost = np.isfinite(goal.wanted)
+    unit = PRICE if least_cost else 1.0  # of the goal, what a newton of margin or of t_max is
+    advice = _advice(robot, found.weights / unit, found.pull, direction, rows.accelerations[found.rows])
+    if least_cost:
+        advice[:1] = [Advice("margin lower by 1 N", total / unit, "N/N")]
     return Reasons(
         tuple(binding),
-        tuple(_advice(robot, variables, found.weights, found.pull, direction, rows.accelerations[found.rows]))
-        + tuple(_of_boxes(variables, found.by_high, found.by_low)),
+        (*advice, *_of_boxes(variables, found.by_high / unit, found.by_low / unit)),
         bool(found.left <= _CONVERGED * max(1.0, abs(margin))),
         int(bound.sum()),
     )
 
 
 def _advice(
-    robot: Robot,
-    variables: Variables,
-    weights: np.ndarray,
-    pull: np.ndarray,
-    direction: np.ndarray,
-    accelerations: np.ndarray,
+    robot: Robot, weights: np.ndarray, pull: np.ndarray, direction: np.ndarray, accelerations: np.ndarray
 ) -> list[Advice]:
     """Return what stronger cables, a lower smallest tension and a lighter platform would gain."""
-    if not weights.size:
-        return []
     stronger = float(weights @ np.maximum(pull, 0.0).sum(axis=1))
     slacker = -float(weights @ np.minimum(pull, 0.0).sum(axis=1))
     free_to_fall = (accelerations[:, :3] - np.array(robot.gravity)) * robot.dof_mask[:3]

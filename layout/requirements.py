@@ -11,6 +11,7 @@ from ..base.inputs import file_path
 from ..models.parsing import read_yaml, validate
 from ..models.part import Box, Name, NonNegative, Part, Pose, Positive, Rows, Vector3, Whole
 from ..models.ranges import Range
+from ..ocp.tasks.task import Task
 
 Wrench = Pose  # six finite numbers
 NO_WRENCH: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -156,6 +157,11 @@ class Requirements(Part):
     require: Annotated[tuple[Requirement, ...], Field(min_length=1, max_length=200)] = Field(
         description="poses and the wrenches to balance there"
     )
+    tasks: Annotated[tuple[Task, ...], Field(max_length=20)] = Field(
+        default=(),
+        description="tasks, with the keys of task files, of which a plan on the found robot must be feasible; default: "
+        "none",
+    )
     margin: Positive = Field(
         default=LEAST_MARGIN,
         ge=LEAST_MARGIN,
@@ -163,6 +169,11 @@ class Requirements(Part):
     )
     clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: no limit")
     maximise: Literal["margin"] = Field(default="margin", description="objective: the smallest capacity margin")
+    minimise: Literal["t_max"] | None = Field(
+        default=None,
+        description="objective instead: the mean t_max of the cables with which the smallest margin is `margin`; t_max "
+        "must be free",
+    )
     start: Literal["robot", "random"] = Field(
         default="robot", description="first layout: the robot's own, moved into the boxes, or a random one"
     )
@@ -173,6 +184,8 @@ class Requirements(Part):
     def _not_too_many(self) -> Self:
         if len(self.free) > 1 and any(each.pairing for each in self.free):
             raise ValueError(f"free must have no item besides a pairing, got {len(self.free) - 1} more")
+        if self.minimise is not None and not any(each.part == "t_max" for each in self.free):
+            raise ValueError("free must have an item with part t_max for minimise: t_max, got none")
         size = sum(each.size for each in self.require)
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} pairs of pose and wrench, got {size}")

@@ -10,6 +10,7 @@ from ..base.text import quantity, quantity_row
 from ..figures.report import Part, Report, Reported, Section, Table
 from ..models import Robot
 from ..models.parsing import to_yaml
+from ..ocp.plan import Plan
 from ..solvers import Certificate, TensionProblem, capacity_margin
 from .impossibility import Impossibility
 from .reasons import Binding, Reasons
@@ -32,9 +33,9 @@ class Design(Reported, Displayed):
     requirements
         What it should do.
     status
-        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, and its clearance
-        are as required; infeasible if no layout inside the boxes meets the requirements, by `impossibility`; otherwise
-        not-found, which proves nothing.
+        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, its clearance and
+        the plans of its tasks are as required; infeasible if no layout inside the boxes meets the requirements, by
+        `impossibility`; otherwise not-found, which proves nothing.
     margin, margin_before
         Smallest capacity margin of both at the same poses, with moments divided by `before.length` [N].
     clearance
@@ -47,6 +48,8 @@ class Design(Reported, Displayed):
         Number of layouts from which it searched, or of pairings that it compared.
     stopped
         Whether the search was interrupted.
+    plans
+        A plan of each task of the requirements; empty if the margin or the clearance is not as required.
     """
 
     robot: Robot
@@ -62,6 +65,7 @@ class Design(Reported, Displayed):
     audited: int
     starts: int
     stopped: bool
+    plans: tuple[Plan, ...] = ()
 
     @property
     def feasible(self) -> bool:
@@ -77,6 +81,9 @@ class Design(Reported, Displayed):
         if self.impossibility is not None:
             return self.impossibility.describe(self._up())
         text = f"capacity margin {quantity(self.margin, 'N')} (before {quantity(self.margin_before, 'N')})"
+        if self.requirements.minimise is not None:
+            mean, before = (quantity(robot.t_max.mean(), "N") for robot in (self.robot, self.before))
+            text = f"mean t_max {mean} (before {before}), {text}"
         if self.requirements.clearance > 0.0:
             text += f", cables {quantity(self.clearance, 'm')} apart"
         return text
@@ -103,9 +110,11 @@ class Design(Reported, Displayed):
         facts = [("searched", f"{searched}, audited at {quantity(self.audited)} random pairs")]
         if self.stopped:
             facts.append(("", "INTERRUPTED: this is the best layout so far"))
+        facts += [("task", each.report().splitlines()[0]) for each in self.plans]
         if self.status == "not-found":
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
             wanted += [f"clearance of {quantity(self.requirements.clearance, 'm')}"] * (self.requirements.clearance > 0)
+            wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
             facts.append(("wanted", f"{' and a '.join(wanted)}; this does not prove that no layout has it"))
         parts.append(Section("", facts))
         if self.reasons is not None:
@@ -118,8 +127,9 @@ class Design(Reported, Displayed):
         if self.requirements.free[0].pairing:
             state, bounds = "the best of all pairings at the poses of the grid", "all points are given"
         facts = [("layout", f"{state}; {bounds}")]
+        gain = "margin +" if self.requirements.minimise is None else "mean t_max -"
         facts += [
-            (one.change, f"margin {quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
+            (one.change, f"{gain}{quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
             for one in found.advice
         ]
         rows = [self._binding_row(one) for one in found.binding[:MOST_LISTED]]
@@ -145,12 +155,14 @@ class Design(Reported, Displayed):
             "feasible": self.feasible,
             "margin": self.margin,
             "margin_before": self.margin_before,
+            "t_max": self.robot.t_max.tolist(),
             "clearance": self.clearance,
             "length": self.before.length,
             "poses": self.poses,
             "audited": self.audited,
             "starts": self.starts,
             "stopped": self.stopped,
+            "tasks": [{"task": each.scenario.task.name, "status": each.status} for each in self.plans],
             "local_optimum": None if found is None else found.local_optimum,
             "binding": []
             if found is None

@@ -1,4 +1,4 @@
-"""`design`: the layout of a robot that meets requirements with the largest margin."""
+"""`design`: the layout of a robot that meets requirements with the largest margin or the weakest winches."""
 
 import os
 from collections.abc import Sequence
@@ -11,14 +11,17 @@ from ..base.inputs import one_of, shown
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
+from ..ocp.planner import plan
 from ..solvers.margins import margins
 from .evaluation import Evaluation, Rows, rows_of
+from .goal import goal_of
 from .impossibility import find_impossibility
 from .pairings import best_pairing, with_attachments
 from .reasons import reasons
 from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design, judged_margin
 from .search import AUDITED, Progress, search
+from .task_rows import with_tasks
 from .variables import Variables, variables_of
 
 _JUDGED = 100  # worst poses, by `capacity_margin`
@@ -34,7 +37,7 @@ def design(
     progress: Progress | None = None,
     **options: Any,
 ) -> Design:
-    """Find anchors, attachments and tension limits with the largest smallest capacity margin.
+    """Find anchors, attachments and tension limits with the largest smallest capacity margin, or the lowest t_max.
 
     Layouts from simulated annealing on few poses are improved by sequential linear programs on all of them, and audits
     at 100 000 random poses add the worst. The result is judged by `capacity_margin`. It is a local optimum. Carriers
@@ -49,13 +52,14 @@ def design(
     require
         Poses and wrenches: `Requirement`, or mappings with its keys.
     maximise
-        Objective: "margin".
+        Objective: "margin". With the option minimise="t_max" instead the smallest mean t_max whose margin is the
+        option `margin`.
     requirements
         Instead of all of these: `Requirements`, a mapping, or the path of a file.
     progress
         Called with what is being done, the share of the time that has passed, and the best margin so far [N].
     **options
-        Other keys of `Requirements`: name, margin, clearance, start, time_limit, seed.
+        Other keys of `Requirements`: name, minimise, margin, clearance, start, time_limit, seed.
 
     Returns
     -------
@@ -96,6 +100,7 @@ def design(
         )  # fmt: skip
     if wanted.free[0].pairing:
         cables = tuple(number - 1 for number in wanted.free[0].cables or range(1, chosen.m + 1))
+        grid = with_tasks(grid, chosen, wanted.tasks)
         attachment_of, count = best_pairing(chosen, grid, cables, wanted.clearance)
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
         return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)
@@ -126,10 +131,13 @@ def _designed(
         some = np.unique(audited.pose_of, return_index=True)[1][:: max(1, len(audited.poses) // 10_000)]
         nearest = min(nearest, _nearest(Evaluation(variables, audited.only(some)), y))
     feasible = margin >= wanted.margin and nearest >= wanted.clearance
+    plans = tuple(plan(robot, task) for task in wanted.tasks) if feasible and not stopped else ()
+    feasible &= len(plans) == len(wanted.tasks) and all(found.feasible for found in plans)
+    why = reasons(evaluation, goal_of(variables, wanted), y, wanted.clearance)
     return Design(
         robot, before, wanted, "feasible" if feasible else "not-found", margin,
-        _judged(before, before.length, every), nearest, reasons(evaluation, y, wanted.clearance), None, count,
-        len(audited.pose_of), starts, stopped,
+        _judged(before, before.length, every), nearest, why, None, count, len(audited.pose_of), starts, stopped,
+        plans,
     )  # fmt: skip
 
 

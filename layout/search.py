@@ -8,8 +8,10 @@ import numpy as np
 
 from .annealing import anneal
 from .evaluation import Evaluation, Rows, rows_of
+from .goal import Goal, goal_of
 from .linear_programs import maximise, missing
 from .requirements import Requirements
+from .task_rows import FEW_INSTANTS, with_tasks
 from .variables import Variables
 
 Progress = Callable[[str, float, float], None]  # what is being done, the share of time, the best margin so far [N]
@@ -29,6 +31,7 @@ _SPARE = 0.002  # of the clearance: what is searched for more than is asked
 class Found:
     """The best layout of a search so far, and how the search went."""
 
+    goal: Goal
     y: np.ndarray  # variables, (p,)
     rows: Rows  # all rows: those of the requirements, and what audits have added
     margin: float = -np.inf  # smallest margin over all rows and the audited poses [N]
@@ -37,11 +40,11 @@ class Found:
     audit_agrees: bool = False  # whether the random poses of the last audit are no worse than the rows
     stopped: bool = False  # whether the search was interrupted
 
-    def better(self, margin: float, short: float) -> bool:
-        """Return whether another result is better: less clearance is missing, or none and the margin is larger."""
+    def better(self, y: np.ndarray, margin: float, short: float) -> bool:
+        """Return whether another result is better: less clearance is missing, or none and its rank is higher."""
         if short > 0.0 or self.missing > 0.0:
             return (short, -margin) < (self.missing, -self.margin)
-        return margin > self.margin
+        return self.goal.rank(margin, y) > self.goal.rank(self.margin, self.y)
 
 
 def search(variables: Variables, requirements: Requirements, progress: Progress) -> Found:
@@ -50,15 +53,18 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
     until = started + requirements.time_limit
     enough = started + _STARTING * requirements.time_limit
     rng = np.random.default_rng(requirements.seed)
-    rows = rows_of(robot, requirements.require, [each.places() for each in requirements.require])
-    few = Evaluation(variables, _few(rows_of(robot, requirements.require, _coarse(requirements)), rng))
+    require, tasks = requirements.require, requirements.tasks
+    rows = with_tasks(rows_of(robot, require, [each.places() for each in require]), robot, tasks)
+    coarse = _few(rows_of(robot, require, _coarse(requirements)), rng)
+    few = Evaluation(variables, with_tasks(coarse, robot, tasks, FEW_INSTANTS))
     clearance = requirements.clearance * (1.0 + _SPARE)
-    found = Found(variables.of_robot(), rows)
+    goal = goal_of(variables, requirements)
+    found = Found(goal, variables.of_robot(), rows)
 
     def improve(what: str, delta: float) -> None:
         share = (time.perf_counter() - started) / requirements.time_limit
         progress(what, min(share, 1.0), found.margin)
-        maximise(Evaluation(variables, found.rows), y, clearance, until, delta)
+        maximise(Evaluation(variables, found.rows), goal, y, clearance, until, delta)
         _take(variables, requirements, found, y, rng)
 
     y = found.y.copy()
@@ -68,7 +74,7 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
                 improve("the robot's own layout", _FIRST_STEP)
             else:
                 near = found.y if found.starts % 2 and found.starts > 1 else None
-                y = anneal(few, clearance, rng, until, near)
+                y = anneal(few, goal, clearance, rng, until, near)
                 improve(f"start {found.starts + 1}", _FIRST_STEP)
             found.starts += 1
         for number in range(_ROUNDS):
@@ -79,7 +85,7 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
     except KeyboardInterrupt:
         found.stopped = True
         evaluation = Evaluation(variables, found.rows)
-        if found.better(float(evaluation.margins(y).min()), missing(evaluation, y, requirements.clearance)):
+        if found.better(y, float(evaluation.margins(y).min()), missing(evaluation, y, requirements.clearance)):
             found.y = y
     return found
 
@@ -90,14 +96,14 @@ def _take(
     """Audit a layout, add the worst poses to the rows, and keep it if it is the best."""
     evaluation = Evaluation(variables, found.rows)
     promised, short = float(evaluation.margins(y).min()), missing(evaluation, y, requirements.clearance)
-    if not found.better(promised, short):
+    if not found.better(y, promised, short):
         return  # the audit can only find less
     margin, missed, worst = _audit(variables, requirements, y, rng)
     agrees = margin >= promised - _SAME * abs(promised) and missed <= short
     if not agrees:
         found.rows = found.rows.joined(worst)
     margin, short = min(margin, promised), max(short, missed)
-    if found.better(margin, short):
+    if found.better(y, margin, short):
         found.y, found.margin, found.missing, found.audit_agrees = y.copy(), margin, short, agrees
 
 

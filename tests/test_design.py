@@ -8,9 +8,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline import Dynamics, InputError, Requirements, TensionProblem, core, design, load, read_requirements
+from towline import (
+    Dynamics,
+    InputError,
+    Requirements,
+    Robot,
+    TensionProblem,
+    core,
+    design,
+    load,
+    plan,
+    read_requirements,
+)
 from towline.layout import Free
 from towline.layout.evaluation import Evaluation, rows_of
+from towline.layout.goal import Goal
 from towline.layout.impossibility import find_impossibility
 from towline.layout.linear_programs import maximise
 from towline.layout.pairings import with_attachments
@@ -163,19 +175,20 @@ def test_advice_is_the_slope_of_optima_solved_again():
         require = [{"box": {"min": low.tolist(), "max": high.tolist()}, "grid": [3, 1, 3]}]
         evaluation = evaluation_of(changed, {"free": [{"part": "anchor", "box": box}], "require": require})
         y = evaluation.variables.of_robot()
+        goal = Goal(np.inf, np.zeros(y.size))
         for delta in (0.1, 0.02, 0.004):
-            maximise(evaluation, y, 0.0, np.inf, delta)
-        return evaluation, y, float(evaluation.margins(y).min())
+            maximise(evaluation, goal, y, 0.0, np.inf, delta)
+        return evaluation, goal, y, float(evaluation.margins(y).min())
 
-    evaluation, y, best = optimum()
+    evaluation, goal, y, best = optimum()
     assert best > 1.0
-    found = reasons(evaluation, y, 0.0)
+    found = reasons(evaluation, goal, y, 0.0)
     assert found.local_optimum
     gains = {one.change: one.gain for one in found.advice}
     for change, step, name in (("stronger", 0.1, "t_max of every cable higher by 1 N"),
                                ("slacker", 0.1, "t_min of every cable lower by 1 N"),
                                ("longer", 1e-3, "boxes of anchors longer by 1 m at both ends along x")):  # fmt: skip
-        ahead, behind = (optimum(**{change: s * step})[2] for s in (1, -1))
+        ahead, behind = (optimum(**{change: s * step})[3] for s in (1, -1))
         assert gains.get(name, 0.0) == pytest.approx((ahead - behind) / (2 * step), rel=1e-3, abs=1e-3), name
 
 
@@ -417,3 +430,82 @@ def test_distances_of_the_core_are_those_of_interference():
         for wrong in (distances[:, 1:].copy(), distances[1:], None):
             with pytest.raises(ValueError, match="rows of the sizes"):
                 core.cable_distances(record, poses, robot.carrier_home, wrong)
+
+
+def winches(robot):
+    """One t_max for all cables."""
+    return {"part": "t_max", "range": {"min": robot.t_min.max() + 1.0, "max": 20_000}, "equal": True}
+
+
+@pytest.mark.parametrize(("name", "margin"), [("cogiro", 30.0), ("ipanema-2", 12.0), ("planar-4", 5.0)])
+def test_the_weakest_winches_are_those_of_a_bisection(name, margin):
+    """With the points of the file: the margin at listed poses is that of weaker winches up to what `design` finds."""
+    robot, rng = load(name), np.random.default_rng(3)
+    poses = np.tile(robot.home, (6, 1))
+    poses[:, :3] += 0.1 * rng.uniform(-1, 1, (6, 3)) * robot.dof_mask[:3]
+    found = design(
+        robot,
+        [winches(robot)],
+        [{"poses": poses.tolist()}],
+        minimise="t_max",
+        margin=margin,
+        start="robot",
+        time_limit=0.5,
+    )
+    assert found.feasible, found.report()
+    kept = np.flatnonzero(robot.dof_mask)
+    w = Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))[kept]
+    scale = np.repeat([1.0, 1.0 / robot.length], 3)[kept]
+
+    def least(t_max):
+        problems = (
+            TensionProblem(A[kept] * scale[:, None], w * scale, robot.t_min, np.full(robot.m, t_max))
+            for A in Dynamics(robot).wrench_matrix(poses)
+        )
+        return min(capacity_margin(problem).value for problem in problems)
+
+    low, high = robot.t_min.max(), 20_000.0
+    for _ in range(50):
+        middle = (low + high) / 2
+        low, high = (low, middle) if least(middle) >= margin else (middle, high)
+    (t_max,) = set(found.robot.t_max)
+    assert high - 1e-6 <= t_max <= 1.01 * high + 1.0  # it searches for 0.5 % more margin than is required
+    first, *_ = found.reasons.advice
+    slope = (least(t_max + 0.01) - least(t_max - 0.01)) / 0.02
+    assert first.change == "margin lower by 1 N"
+    assert first.gain == pytest.approx(1.0 / slope, rel=1e-3)
+
+
+def test_weaker_winches_are_enough_for_a_better_layout(tmp_path):
+    robot = load("ipanema-2")
+    requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=2.0)
+    fixed = design(robot, requirements=requirements | {"free": [winches(robot)], "time_limit": 0.5})
+    (tmp_path / "wanted.yaml").write_text(json.dumps(requirements | {"free": [*requirements["free"], winches(robot)]}))
+    done = towline("design", "ipanema-2", str(tmp_path / "wanted.yaml"), "--json", "--out", str(tmp_path / "out.yaml"))
+    assert done.returncode == 0, done.stderr
+    better = json.loads(done.stdout)
+    assert max(better["t_max"]) < 0.95 * fixed.robot.t_max.max()
+    assert load(tmp_path / "out.yaml").t_max.tolist() == better["t_max"]
+    assert fixed.report().startswith("ipanema-2, design: FEASIBLE, mean t_max")
+    with pytest.raises(InputError, match="free must have an item with part t_max for minimise: t_max, got none"):
+        design(robot, requirements=requirements)
+
+
+def test_winches_are_strong_enough_for_a_task_and_not_much_stronger():
+    """A fast lift needs more than rest does; with 0.95 of the tensions that `design` finds it is infeasible."""
+    robot, path = load("ipanema-2"), {"kind": "line", "start": [0, 0, 2.2], "end": [0, 0, 2.8]}
+    task = {"name": "fast", "path": path, "duration": 0.3}
+    rest = {"poses": [[0, 0, 2.5, 0, 0, 0]]}
+    given = {"free": [winches(robot)], "require": [rest], "minimise": "t_max", "time_limit": 0.3}
+    found = design(robot, **given, tasks=[task])
+    assert found.feasible
+    assert "ipanema-2, fast: FEASIBLE" in found.report()
+    assert found.robot.t_max.max() > 2 * design(robot, **given).robot.t_max.max()
+    cables = [{**cable.model_dump(), "t_max": 0.95 * cable.t_max} for cable in found.robot.cables]
+    weaker = Robot.model_validate(found.robot.model_dump() | {"cables": cables})
+    assert plan(weaker, task).status == "infeasible"
+    weak = design(robot, [winches(robot) | {"range": {"min": 50, "max": 100}}], [rest], time_limit=0.3, tasks=[task])
+    assert weak.status == "not-found"
+    assert "feasible plan of each task" in weak.report()
+    with pytest.raises(InputError, match=r"tasks\[0\]\.path"):
+        design(robot, **given, tasks=[{"name": "pathless"}])
