@@ -28,7 +28,6 @@ MOVED = {
     ("ocp", "Timing"): ("ocp", "Plan"),
     ("simulation", "Flight"): ("simulation", "Simulation"),
     ("models", "PoseEstimate"): ("estimation", None),
-    ("models", "PoseTracker"): ("estimation", None),
     ("models", "branches"): ("estimation", None),
     ("models", "pose_from_lengths"): ("estimation", None),
 }

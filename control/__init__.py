@@ -1,12 +1,14 @@
 """Controllers: each step maps a measured state and a reference to a command.
 
 `Controller` is their base class. `ComputedTorque` works for every robot, `Predictive` looks ahead, `LengthControl` is
-for winches that take lengths, and `OpenLoop` commands the plan without sensors.
+for winches that take lengths, `Filtered` estimates velocities from poses, and `OpenLoop` commands the plan without
+sensors.
 """
 
 from .command import ANSWERS, Command
 from .computed_torque import ComputedTorque
 from .controller import Controller
+from .filtered import Filtered
 from .length_control import LengthControl
 from .open_loop import OpenLoop
 from .planned_references import references
@@ -20,6 +22,7 @@ __all__ = [
     "Command",
     "ComputedTorque",
     "Controller",
+    "Filtered",
     "LengthControl",
     "OpenLoop",
     "Predictive",

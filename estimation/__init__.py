@@ -5,11 +5,19 @@ from typing import TYPE_CHECKING, Any
 
 from .pose.branches import branches
 from .pose.estimate import PoseEstimate
+from .pose.filter import MotionEstimate, PoseFilter
 from .pose.from_lengths import pose_from_lengths
 from .pose.from_log import LogPoses, poses_from_log
-from .pose.tracker import PoseTracker
 
-__all__ = ["LogPoses", "PoseEstimate", "PoseTracker", "branches", "pose_from_lengths", "poses_from_log"]
+__all__ = [
+    "LogPoses",
+    "MotionEstimate",
+    "PoseEstimate",
+    "PoseFilter",
+    "branches",
+    "pose_from_lengths",
+    "poses_from_log",
+]
 
 
 if not TYPE_CHECKING:  # a type checker would accept any name

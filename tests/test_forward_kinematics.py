@@ -13,7 +13,7 @@ from scipy.stats import chi2, ncx2
 from towline import InputError, Robot, available, core, load, solve_batch
 from towline.estimation.pose.estimate import gradient, moved
 from towline.estimation.pose.problem import problem_of
-from towline.models import PoseTracker, branches, points, pose_from_lengths
+from towline.models import branches, points, pose_from_lengths
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
 from towline.statics import equilibria as statics
@@ -376,50 +376,6 @@ def test_a_nearly_singular_geometry_is_reported():
         assert exact.conditioned == (sigma == 1e-4)
     assert 0.93 <= held[1e-4] <= 0.97
     assert held[2e-2] < 0.9
-
-
-def test_a_tracker_follows_and_recovers():
-    robot = load("cogiro")
-    t = np.linspace(0, 4, 800)
-    poses = np.stack([np.sin(t), np.cos(t), 2 + 0.3 * np.sin(2 * t), *(0.2 * np.sin(t + k) for k in range(3))], axis=1)
-    poses[400:] += [3, -2, 0.5, 0, 0, 0.3]  # it was off for a while
-    lengths = dynamics_of(robot).cable_lengths(poses)
-    tracker = PoseTracker(robot)
-    np.testing.assert_allclose(tracker.follow(lengths), poses, atol=1e-9)
-    assert tracker.searches <= 2
-    wrong = tracker.update(lengths[-1] + [0.3, 0, 0, 0, 0, 0, 0, 0])
-    assert not wrong.consistent
-    np.testing.assert_allclose(tracker.pose, poses[-1], atol=1e-9)
-
-
-def test_a_tracker_keeps_its_own_pose():
-    robot = load("cogiro")
-    start, lengths = robot.home.copy(), dynamics_of(robot).cable_lengths(robot.home)
-    tracker = PoseTracker(robot, start)
-    start[:] = 1e5
-    tracker.update(lengths).pose[:] = 1e5
-    np.testing.assert_allclose(tracker.pose, robot.home, atol=1e-9)
-    assert tracker.follow(np.empty((0, 8))).shape == (0, 6)
-    moved_frame = np.array([[0.1, 0, 0, 0, 0, 0]])
-    np.testing.assert_allclose(tracker.follow([lengths, lengths], moved_frame)[:, 0], robot.home[0] + 0.1, atol=1e-9)
-    assert tracker.searches == 0
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda tracker: tracker.update(np.full((2, 8), 8.0)), r"lengths must have the shape \(8,\)"),
-        (lambda tracker: tracker.update(np.full(8, 8.0), np.zeros((1, 1, 6))), r"shape \(1, 6\), got \(1, 1, 6\)"),
-        (lambda tracker: tracker.follow(3.0), r"lengths must have the shape \(\.\.\., 8\)"),
-        (lambda tracker: tracker.follow([[1, 2], [3]]), "lengths must be numbers of shape"),
-        (lambda tracker: tracker.follow(np.full(8, 8.0)), r"lengths must have the shape \(N, 8\)"),
-        (lambda tracker: tracker.follow(np.full((2, 8), 8.0), np.zeros((3, 1, 6))), r"\(1, 6\) or \(2, 1, 6\), got"),
-        (lambda tracker: PoseTracker(tracker.robot, sigma=-1), "sigma must be numbers > 0"),
-    ],
-)
-def test_wrong_input_of_a_tracker_is_one_line(call, message):
-    with pytest.raises(InputError, match=message):
-        call(PoseTracker("cogiro"))
 
 
 def test_a_single_estimate_takes_microseconds():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, InputError, load, solve_batch
-from towline.estimation import PoseTracker, branches, pose_from_lengths
+from towline.estimation import branches, pose_from_lengths
 from towline.solvers import Horizon
 
 ROBOT = load("wang-flying")
@@ -34,7 +34,6 @@ DEEP = (1,) * 60
         ),
         (lambda: pose_from_lengths(ROBOT, LENGTHS, sigma=1e-200).suspects(), "sigma must be numbers > 0 .* got 1e-200"),
         (lambda: branches(ROBOT, LENGTHS, sigma=1e-320), "sigma must be numbers > 0 .*, got "),
-        (lambda: PoseTracker(ROBOT, sigma=np.full(6, 1e150)), r"sigma must be numbers > 0 .*, got 1e\+150"),
         (lambda: Dynamics(ROBOT).wrench_matrix(np.full(6, np.longdouble("1e4000"))), "pose must be finite numbers"),
         (lambda: pose_from_lengths(ROBOT, np.full(6, np.longdouble("1e4000"))), "lengths must be finite numbers"),
     ],

@@ -25,6 +25,7 @@ import towline
 from towline import Dynamics, Planner, TensionProblem, TowlineError, load, plan, solve, solve_batch, time_along, viewer
 from towline.base.inputs import printable
 from towline.control import ComputedTorque, Predictive, Reference, State
+from towline.estimation import PoseFilter
 from towline.estimation.calibration import Calibration, Measurements, calibrate
 from towline.models import RelativeDynamics
 from towline.models.uncertainty import Uncertainty
@@ -365,6 +366,8 @@ VALID: dict[str, Callable[[], Any]] = {
     "integral": lambda: 0.0,
     "proportional": lambda: 1.0,
     "LengthControl.stiffness": lambda: 1e5,
+    "Filtered.controller": lambda: ComputedTorque(ROBOT),
+    "Filtered.filter": lambda: PoseFilter(ROBOT),
     "lag": lambda: 0.01,
     "most": lambda: 0.1,
     "observer": lambda: 10.0,

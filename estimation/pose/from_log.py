@@ -21,7 +21,6 @@ from ...models.robot import Robot
 from ..logs.measurements import Measurements, check_measurements
 from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
-from .tracker import PoseTracker
 
 MOST_TRACKED = 2000  # samples that are followed one by one; all others begin between them
 MOST_NAMED = 12
@@ -158,8 +157,13 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     given, deviations = check_measurements(robot, measurements), checked_sigma(sigma, robot.m)
     lengths = lengths_of(robot, given.lengths, given.tensions)
     rows = np.unique(np.linspace(0, len(lengths) - 1, min(len(lengths), MOST_TRACKED)).astype(int))
-    tracker = PoseTracker(robot, sigma=deviations)
-    some = [tracker.update(lengths[row]) for row in rows]
+    some, last = list[PoseEstimate](), None
+    for row in lengths[rows]:
+        found = None if last is None else pose_from_lengths(robot, row, last, sigma=deviations)
+        if found is None or not found.consistent:
+            found = pose_from_lengths(robot, row, sigma=deviations)
+        last = found.pose if found.consistent else last
+        some.append(found)
     known = np.array([one.pose for one in some])
     known[:, 3:] = np.unwrap(known[:, 3:], axis=0)
     good = np.array([bool(one.consistent) for one in some])
