@@ -373,6 +373,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "observer": lambda: 10.0,
     "tension_loop": lambda: 20.0,
     "tension_lag": lambda: 0.02,
+    "rotor_lag": lambda: 0.02,
     "rate": lambda: None,
     "reach": lambda: (0.1, 0.1),
     "carrier_bandwidth": lambda: 5.0,
