@@ -8,7 +8,6 @@ alpha) and, once an inertial sensor is used, the biases of its rates and acceler
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -26,6 +25,7 @@ from ...models.part import LARGEST
 from ...models.record import record_of
 from ...models.robot import Robot
 from .from_lengths import pose_from_lengths
+from .one_rotation import axes_of, cross, turn_by, vector_of
 
 SIGMA = {"lengths": 1e-3, "position": 1e-3, "rotation": 1e-3, "rate": 1e-2, "acceleration": 0.1}
 SIGMA |= {"tensions": 0.02, "forces": 0.02, "rate_bias": 0.02, "acceleration_bias": 0.2}
@@ -195,7 +195,7 @@ class PoseFilter(Displayed):
         assert self._time is not None
         pose = np.concatenate([self._x[SHIFT], points.angles(self._R)])
         twist = np.concatenate([self._x[SPEED], self._x[SPIN]])
-        axes, sine = _axes(pose[3:]), np.cos(pose[4])
+        axes, sine = axes_of(pose[3:]), np.cos(pose[4])
         rates = np.full(3, np.nan) if abs(sine) < 1e-9 else np.linalg.solve(axes, twist[3:])
         velocity = np.concatenate([twist[:3], rates])
         return MotionEstimate(self._time, pose, velocity, twist, self._P[:12, :12].copy(), self._left_out)
@@ -224,7 +224,7 @@ class PoseFilter(Displayed):
     def _begin_along(self, reference: Sequence[ArrayLike]) -> None:
         """Start with about the velocity of the reference."""
         pose, velocity = (np.asarray(part, dtype=float) for part in tuple(reference)[:2])
-        self._x[SPEED], self._x[SPIN] = velocity[:3], _axes(pose[3:]) @ velocity[3:]
+        self._x[SPEED], self._x[SPIN] = velocity[:3], axes_of(pose[3:]) @ velocity[3:]
         shares = np.repeat([1.0, *BEGIN], 6)
         self._P[:18, :18] *= np.outer(shares, shares)
 
@@ -241,7 +241,7 @@ class PoseFilter(Displayed):
         if ahead is not None:
             self._input = ahead if last is None else (ahead + last) / 2
         acceleration = self._accelerations()
-        turn = _turn(dt * x[SPIN] + dt**2 / 2 * acceleration[3:])
+        turn = turn_by(dt * x[SPIN] + dt**2 / 2 * acceleration[3:])
         x[SHIFT] += dt * x[SPEED] + dt**2 / 2 * acceleration[:3]
         x[SPEED] += dt * acceleration[:3]
         x[SPIN] += dt * acceleration[3:]
@@ -278,7 +278,7 @@ class PoseFilter(Displayed):
         self._P = (P + P.T) / 2
         self._x[: len(step)] += step
         self._x[TURN] = 0.0
-        self._R = _turn(step[TURN]) @ self._R
+        self._R = turn_by(step[TURN]) @ self._R
 
     def _rows(self, count: int) -> np.ndarray:
         return np.zeros((count, len(self._P)))
@@ -288,7 +288,7 @@ class PoseFilter(Displayed):
         H = self._rows(6)
         H[:, :6] = np.eye(6)
         sigma = np.repeat([self._sigma["position"], self._sigma["rotation"]], 3)
-        self._correct(np.concatenate([pose[:3] - self._x[SHIFT], _vector_of(turned)]), H, np.diag(sigma**2))
+        self._correct(np.concatenate([pose[:3] - self._x[SHIFT], vector_of(turned)]), H, np.diag(sigma**2))
 
     def _geometry(self, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the lengths (m,) [m] and the wrench matrix about the platform frame, (6, m)."""
@@ -322,18 +322,18 @@ class PoseFilter(Displayed):
         x, to_platform = self._x, self._R.T
         if rate is not None:
             H = self._rows(3)
-            H[:, TURN], H[:, SPIN], H[:, 18:21] = to_platform @ _cross(x[SPIN]), to_platform, np.eye(3)
+            H[:, TURN], H[:, SPIN], H[:, 18:21] = to_platform @ cross(x[SPIN]), to_platform, np.eye(3)
             self._correct(rate - to_platform @ x[SPIN] - x[18:21], H, self._sigma["rate"] ** 2 * np.eye(3))
         if force is not None:
             to_platform, spin = self._R.T, self._x[SPIN]
             acceleration, arm = self._accelerations(), self._R @ self._sensor
-            about, lever = _cross(spin), _cross(arm)
+            about, lever = cross(spin), cross(arm)
             around = about @ arm
             felt = acceleration[:3] - lever @ acceleration[3:] + about @ around - self._gravity
             H = self._rows(3)
-            H[:, TURN], H[:, PUSH], H[:, 21:] = to_platform @ _cross(felt), to_platform, np.eye(3)
+            H[:, TURN], H[:, PUSH], H[:, 21:] = to_platform @ cross(felt), to_platform, np.eye(3)
             H[:, TWIRL] = -to_platform @ lever
-            H[:, SPIN] = -to_platform @ (_cross(around) + about @ lever)
+            H[:, SPIN] = -to_platform @ (cross(around) + about @ lever)
             innovation = force - to_platform @ felt - x[21:]
             self._correct(innovation, H, self._sigma["acceleration"] ** 2 * np.eye(3))
 
@@ -341,18 +341,18 @@ class PoseFilter(Displayed):
         """Update by Newton's and Euler's equations about the platform frame, whose acceleration the tensions give."""
         R, spin, rows, A = self._R, self._x[SPIN], self._free, self._geometry(carriers)[1]
         mass, arm, inertia = self.robot.platform.mass, R @ self._com, R @ self._inertia @ R.T
-        acceleration, about, lever = self._accelerations(), _cross(spin), _cross(arm)
+        acceleration, about, lever = self._accelerations(), cross(spin), cross(arm)
         around, momentum = about @ arm, inertia @ spin
         force = mass * (acceleration[:3] - lever @ acceleration[3:] + about @ around - self._gravity)
         moment = inertia @ acceleration[3:] + about @ momentum + lever @ force
         H = self._rows(6)
         H[:3, SPIN], H[:3, PUSH], H[:3, TWIRL] = (
-            -mass * (_cross(around) + about @ lever),
+            -mass * (cross(around) + about @ lever),
             mass * np.eye(3),
             -mass * lever,
         )
         H[3:] = lever @ H[:3]
-        H[3:, SPIN] += about @ inertia - _cross(momentum)
+        H[3:, SPIN] += about @ inertia - cross(momentum)
         H[3:, TWIRL] += inertia
         size = np.maximum(np.abs(tensions), self._force / len(tensions)) * self._sigma["tensions"]
         covariance = (A * size**2) @ A.T + np.diag((self._sigma["forces"] * self._force / self.robot.wrench_scale) ** 2)
@@ -395,30 +395,6 @@ def _acceleration(reference: Sequence[ArrayLike]) -> np.ndarray:
         raise InputError(f"reference must be a pose, a velocity and an acceleration, each (6,), got {shown(reference)}")
     names = ("reference pose", "reference velocity", "reference acceleration")
     pose, velocity, acceleration = (finite_array(*pair, (6,)) for pair in zip(names, parts, strict=True))
-    axes, rates = _axes(pose[3:]), velocity[3:]
-    turning = rates[0] * _cross(axes @ rates) @ axes[:, 0] + rates[1] * rates[2] * _cross(axes[:, 2]) @ axes[:, 1]
+    axes, rates = axes_of(pose[3:]), velocity[3:]
+    turning = rates[0] * cross(axes @ rates) @ axes[:, 0] + rates[1] * rates[2] * cross(axes[:, 2]) @ axes[:, 1]
     return np.concatenate([acceleration[:3], axes @ acceleration[3:] + turning])
-
-
-def _axes(angles: np.ndarray) -> np.ndarray:
-    """Return the axes in {G} about which roll, pitch and yaw turn, as columns (3, 3)."""
-    (_, sp, sy), (_, cp, cy) = np.sin(angles), np.cos(angles)
-    return np.array([[cy * cp, -sy, 0.0], [sy * cp, cy, 0.0], [-sp, 0.0, 1.0]])
-
-
-def _cross(v: np.ndarray) -> np.ndarray:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
-def _turn(vector: np.ndarray) -> np.ndarray:
-    """Return the rotation by a rotation vector (3,), (3, 3)."""
-    angle, K = math.sqrt(vector @ vector), _cross(vector)
-    first, second = (math.sin(angle) / angle, math.sin(angle / 2) / angle) if angle else (1.0, 0.5)
-    return np.eye(3) + first * K + 2 * second**2 * K @ K
-
-
-def _vector_of(R: np.ndarray) -> np.ndarray:
-    """Return the rotation vector of a rotation by less than half a turn, (3,) [rad]."""
-    twice = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine = math.sqrt(twice @ twice) / 2
-    return twice / 2 * (math.atan2(sine, (R.trace() - 1) / 2) / sine if sine else 1.0)
