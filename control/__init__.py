@@ -15,7 +15,7 @@ from .planned_references import references
 from .predictive import Predictive
 from .reference import Reference
 from .state import State
-from .stops import Stop, stop
+from .stops import Stop, longest_stop, stop
 
 __all__ = [
     "ANSWERS",
@@ -29,6 +29,7 @@ __all__ = [
     "Reference",
     "State",
     "Stop",
+    "longest_stop",
     "references",
     "stop",
 ]

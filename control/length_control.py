@@ -11,13 +11,13 @@ from ..base.inputs import number, repeated, required, shown
 from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
 from ..models.robot import Robot
+from ..models.trajectory import moved_on
 from .as_floats import as_floats, is_time, measured_at, rows_of
 from .command import HOLD, PLANNED, Command
 from .controller import Controller
 from .open_loop import planned_command
 from .reference import Reference
 from .state import State
-from .trajectory import moved_on
 
 SHARE = 0.05  # of the robot's length: the default of `most`
 CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]

@@ -11,15 +11,16 @@ from ..base.inputs import number, shown
 from ..models.dynamics import dynamics_of
 from ..models.parsing import parse_yaml
 from ..models.robot import Robot
+from ..models.trajectory import Motion, Trajectory
 from ..solvers import solve_batch
+from ..statics.stops import SOFT
 from .reference import Reference
-from .trajectory import HasTrajectory, Motion, Trajectory, read_trajectory, samples_of
+from .trajectory import HasTrajectory, read_trajectory, samples_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 MOST = 1e6  # periods
-SOFT = 1e8  # weight of the wrench where no tensions give it
 
 
 def references(

@@ -1,115 +1,20 @@
-"""Stop a robot on the path of its plan, as soon as its tensions permit: `stop`.
-
-A motion q(tau) that is followed at a rate r(t), with dtau/dt = r, stays on its path. It needs the wrench
-
-    w = a u + b r^2 + c,   u = dr/dt
-
-with c the wrench of rest, a that of the velocity dq/dtau as an acceleration, and b what velocities and accelerations of
-the plan need beside c: r = 1 and u = 0 are the plan itself. Each facet of the available wrench set (`solvers.facets`)
-therefore bounds u at each tau and r. A stop takes the least u, from r = 1 to r = 0.
-"""
+"""Stop a robot on the path of its plan: `stop`, and from where that takes longest: `longest_stop`."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..base.display import Displayed, Fact
 from ..base.errors import InputError
 from ..base.inputs import number
-from ..base.netcdf import Contents
-from ..base.text import quantity
-from ..models.dynamics import dynamics_of
-from ..models.motion_file import dimensions, motion_variables, over
-from ..models.parsing import to_yaml
-from ..models.robot import Robot
-from ..solvers import Certificate, certify, solve_batch
-from ..solvers.available_wrench import facets
-from ..statics.distribution import wrench_problem
-from .planned_references import SOFT, planned
-from .trajectory import HasTrajectory, Motion, Trajectory, moved_on
+from ..statics.stops import Stop, longest_stop_along, stop_along
+from .planned_references import planned
+from .trajectory import HasTrajectory
 
 if TYPE_CHECKING:
     import xarray as xr
 
-STEP = 0.008  # [s] between two instants of a stop, in which u is linear
-PARTS = 8  # of a step, between which a stop is audited and given
-FASTEST = 0.5 / STEP  # [1/s], of u
-WINDOW, INSTANTS = 0.8, 80  # [s] of the plan that limits are computed for at once, and at how many instants
-LEVELS = np.linspace(0.0, 1.0, 65)  # of r^2, at which is asked how slow a stop may become
-# One after the other: the reserve, a share of what the cables can give along each normal, and whether a robot goes on
-# through places in which it cannot rest.
-ATTEMPTS = (0.002, True), (0.02, True), (0.1, True), (0.002, False)
-LITTLE = 1e-3  # of the robot's forces: a wrench that is missed by less matters less than the time to stop
-ROOM = 1.0  # [1/s], between the least and the largest u
-LONGEST = 60.0  # [s]
-STILL = 1e-9  # of the rate
-RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
-FLAT = 1e-12  # of the robot's forces: a facet along which u changes less does not bound it
-MISSING = 1e-7  # of the robot's forces: a wrench that is missed by less is given
-
-
-@dataclass(frozen=True, eq=False)
-class Stop(Displayed):
-    """A motion from an instant of a plan to rest, on the plan's path.
-
-    Attributes
-    ----------
-    robot
-        The robot.
-    begins, ends
-        Times in the plan [s]: where the stop begins, and where on the path it ends.
-    times
-        From 0 to its duration, (n,) [s].
-    platform, carriers
-        Pose, velocity and acceleration in {G} at these times: (n, 6) each, and (n, c, 6) each.
-    tensions
-        (n, m) [N]; where none exist inside the limits, those with the closest wrench.
-    distance
-        Length of the path of the platform until it rests [m].
-    certificate
-        Certificate of the instant with the largest shortfall; None if tensions inside their limits always exist.
-    """
-
-    robot: Robot
-    begins: float
-    ends: float
-    times: np.ndarray
-    platform: Motion
-    carriers: Motion
-    tensions: np.ndarray
-    distance: float
-    certificate: Certificate | None
-
-    @property
-    def duration(self) -> float:
-        """Return the time until the robot rests [s]."""
-        return float(self.times[-1])
-
-    @property
-    def feasible(self) -> bool:
-        """Return whether tensions inside their limits exist from the beginning to the end."""
-        return self.certificate is None
-
-    @property
-    def trajectory(self) -> xr.Dataset:
-        """Return the motion and its tensions over time, as `Plan.trajectory` does; `simulate` follows it."""
-        variables = motion_variables(self.platform, self.carriers)
-        variables["tensions"] = over(("time", "cable"), self.tensions, "N", "cable tensions")
-        status = "feasible" if self.feasible else "not-found"
-        attributes = {"title": f"{self.robot.name}, stop", "status": status, "robot": to_yaml(self.robot)}
-        return Contents(variables, dimensions(self.robot, self.times), attributes).dataset()
-
-    def _headline(self) -> str:
-        return f"{'stop' if self.feasible else 'stop beyond limits'} in {quantity(self.duration, 's')}"
-
-    def _facts(self) -> list[Fact]:
-        tensions = f"{quantity(self.tensions.min(), 'N')} to {quantity(self.tensions.max(), 'N')}"
-        facts = [("begins", quantity(self.begins, "s")), ("path", quantity(self.distance, "m")), ("tensions", tensions)]
-        return facts if self.certificate is None else [*facts, ("limits", self.certificate.describe())]
+MOST = 10_000  # instants
 
 
 def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float) -> Stop:
@@ -142,226 +47,26 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     return stop_along(robot, trajectory, number("time", time, 0.0, 1e9))
 
 
-def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
-    """Stop as `stop` does, on a trajectory with a duration. Raises `InputError` if the robot has flying carriers."""
-    for carrier in robot.carriers:
-        if carrier.efforts:
-            raise InputError(
-                "a stop must be of a robot with carriers of kind ground, prescribed or mobile, got "
-                f"{robot.name!r} with {carrier.name!r} of kind {carrier.kind}"
-            )
-    end = trajectory.duration or 0.0
-    trajectory, begins = _continued(trajectory, end), min(time, end)
-    best: tuple[tuple[int, float], Stop] | None = None
-    for reserve, goes_on in ATTEMPTS:
-        law = _refined(_braking(_Limits(robot, trajectory, begins, reserve, goes_on)))
-        missing, found = _audited(robot, trajectory, law)
-        if found.feasible:
-            return found
-        # Of two that miss little, or nearly the same, the shorter one.
-        rank = (round(missing / (LITTLE * robot.force_scale)), found.duration)
-        best = (rank, found) if best is None or rank < best[0] else best
-    assert best is not None
-    return best[1]
+def longest_stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], period: float = 0.02) -> Stop:
+    """Return the stop that takes longest, of those from instants of a plan; first of all one beyond the limits.
 
+    If it is feasible, so are all others, and the robot can stop within its duration from each of these instants. A stop
+    takes some 5 ms to compute.
 
-def _continued(trajectory: Trajectory, end: float) -> Trajectory:
-    """Return a trajectory that goes on after its end with its last acceleration, unless the robot rests there."""
-    last = trajectory.at(np.array([end]))
-    if max(np.abs(motion[1]).max() for motion in last) < RESTS:
-        return trajectory
+    Parameters
+    ----------
+    plan
+        As for `stop`.
+    period
+        Time between two instants [s].
 
-    def at(times: np.ndarray) -> tuple[Motion, Motion]:
-        more = [np.maximum(times - end, 0.0).reshape(-1, *[1] * (motion[0].ndim - 1)) for motion in last]
-        platform, carriers = trajectory.at(np.minimum(times, end))
-        return moved_on(platform, more[0]), moved_on(carriers, more[1])
-
-    return trajectory._replace(at=at)
-
-
-class _Law(NamedTuple):
-    """The time in the plan [s], the rate and its derivative [1/s] over time, (n,) each."""
-
-    times: np.ndarray
-    tau: np.ndarray
-    rate: np.ndarray
-    slope: np.ndarray
-
-
-class _Limits:
-    """The range of u at times of a plan, from the limits of tensions and of the accelerations of carriers."""
-
-    def __init__(self, robot: Robot, trajectory: Trajectory, begins: float, reserve: float, goes_on: bool):
-        self.begins, self._apart, self._goes_on = begins, WINDOW / INSTANTS, goes_on
-        self._end = trajectory.duration or 0.0
-        self._bounds = lambda first: _bounds(robot, trajectory, first + self._apart * np.arange(INSTANTS), reserve)
-        self._rows = self._bounds(begins)
-        self._extend(0)
-
-    def _extend(self, windows: int) -> None:
-        """Compute the limits of more windows, up to an instant at which the robot can rest, or the end of the plan."""
-        for _ in range(windows):
-            self._add()
-        while self._goes_on and not self._rows.can_rest[-1] and self._until < self._end:
-            self._add()
-        self._lowest = self._floor()
-
-    def _add(self) -> None:
-        more = self._bounds(self._until)
-        self._rows = _Bounds(*(np.concatenate(parts) for parts in zip(self._rows, more, strict=True)))
-
-    @property
-    def _until(self) -> float:
-        return self.begins + self._apart * len(self._rows.a)
-
-    def _floor(self) -> np.ndarray:
-        """Return the least x = r^2 from which the motion can go on inside the limits, at each instant, (n,)."""
-        floor, after = np.zeros(len(self._rows.a)), 0.0
-        if not self._goes_on or self._rows.can_rest.all():
-            return floor
-        ranges = np.array([self._rows.range_of(np.full_like(floor, x)) for x in LEVELS])
-        least, most = ranges[:, 0], ranges[:, 1]
-        free = most - least
-        needed = np.clip(free[-1], 0.0, ROOM)  # where u has no room, no step ends
-        for at in range(len(floor) - 1, -1, -1):
-            good = (free[:, at] >= needed[at]) & (LEVELS + 2 * self._apart * most[:, at] >= after)
-            floor[at] = after = float(LEVELS[np.argmax(good)])  # the lowest, where not even the plan is possible
-        return floor
-
-    def at(self, tau: float, rate: float) -> tuple[float, float]:
-        """Return the least and the largest u at a time of the plan and a rate."""
-        place = (tau - self.begins) / self._apart
-        while place > len(self._lowest) - 3:
-            self._extend(1)
-        k = int(place)
-        least, most = _Bounds(*(part[k : k + 2] for part in self._rows)).range_of(np.full(2, rate * rate))
-        low, high = float(least.max()), float(most.min())
-        if low > high:  # none is possible: of those between, the one nearest to the rate of now
-            u = min(max(0.0, high), low)
-            return u, u
-        floor = float(self._lowest[k + 2])
-        if floor > 0:  # reached in time, from one to two instants before
-            low = min(max(low, (floor - rate * rate) / (2 * self._apart * (k + 2 - place))), high)
-        return low, high
-
-
-class _Bounds(NamedTuple):
-    """Bounds of u at n instants: low <= a u + b x <= high of k facets, |v u + g x| <= most of c carriers."""
-
-    a: np.ndarray  # (n, k), nan where a facet bounds nothing
-    b: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    vv: np.ndarray  # (n, c), v . v, and so on; nan where the carrier rests
-    vg: np.ndarray
-    gg: np.ndarray
-
-    @property
-    def can_rest(self) -> np.ndarray:
-        """Return at which instants the robot can rest, (n,)."""
-        least, most = self.range_of(np.zeros(len(self.a)))
-        return (least <= 0) & (most >= 0)
-
-    def range_of(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the least and the largest u for x = r^2 of each instant, (n,)."""
-        at = self.b * x[:, None]
-        one, two = (self.low - at) / self.a, (self.high - at) / self.a
-        least, most = np.fmax.reduce(np.fmin(one, two), axis=1), np.fmin.reduce(np.fmax(one, two), axis=1)
-        least, most = np.fmax(least, -FASTEST), np.fmin(most, FASTEST)
-        if self.vv.shape[1]:
-            middle = -self.vg * x[:, None]
-            root = np.sqrt(np.maximum(middle**2 - self.vv * (self.gg * x[:, None] ** 2 - 1.0), 0.0))
-            least = np.fmax(least, np.fmax.reduce((middle - root) / self.vv, axis=1))
-            most = np.fmin(most, np.fmin.reduce((middle + root) / self.vv, axis=1))
-        return least, most
-
-
-def _bounds(robot: Robot, trajectory: Trajectory, tau: np.ndarray, reserve: float) -> _Bounds:
-    """Return the bounds of u at times of a plan (n,) [s]; tensions keep the share `reserve` of their range."""
-    platform, carriers = trajectory.at(tau)
-    dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
-    scale, still = robot.wrench_scale[rows], np.zeros_like(platform[0])
-    whole = dynamics.wrench_matrix(platform[0], carriers[0])
-    c, a, b = (
-        dynamics.required_wrench(platform[0], *motion, wind=trajectory.wind)
-        for motion in ((still, still), (still, platform[1]), platform[1:])
-    )
-    a, b = a - c, b - c
-    available = facets(whole[:, rows] * scale[:, None], robot.t_min, robot.t_max)
-    a, b, c = (np.einsum("nki,ni->nk", available.normals, part[:, rows] * scale) for part in (a, b, c))
-    a[np.abs(a) < FLAT * robot.force_scale] = np.nan
-    inside, now = reserve * (available.high - available.low), b + c
-    # At most half of what the plan itself keeps, so that it stays possible and can be left.
-    low = available.low + np.clip((now - available.low) / 2, 0.0, inside)
-    high = available.high - np.clip((available.high - now) / 2, 0.0, inside)
-    low, high = np.minimum(low, now) - c, np.maximum(high, now) - c
-    limited = [k for k, carrier in enumerate(robot.carriers) if carrier.motion_limits.acceleration is not None]
-    largest = np.array([robot.carriers[k].motion_limits.acceleration for k in limited], dtype=float)
-    v, g = (part[:, limited, :3] / largest[:, None] for part in carriers[1:])
-    vv, vg, gg = (np.einsum("nci,nci->nc", *two) for two in ((v, v), (v, g), (g, g)))
-    return _Bounds(a, b, low, high, np.where(vv > STILL, vv, np.nan), vg, gg)
-
-
-def _braking(limits: _Limits) -> _Law:
-    """Return the law of the shortest stop."""
-    t, tau, rate, u = 0.0, limits.begins, 1.0, 0.0
-    rows = [(t, tau, rate, u)]
-    while rate > STILL and t < LONGEST:
-        landing = -2 * rate / u if u < 0 else np.inf
-        if landing <= 1.5 * STEP:  # u becomes 0 as the rate does
-            rows.append((t + landing, tau + landing * rate / 3, 0.0, 0.0))
-            break
-        end = max(rate + STEP * u, 0.0)
-        least, most = limits.at(tau + STEP * (rate + end) / 2, end)
-        least = max(least, -(rate + STEP * u / 2) / STEP)  # so that a step is left for landing
-        after = min(max(least, -FASTEST), most, 2 * (1 - rate) / STEP - u)
-        tau += STEP * rate + STEP**2 * (2 * u + after) / 6
-        t, rate, u = t + STEP, rate + STEP * (u + after) / 2, after
-        rows.append((t, tau, rate, u))
-    return _Law(*np.array(rows).T)
-
-
-def _refined(law: _Law) -> _Law:
-    """Return a law with more instants in each step, in which u is linear."""
-    t, tau, rate, u = (part[:-1, None] for part in law)
-    into = np.diff(law.times)[:, None] * np.arange(PARTS) / PARTS
-    jerk = np.diff(law.slope)[:, None] / np.diff(law.times)[:, None]
-    inside = (
-        t + into,
-        tau + into * (rate + into * (u / 2 + into * jerk / 6)),
-        rate + into * (u + into * jerk / 2),
-        u + into * jerk,
-    )
-    return _Law(*(np.append(its.ravel(), part[-1]) for part, its in zip(law, inside, strict=True)))
-
-
-def _slowed(motion: Motion, law: _Law) -> Motion:
-    """Return pose, velocity and acceleration of a motion that follows a law."""
-    pose, velocity, acceleration = motion
-    rate, slope = (part.reshape(-1, *[1] * (pose.ndim - 1)) for part in (law.rate, law.slope))
-    return pose, rate * velocity, rate**2 * acceleration + slope * velocity
-
-
-def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[float, Stop]:
-    """Return how much of the wrench the tensions of a stop miss most [N], and the stop."""
-    platform, carriers = trajectory.at(law.tau)
-    slowed, dynamics, mask = _slowed(platform, law), dynamics_of(robot), robot.dof_mask
-    A = dynamics.wrench_matrix(platform[0], carriers[0])
-    w = dynamics.required_wrench(*slowed, wind=trajectory.wind)
-    A, w = A * mask[:, None], w * mask
-    near = None if trajectory.tensions is None else np.nan_to_num(trajectory.tensions(law.tau))
-    tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=SOFT).tensions
-    missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1)
-    worst = int(np.argmax(missing))
-    broken = missing[worst] > MISSING * robot.force_scale
-    return float(missing[worst]), Stop(
-        robot=robot,
-        begins=float(law.tau[0]),
-        ends=float(law.tau[-1]),
-        times=law.times,
-        platform=slowed,
-        carriers=_slowed(carriers, law),
-        tensions=tensions,
-        distance=float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum()),
-        certificate=certify(wrench_problem(robot, A[worst], w[worst])) if broken else None,
-    )
+    Raises
+    ------
+    InputError
+        As `stop` does, or if there are more than 10 000 instants.
+    """
+    robot, trajectory = planned(plan)
+    period = number("period", period, 1e-6, 1e9)
+    if (trajectory.duration or 0.0) > MOST * period:
+        raise InputError(f"period must be such that there are at most {MOST} of them, got {period:g} s")
+    return longest_stop_along(robot, trajectory, period)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from ..base.netcdf import load_netcdf, numbers_of
 from ..figures.outlines import outlines_from
 from ..models.part import LARGEST
 from ..models.robot import Robot
+from ..models.trajectory import Motion, Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,28 +26,6 @@ DOUBTS = {  # by the status of a plan
 }
 SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")
-Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
-
-
-def moved_on(motion: Motion, time: float | np.ndarray) -> Motion:
-    """Return a motion some time [s] later, or earlier, with its acceleration."""
-    pose, velocity, acceleration = motion
-    return pose + time * (velocity + 0.5 * time * acceleration), velocity + time * acceleration, acceleration
-
-
-class Trajectory(NamedTuple):
-    """A reference over time."""
-
-    duration: float | None  # duration [s]; None for a pose to hold
-    # Function of times (n,) [s] that returns pose, velocity and acceleration of the platform, (n, 6) each, and of the
-    # carriers, (n, c, 6) each.
-    at: Callable[[np.ndarray], tuple[Motion, Motion]]
-    # Function of times that returns the planned tensions, (n, m) [N]; None if none are planned.
-    tensions: Callable[[np.ndarray], np.ndarray] | None = None
-    # For each keep-out region of a plan, the lines that outline it, (n, 3) each in {G} [m].
-    keep_out: Sequence[Sequence[np.ndarray]] = ()
-    doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit; empty if it is not
-    wind: np.ndarray | None = None  # velocity of the air in {G} for which it is planned, (3,) [m/s]; None without air
 
 
 class HasTrajectory(Protocol):

@@ -44,6 +44,7 @@ from .search.relaxations import near_fixed_motion, near_motion
 from .search.replanning import Replanner
 from .search.search import Search
 from .search.start import deviation_from
+from .search.stops_within import stopping_within
 from .search.stronger_or_nearer import stronger_or_nearer
 from .search.time_law import BOUND, fastest
 from .search.uncertain_robots import for_robots, judged
@@ -187,6 +188,8 @@ class Planner(Displayed):
                 self._last = search.mesh, plan.deviation
             if self._share is not None:
                 plan = for_robots(plan, self._share, partial(self._plan_again, search))
+            if (within := self.scenario.task.stop_within) is not None:
+                plan = stopping_within(plan, self.scenario, within, partial(self._plan_again, search))
         self._search = None
         self._flown = plan if plan.feasible else None
         return plan
@@ -303,18 +306,8 @@ def _durations(search: Search, scenario: Scenario) -> Durations | None:
     """Return the durations that the path allows; None if they are not known."""
     with search.stage("durations") as stage:
         left = durations(scenario)
-        stage.message = _message(left)
+        stage.message = "" if left is None else left.describe()
     return left
-
-
-def _message(left: Durations | None) -> str:
-    if left is None:
-        return ""
-    if not left.exist:
-        part = f"first {quantity(100 * left.at, '%', 3)}" if left.at else "start"
-        return f"no duration is feasible with the task's time law (shown on the {part} of the motion)"
-    upper = "" if left.longest == float("inf") else f", at most {quantity(left.longest, 's')}"
-    return f"at least {quantity(left.shortest, 's')}{upper} with the task's time law"
 
 
 def _blocked(search: Search) -> Plan | None:

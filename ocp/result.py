@@ -27,6 +27,7 @@ from .warnings.short_cables import short_cables
 from .warnings.slipped_units import slipped_units
 
 if TYPE_CHECKING:
+    from ..statics.stops import Stop
     from .audits.robust_margin import RobustMargin
     from .timing.fastest_law import FastestLaw
 
@@ -70,6 +71,8 @@ class PlanData(Displayed):
         Final value of the solver's objective; None if no program was solved.
     robust
         Tension spread due to geometric uncertainty; None unless the task requires it.
+    stop
+        The longest stop on the path from an instant of the plan; None unless the task has `stop_within`.
     offers
         Computes `relaxations`.
     law
@@ -90,6 +93,7 @@ class PlanData(Displayed):
     stages: tuple[PlannerStep, ...] = ()
     objective: float | None = None
     robust: RobustMargin | None = None
+    stop: Stop | None = None
     offers: Callable[[], Iterable[Relaxed]] = field(default=tuple, repr=False, compare=False)
     law: FastestLaw | None = field(default=None, repr=False)
 
@@ -244,6 +248,7 @@ class PlanData(Displayed):
             "solver_message": self.message,
             "audit": self.audit.to_dict(),
             "robust": None if self.robust is None else self.robust.to_dict(),
+            "stop": None if self.stop is None else self.stop.to_dict(),
             "certificate": None if self.certificate is None else self.certificate.to_dict(),
             "infeasible_spans": [certificate.to_dict() for certificate in self.infeasible_spans],
             "relaxations": [relaxed.to_dict() for relaxed in self.relaxations],

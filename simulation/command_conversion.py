@@ -6,8 +6,8 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..control import Command
-from ..control.trajectory import moved_on
 from ..core import winch_lengths
+from ..models.trajectory import moved_on
 from ..plant import Plant, layout
 from .drives import Drives
 from .experiment import Experiment, Wind

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..control.lag import Lag
-from ..control.trajectory import moved_on
+from ..models.trajectory import moved_on
 from .mismatch import LAGS, TENSIONS, Drawn
 
 SLOW = 0.01  # [m/s] of a cable: slower, dry friction is less, without which it would chatter at rest

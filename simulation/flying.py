@@ -11,9 +11,9 @@ from ..base.errors import InputError
 from ..base.inputs import shown
 from ..control import ANSWERS, Command, Controller, Reference, State
 from ..control.command import HOLD
-from ..control.trajectory import moved_on
 from ..core import sense
 from ..models.robot import Robot
+from ..models.trajectory import moved_on
 from ..plant import Plant
 from ..plant.periods import Periods
 from .command_conversion import Orders

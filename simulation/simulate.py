@@ -17,11 +17,12 @@ from ..base.execution import Execution, ExecutionOptions
 from ..base.inputs import required, shown, whole_number, with_fields
 from ..control import ComputedTorque, Controller, Reference
 from ..control.planned_references import references_at
-from ..control.trajectory import Trajectory, read_trajectory
+from ..control.trajectory import read_trajectory
 from ..estimation.logs.opening import is_recording
 from ..models.files import as_robot
 from ..models.parsing import validate
 from ..models.robot import Robot
+from ..models.trajectory import Trajectory
 from ..plant import Plant
 from ..plant.steps import default_drive, steps_in
 from .command_conversion import Orders

@@ -6,8 +6,8 @@ import xarray as xr
 from scipy.optimize import linprog
 from scipy.sparse import block_diag
 
-from towline import Dynamics, InputError, Robot, load, plan, simulate
-from towline.control import Stop, references, stop
+from towline import Dynamics, InputError, Planner, Robot, load, plan, simulate
+from towline.control import Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
 
 PLANS = {
@@ -77,6 +77,65 @@ def test_a_stop_is_nearly_as_short_as_linear_programs_permit():
         least = linprog(np.r_[1.0, np.zeros(robot.m)], A_eq=np.c_[-a, A], b_eq=w, bounds=bounds).fun
         tau, rate, took = tau + step * rate, rate + step * least, took + step
     assert took - step <= stop(found, time).duration <= 1.1 * took + 0.03
+
+
+def test_no_stop_takes_longer_than_the_longest(made):
+    _, found = made
+    longest = longest_stop(found, 0.1)
+    stops = [stop(found, time) for time in np.linspace(0, found.duration, round(np.ceil(found.duration / 0.1)) + 1)]
+    assert longest.duration == max(its.duration for its in stops)
+    assert longest.begins in [its.begins for its in stops]
+    with pytest.raises(InputError, match="period must be such that there are at most 10000 of them, got 1e-05 s"):
+        longest_stop(found, 1e-5)
+
+
+WITHIN = {"path": {"kind": "line", "start": [-1, -0.5, 1], "end": [1, 0.5, 1.5]}, "stop_within": 0.25}
+
+
+@pytest.mark.parametrize("tube", [0, 0.02])
+def test_a_plan_is_as_fast_as_stops_in_time_permit(tube):
+    """Stops from instants between those of the check are in time, too; with a little less time they are not."""
+    task = {**WITHIN, "duration": {"min": 2.7, "max": 20}, "objective": {"time": 1}, "tube": {"position": tube}}
+    found = plan("cogiro", task)
+    assert found.feasible
+    assert found.stop.feasible
+    for time in np.random.default_rng(1).uniform(0, found.duration, 15):
+        assert stop(found, time).duration <= 0.25 + 0.008
+    too_fast = plan("cogiro", {**task, "duration": 0.95 * found.duration})
+    assert not too_fast.feasible
+    (excess,) = too_fast.audit.excess
+    assert (excess.limit, excess.bound) == ("stop_within", 0.25)
+    assert 0.25 < stop(too_fast, excess.time).duration == pytest.approx(excess.value)
+    assert "stops" in str(too_fast.report())
+    assert found.to_dict()["stop"]["duration"] == found.stop.duration
+
+
+REFUSED = {
+    "flying": ("multi-quadrotor-3", {}, "stop_within must be left out with flying carriers"),
+    "nothing": ("cogiro", {"stop_within": 0}, "stop_within must be greater than 0, got 0"),
+    "nan": ("cogiro", {"stop_within": float("nan")}, "stop_within"),
+    "loads": (
+        "cogiro",
+        {"path": None, "phases": [{"name": "lift", "duration": 2, "path": WITHIN["path"], "load": {"mass": 5}}]},
+        "stop_within must be left out with loads",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_cannot_be_stopped_is_one_line(case):
+    robot, keys, message = REFUSED[case]
+    task = {key: value for key, value in {**WITHIN, **keys}.items() if value is not None}
+    with pytest.raises(InputError, match=message) as caught:
+        plan(robot, task if "phases" in task else {"duration": 3, **task})
+    assert "\n" not in str(caught.value)
+
+
+def test_a_remainder_is_not_planned_with_stops():
+    planner = Planner("cogiro", {**WITHIN, "duration": 6, "tube": {"position": 0.1}})
+    assert planner.plan().feasible
+    with pytest.raises(InputError, match="stop_within must be left out to replan"):
+        planner.replan({"pose": [-1, -0.5, 1, 0, 0, 0]}, 0.0)
 
 
 SLING = {

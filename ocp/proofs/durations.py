@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.text import quantity
 from ..audits.tensions import INDEPENDENT
 from ..tasks.scenario import Scenario
 
@@ -41,6 +42,14 @@ class Durations(NamedTuple):
     def exist(self) -> bool:
         """Return whether any duration is possible."""
         return self.shortest <= self.longest
+
+    def describe(self) -> str:
+        """Return the shortest and the longest duration as text."""
+        if not self.exist:
+            part = f"first {quantity(100 * self.at, '%', 3)}" if self.at else "start"
+            return f"no duration is feasible with the task's time law (shown on the {part} of the motion)"
+        upper = "" if self.longest == float("inf") else f", at most {quantity(self.longest, 's')}"
+        return f"at least {quantity(self.shortest, 's')}{upper} with the task's time law"
 
     def leave(self, low: float, high: float) -> bool:
         """Return whether a duration from `low` to `high` [s] may be possible; doubtful ones may."""

@@ -26,7 +26,21 @@ def motion_facts(plan: PlanData) -> list[Fact]:
         *_feed(task.path),
         *_accuracy(plan),
         ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
+        *_stop(plan),
         *([("wind", _task_wind(task))] if task.wind is not None else []),
+    ]
+
+
+def _stop(plan: PlanData) -> list[Fact]:
+    """Return how long the robot takes to stop, where it takes longest."""
+    its = plan.stop
+    if its is None:
+        return []
+    return [
+        (
+            "stops",
+            f"in at most {quantity(its.duration, 's')}, over {quantity(its.distance, 'm')} from t = {its.begins:.3f} s",
+        )
     ]
 
 

@@ -79,6 +79,8 @@ def _check(scenario: Scenario) -> None:
         raise InputError(f"{where}: phases must be left out to replan, got {len(scenario.phases.all)}")
     if task.robust is not None:
         raise InputError(f"{where}: robust must be left out to replan, got {task.robust:g}")
+    if task.stop_within is not None:
+        raise InputError(f"{where}: stop_within must be left out to replan, got {task.stop_within:g} s")
     if scenario.relative:
         raise InputError(f"{where}: path.frame must be world to replan, got {scenario.path.frame!r}")
     if task.tube.waypoints == "exact":

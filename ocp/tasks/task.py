@@ -185,6 +185,12 @@ class Task(Part):
         "must stay inside their limits, reduced by the margin, to first order; default: the nominal robot "
         "only",
     )
+    stop_within: Positive | None = Field(
+        default=None,
+        description="time in which the robot must be able to stop on its path, inside the tension limits, from every "
+        "instant of the plan [s]; checked every 0.02 s, or at 200 instants of plans of more than 4 s; default: not "
+        "checked",
+    )
     wind: Vector3 | WindBox | None = Field(
         default=None,
         description="wind on the platform, constant, in {G} [m/s], or a range {min, max}: tensions exist for every "

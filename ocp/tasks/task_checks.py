@@ -41,6 +41,7 @@ def check_task(robot: Robot, task: Task) -> None:
     _check_times(task, where)
     _check_waypoints(task, where)
     _check_cycle(task, where)
+    _check_stops(robot, task, where)
     if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
         raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
 
@@ -120,6 +121,21 @@ def _check_robust(robot: Robot, task: Task, where: str) -> None:
     for phase in task.phases or ():
         if phase.ground is not None:
             raise InputError(f"{where}: robust must be left out with phases on the ground, got phase {phase.name!r}")
+
+
+def _check_stops(robot: Robot, task: Task, where: str) -> None:
+    """Refuse what stops are not known for."""
+    if task.stop_within is None:
+        return
+    flying = [carrier.name for carrier in robot.carriers if carrier.efforts]
+    loads = [phase.name for phase in task.phases or () if phase.load or phase.ground]
+    for others, what in (
+        (flying, "flying carriers"),
+        (loads, "loads or phases on the ground"),
+        (task.robust, "robust"),
+    ):
+        if others:
+            raise InputError(f"{where}: stop_within must be left out with {what}, got {task.stop_within:g} s")
 
 
 def _check_times(task: Task, where: str) -> None:

@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from ...base.display import Displayed
-from ...control.trajectory import Trajectory
 from ...models.part import Part
 from ...models.robot import Robot
+from ...models.trajectory import Trajectory
 from ...plant import Plant
 from ...plant.periods import Periods
 

@@ -10,9 +10,10 @@ from typing_extensions import override
 
 from ...base.errors import InputError
 from ...base.text import quantity
-from ...control.stops import stop_along
-from ...control.trajectory import Trajectory, read_trajectory
+from ...control.trajectory import read_trajectory
 from ...models.robot import Robot
+from ...models.trajectory import Trajectory
+from ...statics.stops import stop_along
 from .event import Event
 
 BEYOND = "a stop that needs tensions beyond their limits"

@@ -1,0 +1,110 @@
+"""Plan a motion so slow that the robot can stop on its path in time from every instant: `stopping_within`.
+
+The stops are those of `control.stop`. If the robot stops too late and the duration is a choice, longer ones are tried:
+first longer by as much as the stop is too long, then between one that is too short and one that suffices.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.text import quantity
+from ...models.ranges import PositiveRange
+from ...models.trajectory import Motion, Trajectory
+from ...statics.stops import longest_stop_along
+from ..audits.excess import Excess
+from ..plan import Plan
+from ..result import PlannerStep
+from ..tasks.deviation import Deviation
+from ..tasks.scenario import Scenario
+from ..tasks.status import MotionStatus
+
+LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from the beginning of one stop to that of the next; and how many at most
+ROUNDS = 10
+LEAST_STEP, STEP = 1.05, 1.5  # times the duration: at least, and where no stop keeps the tension limits
+CLOSE = 1.01  # times the longest duration that is known to be too short
+NEAR = 0.97  # of the time: stops that take so long are not made longer
+ROUNDING = 1e-9  # of the time
+LEAST_SHARE = 0.1  # of the way between two durations
+
+
+def stopping_within(
+    first: Plan, scenario: Scenario, seconds: float, climb: Callable[[Scenario, Deviation | None], Plan]
+) -> Plan:
+    """Return the plan of a scenario whose stops take at most so many seconds, from the `first` one.
+
+    `climb` plans a scenario from a start. The plan is not feasible if no such one is found.
+    """
+    best = plan = _judged(first, scenario, seconds)
+    if plan.feasible:
+        return plan
+    span, begun, tried = scenario.duration_range, time.perf_counter(), 0
+    short, enough = plan, None  # of two durations, the plan that stops too late and the one that stops in time
+    while tried < ROUNDS and span is not None and plan.stop is not None and not _suffices(plan, seconds):
+        target = min(_between(short, enough, seconds), span.max)
+        if (span.max if enough is None else enough.duration) <= CLOSE * short.duration:
+            break
+        task = scenario.task.model_copy(update={"duration": PositiveRange(min=target, max=span.max)})
+        start = None if plan.deviation is None else plan.deviation.stretched(target / plan.duration)
+        plan, tried = _judged(climb(replace(scenario, task=task, duration=target), start), scenario, seconds), tried + 1
+        if plan.feasible:
+            best = enough = plan
+        else:
+            short = plan
+    if not tried:
+        return best
+    said = f"{tried} tried" + f", {quantity(best.duration, 's')} suffices" * best.feasible
+    stages = (*first.stages, PlannerStep("slower, to stop in time", said, time.perf_counter() - begun))
+    return replace(best, stages=stages)
+
+
+def _suffices(plan: Plan, seconds: float) -> bool:
+    """Return whether a plan stops in time, and hardly sooner."""
+    return plan.feasible and plan.stop is not None and plan.stop.duration >= NEAR * seconds
+
+
+def _between(short: Plan, enough: Plan | None, seconds: float) -> float:
+    """Return the next duration to try [s], from the stops of two plans: they take as long as it is fast."""
+    stops = [
+        np.inf if each is None or each.stop is None or not each.stop.feasible else each.stop.duration
+        for each in (short, enough)
+    ]
+    if enough is None:
+        return short.duration * (max(stops[0] / seconds, LEAST_STEP) if np.isfinite(stops[0]) else STEP)
+    share = np.log(stops[0] / seconds) / np.log(stops[0] / stops[1]) if np.isfinite(stops[0]) else 0.5
+    return short.duration * (enough.duration / short.duration) ** float(np.clip(share, LEAST_SHARE, 1 - LEAST_SHARE))
+
+
+def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
+    """Return a plan as one of the scenario's task, with its longest stop; not feasible if that takes too long."""
+    plan = replace(plan, scenario=replace(plan.scenario, task=scenario.task))
+    if not plan.feasible:
+        return plan
+    begun = time.perf_counter()
+    its = longest_stop_along(scenario.robot, _trajectory(plan), max(LEAST_PERIOD, plan.duration / INSTANTS))
+    said = f"in at most {quantity(its.duration, 's')}" if its.feasible else "beyond the tension limits"
+    stages = (*plan.stages, PlannerStep("stops", said, time.perf_counter() - begun))
+    plan = replace(plan, stop=its, stages=stages)
+    if its.feasible and its.duration <= seconds * (1 + ROUNDING):
+        return plan
+    why = "" if its.certificate is None else f"no stop keeps the tension limits: {its.certificate.describe()}"
+    excess = Excess("stop_within", "platform", its.begins, its.duration, seconds, "s", "at most", why)
+    status = MotionStatus.INFEASIBLE if scenario.is_fixed else MotionStatus.NOT_FOUND
+    audit = replace(plan.audit, excess=[*plan.audit.excess, excess])
+    return replace(plan, status=status, audit=audit, offers=tuple)
+
+
+def _trajectory(plan: Plan) -> Trajectory:
+    """Return the motion of a plan over time; after its end it is the last state."""
+    scenario, audit = plan.scenario, plan.audit
+
+    def at(times: np.ndarray) -> tuple[Motion, Motion]:
+        return scenario.motion(np.minimum(times, scenario.duration), plan.deviation)
+
+    def tensions(times: np.ndarray) -> np.ndarray:
+        return np.stack([np.interp(times, audit.times, column) for column in audit.tensions.T], axis=1)
+
+    wind = None if scenario.wind is None else np.array(scenario.wind)
+    return Trajectory(scenario.duration, at, tensions, wind=wind)
