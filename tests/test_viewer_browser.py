@@ -145,7 +145,10 @@ def test_a_picture_is_saved(page, tmp_path):
             if (pixels.max(axis=2) < 100).sum() > 100:
                 break
             page.wait_for_timeout(250)
-    assert pixels.shape[0] == 480
+    assert pixels.shape[0] == 2 * 480
+    # The handle's arrows are pink, green and light blue; edges of the red axis too, a little.
+    red, green, blue = np.moveaxis(pixels.astype(int), 2, 0)
+    assert ((red > 230) & (green < 170) & (blue > 120) & (blue < 200)).sum() < 30
     assert (pixels == 255).all(axis=2).mean() > 0.2  # white, not transparent, between what is drawn
     assert (pixels.max(axis=2) < 100).sum() > 100
 

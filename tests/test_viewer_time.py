@@ -73,14 +73,15 @@ def test_steps_and_ends_and_playing_once_or_again_and_again(wire, folder):
             pass
         return wire.element(label="time [s]")[1]["value"]
 
-    for word, index in (("last", -1), ("next", -1), ("back", -2), ("first", 0), ("back", 0), ("next", 1)):
-        wire.set(word, label="step")
+    steps = (("last", -1), ("next", -1), ("back", -2), ("first", 0), ("back", 0), ("next", 1))
+    for word, index in steps:
+        wire.set(word, label="step" if word in ("back", "next") else "go to")
         assert shown() == pytest.approx(saved[index], abs=1e-6), word
     wire.set(False, label="loop")
     took = []
     for speed in ("1x", "4x"):
         wire.set(speed, label="speed")
-        wire.set("first", label="step")
+        wire.set("first", label="go to")
         wire.set(True, label="Play")
         began, seen = time.monotonic(), []
         while time.monotonic() < began + 20 and not (seen and seen[-1] == pytest.approx(2.0)):
@@ -100,6 +101,21 @@ def test_steps_and_ends_and_playing_once_or_again_and_again(wire, folder):
     pytest.fail("it does not begin again")
 
 
+@pytest.mark.parametrize("wire", ["hover"], indirect=True)
+def test_the_worst_instant_is_marked_and_one_click_away(wire, folder):
+    """By the file alone: one without tensions, here the first of those."""
+    with xr.open_dataset(folder / "hover.nc") as saved:
+        missing = saved["tensions"].isnull().any("cable").to_numpy()
+        worst = float(saved["time"].to_numpy()[missing.argmax()])
+    assert missing.any()
+    assert wire.element(label="time [s]")[1]["_marks"][0]["value"] == pytest.approx(worst)
+    wire.set("last", label="go to")
+    wire.set("worst", label="go to")
+    while wire.read(0.3):
+        pass
+    assert f"t = {worst:.2f} s" in wire.readout()
+
+
 @pytest.mark.parametrize("wire", ["line"], indirect=True)
 def test_a_film_of_the_saved_instants_is_sent_while_the_view_goes_on(wire, folder):
     wire.set(True, label="Save film")
@@ -107,7 +123,7 @@ def test_a_film_of_the_saved_instants_is_sent_while_the_view_goes_on(wire, folde
     for _ in range(200):
         wire.read(0.3)
         if moved is None and any(found.get("label") == "Drawing a film ..." for found in wire.panel.values()):
-            wire.set("last", label="step")
+            wire.set("last", label="go to")
             moved = False
         drawing = any(found.get("label") == "Drawing a film ..." for found in wire.panel.values())
         moved = moved or (drawing and "t = 2.00 s" in wire.readout())

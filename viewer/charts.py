@@ -1,5 +1,6 @@
 """Chart tensions and margin over time in the panel, with spans without tensions and the time that the scene shows."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,10 @@ from .curves import Curves
 
 TALL, LOW = 170, 110  # [pixels]
 MARK = "#D55E0055"  # spans without tensions
-NOW = "#222222"
+NOW, LIMIT = "#222222", "#888888"
 BELOW = -1e6  # times the range: a curve that leaves the chart, as charts join the points on both sides of a nan
 DASHES = ([], [8, 3], [2, 3], [8, 3, 2, 3])  # of the first eight colours, and of those after them
+LIMIT_DASH = [2, 2]
 OTHER = [4, 4]  # of the plan that the shown one is compared with
 
 
@@ -24,11 +26,13 @@ class Charts:
         Of the server.
     shown
         The curves of what the scene shows.
+    limits
+        Tension limits, which are drawn as far as the tensions come near them [N].
     other
         Curves to compare them with, if there are any.
     """
 
-    def __init__(self, gui: Any, shown: Curves, other: Curves | None = None):
+    def __init__(self, gui: Any, shown: Curves, limits: np.ndarray, other: Curves | None = None):
         self._curves = shown
         drawn = [(shown, "", {})]
         drawn += [] if other is None else [(other.on(shown.times), ", other", {"dash": OTHER, "width": 1.0})]
@@ -38,7 +42,7 @@ class Charts:
         ]
         margins = [(its.margins, f"margin{word}", _stroke(0) | look) for its, word, look in drawn]
         self._charts = [
-            self._chart(gui, "tensions [N]", tensions, TALL),
+            self._chart(gui, "tensions [N]", tensions, TALL, np.unique(limits)),
             self._chart(gui, "tension margin [N]", margins, LOW),
         ]
 
@@ -53,11 +57,21 @@ class Charts:
         column[self._curves.nearest(time)] = 1.0
         return column
 
-    def _chart(self, gui: Any, title: str, lines: list[tuple[np.ndarray, str, dict[str, Any]]], height: int) -> Any:
+    def _chart(
+        self,
+        gui: Any,
+        title: str,
+        lines: list[tuple[np.ndarray, str, dict[str, Any]]],
+        height: int,
+        limits: Iterable[float] = (),
+    ) -> Any:
         """Return the handle of a chart, and its columns without time and cursor."""
         known = np.concatenate([values[np.isfinite(values)] for values, _, _ in lines])
         low, high = min(float(known.min(initial=0.0)), 0.0), float(known.max(initial=0.0))
         low, high = 1.05 * low, 1.05 * high if high > low else low + 1.0
+        constant = {"stroke": LIMIT, "width": 1.0, "dash": LIMIT_DASH}
+        shown = [limit for limit in limits if low < limit < high]
+        lines = [*((np.full(len(self._curves.times), limit), "limit", constant) for limit in shown), *lines]
         outside = low + BELOW * (high - low)
         marks = self._curves.infeasible.astype(float)
         columns = [marks, *(_drawn(values, outside) for values, _, _ in lines)]
@@ -74,7 +88,7 @@ class Charts:
             title=title,
             scales={"x": {"time": False}, "y": {"range": (low, high)}, "mark": {"range": (0.0, 1.0)}},
             axes=({"size": 30}, {"size": 45, "scale": "y"}),
-            legend={"show": False},
+            legend={"show": True},
             height=height,
             padding=(4, 12, 0, 0),
         )

@@ -13,8 +13,8 @@ from .sliders import Slider
 PLACES = 48  # of a strip, about one for every other pixel
 QUIET = 0.15  # [s] after the last change
 HOLDS, FAILS = style.colour(2), "#e8e8e8"
-# Places a strip below the track of a slider in a folder of viser's panel, between its label and its number.
-STRIP = "height:4px;margin:-19px calc(0.625rem + 3.84rem) 15px calc(0.625rem + 6.87em);pointer-events:none"
+# Places a strip above the track of a slider in a folder of viser's panel, between its label and its number.
+STRIP = "height:4px;margin:-30px calc(0.625rem + 3.84rem) 26px calc(0.625rem + 6.87em);pointer-events:none"
 
 
 def holding(robot: Robot, settings: list[Slider], pose: np.ndarray, carriers: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ from .frames import Frames
 from .geometry import FARTHEST
 from .posing import Posing
 from .sliders import whole_steps
+from .stage import VIEWS
 from .timeline import TimeLine
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from .stage import Stage
     from .subject import Subject
 import tempfile
+from contextlib import nullcontext
 from pathlib import Path
 
 from ..figures.animation import FASTEST, draw, timing
@@ -33,6 +35,7 @@ from ..statics.scene import scene
 from .replay import Replay
 
 PATIENCE = 60.0  # [s] for a browser to draw a picture
+FINE = 2.0  # times the size in the browser: of a saved picture
 RATE = 12.5  # [1/s]
 LONGEST = 12.0  # [s] of the film: longer motions are shown faster
 
@@ -55,12 +58,14 @@ class Panel:
         else:
             self._controls = TimeLine(server, frames, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):
+            view = self._gui.add_button_group("view", tuple(VIEWS))
+            view.on_click(lambda event: _look(event.client, stage, view.value))
             numbers = self._gui.add_checkbox("numbers at the cables", True)
             numbers.on_update(lambda _: stage.show_numbers(numbers.value))
             if subject.cloud is not None:
                 self._add_cuts(subject.cloud.positions)
             save = self._gui.add_button("Save picture")
-            save.on_click(lambda event: _send_picture(event.client, f"{subject.robot.name}.png"))
+            save.on_click(lambda event: self._send_picture(event.client, f"{subject.robot.name}.png"))
             if subject.replay is not None:
                 self._add_film(subject.replay)
         with self._gui.add_folder("Legend"):
@@ -131,6 +136,26 @@ class Panel:
         # A daemon, so that the process ends at Ctrl-C without waiting for it.
         button.on_click(lambda event: threading.Thread(target=save, args=(event.client,), daemon=True).start())
 
+    def _send_picture(self, client: viser.ClientHandle | None, name: str) -> None:
+        """Let a browser download its view of the scene without handles, twice as large as it is shown, on white."""
+        if client is None:
+            return
+        import io
+
+        from matplotlib.image import imsave
+
+        size = (round(FINE * client.camera.image_height), round(FINE * client.camera.image_width))
+        hidden = self._controls.without_handles() if isinstance(self._controls, Posing) else nullcontext()
+        try:
+            with hidden:
+                picture = client.get_render(*size, transport_format="png", timeout=PATIENCE) / 255.0
+        except RuntimeError:  # the browser has left
+            return
+        opaque = picture[..., 3:]
+        file = io.BytesIO()
+        imsave(file, np.clip(picture[..., :3] * opaque + 1.0 - opaque, 0.0, 1.0), format="png")
+        client.send_file_download(name, file.getvalue(), save_immediately=True)
+
     def close(self) -> None:
         """Stop playing and shading."""
         self._controls.close()
@@ -146,23 +171,10 @@ class Panel:
         self._readout.content = labels.readout(instant, self._subject.robot, other)
 
 
-def _send_picture(client: viser.ClientHandle | None, name: str) -> None:
-    """Let a browser download its view of the scene, on white."""
-    if client is None:
-        return
-    import io
-
-    from matplotlib.image import imsave
-
-    width, height = client.camera.image_width, client.camera.image_height
-    try:
-        picture = client.get_render(height, width, transport_format="png", timeout=PATIENCE) / 255.0
-    except RuntimeError:  # the browser has left
-        return
-    opaque = picture[..., 3:]
-    file = io.BytesIO()
-    imsave(file, np.clip(picture[..., :3] * opaque + 1.0 - opaque, 0.0, 1.0), format="png")
-    client.send_file_download(name, file.getvalue(), save_immediately=True)
+def _look(client: viser.ClientHandle | None, stage: Stage, view: str) -> None:
+    """Point the camera of a browser at the robot from one of the sides."""
+    if client is not None:
+        stage.frame(client.camera, client.camera.image_width, client.camera.image_height, view)
 
 
 def film(replay: Replay) -> bytes:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -93,12 +94,23 @@ class Posing:
         nearest.on_click(lambda _: self._approach())
         home.on_click(lambda _: self._go(self._home, self._robot.carrier_home))
 
-        def choose(_: Any) -> None:
-            for owner, handle in self._handles.items():
-                handle.visible = drag.value == names[owner]
-
-        drag.on_update(choose)
+        self._dragged_name = lambda owner: drag.value == names[owner]
+        drag.on_update(lambda _: self._show_handles())
         self._go(self._pose, self._carriers)
+
+    def _show_handles(self) -> None:
+        for owner, handle in self._handles.items():
+            handle.visible = self._dragged_name(owner)
+
+    @contextmanager
+    def without_handles(self) -> Iterator[None]:
+        """Hide the handles until the block ends."""
+        for handle in self._handles.values():
+            handle.visible = False
+        try:
+            yield
+        finally:
+            self._show_handles()
 
     def _handle(self, owner: int | None, visible: bool) -> Any:
         """Return the handle in the scene of the platform (None) or a carrier."""

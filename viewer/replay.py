@@ -23,6 +23,7 @@ from .snapshot import Snapshot, least_distance
 
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
 MOST_FRAMES = 1500  # of a page
+MOST_MARKS = 20
 LONGEST = 100  # letters of a text of the file
 
 
@@ -76,6 +77,7 @@ class Replay:
         self._words = _answers(dataset) if self._flown else None
         self._cut = read("cut", (n, m)) > 0 if "cut" in dataset.variables else None
         self._events = _events(dataset) if self._flown else []
+        self._starts = read("phase_start", (-1,)).tolist() if "phase_start" in dataset.variables else []
         self.obstacles = outlines_from(dataset, where)
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
@@ -95,6 +97,16 @@ class Replay:
     def margins(self) -> np.ndarray:
         """Return the smallest distance of a tension from its limits at each instant, (n,) [N]; nan without tensions."""
         return np.minimum(self.tensions - self._t_min, self.robot.t_max - self.tensions).min(axis=1)
+
+    @property
+    def worst(self) -> int:
+        """Return the index of the instant without tensions, or with the least margin."""
+        return int(np.where(np.isnan(self.margins), -np.inf, self.margins).argmin())
+
+    @property
+    def marks(self) -> tuple[float, ...]:
+        """Return the times to mark on a time line [s]: the worst instant, the starts of phases, and events."""
+        return (float(self.times[self.worst]), *self._starts[:MOST_MARKS], *(at for at, _ in self._events[:MOST_MARKS]))
 
     @property
     def path(self) -> np.ndarray:

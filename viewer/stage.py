@@ -34,6 +34,7 @@ BLACK, GREY = (0, 0, 0), (150, 150, 150)
 DOT = 0.008  # of the robot's size: diameter of the ends of cables
 HEAD = 0.25  # of an arrow's length
 BARBS = 12
+VIEWS = {"all": ALONG, "top": (0.0, -1e-3, 1.0), "front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0)}  # to the camera
 AIMS = 50  # of a camera that are remembered
 
 Colour = tuple[int, int, int]
@@ -149,8 +150,8 @@ class Stage:
             self._short.position = ends[1]
             _write(self._short, labels.shortfall(instant))
 
-    def frame(self, camera: Any, width: float, height: float) -> None:
-        """Point a camera at the whole robot from the front, a little from the side and above.
+    def frame(self, camera: Any, width: float, height: float, view: str = "all") -> None:
+        """Point a camera at the whole robot, by default from the front, a little from the side and above.
 
         In a picture that is higher than wide, as on a phone, the camera is farther away, and the robot above the panel.
 
@@ -160,14 +161,18 @@ class Stage:
             Of viser: the initial one, or that of a client.
         width, height
             Of its picture [pixels].
+        view
+            One of `VIEWS`.
         """
+        along = np.array(VIEWS[view])
+        along /= np.linalg.norm(along)
         free = 1.0 - labels.SHEET_SHARE if width < height else 1.0
         away = self.extent.nearest / min(width / height, free, 1.0)
-        side = np.cross([0.0, 0.0, 1.0], ALONG)
-        upwards = np.cross(ALONG, side / np.linalg.norm(side))
+        side = np.cross([0.0, 0.0, 1.0], along)
+        upwards = np.cross(along, side / np.linalg.norm(side))
         # The part that the panel leaves free has its centre above that of the picture.
         centre = self.extent.centre - (1.0 - free) * away * np.tan(FIELD_OF_VIEW / 2) * upwards
-        camera.position = centre + away * ALONG
+        camera.position = centre + away * along
         camera.look_at = centre
         camera.fov = FIELD_OF_VIEW
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size

@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .charts import Charts
 from .curves import curves
 from .snapshot import Snapshot
@@ -55,21 +57,27 @@ class TimeLine:
         first, last = float(replay.times[0]), float(replay.times[-1])
         with gui.add_folder("Time"):
             ticks = max(math.ceil((last - first) / TICK - 1e-6), 1)  # whole ones, so that the end is a round number
-            self._now = gui.add_slider("time [s]", first, first + round(ticks * TICK, 6), TICK, first)
+            end = first + round(ticks * TICK, 6)
+            about = "Dots: the worst instant, the starts of phases, and events."
+            self._now = gui.add_slider("time [s]", first, end, TICK, first, marks=replay.marks, hint=about)
             self._play = gui.add_button("Play", hint="K")
-            self._step = gui.add_button_group("step", ("first", "back", "next", "last"))
+            groups = (("step", ("back", "next")), ("go to", ("first", "worst", "last")))
+            jumps = [gui.add_button_group(*group) for group in groups]
             self._loop = gui.add_checkbox("loop", True)
             self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1x")
-            self._charts = Charts(gui, curves(replay), None if other is None else curves(other))
+            limits = np.concatenate([replay.robot.t_min, replay.robot.t_max])
+            self._charts = Charts(gui, curves(replay), limits, None if other is None else curves(other))
         self._now.on_update(self._dragged)
         self._play.on_click(lambda _: self._turn(not self._playing.is_set()))
         steps = {
             "first": ("home", lambda: 0),
             "back": ("J", lambda: self._index - 1),
+            "worst": ("W", lambda: replay.worst),
             "next": ("L", lambda: self._index + 1),
             "last": ("end", lambda: len(replay.times) - 1),
         }
-        self._step.on_click(lambda _: self._jump(steps[self._step.value][1]))
+        for group in jumps:
+            group.on_click(lambda _, group=group: self._jump(steps[group.value][1]))
         for word, (key, step) in steps.items():
             gui.add_command(f"Time: {word}", hotkey=key).on_trigger(lambda _, step=step: self._jump(step))
         gui.add_command("Time: play or pause", hotkey="K").on_trigger(lambda _: self._turn(not self._playing.is_set()))
