@@ -95,6 +95,44 @@ def test_values_of_the_robot_vary_too(swept):
     assert table["robot.cables.t_max"].attrs["units"] == "N"
 
 
+def test_whole_robots_and_tasks_vary_and_fields_of_each(folder, monkeypatch):
+    """A matrix of two tasks and three robots, of which one cannot do the task with wind, and a field of both."""
+    monkeypatch.chdir(folder)
+    slow = Task.model_validate({**LIFT, "name": "slow", "duration": 2})
+    slow.save("slow.yaml")
+    hoist().model_copy(update={"name": "other"}).save("other.yaml")
+    vary = {"robot": ["hoist.yaml", "other.yaml"], "task": ["lift.yaml", "slow.yaml"], "robot.platform.mass": [1, 3]}
+    found = sweep("wang-flying", {**LIFT, "margin": 24}, vary)
+    assert found.table["tension_max"].dims == ("robot", "task", "robot.platform.mass")
+    for i, j, k in product(range(2), repeat=3):
+        high = ends((1.2, 2)[j], (1, 3)[k])[1]
+        assert float(found.table["tension_max"][i, j, k]) == pytest.approx(high, rel=1e-4)
+    assert found.plan(7).scenario.robot.name == "other"
+    assert found.plan(7).scenario.task.name == "slow"
+    assert str(found.report()).startswith("2 robots, 2 tasks: 8 of 8 plans feasible")
+    windy = sweep("hoist.yaml", "lift.yaml", {"task": ["lift.yaml", {**LIFT, "wind": [1, 0, 0]}]})
+    assert windy.table["status"].values.tolist() == ["feasible", "failed"]
+    assert "wind must be left out for a robot without platform.aero" in windy.rows[1].reason
+    with pytest.raises(InputError, match="wind must be left out"):
+        sweep("hoist.yaml", "lift.yaml", {"task": [{**LIFT, "wind": [1, 0, 0]}]})
+    with pytest.raises(InputError, match=r"none.yaml: no such file"):
+        sweep("hoist.yaml", "lift.yaml", {"task": ["lift.yaml", "none.yaml"]})
+    with pytest.raises(InputError, match="no robot or file 'hoisd'"):
+        sweep("hoist.yaml", "lift.yaml", {"robot": ["hoisd"]})
+
+
+def test_a_checkpoint_knows_the_files_of_its_tasks(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    arguments = ["plan", "hoist.yaml", "lift.yaml", "--vary", "task=lift.yaml", "--resume", "sweep.chk"]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    Task.model_validate({**LIFT, "duration": 2}).save("lift.yaml")
+    with pytest.raises(InputError, match="with values of task"):
+        sweep("hoist.yaml", LIFT, {"task": ["lift.yaml"]}, checkpoint="sweep.chk", resume=True)
+    done = CliRunner().invoke(app, ["plan", "hoist.yaml", "lift.yaml", "--vary", "task=5"])
+    assert isinstance(done.exception, InputError)
+    assert "\n" not in str(done.exception)
+
+
 def test_each_row_is_that_of_a_plan(swept):
     number = int(swept.table["plan"].sel({"task.duration": 1.0, "task.margin": 3}))
     alone = plan(hoist(), {**LIFT, "duration": 1.0, "margin": 3})

@@ -7,10 +7,20 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...models import Robot
+from ...models.files import as_robot
 from ...models.parsing import validate
 from ..tasks.lay_out import lay_out
-from ..tasks.task import Task
+from ..tasks.task import Task, read_task
 from .axis import Axis
+
+
+def _data_of(task: Task) -> dict[str, Any]:
+    """Return the fields of a task that are set, as a mapping."""
+    data = task.model_dump(exclude_unset=True)
+    for key, own in (("limits", task.limits.own), ("objective", task.objective.own)):
+        if own:
+            data.setdefault(key, {})["own"] = own
+    return data
 
 
 class Cases:
@@ -22,11 +32,19 @@ class Cases:
     def __init__(self, robot: Robot, task: Task, axes: tuple[Axis, ...]):
         self.robot, self.task, self.axes = robot, task, axes
         self.shape = tuple(len(axis.values) for axis in axes)
-        self._data = task.model_dump(exclude_unset=True)
-        for key, own in (("limits", task.limits.own), ("objective", task.objective.own)):
-            if own:
-                self._data.setdefault(key, {})["own"] = own
+        self.wholes: dict[str, list[Any]] = {}  # robots and tasks that are values, by "robot" and "task"
+        for axis in axes:
+            if axis.field.whole:
+                read = as_robot if axis.field.of_robot else read_task
+                self.wholes[axis.field.key] = [read(value) for value in axis.values]
+        self._data = {id(each): _data_of(each) for each in (task, *self.wholes.get("task", ()))}
         self._robots: dict[tuple[int, ...], Robot] = {}
+
+    @property
+    def title(self) -> str:
+        """Return the names of robot and task, or how many there are."""
+        names = {"robot": self.robot.name, "task": self.task.name}
+        return ", ".join(f"{len(self.wholes[key])} {key}s" if key in self.wholes else names[key] for key in names)
 
     def __len__(self) -> int:
         """Return the number of combinations."""
@@ -46,35 +64,47 @@ class Cases:
 
         Raises `InputError` if the values are not valid.
         """
-        data, of_robot = self._data, list[tuple[Axis, int]]()
-        for axis, index in self.places(number):
-            if axis.field.of_robot:
-                of_robot.append((axis, index))
-            else:
-                data = axis.field.set(data, axis.values[index])
-        return self._robot(of_robot), validate(data, Task, f"task {self.task.name!r}")
+        places = self.places(number)
+        task = self._whole("task", self.task, places)
+        data = self._data[id(task)]
+        parts = [(axis, index) for axis, index in places if not (axis.field.of_robot or axis.field.whole)]
+        for axis, index in parts:
+            data = axis.field.set(data, axis.values[index])
+        task = validate(data, Task, f"task {task.name!r}") if parts else task
+        return self._robot([place for place in places if place[0].field.of_robot]), task
+
+    def _whole(self, key: str, own: Any, places: list[tuple[Axis, int]]) -> Any:
+        """Return the robot or the task of a combination, before parts of it vary."""
+        return next((self.wholes[key][index] for axis, index in places if axis.field.key == key), own)
 
     def _robot(self, varied: list[tuple[Axis, int]]) -> Robot:
-        if not varied:
-            return self.robot
-        place = tuple(index for _, index in varied)
-        if place not in self._robots:
-            data: Any = self.robot.model_dump(exclude_unset=True)
-            for axis, index in varied:
+        robot = self._whole("robot", self.robot, varied)
+        parts, place = [each for each in varied if not each[0].field.whole], tuple(index for _, index in varied)
+        if parts and place not in self._robots:
+            data: Any = robot.model_dump(exclude_unset=True)
+            for axis, index in parts:
                 data = axis.field.set(data, axis.values[index])
-            self._robots[place] = validate(data, Robot, f"robot {self.robot.name!r}")
-        return self._robots[place]
+            self._robots[place] = validate(data, Robot, f"robot {robot.name!r}")
+        return self._robots[place] if parts else robot
 
     def check(self) -> None:
         """Check every combination: whether the values are valid and the task fits the robot.
 
-        Raises `InputError` for the first one that is wrong, with its values.
+        Raises `InputError` for the first one that is wrong, with its values. If whole robots or tasks vary, it is
+        enough that one of the tasks fits its robot: the other combinations are rows with the status `failed`.
         """
+        wrong: list[InputError] = []
         for number in range(len(self)):
             try:
-                lay_out(*self.case(number))
+                case = self.case(number)
             except InputError as error:
                 raise InputError(f"{error} (with {self.described(number)})") from None
+            try:
+                lay_out(*case)
+            except InputError as error:
+                wrong.append(InputError(f"{error} (with {self.described(number)})"))
+            if wrong and (not self.wholes or len(wrong) == len(self)):
+                raise wrong[0]
 
     def units(self) -> tuple[str, ...]:
         """Return the unit of each varied field; empty without a unit."""

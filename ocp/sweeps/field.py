@@ -12,6 +12,7 @@ from ...base.errors import InputError
 from ...base.inputs import shown
 
 OF_ROBOT = "robot."  # begins the key of a field of the robot; a task has no field of that name
+WHOLE = "robot", "task"  # keys whose values are whole robots or tasks, by name or file
 _KEY = re.compile(r"[A-Za-z_][\w-]*(\[\d+\])*(\.[A-Za-z_][\w-]*(\[\d+\])*)*")
 _STEP = re.compile(r"[^.\[\]]+")
 _UNIT = re.compile(r"\[([^\]]+)\]")  # in the description of a field
@@ -22,7 +23,7 @@ class Field(Displayed):
     """A field of a task, such as `tube.position`, or of the robot, such as `robot.platform.mass`.
 
     Items of lists have numbers from 0 on, as in `limits.keep_out[0].radius`; without a number all items are meant, as
-    in `robot.cables.t_max`.
+    in `robot.cables.t_max`. `robot` and `task` are the whole of each.
     """
 
     key: str
@@ -41,12 +42,17 @@ class Field(Displayed):
     @property
     def of_robot(self) -> bool:
         """Return whether it is a field of the robot, and not of the task."""
-        return self.key.startswith(OF_ROBOT)
+        return self.key == "robot" or self.key.startswith(OF_ROBOT)
+
+    @property
+    def whole(self) -> bool:
+        """Return whether its values are whole robots or tasks."""
+        return self.key in WHOLE
 
     @property
     def name(self) -> str:
         """Return its name in tables: the varied `task.margin` is not the `margin` of a plan."""
-        return self.key if self.of_robot else f"task.{self.key}"
+        return self.key if self.of_robot or self.whole else f"task.{self.key}"
 
     @property
     def steps(self) -> tuple[str | int, ...]:
@@ -55,7 +61,9 @@ class Field(Displayed):
         return tuple(int(step) if step.isdecimal() else step for step in steps)
 
     def holds(self, other: Field) -> bool:
-        """Return whether the other field is this one or a part of it."""
+        """Return whether the other field is this one or a part of it; of a whole robot or task fields can vary too."""
+        if self.whole or other.whole:
+            return self == other
         return other.steps[: len(self.steps)] == self.steps and other.of_robot == self.of_robot
 
     def set(self, data: Any, value: Any) -> Any:
@@ -86,7 +94,7 @@ class Field(Displayed):
     def unit(self, part: Any) -> str:
         """Return the field's unit from its description, in a task or robot; empty if it has none."""
         description, step = "", ""
-        for step in self.steps:
+        for step in () if self.whole else self.steps:
             if isinstance(step, int):
                 part = part[step]  # an item has its list's unit
                 continue

@@ -79,9 +79,9 @@ class Sweep(Displayed, Reported):
     rows: tuple[Row, ...]
 
     def _headline(self) -> str:
-        robot, task, total = self.cases.robot.name, self.cases.task.name, len(self.rows)
+        total = len(self.rows)
         others = [f"{quantity(count)} {status}" for status, count in self.counts.items() if status != "feasible"]
-        first = f"{robot}, {task}: {quantity(self.feasible)} of {quantity(total)} plans feasible"
+        first = f"{self.cases.title}: {quantity(self.feasible)} of {quantity(total)} plans feasible"
         return ", ".join([first, *others])
 
     def _facts(self) -> Iterable[Fact]:
@@ -120,7 +120,7 @@ class Sweep(Displayed, Reported):
             for axis, unit in zip(cases.axes, cases.units(), strict=True)
         }
         attributes = {
-            "title": f"towline sweep of {cases.robot.name}: {cases.task.name}",
+            "title": f"towline sweep of {cases.title}",
             "robot": to_yaml(cases.robot),
             "task": to_yaml(cases.task.in_file()),
             "vary": json.dumps({axis.field.key: list(axis.values) for axis in cases.axes}),

@@ -61,7 +61,8 @@ def sweep(
     vary
         Lists of values by dotted keys of a task file: `{"margin": [0, 5, 10], "scheme": ["linear", "spline"]}`. Keys
         that begin with `robot.` are keys of the robot file: `robot.platform.mass`. Items of lists are numbered from 0,
-        `limits.keep_out[0].radius`; a key without a number means all items, `robot.cables.t_max`.
+        `limits.keep_out[0].radius`; a key without a number means all items, `robot.cables.t_max`. The keys `robot` and
+        `task` vary the whole robot or task: names or files. Where one does not fit the other, the row is `failed`.
     workers
         Number of processes on this machine, with one thread each; 1: this process.
     scheduler
@@ -139,15 +140,21 @@ def _header(cases: Cases, folder: Path | None) -> dict[str, Any]:
     robot, task = cases.robot, cases.task
     versions = {"towline": __version__, "casadi": ca.CasadiMeta.version(), "numpy": np.__version__}
     return {
-        "robot": f"{robot.name} {_digest(robot.model_dump(mode='json'))}",
-        "task": f"{task.name} {_digest(task.in_file().model_dump(mode='json'))}",
+        "robot": f"{robot.name} {_digest(_content(robot))}",
+        "task": f"{task.name} {_digest(_content(task))}",
         "limits.own": [limit.name for limit in task.limits.own],
         "objective.own": [f"{cost.name} {cost.amount}" for cost in task.objective.own],
         "order of vary": [axis.field.key for axis in cases.axes],
         **{f"vary {axis.field.key}": list(axis.values) for axis in cases.axes},
+        **{f"values of {key}": [_digest(_content(each)) for each in its] for key, its in cases.wholes.items()},
         "keep": folder is not None,
         **versions,
     }
+
+
+def _content(each: Robot | Task) -> dict[str, Any]:
+    """Return all numbers of a robot or a task."""
+    return (each.in_file() if isinstance(each, Task) else each).model_dump(mode="json")
 
 
 def _digest(data: dict[str, Any]) -> str:
