@@ -25,7 +25,7 @@ def calibrate(
     poses: Annotated[
         Path | None,
         typer.Option(
-            metavar="LOG", help="Log of the poses, if it is another one; its clock is aligned by cable speeds."
+            metavar="LOG", help="Log of the poses, if they are in another file; its clock is aligned by cable speeds."
         ),
     ] = None,
     fields: FieldsOption = None,

@@ -38,7 +38,7 @@ COMMANDS = {
     "view": "Show robots, plans, simulations and workspaces in the browser.",
     "import": "Convert a robot of another program to a robot file.",
     "reproduce": "Recompute a paper's results, claim by claim.",
-    "export": "Export a robot as a MuJoCo model or as C code.",
+    "export": "Export a robot as a MuJoCo model, C code or an FMU.",
     "bench": "Compare towline with other solvers on this machine.",
 }
 MODULES = {"import": "import_"}  # where the module is not named like the command

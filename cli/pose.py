@@ -68,7 +68,7 @@ def pose(
 
     If the lengths do not determine the pose, the result is the equilibrium pose. The exit code is 1 if no pose fits the
     lengths. With --log, the poses of all samples are written, and samples that no pose fits are listed; the exit code
-    is 1 if these are more than one in twenty.
+    is 1 if these are more than 5 % of all samples.
     """
     from ..estimation import branches, pose_from_lengths
     from ..models import load

@@ -161,7 +161,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
     """Return where the platform can rest, and how that was sampled."""
     import numpy as np
 
-    from ..base.text import quantity_range, quantity_row
+    from ..base.text import quantity, quantity_range, quantity_row
 
     attitude = "in its home attitude"
     if box is None:
@@ -181,7 +181,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
     if (box.centre != robot.home[:3]).any():
         lines[0] += f" about ({quantity_row(box.centre)}) m, the nearest sample at which it can"
     steps = quantity_row(box.spacing[box.spacing > 0], digits=2)
-    return [*lines, f"    ({box.samples} positions sampled, in the box at most {steps} m apart along each axis)"]
+    return [*lines, f"    ({quantity(box.samples)} positions sampled, spaced by {steps} m along the axes)"]
 
 
 def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:

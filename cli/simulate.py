@@ -116,7 +116,7 @@ def simulate(
         Path | None,
         typer.Option(
             help="NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default: PLAN-flight.nc in this folder, "
-            "with --runs PLAN-flights.nc. An existing file is overwritten."
+            "with --runs PLAN-flights.nc, of a recording LOG-replay.nc. An existing file is overwritten."
         ),
     ] = None,
     figures: Annotated[
@@ -133,16 +133,17 @@ def simulate(
     fps: FpsOption = FPS,
     report: ReportOption = None,
     replay: Annotated[
-        bool, typer.Option("--replay", help="Replay PLAN as a recording also if it is a file of a simulation.")
+        bool, typer.Option("--replay", help="Replay PLAN as a recording, even if it is the file of a simulation.")
     ] = False,
     poses: Annotated[
-        Path | None, typer.Option(metavar="LOG", help="With a recording: log of the poses, if it is another file.")
+        Path | None,
+        typer.Option(metavar="LOG", help="With a recording: log of the poses, if they are in another file."),
     ] = None,
     fields: FieldsOption = None,
     drive: Annotated[
         str | None,
         typer.Option(
-            help="With a recording: what drives the plant: lengths, tensions or forces (default: depends on the log)."
+            help="With a recording: commands of the plant: lengths, tensions or forces (default: depends on the log)."
         ),
     ] = None,
     delay: Annotated[
@@ -153,8 +154,8 @@ def simulate(
         Path | None,
         typer.Option(
             metavar="FILE.yaml",
-            help="With a recording: fit what explains the residuals, and write the robot if it is better in windows "
-            "that were not fitted.",
+            help="With a recording: robot file to write, with parameters fitted to half of the windows; written only "
+            "if they reduce the residuals of the other half.",
         ),
     ] = None,
     as_json: JsonOption = False,
@@ -163,8 +164,8 @@ def simulate(
 
     A run passes if it does not diverge, its position error stays within --tolerance, no tension exceeds t_max by more
     than 0.1 % of the cable's range, and no cable with t_min above zero goes slack. The exit code is 0 if all runs pass,
-    otherwise 1. A recording is replayed by its commands, in windows that each start from the recorded state; it passes
-    if 95 % of the position residuals are within --tolerance.
+    otherwise 1. A recording is replayed with its commands, in windows that each start from the recorded state; it
+    passes if 95 % of the position residuals are within --tolerance.
     """
     from ..figures.style import FORMATS
 

@@ -37,9 +37,10 @@ def workspace(
     condition: Annotated[
         list[str] | None,
         typer.Option(
+            metavar="KIND|JSON",
             help="Condition: its kind, or JSON with the kind and its keys, such as "
             f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
-            "Default: static-equilibrium."
+            "Default: static-equilibrium.",
         ),
     ] = None,
     define: Annotated[
@@ -303,9 +304,8 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reaso
     from ..base.text import quantity, quantity_range
 
     accepted, samples = summary["accepted"], summary["samples"]
-    typer.echo(
-        f"{summary['robot']}: {quantity(accepted)} of {quantity(samples)} samples accepted ({accepted / samples:.2%})"
-    )
+    share = f"{100 * accepted / samples:.2f} %"
+    typer.echo(f"{summary['robot']}: {quantity(accepted)} of {quantity(samples)} samples accepted ({share})")
     if reason is not None:
         typer.echo(f"  why: {reason}")
     low, high = summary["volume_interval"]

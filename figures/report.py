@@ -118,7 +118,7 @@ class Reported:
     def save_report(self, file: str | os.PathLike[str]) -> Path:
         """Write the report atomically, by the file's suffix: as text (.txt), data (.json), or else an HTML page.
 
-        The page has the figures inside and loads nothing from anywhere, so that it can be mailed and kept.
+        The page contains its figures and loads nothing from the network.
         Raises `InputError` if the file cannot be written.
         """
         path, report = file_path("file", file), self._report()

@@ -150,7 +150,7 @@ class Requirement(Part):
 class Requirements(Part):
     """Requirements of a design: free numbers, poses and wrenches. In a file: YAML with these keys."""
 
-    name: Name = Field(default="design", description="of the requirements, in reports and names of files")
+    name: Name = Field(default="design", description="name of the requirements, for reports and file names")
     free: Annotated[tuple[Free, ...], Field(min_length=1, max_length=200)] = Field(
         description="numbers of the robot that the design chooses; all others keep the values of its file"
     )
@@ -165,7 +165,7 @@ class Requirements(Part):
     margin: Positive = Field(
         default=LEAST_MARGIN,
         ge=LEAST_MARGIN,
-        description="smallest capacity margin, with moments divided by the `length` of the robot's file [N]",
+        description="smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]",
     )
     clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: no limit")
     maximise: Literal["margin"] = Field(default="margin", description="objective: the smallest capacity margin")

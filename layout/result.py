@@ -29,23 +29,23 @@ class Design(Reported, Displayed):
     robot
         The best robot found; the robot of the file if the requirements are impossible.
     before
-        The robot that was changed.
+        The initial robot.
     requirements
-        What it should do.
+        The requirements of the design.
     status
         feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, its clearance and
         the plans of its tasks are as required; infeasible if no layout inside the boxes meets the requirements, by
         `impossibility`; otherwise not-found, which proves nothing.
     margin, margin_before
-        Smallest capacity margin of both at the same poses, with moments divided by `before.length` [N].
+        Smallest capacity margin of both robots at the same poses, with moments divided by `before.length` [N].
     clearance
         Smallest distance between two cables [m]; infinite for one cable.
     reasons
-        What binds and what would help; None if the requirements are impossible.
+        Active constraints and the gain from relaxing them; None if the requirements are impossible.
     poses, audited
         Number of pairs of pose and wrench in the requirements, and of random ones in the last audit.
     starts
-        Number of layouts from which it searched, or of pairings that it compared.
+        Number of initial layouts, or of compared pairings.
     stopped
         Whether the search was interrupted.
     plans

@@ -37,7 +37,7 @@ def design(
     progress: Progress | None = None,
     **options: Any,
 ) -> Design:
-    """Find anchors, attachments and tension limits with the largest smallest capacity margin, or the lowest t_max.
+    """Find anchors, attachments and tension limits whose smallest capacity margin is largest, or the lowest t_max.
 
     Layouts from simulated annealing on few poses are improved by sequential linear programs on all of them, and audits
     at 100 000 random poses add the worst. The result is judged by `capacity_margin`. It is a local optimum. Carriers
@@ -52,12 +52,12 @@ def design(
     require
         Poses and wrenches: `Requirement`, or mappings with its keys.
     maximise
-        Objective: "margin". With the option minimise="t_max" instead the smallest mean t_max whose margin is the
+        Objective: "margin". With the option minimise="t_max" instead: the smallest mean t_max with at least the
         option `margin`.
     requirements
         Instead of all of these: `Requirements`, a mapping, or the path of a file.
     progress
-        Called with what is being done, the share of the time that has passed, and the best margin so far [N].
+        Called with a description of the step, the elapsed share of the time, and the best margin so far [N].
     **options
         Other keys of `Requirements`: name, minimise, margin, clearance, start, time_limit, seed.
 

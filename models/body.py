@@ -30,7 +30,9 @@ class BodyBox(Block):
 class BodyHull(ConvexMesh):
     """A convex body with plane faces that is fixed in a frame, with sharp or round edges."""
 
-    radius: NonNegative = Field(default=0.0, description="by which it is larger than the hull on all sides [m]")
+    radius: NonNegative = Field(
+        default=0.0, description="distance by which the body extends beyond the hull on all sides [m]"
+    )
 
     @property
     @override

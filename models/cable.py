@@ -9,15 +9,13 @@ from .part import Finite, Name, NonNegative, Part, Positive, Vector3
 
 
 class Pulley(Part):
-    """A swivelling pulley: the cable comes up the swivel axis at the anchor, runs over the sheave, leaves tangentially.
+    """A swivelling pulley: the cable comes up the swivel axis at the anchor and leaves the sheave tangentially.
 
     The sheave's plane contains the axis and turns about it so that it also contains the attachment.
     """
 
-    radius: Positive = Field(description="of the sheave [m]")
-    axis: Vector3 = Field(
-        default=(0.0, 0.0, 1.0), description="swivel axis in the carrier frame, need not be of unit length"
-    )
+    radius: Positive = Field(description="radius of the sheave [m]")
+    axis: Vector3 = Field(default=(0.0, 0.0, 1.0), description="swivel axis in the carrier frame, of any length")
 
     @field_validator("axis")
     @classmethod
@@ -40,8 +38,10 @@ class Encoder(Part):
     """The reading y of a winch: the unstrained length of the cable is offset + scale * y + build_up * y^2."""
 
     offset: Finite = Field(default=0.0, description="length of the cable at reading 0 [m]")
-    scale: Finite = Field(default=1.0, description="metres of cable per unit of reading, not 0")
-    build_up: Finite = Field(default=0.0, description="of layers of cable on the drum, per square of the reading [1/m]")
+    scale: Finite = Field(default=1.0, description="metres of cable per unit of the reading, not 0")
+    build_up: Finite = Field(
+        default=0.0, description="growth by layers of cable on the drum, per square of the reading [1/m]"
+    )
 
     @field_validator("scale")
     @classmethod
@@ -55,21 +55,26 @@ class Cable(Part):
     """One cable, from its anchor on a carrier to its attachment on the platform. It pulls and never pushes."""
 
     carrier: Name = Field(description="name of the carrier that holds its anchor")
-    anchor: Vector3 = Field(description="A_i in the carrier frame [m]")
-    attachment: Vector3 = Field(description="B_i in the platform frame [m]")
+    anchor: Vector3 = Field(description="point A_i on the carrier, in its frame [m]")
+    attachment: Vector3 = Field(description="point B_i on the platform, in its frame [m]")
     t_min: NonNegative = Field(description="smallest tension [N]; above zero keeps the cable taut")
     t_max: Positive = Field(description="largest tension [N]")
-    stiffness: Positive | None = Field(default=None, description="E A [N]; default: inextensible")
-    damping: NonNegative | None = Field(default=None, description="C [N s/m]")
-    length: Positive | None = Field(
-        default=None, description="[m], for the drive fixed-length; default: from anchor to attachment at home"
+    stiffness: Positive | None = Field(default=None, description="axial stiffness E A [N]; default: inextensible")
+    damping: NonNegative | None = Field(
+        default=None, description="damping C of an elastic cable [N s/m]; default: none"
     )
-    pulley: Pulley | None = Field(default=None, description="default: the anchor is a point")
+    length: Positive | None = Field(
+        default=None,
+        description="constant length, for the drive fixed-length [m]; default: from anchor to attachment at home",
+    )
+    pulley: Pulley | None = Field(
+        default=None, description="swivelling pulley at the anchor; default: none, the anchor is a point"
+    )
     winch: Winch | None = Field(
         default=None, description="winch of the cable, for simulation; default: its length follows commands exactly"
     )
     encoder: Encoder | None = Field(
-        default=None, description="reading of the winch, for calibration; default: the length itself [m]"
+        default=None, description="relation between the reading of the winch and the length; default: they are equal"
     )
 
     @model_validator(mode="after")

@@ -95,7 +95,7 @@ class Carrier(Part):
     tows: ClassVar[bool] = False  # by cables without winches, unless the robot's file has winches or states its drive
     efforts: ClassVar[tuple[str, ...]] = ()  # names of what must hold it, against gravity and the pull of its cables
 
-    name: Name = Field(description="by which cables and tasks refer to it")
+    name: Name = Field(description="name by which cables and tasks refer to the carrier")
     home: Pose = Field(default=AT_ORIGIN, description="pose of the carrier frame in {G} at rest [m, rad]")
     kind: Any  # a Literal in each class
 
@@ -238,8 +238,8 @@ class MobileCarrier(Carrier):
 
     kind: Literal["mobile"]
     reach: Box = Field(description="box of positions of the carrier's origin, in {G} [m]")
-    speed_max: Positive = Field(description="[m/s]")
-    acceleration_max: Positive = Field(description="[m/s^2]")
+    speed_max: Positive = Field(description="largest speed [m/s]")
+    acceleration_max: Positive = Field(description="largest acceleration [m/s^2]")
 
     @model_validator(mode="after")
     def _home_in_reach(self) -> Self:
@@ -259,25 +259,25 @@ class MobileCarrier(Carrier):
 
 
 class QuadrotorCarrier(Carrier):
-    """A flying robot with reaction from its cables: rigid body, thrust along its z axis, torques about its axes.
+    """A rigid body that flies by thrust along its z axis and torques about its axes.
 
-    Its frame sits in its CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
+    Its frame has its origin at the CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
     """
 
     tows: ClassVar[bool] = True
     efforts: ClassVar[tuple[str, ...]] = ("thrust", "torque", "force across the thrust")
 
     kind: Literal["quadrotor"]
-    mass: Positive = Field(description="[kg]")
-    inertia: BodyInertia = Field(description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in its axes [kg m^2]")
+    mass: Positive = Field(description="mass [kg]")
+    inertia: BodyInertia = Field(description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM [kg m^2]")
     thrust_min: NonNegative = Field(default=0.0, description="smallest total thrust [N]")
     thrust_max: Positive = Field(description="largest total thrust [N]")
     torque_max: tuple[Positive, Positive, Positive] = Field(description="largest torque about each axis [N m]")
     tilt_max: Positive = Field(
-        default=0.6, description="largest angle of its z axis to the vertical [rad]; for planners"
+        default=0.6, description="largest angle between its z axis and the vertical in plans [rad]"
     )
-    speed_max: Positive = Field(default=10.0, description="[m/s]; for planners")
-    acceleration_max: Positive = Field(default=10.0, description="[m/s^2]; for planners")
+    speed_max: Positive = Field(default=10.0, description="largest speed in plans [m/s]")
+    acceleration_max: Positive = Field(default=10.0, description="largest acceleration in plans [m/s^2]")
     radius: Positive | None = Field(
         default=None,
         description="radius of the ball about its CoM that contains its rotors [m]; default: 0.3 m times the square "

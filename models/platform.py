@@ -25,22 +25,23 @@ class Aero(Part):
     coefficient; V is the air's velocity relative to the platform.
     """
 
-    air_density: Positive = Field(description="rho [kg/m^3]")
+    air_density: Positive = Field(description="density rho [kg/m^3]")
     drag: NonNegative = Field(description="drag coefficient C_d [-]")
     lift: NonNegative = Field(description="lift coefficient C_l [-]")
     area: Positive = Field(description="largest cross-section S of the platform [m^2]")
     form: Literal["signed", "printed"] = Field(
-        default="signed", description="signed: V abs(V), as drag acts; printed: V^2, never negative, as in paper F"
+        default="signed",
+        description="signed: V abs(V), the direction of real drag; printed: V^2, never negative, as in paper F",
     )
 
 
 class Platform(Part):
     """The rigid body that the cables pull."""
 
-    mass: Positive = Field(description="[kg]")
+    mass: Positive = Field(description="mass [kg]")
     inertia: BodyInertia | None = Field(
         default=None,
-        description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
+        description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
         "required unless the platform cannot turn",
     )
     com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")

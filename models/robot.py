@@ -78,20 +78,20 @@ class Robot(DisplayedRobot):
     Computations use the arrays below; each has one row per cable or carrier, in the order of the file.
     """
 
-    name: Name = Field(description="of the robot, in reports and names of files")
+    name: Name = Field(description="name of the robot, for reports and file names")
     source: str = Field(min_length=1, description="source of the numbers, and which of them are assumed")
-    gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="in {G} [m/s^2]")
+    gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="acceleration of gravity in {G} [m/s^2]")
     drive: Drive = Field(
         default=cast(Any, None),
         json_schema_extra=_without_default,
-        description="what moves the platform (paper C). fixed-length: the carriers, with cables of constant length; "
-        "variable-length: the winches, with mobile carriers at home; both: carriers and winches. Default: "
+        description="drives that move the platform (paper C). fixed-length: carriers, with cables of constant length; "
+        "variable-length: winches, with mobile carriers at home; both: carriers and winches. Default: "
         "fixed-length "
         "if all cables hang from quadrotors or mobile carriers and none has a winch, an encoder or a pulley; else both",
     )
     platform: Platform
-    carriers: tuple[AnyCarrier, ...] = Field(min_length=1, description="what the cables hang from")
-    cables: tuple[Cable, ...] = Field(min_length=1, description="in the order in which results number them")
+    carriers: tuple[AnyCarrier, ...] = Field(min_length=1, description="bodies from which the cables hang")
+    cables: tuple[Cable, ...] = Field(min_length=1, description="cables; results number them in this order")
     uncertainty: Uncertainty | None = Field(
         default=None, description="uncertainty of anchors, attachments and pulley radii; default: exact"
     )
@@ -100,7 +100,7 @@ class Robot(DisplayedRobot):
         default=None, description="height z in {G} below which no part of platform and load may be [m]; default: none"
     )
     workspace_box: Box | None = Field(
-        default=None, description="room in {G} in which platform and load stay with their bodies [m]; default: no walls"
+        default=None, description="box in {G} in which the bodies of platform and load stay [m]; default: no walls"
     )
 
     @model_validator(mode="after")

@@ -36,27 +36,27 @@ class Sphere(Part, _Round):
     """A ball."""
 
     kind: Literal["sphere"]
-    centre: Vector3 = Field(description="in its frame [m]")
-    radius: Positive = Field(description="[m]")
+    centre: Vector3 = Field(description="centre [m]")
+    radius: Positive = Field(description="radius [m]")
 
 
 class Capsule(Part, _Round):
     """All points within `radius` of the line from `start` to `end`."""
 
     kind: Literal["capsule"]
-    start: Vector3 = Field(description="in its frame [m]")
-    end: Vector3 = Field(description="in its frame [m]")
-    radius: Positive = Field(description="[m]")
+    start: Vector3 = Field(description="start of the axis [m]")
+    end: Vector3 = Field(description="end of the axis [m]")
+    radius: Positive = Field(description="radius [m]")
 
 
 class Block(Part):
     """A box along the axes of its frame, or turned about its centre."""
 
     kind: Literal["box"]
-    min: Vector3 = Field(description="corner in its frame, before it is turned [m]")
-    max: Vector3 = Field(description="corner in its frame, before it is turned [m]")
+    min: Vector3 = Field(description="lowest corner before the rotation [m]")
+    max: Vector3 = Field(description="highest corner before the rotation [m]")
     attitude: Vector3 | None = Field(
-        default=None, description="roll, pitch, yaw by which it is turned about its centre [rad]; default: not turned"
+        default=None, description="rotation about its centre: roll, pitch, yaw [rad]; default: none"
     )
 
     @model_validator(mode="after")
@@ -100,22 +100,21 @@ class ConvexMesh(Part):
 
     kind: Literal["mesh"]
     file: str | None = Field(
-        default=None, description="in a file: an STL file, binary or text, relative to that file, instead of vertices"
+        default=None,
+        description="STL file, binary or text, instead of vertices; its path is relative to the robot or task file",
     )
     hull: bool = Field(
-        default=False, description="of a file: accept a surface that is not convex, and take its convex hull"
+        default=False, description="true: accept an STL surface that is not convex, and use its convex hull"
     )
     vertices: tuple[Vector3, ...] = Field(
-        default=(), description="points in the body's own axes, in units of `scale`, of which it is the convex hull"
+        default=(), description="points whose convex hull is the body, in its own axes and in units of `scale`"
     )
     scale: Positive = Field(
         default=1.0,
         description="length of a unit of vertices or file [m]: 0.001 for millimetres; required for a file, since STL "
         "has no unit",
     )
-    pose: Pose = Field(
-        default=AT_ORIGIN, description="of the body's axes in its frame, x, y, z, roll, pitch, yaw [m, rad]"
-    )
+    pose: Pose = Field(default=AT_ORIGIN, description="pose of the body's axes: x, y, z, roll, pitch, yaw [m, rad]")
 
     @model_validator(mode="before")
     @classmethod

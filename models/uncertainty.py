@@ -20,7 +20,7 @@ ParameterName = Annotated[str, AfterValidator(_is_one)]
 
 
 class Uncertainty(Part):
-    """The covariance of some numbers of a robot: their errors are normally distributed about the file's values."""
+    """The covariance of some parameters of a robot: their errors are normally distributed about the file's values."""
 
     parameters: tuple[ParameterName, ...] = Field(
         min_length=1,
@@ -28,7 +28,7 @@ class Uncertainty(Part):
         "cables count from 0",
     )
     covariance: tuple[tuple[Finite, ...], ...] = Field(
-        description="of these, a row for each [m^2]; symmetric, no negative eigenvalues"
+        description="covariance of these parameters [m^2]; symmetric, no negative eigenvalues"
     )
 
     @field_validator("parameters")

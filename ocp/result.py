@@ -173,7 +173,7 @@ class PlanData(Displayed):
         """Return feasible variations of an infeasible task; may be empty.
 
         Relaxations with the same plan apply only together. They are computed on first use, which can take longer than
-        the plan: programs are solved for them in the time that the task's limit left.
+        the plan: programs are solved for them in the time that remains of `time_limit`.
         """
         return tuple(self.offers())
 
@@ -184,7 +184,7 @@ class PlanData(Displayed):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Return facts to know before a robot follows the motion, a sentence each.
+        """Return possible problems that no limit covers, one sentence each: read them before a robot moves.
 
         A motion with warnings can be feasible: no limit of the task or the robot forbids them.
         """

@@ -93,7 +93,7 @@ class SimulationData(Displayed):
 
     @property
     def passed(self) -> bool:
-        """Return whether the run is complete, near its reference, and keeps tension limits and taut cables."""
+        """Return whether the run meets all pass criteria: it ended near its reference, within limits, without slack."""
         return not self.failures
 
     @cached_property

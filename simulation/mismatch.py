@@ -40,15 +40,15 @@ class Mismatch(Part):
     carrier; the numbers of a run depend on its seed.
     """
 
-    geometry: bool = Field(default=False, description="whether each run draws a robot from the file's `uncertainty`")
+    geometry: bool = Field(default=False, description="true: each run draws a robot from the file's `uncertainty`")
     mass: Factor = Field(default=1.0, description="factor of the platform's mass and inertia")
     com: Offset = Field(default=0.0, description="distance of the CoM from that of the file, along each axis [m]")
     stiffness: Factor = Field(default=1.0, description="factor of the stiffness of cables")
     tension_gain: Factor = Field(default=1.0, description="tension that a winch gives, as a factor of the command")
     friction: Force = Field(default=0.0, description="dry friction of winches and pulleys, as a force on a cable [N]")
     winch_lag: Lag = Field(default=0.0, description="time constant with which winches follow commands [s]")
-    rotor_lag: Lag = Field(default=0.0, description="the same of the actuators of flying carriers [s]")
-    carrier_lag: Lag = Field(default=0.0, description="the same of carriers whose motion is commanded [s]")
+    rotor_lag: Lag = Field(default=0.0, description="time constant of the actuators of flying carriers [s]")
+    carrier_lag: Lag = Field(default=0.0, description="time constant of carriers whose motion is commanded [s]")
 
     def check(self, robot: Robot) -> None:
         """Check that the robot has what should differ.

@@ -20,14 +20,22 @@ class Noise(Part):
     its beginning.
     """
 
-    position: float = Field(default=0.0, ge=0, le=1e3, description="of the platform's position [m]")
-    attitude: float = Field(default=0.0, ge=0, le=10, description="of its roll, pitch and yaw [rad]")
-    velocity: float = Field(default=0.0, ge=0, le=1e3, description="of its velocity [m/s]")
-    attitude_rate: float = Field(default=0.0, ge=0, le=1e3, description="of the rates of roll, pitch and yaw [rad/s]")
-    tension: float = Field(default=0.0, ge=0, le=1e9, description="of the tensions [N]")
-    position_bias: float = Field(default=0.0, ge=0, le=1e3, description="of the bias of the position [m]")
-    attitude_bias: float = Field(default=0.0, ge=0, le=10, description="of the bias of roll, pitch and yaw [rad]")
-    tension_bias: float = Field(default=0.0, ge=0, le=1e9, description="of the bias of the tensions [N]")
+    position: float = Field(default=0.0, ge=0, le=1e3, description="standard deviation of the platform's position [m]")
+    attitude: float = Field(default=0.0, ge=0, le=10, description="standard deviation of roll, pitch and yaw [rad]")
+    velocity: float = Field(default=0.0, ge=0, le=1e3, description="standard deviation of the velocity [m/s]")
+    attitude_rate: float = Field(
+        default=0.0, ge=0, le=1e3, description="standard deviation of the rates of roll, pitch and yaw [rad/s]"
+    )
+    tension: float = Field(default=0.0, ge=0, le=1e9, description="standard deviation of the tensions [N]")
+    position_bias: float = Field(
+        default=0.0, ge=0, le=1e3, description="standard deviation of the bias of the position [m]"
+    )
+    attitude_bias: float = Field(
+        default=0.0, ge=0, le=10, description="standard deviation of the bias of roll, pitch and yaw [rad]"
+    )
+    tension_bias: float = Field(
+        default=0.0, ge=0, le=1e9, description="standard deviation of the bias of the tensions [N]"
+    )
     resolution: float = Field(default=0.0, ge=0, le=1e3, description="steps of the measured position [m]")
     attitude_resolution: float = Field(default=0.0, ge=0, le=10, description="steps of roll, pitch and yaw [rad]")
     tension_resolution: float = Field(default=0.0, ge=0, le=1e9, description="steps of the measured tensions [N]")
@@ -36,9 +44,11 @@ class Noise(Part):
         default=None,
         ge=0.1,
         le=1e6,
-        description="of all sensors [1/s]; the last readings are held; default: each period",
+        description="rate of all sensors [1/s]; between readings the last one is held; default: each period",
     )
-    delay: float = Field(default=0.0, ge=0, le=10, description="of all sensors [s]; rounded to whole control periods")
+    delay: float = Field(
+        default=0.0, ge=0, le=10, description="delay of all sensors [s]; rounded to whole control periods"
+    )
     stamped: bool = Field(
         default=False, description="whether states have the time of their measurement, from which controllers predict"
     )

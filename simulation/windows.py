@@ -137,7 +137,9 @@ class Windows:
         gaps = np.concatenate([[0], np.cumsum(np.diff(times) > max(GAP * apart, MARGIN))])
         starts = starts[(last - first >= FEWEST) & (gaps[last - 1] == gaps[np.maximum(first - 1, 0)])]
         if not len(starts):
-            raise InputError(f"log must have poses without a gap for {self.window:g} s (window) or longer, got none")
+            raise InputError(
+                f"log must have poses without a gap over at least one window of {self.window:g} s, got none"
+            )
         if len(starts) > MOST_WINDOWS:
             self.notes.append(f"{MOST_WINDOWS} of {len(starts)} windows are used, evenly spread")
             starts = starts[np.linspace(0, len(starts) - 1, MOST_WINDOWS).astype(int)]

@@ -22,7 +22,7 @@ _NO_ENTRY = 1e-6  # Entries of a null-space vector below this have no sign of th
 
 @dataclass(frozen=True, eq=False)
 class TensionProblem(Displayed):
-    r"""Find the tensions closest to reference tensions that give a wrench inside the tension limits.
+    r"""Find tensions inside their limits that give a wrench, as close as possible to reference tensions.
 
     $$
     \min\limits_t \; \sum_i \omega_i (t_i - t_{\text{ref},i})^2
@@ -191,7 +191,7 @@ class TensionProblem(Displayed):
         Parameters
         ----------
         tensions :
-            The tensions to judge [N], shape (m,).
+            The tensions to check [N], shape (m,).
         """
         if not isinstance(tensions, np.ndarray) or tensions.shape != self.t_min.shape or tensions.dtype != np.float64:
             tensions = _per_cable("tensions", tensions, self.m)

@@ -85,12 +85,12 @@ def test_units_and_defaults_are_those_of_the_schema(made):
     """A few rows as they should be, written by hand."""
     robot, task = made["reference/robot-keys.md"], made["reference/task-keys.md"]
     for row in (
-        "| `gravity` | 3 numbers | m/s² | `[0, 0, -9.81]` | in &#123;G&#125; |",
+        "| `gravity` | 3 numbers | m/s² | `[0, 0, -9.81]` | acceleration of gravity in &#123;G&#125; |",
         "| `t_max` | number &gt; 0 | N | required | largest tension |",
         "| `friction` | number &gt;= 0 | N | 0 | dry friction, as a force on the cable |",
     ):
         assert row in robot
-    assert "| `margin` | number &gt;= 0 | N | 0 | every tension stays this far inside its limits |" in task
+    assert "| `margin` | number &gt;= 0 | N | 0 | smallest distance of every tension from its limits |" in task
     assert "| `steps` | whole number &gt;= 4, &lt;= 20000 |  | 100 |" in task
 
 

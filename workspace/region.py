@@ -31,7 +31,8 @@ class Region(Part):
     """
 
     position: Box | None = Field(
-        default=None, description="of the platform frame in {G} [m]; default: a box about home and anchors"
+        default=None,
+        description="box of positions of the platform frame in {G} [m]; default: a box about home and anchors",
     )
     attitude: Vector3 | AngleBox | None = Field(
         default=None, description="(roll, pitch, yaw) or a box of them [rad]; default: the attitude at home"
@@ -42,8 +43,8 @@ class Region(Part):
     )
     lengths: PositiveRange | None = Field(
         default=None,
-        description="of each of three cables [m]; the position then follows from carriers, attitude and lengths: the "
-        "lower of the two points where the cables meet",
+        description="range of the lengths of each of three cables [m]; the position then follows from carriers, "
+        "attitude and lengths: the lower of the two points where the cables meet",
     )
 
     @model_validator(mode="after")

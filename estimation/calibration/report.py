@@ -89,7 +89,9 @@ def _of_held_out(result: CalibrationData) -> list[str]:
             f"help"
         )
     elif held_out.after > 1.5 * fitted:
-        lines.append(f"fitted samples have {_mm(fitted)}: too few samples for so many parameters, measure more")
+        lines.append(
+            f"training samples have {_mm(fitted)}: too few samples for this number of parameters, measure more"
+        )
     return lines
 
 

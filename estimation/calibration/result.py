@@ -103,7 +103,7 @@ class CalibrationData(Displayed):
 
     @property
     def beyond_prior(self) -> tuple[tuple[str, float], ...]:
-        """Return parameters that moved by more than 5 standard deviations of the prior, and by how many, most first."""
+        """Return parameters moved by more than 5 standard deviations of the prior, largest first, and by how many."""
         of, state = self._solved.model.parameters, self._solved.fit.state
         moved = np.abs(state.x - of.first) / self._solved.model.prior_sigmas
         far = [i for i in np.argsort(-moved) if moved[i] > FAR]

@@ -72,7 +72,7 @@ def read_measurements(
         Standard deviations as for `Measurements`; default: those of the file if `Measurements.save` wrote it, otherwise
         the defaults of `Measurements`.
     poses
-        Log of the poses, if it is another one; its clock is aligned by cable speeds.
+        Log of the poses, if they are in another file; its clock is aligned by cable speeds.
     robot
         Robot of the log, to align clocks; not used otherwise.
     fields

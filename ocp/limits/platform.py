@@ -54,7 +54,7 @@ class PlatformAcceleration(Magnitude):
 
 
 class PlatformLateralAcceleration(Magnitude):
-    """Limit what an open cup on the platform feels sideways: acceleration less gravity in the platform's x and y."""
+    """Limit acceleration minus gravity along the platform's x and y axes, which makes an open cup spill."""
 
     name, unit = "platform_lateral_acceleration", "m/s^2"
 

@@ -40,21 +40,21 @@ class _State(Part):
 class Initial(_State):
     """The state at the start of a motion, in {G}; it overrides `tube.ends` and `base.ends` there."""
 
-    pose: PoseOrPosition = Field(description="(x, y, z) or (x, y, z, roll, pitch, yaw) of the platform [m, rad]")
-    velocity: PoseOrPosition = Field(default=STILL, description="their time derivatives [m/s, rad/s]")
+    pose: PoseOrPosition = Field(description="pose of the platform: (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+    velocity: PoseOrPosition = Field(default=STILL, description="time derivative of the pose [m/s, rad/s]")
     acceleration: PoseOrPosition | None = Field(
-        default=None, description="the second ones [m/s^2, rad/s^2]; default: as the planner chooses"
+        default=None, description="second time derivative [m/s^2, rad/s^2]; default: chosen by the planner"
     )
     carrier_pose: tuple[Pose, ...] | None = Field(
-        default=None, description="of each carrier [m, rad]; default: as base.ends requires"
+        default=None, description="pose of each carrier [m, rad]; default: as base.ends requires"
     )
     carrier_velocity: tuple[Pose, ...] | None = Field(
-        default=None, description="of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
+        default=None, description="velocity of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
     )
     tensions: tuple[Finite, ...] | None = Field(
         default=None,
-        description="of each cable [N], clipped to the limits; they determine the acceleration at the start. Default: "
-        "as the planner chooses",
+        description="tension of each cable, clipped to the limits [N]; they determine the acceleration at the start; "
+        "default: chosen by the planner",
     )
 
 
@@ -63,23 +63,26 @@ class Final(_State):
 
     pose: PoseOrPosition | None = Field(
         default=None,
-        description="of the platform [m, rad]; default: anywhere in the tube if velocity is given, else as tube.ends "
-        "requires",
+        description="pose of the platform [m, rad]; default: anywhere in the tube if velocity is given, else as "
+        "tube.ends requires",
     )
     velocity: OrZero | None = Field(
-        default=None, description="its time derivative, or 0: at rest; default: at rest, if pose is given"
+        default=None,
+        description="time derivative of the pose [m/s, rad/s], or 0: at rest; default: at rest, if pose is given",
     )
     acceleration: OrZero | None = Field(
-        default=None, description="the second one, or 0; default: 0 at rest without a pose, else as the planner chooses"
+        default=None,
+        description="second time derivative [m/s^2, rad/s^2], or 0; default: 0 at rest without a pose, else chosen by "
+        "the planner",
     )
     carrier_pose: tuple[Pose, ...] | None = Field(
-        default=None, description="of each carrier [m, rad]; default: as base.ends requires"
+        default=None, description="pose of each carrier [m, rad]; default: as base.ends requires"
     )
     carrier_velocity: tuple[Pose, ...] | None = Field(
-        default=None, description="of each carrier; default: at rest, if carrier_pose is given"
+        default=None, description="velocity of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
     )
     carrier_acceleration: tuple[Pose, ...] | None = Field(
-        default=None, description="of each carrier; default: as the planner chooses"
+        default=None, description="acceleration of each carrier [m/s^2, rad/s^2]; default: chosen by the planner"
     )
 
     @property

@@ -25,11 +25,12 @@ def _check_positive_semidefinite(inertia: Inertia) -> Inertia:
 class Load(Part):
     """A rigid body that is fixed to the platform, in addition to the platform of the robot's file."""
 
-    mass: Positive = Field(description="[kg]")
+    mass: Positive = Field(description="mass [kg]")
     com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM of the load in the platform frame [m]")
     inertia: Annotated[Inertia, AfterValidator(_check_positive_semidefinite)] = Field(
         default=AT_ORIGIN,
-        description="(Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs [kg m^2]",
+        description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs "
+        "[kg m^2]",
     )
     body: AnyBody | None = Field(
         default=None,
@@ -60,16 +61,18 @@ class Ground(Part):
 class Phase(Part):
     """A part of a task: a path, the load, and the ground."""
 
-    name: Name = Field(description="of the phase, in reports")
-    path: SinglePath | None = Field(default=None, description="default: rest at the end of the previous phase")
+    name: Name = Field(description="name of the phase, for reports")
+    path: SinglePath | None = Field(
+        default=None, description="path of the platform; default: rest at the end of the previous phase"
+    )
     duration: Positive | PositiveRange | None = Field(
         default=None,
-        description="[s], at least 0.01; or a range {min, max}, from which the planner takes the shortest "
+        description="duration [s], at least 0.01; or a range {min, max}, from which the planner takes the shortest "
         "feasible duration; default: the path's own",
     )
     load: Load | None = Field(default=None, description="load fixed to the platform; default: none")
     ground: Ground | None = Field(
-        default=None, description="the platform or its load rests on the ground; default: it hangs"
+        default=None, description="contact of the platform or its load with the ground; default: none, it hangs"
     )
 
 

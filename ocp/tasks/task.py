@@ -68,14 +68,18 @@ class HoldBase(Part):
     """Carriers that hold their positions."""
 
     kind: Literal["hold"]
-    poses: dict[Name, Pose] = Field(default={}, description="poses by carrier, in {G} [m, rad]; others at home")
+    poses: dict[Name, Pose] = Field(
+        default={}, description="pose of each carrier by its name, in {G} [m, rad]; others at home"
+    )
 
 
 class GivenBase(Part):
     """Carriers that move as given: their motion is a disturbance."""
 
     kind: Literal["given"]
-    paths: dict[Name, AnyPath] = Field(min_length=1, description="by carrier, in {G}; others stay at home")
+    paths: dict[Name, AnyPath] = Field(
+        min_length=1, description="path of each carrier by its name, in {G}; others stay at home"
+    )
 
 
 class FreeBase(Part):
@@ -83,10 +87,10 @@ class FreeBase(Part):
 
     kind: Literal["free"]
     around: dict[Name, AnyPath] = Field(
-        default={}, description="by carrier, the reference motion in {G} for its offset; default: rest at home"
+        default={}, description="reference motion of each carrier by its name, in {G}; default: rest at home"
     )
-    acceleration_max: Positive | None = Field(default=None, description="[m/s^2]")
-    speed_max: Positive | None = Field(default=None, description="[m/s]")
+    acceleration_max: Positive | None = Field(default=None, description="largest acceleration [m/s^2]")
+    speed_max: Positive | None = Field(default=None, description="largest speed [m/s]")
     tilt_max: float = Field(
         default=0.0,
         ge=0,
@@ -94,7 +98,9 @@ class FreeBase(Part):
         description="largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have "
         "the limit of the robot's file",
     )
-    turn_acceleration_max: Positive | None = Field(default=None, description="[rad/s^2], each Euler angle")
+    turn_acceleration_max: Positive | None = Field(
+        default=None, description="largest second derivative of each Euler angle [rad/s^2]"
+    )
     ends: Literal["free", "rest", "periodic", "exact"] | None = Field(
         default=None,
         description="free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
@@ -107,7 +113,7 @@ AnyBase = Annotated[HoldBase | GivenBase | FreeBase, Field(discriminator="kind")
 
 
 class Objective(Part):
-    """Weights of the cost terms: each number is the amount of its quantity that adds 1 (Bryson's rule).
+    """Scales of the cost terms: each number is the amount of its quantity that adds 1 (Bryson's rule).
 
     The cost is the mean over time of sum |quantity / number|^2, so a larger number makes a term less important. A term
     applies only if its quantity is free.
@@ -122,7 +128,7 @@ class Objective(Part):
         default=None,
         description="distance from the path [m], angles times `Robot.length`; default: a tenth of the tube",
     )
-    carrier_acceleration: Positive = Field(default=1.0, description="[m/s^2, rad/s^2]")
+    carrier_acceleration: Positive = Field(default=1.0, description="acceleration of carriers [m/s^2, rad/s^2]")
     carrier_offset: Positive = Field(default=10.0, description="distance of carriers from `around` or home [m, rad]")
     jerk: Positive = Field(
         default=10.0, description="jerk of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth"
@@ -159,7 +165,7 @@ class Task(Part):
 
     model_config = ConfigDict(json_schema_extra=_or_phases)
 
-    name: Name = Field(default="task", description="of the task, in reports and names of files")
+    name: Name = Field(default="task", description="name of the task, for reports and file names")
     path: AnyPath = Field(
         default=cast(Any, None), description="path of the platform; with phases: the sequence of their paths"
     )
@@ -167,7 +173,7 @@ class Task(Part):
         default=None, min_length=1, description="instead of path and duration: parts of the motion, with their loads"
     )
     duration: Positive | PositiveRange | None = Field(
-        default=None, description="[s], or a range from which the planner chooses; default: the path's own"
+        default=None, description="duration [s], or a range from which the planner chooses; default: the path's own"
     )
     base: AnyBase = Field(
         default=HoldBase(kind="hold"),
@@ -178,7 +184,7 @@ class Task(Part):
         default=None, description="measured initial state of a moving robot; default: as `ends` require"
     )
     final: Final | None = Field(default=None, description="state in which the motion ends; default: as `ends` require")
-    margin: NonNegative = Field(default=0.0, description="every tension stays this far inside its limits [N]")
+    margin: NonNegative = Field(default=0.0, description="smallest distance of every tension from its limits [N]")
     robust: Share | None = Field(
         default=None,
         description="fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, whose tensions "
@@ -202,7 +208,7 @@ class Task(Part):
     scheme: SchemeName = Field(
         default="linear",
         description="acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
-        "spline: a cubic B-spline, smooth",
+        "spline: a smooth cubic B-spline",
     )
     objective: Objective = Objective()
     time_limit: Positive = Field(

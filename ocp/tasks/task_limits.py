@@ -44,7 +44,7 @@ class KeepOut(Part):
     carrier_platform_clearance. Cables end at their attachments, so such a body must not contain these.
     """
 
-    name: str = Field(default="obstacle", min_length=1, max_length=60, description="in reports and figures")
+    name: str = Field(default="obstacle", min_length=1, max_length=60, description="name for reports and figures")
     frame: Literal["world", "platform"] = Field(
         default="world",
         description="world: fixed in {G}; platform: it moves with the platform, and cables and carriers keep out of it",
@@ -93,9 +93,9 @@ AnyKeepOut = Annotated[Sphere | Capsule | Block | ConvexMesh, Field(discriminato
 class SpeedZone(Part):
     """A ball in which the platform is slow."""
 
-    name: str = Field(default="zone", min_length=1, max_length=60, description="in reports and figures")
-    centre: Vector3 = Field(description="its centre in {G} [m]")
-    radius: Positive = Field(description="[m]")
+    name: str = Field(default="zone", min_length=1, max_length=60, description="name for reports and figures")
+    centre: Vector3 = Field(description="centre in {G} [m]")
+    radius: Positive = Field(description="radius [m]")
     speed: Positive = Field(description="largest speed of the platform frame's origin inside [m/s]")
 
 
@@ -128,15 +128,15 @@ class TaskLimits(Part):
     tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
     platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
     zone_speed: tuple[SpeedZone, ...] = Field(
-        default=(), description="balls inside which the platform is slow; outside, the limit rises by 10 m/s per metre"
+        default=(), description="balls with a speed limit, which rises by 10 m/s per metre of distance from the ball"
     )
     platform_acceleration: Positive | None = Field(
         default=None, description="acceleration of the platform frame's origin [m/s^2]"
     )
     platform_lateral_acceleration: Positive | None = Field(
         default=None,
-        description="what an open cup on the platform feels sideways: acceleration less gravity in the platform's x "
-        "and y [m/s^2]",
+        description="acceleration minus gravity along the platform's x and y axes, which makes an open cup spill "
+        "[m/s^2]",
     )
     platform_turn: Positive | None = Field(default=None, description="angular velocity of the platform [rad/s]")
     platform_tilt: Positive | None = Field(

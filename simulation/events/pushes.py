@@ -65,10 +65,10 @@ class Wall(Lasting):
 
     kind: Literal["wall"] = "wall"
     point: Vector3 = Field(description="a point of the plane in {G} [m]")
-    normal: Vector3 = Field(description="direction in {G} to the side on which the robot is, of any length")
+    normal: Vector3 = Field(description="direction in {G} towards the robot, of any length")
     stiffness: Positive = Field(description="force per depth [N/m]")
     damping: NonNegative = Field(default=0.0, description="force per speed into the wall [N s/m]")
-    radius: NonNegative = Field(default=0.0, description="of the ball that it touches [m]")
+    radius: NonNegative = Field(default=0.0, description="radius of the ball that touches the wall [m]")
 
     @model_validator(mode="after")
     def _has_normal(self) -> Self:

@@ -17,8 +17,8 @@ class MetricInRange(Condition):
 
     kind: Literal["metric"] = "metric"
     metric: str = Field(description=f"one of {', '.join(METRICS)}")
-    min: Finite | None = Field(default=None, description="in the unit of the metric; default: no minimum")
-    max: Finite | None = Field(default=None, description="in the unit of the metric; default: no maximum")
+    min: Finite | None = Field(default=None, description="minimum, in the unit of the metric; default: none")
+    max: Finite | None = Field(default=None, description="maximum, in the unit of the metric; default: none")
 
     @field_validator("metric")
     @classmethod

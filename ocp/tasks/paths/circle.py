@@ -15,12 +15,12 @@ class CirclePath(PathBase):
     """A circle about the vertical at constant speed, with an optional drift of its centre: a helix."""
 
     kind: Literal["circle"]
-    centre: Vector3 = Field(description="[m]")
-    radius: NonNegative = Field(description="[m]")
-    rate: Finite = Field(description="[rad/s], positive: counter-clockwise from above")
+    centre: Vector3 = Field(description="centre at the start [m]")
+    radius: NonNegative = Field(description="radius [m]")
+    rate: Finite = Field(description="angular velocity [rad/s]; positive: counter-clockwise from above")
     phase: Finite = Field(default=0.0, description="angle at the start, from the x axis [rad]")
     drift: Vector3 = Field(default=(0.0, 0.0, 0.0), description="velocity of the centre [m/s]")
-    attitude: Vector3 = Field(default=(0.0, 0.0, 0.0), description="constant (roll, pitch, yaw) [rad]")
+    attitude: Vector3 = Field(default=(0.0, 0.0, 0.0), description="constant attitude (roll, pitch, yaw) [rad]")
 
     @property
     @override

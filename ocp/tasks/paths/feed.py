@@ -37,12 +37,14 @@ class FeedPath(PathBase):
     )
     feed: Positive | None = Field(default=None, description="speed [m/s]; default: that of each line of a .gcode file")
     acceleration: Positive = Field(description="largest acceleration, along the path and across it in corners [m/s^2]")
-    tolerance: NonNegative = Field(default=1e-3, description="by how much a corner may be missed [m]; 0: stop at each")
+    tolerance: NonNegative = Field(
+        default=1e-3, description="largest distance at which the path passes a corner [m]; 0: stop at each corner"
+    )
     feeds: tuple[Positive, ...] | None = Field(default=None, description="speed of each line, instead of `feed` [m/s]")
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
         json_schema_extra=or_number,
-        description="how long the path stops at each point, a number or one for each [s]; default: no stop",
+        description="duration of the stop at each point, a number or one for each [s]; default: no stop",
     )
     ignored: tuple[str, ...] = Field(default=(), description="words of the .gcode file that were not used")
 

@@ -22,12 +22,16 @@ class ReturnPath(PathBase):
 
     kind: Literal["return"]
     path: Annotated[SinglePath | SequencePath, Field(discriminator="kind")] = Field(description="the whole path")
-    duration: Positive = Field(description="of the whole path [s]")
-    start: NonNegative = Field(description="time on the whole path at which this one starts [s]")
+    duration: Positive = Field(description="duration of the whole path [s]")
+    start: NonNegative = Field(description="time on the whole path at which the remainder starts [s]")
     settle: Positive = Field(description="time after which the offset is zero [s]")
-    offset: Pose = Field(default=AT_ORIGIN, description="from the path at the start [m, rad]")
-    offset_velocity: Pose = Field(default=AT_ORIGIN, description="its time derivative at the start [m/s, rad/s]")
-    offset_acceleration: Pose = Field(default=AT_ORIGIN, description="the second one [m/s^2, rad/s^2]")
+    offset: Pose = Field(default=AT_ORIGIN, description="offset from the path at the start [m, rad]")
+    offset_velocity: Pose = Field(
+        default=AT_ORIGIN, description="time derivative of the offset at the start [m/s, rad/s]"
+    )
+    offset_acceleration: Pose = Field(
+        default=AT_ORIGIN, description="second time derivative of the offset at the start [m/s^2, rad/s^2]"
+    )
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

@@ -15,7 +15,7 @@ class SamplePath(PathBase):
     """Interpolate samples by a quintic spline; its speeds at the ends follow from the samples near them."""
 
     kind: Literal["samples"]
-    times: tuple[Finite, ...] = Field(min_length=6, description="from 0 on, increasing [s]")
+    times: tuple[Finite, ...] = Field(min_length=6, description="times, increasing from 0 [s]")
     poses: tuple[PoseOrPosition, ...] = Field(min_length=6, description="a pose or position at each time [m, rad]")
 
     @model_validator(mode="after")

@@ -31,8 +31,8 @@ SinglePath: TypeAlias = Annotated[
 class Piece(Part):
     """One path of a sequence."""
 
-    path: SinglePath = Field(description="in the frame of the sequence")
-    duration: Positive | None = Field(default=None, description="[s]; default: the path's own")
+    path: SinglePath = Field(description="path in the frame of the sequence")
+    duration: Positive | None = Field(default=None, description="duration [s]; default: the path's own")
 
     @property
     def seconds(self) -> float:

@@ -36,11 +36,10 @@ class TimedPath(PathBase):
     until: Positive | None = Field(
         default=None, description="end of the path by its own time [s]; default: its natural duration"
     )
-    s: tuple[Finite, ...] = Field(min_length=2, description="from 0 to 1, increasing")
+    s: tuple[Finite, ...] = Field(min_length=2, description="grid of s, increasing from 0 to 1")
     speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
     dwell: tuple[NonNegative, ...] | None = Field(
-        default=None,
-        description="how long the path stops at each s [s]; must be zero where its speed is not; default: nowhere",
+        default=None, description="duration of the stop at each s [s]; zero where the speed is not; default: no stop"
     )
 
     @model_validator(mode="after")

@@ -33,7 +33,7 @@ class WaypointPath(PathBase):
 
     The path stays inside the box of its points and passes them at a distance of at most `blend`. It stops at a point
     where it reverses or dwells, and at all points if `blend` is 0. Attitudes turn the shortest way: from 3.1 to -3.1
-    rad is a turn of 0.08 rad. When path length is measured, 1 rad counts as 1 m.
+    rad is a turn of 0.08 rad. Where path length is measured, 1 rad is taken as 1 m.
 
     As a `spline` it is a curve of degree 5 from rest to rest that passes exactly through the points but may leave their
     box.
@@ -72,7 +72,7 @@ class WaypointPath(PathBase):
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None,
         json_schema_extra=or_number,
-        description="for legs: how long the path stops at each point, a number or one for each [s]; included in the "
+        description="for legs: duration of the stop at each point, a number or one for each [s]; included in the "
         "duration; default: no stop",
     )
 
@@ -228,8 +228,8 @@ class WaypointPath(PathBase):
 def shortest_order(points: np.ndarray) -> list[int]:
     """Return the indices of points (n, 6) [m, rad] in the order of the shortest path; the first and the last one stay.
 
-    1 rad counts as 1 m, and angles turn the shortest way. Source: M. Held, R. M. Karp, "A dynamic programming approach
-    to sequencing problems", 1962.
+    1 rad is taken as 1 m, and angles turn the shortest way. Source: M. Held, R. M. Karp, "A dynamic programming
+    approach to sequencing problems", 1962.
     """
     apart = points[:, None] - points
     apart[..., 3:] -= 2 * np.pi * np.round(apart[..., 3:] / (2 * np.pi))
