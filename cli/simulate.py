@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 _MANY = "With --runs: "
 WINDOW = 0.5  # [s]
-CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "open-loop")
+CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "open-loop", "fault-tolerant")
 
 
 def simulate(
@@ -204,7 +204,7 @@ def simulate(
             raise InputError(f"{name} must be left out with --runs, got {file}")
     # Before libraries load: the processes of --workers share the processors.
     with one_thread_each(), _named(event or []):
-        from ..control import ComputedTorque, LengthControl, OpenLoop, Predictive
+        from ..control import ComputedTorque, FaultTolerant, LengthControl, OpenLoop, Predictive
         from ..models import load
         from ..models.parsing import read_yaml
         from ..simulation import Conditions, Execution, Mismatch, Noise, simulate
@@ -219,7 +219,7 @@ def simulate(
         outputs = {"the checkpoint": stored, "--out": target, "--animate": animate, "--report": report}
         outputs["--figures"] = figures and figures / f"error{end}.{form}"
         check_outputs(outputs, {"the plan": plan, "--noise": noise, "--mismatch": mismatch})
-        kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop)
+        kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop, FaultTolerant)
         pilot = dict(zip(CONTROLLERS, kinds, strict=True))[controller](loaded)
         air = None if wind is None else numbers("--wind", wind, 3)
         sensors = None if noise is None else read_yaml(noise, Noise)

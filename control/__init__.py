@@ -8,6 +8,7 @@ sensors.
 from .command import ANSWERS, Command
 from .computed_torque import ComputedTorque
 from .controller import Controller
+from .fault_tolerant import FaultTolerant
 from .filtered import Filtered
 from .length_control import LengthControl
 from .open_loop import OpenLoop
@@ -22,6 +23,7 @@ __all__ = [
     "Command",
     "ComputedTorque",
     "Controller",
+    "FaultTolerant",
     "Filtered",
     "LengthControl",
     "OpenLoop",

@@ -37,6 +37,8 @@ class Command(NamedTuple):
     lengths
         Unstrained lengths for winches that take them, (..., m) [m], instead of the tensions, which are then those that
         are expected; default: None.
+    released
+        Cables that their carriers release, (..., m) of bool; default: None.
     """
 
     tensions: np.ndarray
@@ -49,5 +51,6 @@ class Command(NamedTuple):
     actuation: np.ndarray | None = None
     unexplained: np.ndarray = NOTHING
     lengths: np.ndarray | None = None
+    released: np.ndarray | None = None
 
     __repr__ = record

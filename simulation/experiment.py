@@ -30,13 +30,6 @@ class Experiment(NamedTuple):
 
     __repr__ = record
 
-    def should_pull(self, t_min: np.ndarray, periods: np.ndarray) -> np.ndarray:
-        """Return where a slack cable is a failure, (n, m): t_min (m,) [N] is above zero and no event has cut it.
-
-        `periods`, (n,), are their numbers.
-        """
-        return (t_min > 0) & ~self.cut(len(t_min), periods)
-
     def cut(self, cables: int, periods: np.ndarray) -> np.ndarray:
         """Return which cables are cut when periods begin, (n, cables); `periods`, (n,), are their numbers."""
         result = np.zeros((len(periods), cables), dtype=bool)

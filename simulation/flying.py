@@ -124,6 +124,8 @@ def fly(
         if shapes is None or shapes != expected:
             check_command(command, robot, flights, time)
             expected = shapes
+        if command.released is not None:
+            plant.release(states, command.released)
         try:
             row = orders.rows(k, command, lengths, states)
         except (TypeError, ValueError):
@@ -208,15 +210,14 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
     shapes |= {f"carrier_{part}": (count, 6) for part in ("pose", "velocity", "acceleration")}
     if command.actuation is not None:
         shapes["actuation"] = (count, max(len(carrier.actuators) for carrier in robot.carriers))
-    if command.lengths is not None:
-        shapes["lengths"] = (robot.m,)
+    shapes |= {name: (robot.m,) for name in ("lengths", "released") if getattr(command, name) is not None}
     for name, core in shapes.items():
         values = np.asarray(getattr(command, name))
         if values.shape != (*lead, *core):
             raise InputError(
                 f"controller must return {name} of shape {(*lead, *core)}, got shape {values.shape} at t = {time:g} s"
             )
-        if values.dtype.kind not in "fiu" or not np.isfinite(values).all():
+        if values.dtype.kind not in "fiub" or not np.isfinite(values).all():
             raise InputError(f"controller must return finite {name}, got others at t = {time:g} s")
     answered = np.asarray(command.answered)
     if not ((answered >= 0) & (answered < len(ANSWERS))).all():

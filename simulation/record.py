@@ -32,6 +32,7 @@ class Record(Displayed):
         self.answered = np.zeros(periods, dtype=np.int8)
         self.direction, self.shortfall = np.full((periods, 6), np.nan), np.full(periods, np.nan)
         self.unexplained = np.full(periods, np.nan)
+        self.released = np.zeros((periods, m), dtype=bool)
         self.orders = np.full((periods, carriers, 6), np.nan)
 
     def take(self, period: Period) -> None:
@@ -43,6 +44,8 @@ class Record(Displayed):
             if not 0 < command.answered < len(ANSWERS):
                 raise IndexError(command.answered)
             self.direction[k], self.shortfall[k] = command.direction, command.shortfall
+        if command.released is not None:
+            self.released[k] = command.released
         if command.unexplained is not NOTHING:
             self.unexplained[k] = command.unexplained
         if command.actuation is not None:

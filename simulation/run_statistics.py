@@ -27,8 +27,9 @@ class Extremes:
     def __init__(self, conditions: Experiment, robot: Robot, flights: int):
         self._references, self._t_max, self._range = conditions.references, robot.t_max, robot.t_max - robot.t_min
         periods = np.arange(len(conditions.references))
-        self._taut = conditions.should_pull(robot.t_min, periods)
+        self._taut = (robot.t_min > 0) & ~conditions.cut(robot.m, periods)  # where a slack cable is a failure
         self._cut = conditions.cut(robot.m, periods + 1)  # also inside the period
+        self._kept: np.ndarray | None = None  # cables that are not released, (N, m); None: all
         self._rows = np.arange(flights)
         self._squares, self._largest = np.zeros(flights), np.zeros(flights)  # of the errors: sum, and largest
         self._slack, self._answers = np.zeros(flights, dtype=int), np.zeros((flights, len(ANSWERS)), dtype=int)
@@ -44,11 +45,16 @@ class Extremes:
         square = off[:, 0] + off[:, 1] + off[:, 2]
         self._squares[rows] += square
         self._largest[rows] = np.maximum(self._largest[rows], square)
-        whole = ~self._cut[period.number]
+        whole, taut = ~self._cut[period.number], self._taut[period.number]
+        if command.released is not None:
+            kept = ~np.broadcast_to(np.asarray(command.released, dtype=bool), period.tensions.shape)
+            self._kept = kept if self._kept is None else self._kept & kept
+        if self._kept is not None:
+            whole, taut = whole & self._kept[rows], taut & self._kept[rows]
         self._least[rows] = np.minimum(self._least[rows], tensions, where=whole, out=self._least[rows])
         self._most[rows] = np.maximum(self._most[rows], tensions, where=whole, out=self._most[rows])
         if not tensions.min() > 0:
-            self._slack[rows] += ((tensions <= 0) & self._taut[period.number]).any(axis=1)
+            self._slack[rows] += ((tensions <= 0) & taut).any(axis=1)
         answered = np.atleast_1d(command.answered)[rows]
         if answered.any():
             self._answers[self._rows[rows], answered] += 1

@@ -39,9 +39,8 @@ class Simulation(SimulationData, Filmed, Reported):
 
     def figures_of_merit(self) -> dict[str, Any]:
         """Return the result metrics, without wall times: the same seed gives the same metrics."""
-        periods = np.arange(self._recorded)
         tensions = self.record.tensions[: self._recorded]
-        pulling = tensions[~self.conditions.cut(self.robot.m, periods + 1)]  # where no cut falls inside the period
+        pulling = tensions[~self.cut(1)]  # where no cut falls inside the period
         shortfall = self.record.shortfall[: self._recorded]
         return {
             "passed": self.passed,
@@ -110,8 +109,9 @@ class Simulation(SimulationData, Filmed, Reported):
         if actuators:
             about = "commands to the actuators of each carrier"
             variables["actuation"] = over(("time", "carrier", "actuator"), record.actuation[rows], "N, N m", about)
-        if (gone := self.conditions.cut(self.robot.m, np.arange(self._recorded))).any():
-            variables["cut"] = Variable(cable, gone.astype(np.int8), {"long_name": "1 once the cable is cut"})
+        if (gone := self.cut()).any():
+            about = {"long_name": "1 once the cable is cut or released"}
+            variables["cut"] = Variable(cable, gone.astype(np.int8), about)
         if self.wind is not None:
             variables["wind"] = over(("time", "axis"), self.wind[rows], "m/s", "velocity of the air in G")
         variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
@@ -241,6 +241,10 @@ class Occurrence(NamedTuple):
 def occurrences(flight: SimulationData) -> list[Occurrence]:
     """Return the events of a run and the first instants at which limits were exceeded, in order of time."""
     found = [Occurrence(event.at, "fault", event.describe(flight.robot)) for event in flight.conditions.events]
+    released = flight.record.released[: flight.lasted]
+    for cable in np.flatnonzero(released.any(axis=0)):
+        at = float(flight.times[released[:, cable].argmax()])
+        found.append(Occurrence(at, "fault", f"cable {cable + 1} was released"))
     if flight.slack.any():
         row, cable = np.argwhere(flight.slack)[0]
         found.append(Occurrence(float(flight.times[row]), "slack", f"the first cable to slacken was {cable + 1}"))

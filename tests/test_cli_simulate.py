@@ -131,7 +131,7 @@ def test_many_flights_have_one_table(folder):
             "wang-flying",
             "step.nc",
             ["--controller", "pid"],
-            "--controller must be one of computed-torque, predictive, lengths, open-loop, got 'pid'",
+            "--controller must be one of computed-torque, predictive, lengths, open-loop, fault-tolerant, got 'pid'",
         ),
         ("wang-flying", "step.nc", ["--workers", "2"], "--workers must be left out without --runs"),
         ("wang-flying", "step.nc", ["--runs", "2", "--animate", "film.gif"], "--animate must be left out with --runs"),

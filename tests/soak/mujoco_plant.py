@@ -218,6 +218,8 @@ class World:
             s = k * h
             self._put_mocaps(poses + s * rates + s * s / 2 * bends)
             ends = self._tensions(wanted, h)
+            if command.released is not None:
+                ends = np.where(command.released, 0.0, ends)
             mean += ends / self._substeps
             data.ctrl[:m] = ends
             if actuation is not None:

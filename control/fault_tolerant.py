@@ -1,0 +1,241 @@
+"""`FaultTolerant`: control of a team of flying carriers that goes on with the others if one loses its thrust."""
+
+import os
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+from warnings import warn
+
+import numpy as np
+from typing_extensions import override
+
+from ..base.errors import InputError
+from ..base.inputs import required
+from ..base.text import quantity_row
+from ..models.files import as_robot
+from ..models.robot import Robot
+from ..statics.formation import formation
+from .as_floats import as_floats
+from .command import Command
+from .controller import Controller
+from .predictive import Predictive
+from .reference import Reference
+from .state import State
+from .watch import HandOver
+
+NOTICED = 0.3  # of a carrier's weight: force along gravity that nothing explains
+BLENDED = 1.0  # [s], in which the others go to their new formation
+APART = 0.01  # [s], of references that are announced
+SETTLED = 3.0  # [s], from which their motion is as predicted again
+ROOM = 0.2  # of the cables' length: reach of the others, which have to move far
+
+
+def _orders(*coefficients: float) -> list[np.polynomial.Polynomial]:
+    """Return a polynomial and two derivatives."""
+    return [np.polynomial.Polynomial(coefficients).deriv(order) for order in range(3)]
+
+
+# Of an offset of 1, and of one with a rate of 1, at the beginning, both without acceleration, that end at rest at 0.
+FADES = _orders(1, 0, 0, -10, 15, -6), _orders(0, 1, 0, -6, 8, -3)
+
+
+class Others(Predictive):
+    """Control those that are left, in a motion that begins far from what predictions describe."""
+
+    watched_from = -np.inf  # [s]
+
+    @override
+    def _compare(self, time: float, dt: float, reference: Reference) -> None:
+        if time >= self.watched_from:
+            super()._compare(time, dt, reference)
+        else:
+            self._watch.interrupt()
+
+
+class Rest(NamedTuple):
+    """The team without one carrier and its cables: which are left, its controller, and the offsets of its formation."""
+
+    carriers: np.ndarray  # indices, (c - 1,)
+    cables: np.ndarray  # likewise
+    controller: Others
+    tilt: np.ndarray  # roll and pitch of the platform, (2,) [rad]
+    carrier_pose: np.ndarray  # position from the platform and angles, (c - 1, 6), for a yaw of zero
+    tensions: np.ndarray  # [N]
+
+
+class FaultTolerant(Controller):
+    """Control a team of flying carriers with `Predictive`, and go on without a carrier that loses its thrust.
+
+    A carrier is lost if a force along gravity of 0.3 of its weight is not explained by its thrust, its weight and its
+    cables. From then on its cables are to be released (`Command.released`), and the others go to the formation with
+    which they carry the platform at the planned position, in 1 s. It is found at construction for each carrier, with a
+    controller, see `statics.formation`. If there is none, a warning says which wrench is missing, and nothing changes
+    when that carrier is lost.
+
+    Parameters
+    ----------
+    robot
+        A `Robot`, the name of one in the library, or the path of a robot file, with flying carriers alone and cables of
+        fixed length.
+    options
+        Arguments of `Predictive`, of the team and of the others.
+
+    Attributes
+    ----------
+    lost
+        Time and description of a loss, a `HandOver`; None without one.
+
+    Raises
+    ------
+    InputError
+        If the robot has other carriers or winches, or an argument has a wrong value.
+    """
+
+    def __init__(self, robot: Robot | str | os.PathLike[str], **options: Any):
+        self.robot = as_robot(robot)
+        other = [carrier.name for carrier in self.robot.carriers if not carrier.actuators]
+        if other or self.robot.fixed_lengths is None:
+            reason = f"the carrier {other[0]!r}, which does not fly" if other else "winches"
+            raise InputError(f"robot must be a team of flying carriers with cables of fixed length, got {reason}")
+        self._team = Predictive(self.robot, **options)
+        self._weights = np.array([carrier.body.mass for carrier in self.robot.carriers if carrier.body is not None])
+        self._weights *= np.linalg.norm(self.robot.gravity)
+        self._down = np.array(self.robot.gravity) / np.linalg.norm(self.robot.gravity)
+        self._rests = [_without(self.robot, index, options) for index in range(len(self.robot.carriers))]
+        self.reset()
+
+    @override
+    def reset(self) -> None:
+        self._team.reset()
+        self.lost: HandOver | None = None
+        self._rest: Rest | None = None
+        self._announced: tuple[Sequence[Reference], float, float] | None = None
+
+    @override
+    def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
+        """Receive the future references for the prediction. Arguments and errors as those of `Predictive.follow`."""
+        self._team.follow(references, period, start)
+        self._announced = references, period, start
+
+    @override
+    def step(self, time: float, state: State, reference: Reference) -> Command:
+        """Return the command for the time from `time` [s] until the next step. Arguments as in `Predictive.step`.
+
+        Raises
+        ------
+        InputError
+            If an argument is wrong.
+        """
+        if self._rest is None:
+            command = self._team.step(time, state, reference)
+            state, reference = self._as_floats(state, reference)
+            sender = self._team if self._team.handed_over is None else self._team._beside
+            unexplained = sender.disturbance_of_carriers[0] @ self._down
+            if self.lost is not None or not (unexplained > NOTICED * self._weights).any():
+                return command
+            self._lose(time, int(np.argmax(unexplained / self._weights)), state, reference)
+            if self._rest is None:
+                return command
+        else:
+            state, reference = self._as_floats(state, reference)
+        return self._alone(self._rest, time, state, reference)
+
+    def _as_floats(self, state: State, reference: Reference) -> tuple[State, Reference]:
+        state = as_floats(required("state", state, State), self.robot, None)
+        return state, as_floats(required("reference", reference, Reference), self.robot, None)
+
+    def _lose(self, time: float, index: int, state: State, reference: Reference) -> None:
+        """Remember that a carrier is lost, and take the controller of the others, if there is one."""
+        name, rest = self.robot.carriers[index].name, self._rests[index]
+        goes_on = "its cables are released" if rest is not None else "the others cannot carry the platform"
+        self.lost, self._rest = HandOver(time, f"{name} has lost its thrust: {goes_on}"), rest
+        if rest is None:
+            return
+        rest.controller.reset()
+        rest.controller.watched_from, self._foreseen = time + SETTLED, time
+        now = np.vstack([state.pose, state.carrier_pose[rest.carriers]])
+        rates = np.vstack([state.velocity, state.carrier_velocity[rest.carriers]])
+        self._off = np.stack([now, rates]) - self._target(rest, reference)[:2]
+        self._off[0, :, 3:] = (self._off[0, :, 3:] + np.pi) % (2 * np.pi) - np.pi
+
+    def _foresee(self, rest: Rest, time: float) -> None:
+        """Announce references of the next seconds to the controller of the others, which takes 10 ms."""
+        if self._announced is None or time < self._foreseen:
+            return
+        (references, period, start), stride = self._announced, max(1, round(APART / self._announced[1]))
+        first, coming = max(0, int((time - start) / period)), []
+        for k in range(first, first + round(2 * BLENDED / period) + 1, stride):
+            one = as_floats(references[min(k, len(references) - 1)], self.robot, None)
+            coming.append(self._of_rest(rest, start + k * period, one))
+        rest.controller.follow(coming, stride * period, start + first * period)
+        self._foreseen = time + BLENDED
+
+    def _target(self, rest: Rest, reference: Reference) -> np.ndarray:
+        """Return the motion of platform and others in their formation at the planned position, (3, 1 + c, 6)."""
+        result = np.zeros((3, 1 + len(rest.carriers), 6))
+        for order, motion in enumerate(reference[:3]):
+            result[order, 0], result[order, 1:, :3] = motion, motion[:3]
+        result[0, 0, 3:5] += rest.tilt
+        c, s = np.cos(reference.pose[5]), np.sin(reference.pose[5])
+        aim = rest.carrier_pose.copy()
+        aim[:, :2] = aim[:, :2] @ np.array([[c, s], [-s, c]])
+        result[0, 1:] += aim
+        result[0, 1:, 5] = reference.carrier_pose[rest.carriers, 5]
+        return result
+
+    def _of_rest(self, rest: Rest, time: float, reference: Reference) -> Reference:
+        """Return the reference of the others: from where they were at the loss to their formation."""
+        assert self.lost is not None
+        motion, s = self._target(rest, reference), (time - self.lost.time) / BLENDED
+        if s < 1.0:
+            for order, (pose, velocity) in enumerate(zip(FADES[0], FADES[1], strict=True)):
+                motion[order] += (pose(s) * self._off[0] + BLENDED * velocity(s) * self._off[1]) / BLENDED**order
+        (pose, velocity, acceleration), carriers = motion[:, 0], motion[:, 1:]
+        return Reference(pose, velocity, acceleration, carriers[0], carriers[1], carriers[2], rest.tensions)
+
+    def _alone(self, rest: Rest, time: float, state: State, reference: Reference) -> Command:
+        """Return the command of the others, as one of the team."""
+        pulls = None if state.tensions is None else state.tensions[rest.cables]
+        carriers = state.carrier_pose[rest.carriers], state.carrier_velocity[rest.carriers]
+        own = State(state.pose, state.velocity, carriers[0], carriers[1], pulls, state.time)
+        self._foresee(rest, time)
+        given = rest.controller.step(time, own, self._of_rest(rest, time, reference))
+        assert given.actuation is not None
+        still, c = np.zeros_like(state.carrier_pose), len(state.carrier_pose)
+        changes = {
+            "tensions": np.zeros(self.robot.m),
+            "carrier_pose": state.carrier_pose.copy(),
+            "carrier_velocity": state.carrier_velocity.copy(),
+            "carrier_acceleration": still,
+            "actuation": np.zeros((c, given.actuation.shape[1])),
+        }
+        for name, whole in changes.items():
+            whole[rest.cables if name == "tensions" else rest.carriers] = getattr(given, name)
+        return given._replace(**changes, released=~np.isin(np.arange(self.robot.m), rest.cables))
+
+
+def _without(robot: Robot, index: int, options: dict[str, Any]) -> Rest | None:
+    """Return the team without a carrier and its cables; None, with a warning, if it cannot carry the platform."""
+    data, lengths = robot.model_dump(), robot.fixed_lengths
+    assert lengths is not None
+    carriers = np.delete(np.arange(len(robot.carriers)), index)
+    cables = np.flatnonzero(robot.carrier_of_cable != index)
+    data["carriers"] = [data["carriers"][i] for i in carriers]
+    data["cables"] = [{**data["cables"][i], "length": float(lengths[i])} for i in cables]
+    if len(carriers) == 0:
+        return None
+    home, name = robot.home, robot.carriers[index].name
+    found = formation(Robot.model_validate(data), home, robot.carrier_home[carriers], lengths[cables])
+    if not found.exists:
+        lacks = f"{quantity_row(found.missing[:3], 'N')} and {quantity_row(found.missing[3:], 'N m')}"
+        warn(f"{robot.name} cannot rest without {name}: it would lack {lacks} about the CoM", stacklevel=3)
+        return None
+    data["platform"]["home"] = found.pose.tolist()
+    for carrier, pose in zip(data["carriers"], found.carrier_pose.tolist(), strict=True):
+        carrier["home"] = pose
+    c, s = np.cos(home[5]), np.sin(home[5])
+    offsets = found.carrier_pose.copy()
+    offsets[:, :3] -= home[:3]
+    offsets[:, :2] = offsets[:, :2] @ np.array([[c, -s], [s, c]])
+    options = {"reach": (ROOM * float(lengths.mean()), 0.0)} | options
+    controller = Others(Robot.model_validate(data), **options)
+    return Rest(carriers, cables, controller, found.pose[3:5] - home[3:5], offsets, found.tensions)
