@@ -123,8 +123,9 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution, box: R
     rank = f"rank {result['rank']} {of} at home{reason}"
     if result["rank"] < len(robot.platform.dof):
         rank += f"; highest rank near home: {highest}"
+    cables = f"{result['cables']} cable{'s' * (result['cables'] != 1)}"
     lines = [
-        f"{result['name']}: {result['cables']} cables; carriers: {_count(result['carriers'])}",
+        f"{result['name']}: {cables}; carriers: {_count(result['carriers'])}",
         f"  mass {quantity(result['mass'], 'kg')}, weight {quantity(result['weight'], 'N')}, "
         f"characteristic length {quantity(result['length'], 'm')}",
         f"  home ({quantity_row(result['home'])}) [m, rad], cable lengths there "

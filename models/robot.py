@@ -39,7 +39,7 @@ class DisplayedRobot(Part):
         robot: Any = self
         kinds = [carrier.kind for carrier in robot.carriers]
         carriers = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-        return f"{robot.name}: {robot.m} cables; carriers: {carriers}"
+        return f"{robot.name}: {robot.m} cable{'s' * (robot.m != 1)}; carriers: {carriers}"
 
     def _facts(self) -> Iterable[Fact]:
         robot: Any = self

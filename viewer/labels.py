@@ -3,6 +3,7 @@
 Names come from files, so every text that is not a number passes `html.escape`.
 """
 
+import math
 from html import escape
 
 import numpy as np
@@ -69,9 +70,14 @@ def _margins(instant: Snapshot) -> list[str]:
     return lines
 
 
+def decimals(robot: Robot) -> int:
+    """Return how many decimals tensions of a robot have [N]: two, and more for robots of less than a newton."""
+    return max(2, 2 - math.floor(math.log10(robot.force_scale)))
+
+
 def table(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str:
     """Return a table of the cables: colour, tension, and its place between the limits."""
-    places = place(instant.tensions, robot.t_min, robot.t_max)
+    places, digits = place(instant.tensions, robot.t_min, robot.t_max), decimals(robot)
     rows = []
     for index, (tension, at, shade) in enumerate(zip(instant.tensions, places, shades(places), strict=True)):
         there = bool(np.isfinite(tension))
@@ -81,11 +87,11 @@ def table(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str
             f'<div class="towline-bar" style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}">'
             "</div></div>"
         )
-        shown = f"{tension:.2f} N" if there else "none"
+        shown = f"{tension:.{digits}f} N" if there else "none"
         shown = "cut" if instant.cut is not None and instant.cut[index] else shown
         if other is not None:
             at_other = other.tensions[index]
-            beside = f"{at_other:.2f} N" if np.isfinite(at_other) else "none"
+            beside = f"{at_other:.{digits}f} N" if np.isfinite(at_other) else "none"
             bar = f'<span class="towline-other" style="color:{OTHER}">{beside}</span>'
         limits = f"{robot.t_min[index]:g} to {robot.t_max[index]:g}"
         # The colour of the cable's curve, where there are curves.

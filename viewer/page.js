@@ -9,7 +9,7 @@ if (FRAMES.clocks.length > 1) addEventListener("towline-instant", (event) => {
   all("status")[0].textContent = FRAMES.statuses[k];
   all("time")[0].textContent = FRAMES.clocks[k];
   FRAMES.tensions[k].forEach((tension, i) => {
-    all("tension")[i].textContent = tension === null ? "none" : tension.toFixed(2) + " N";
+    all("tension")[i].textContent = tension === null ? "none" : tension.toFixed(FRAMES.digits) + " N";
     all("bar")[i].style.width = FRAMES.widths[k][i] + "%";
     all("bar")[i].style.background = FRAMES.colours[k][i];
   });

@@ -46,12 +46,13 @@ def aside(subject: Subject, frames: list[Snapshot], cell: float) -> str:
 
 def _data(robot: Robot, frames: list[Snapshot]) -> dict[str, Any]:
     """Return what the table of each frame has."""
-    tensions = np.array([frame.tensions for frame in frames])
+    tensions, digits = np.array([frame.tensions for frame in frames]), labels.decimals(robot)
     places = place(tensions, robot.t_min, robot.t_max)
     return {
         "clocks": [f"t = {frame.time or 0.0:.2f} s" for frame in frames],
+        "digits": digits,
         "statuses": [frame.status for frame in frames],
-        "tensions": [[round(t, 2) if np.isfinite(t) else None for t in row] for row in tensions.tolist()],
+        "tensions": [[round(t, digits) if np.isfinite(t) else None for t in row] for row in tensions.tolist()],
         "widths": np.nan_to_num(np.round(100 * places)).astype(int).tolist(),
         "colours": [["#" + bytes(shade).hex() for shade in row] for row in shades(places)],
     }

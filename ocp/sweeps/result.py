@@ -251,11 +251,12 @@ class Sweep(Displayed, Reported):
         columns = [list(of_axis) for of_axis in zip(*texts, strict=True)]
         columns.append([row.status for row in self.rows])
         columns += [column([getattr(row, name) for row in self.rows]) for name in _NUMBERS]
-        columns.append([row.reason for row in self.rows])
+        ends = ["reason"] * any(row.reason for row in self.rows)
+        columns += [[row.reason for row in self.rows] for _ in ends]
         named = [name if units[name] == "1" else f"{name} [{units[name]}]" for name in _NUMBERS]
         numeric = [k for k, axis in enumerate(self.cases.axes) if axis.numeric]
         numeric += range(len(heads) + 1, len(heads) + 1 + len(_NUMBERS))
-        return Table("", [*heads, "status", *named, "reason"], list(zip(*columns, strict=True)), numeric)
+        return Table("", [*heads, "status", *named, *ends], list(zip(*columns, strict=True)), numeric)
 
 
 def _is_known(cases: Cases, name: str, values: np.ndarray) -> bool:
