@@ -1,5 +1,6 @@
 """`FaultTolerant`: control of a team of flying carriers that goes on with the others if one loses its thrust."""
 
+import inspect
 import os
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -91,6 +92,9 @@ class FaultTolerant(Controller):
     """
 
     def __init__(self, robot: Robot | str | os.PathLike[str], **options: Any):
+        known = inspect.signature(Predictive).parameters
+        if unknown := [name for name in options if name not in known or name == "robot"]:
+            raise InputError(f"{unknown[0]} is no argument of Predictive, which are {', '.join(list(known)[1:])}")
         self.robot = as_robot(robot)
         other = [carrier.name for carrier in self.robot.carriers if not carrier.actuators]
         if other or self.robot.fixed_lengths is None:

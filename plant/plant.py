@@ -380,11 +380,6 @@ class Plant:
         """
         return self._with_condition(state, cable, layout.CUT)
 
-    def release(self, states: np.ndarray, which: np.ndarray) -> None:
-        """Cut cables of states (N, n) in place: those that are true in `which`, (m,) or (N, m)."""
-        block = self._places + layout.CONDITION * self.robot.m
-        states[:, block : block + self.robot.m][np.broadcast_to(which, (len(states), self.robot.m)) != 0] = layout.CUT
-
     def stick(self, state: np.ndarray, cable: int) -> np.ndarray:
         """Return the state, (..., n) [m, rad, s], with a winch stuck at its current length. Arguments as in `cut`."""
         return self._with_condition(state, cable, layout.STUCK)

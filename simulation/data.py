@@ -79,7 +79,7 @@ class SimulationData(Displayed):
         wanted = np.stack([reference.pose[:3] for reference in self.references[: self._recorded]])
         return np.linalg.norm(self.record.motions[: self._recorded, 0, :3] - wanted, axis=1)
 
-    def cut(self, later: int = 0) -> np.ndarray:
+    def _cut(self, later: int = 0) -> np.ndarray:
         """Return which cables are cut or released, (n, m), as the recorded periods begin, or `later` periods later."""
         gone = np.logical_or.accumulate(self.record.released[: self._recorded])
         return gone | self.conditions.cut(self.robot.m, np.arange(self._recorded) + later)
@@ -87,7 +87,7 @@ class SimulationData(Displayed):
     @cached_property
     def slack(self) -> np.ndarray:
         """Return whether each cable with t_min > 0 is slack, (n, m)."""
-        return (self.record.tensions[: self._recorded] <= 0) & (self.robot.t_min > 0) & ~self.cut()
+        return (self.record.tensions[: self._recorded] <= 0) & (self.robot.t_min > 0) & ~self._cut()
 
     @cached_property
     def above(self) -> np.ndarray:

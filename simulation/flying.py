@@ -125,7 +125,7 @@ def fly(
             check_command(command, robot, flights, time)
             expected = shapes
         if command.released is not None:
-            plant.release(states, command.released)
+            periods.release(states, command.released)
         try:
             row = orders.rows(k, command, lengths, states)
         except (TypeError, ValueError):

@@ -40,7 +40,7 @@ class Simulation(SimulationData, Filmed, Reported):
     def figures_of_merit(self) -> dict[str, Any]:
         """Return the result metrics, without wall times: the same seed gives the same metrics."""
         tensions = self.record.tensions[: self._recorded]
-        pulling = tensions[~self.cut(1)]  # where no cut falls inside the period
+        pulling = tensions[~self._cut(1)]  # where no cut falls inside the period
         shortfall = self.record.shortfall[: self._recorded]
         return {
             "passed": self.passed,
@@ -109,7 +109,7 @@ class Simulation(SimulationData, Filmed, Reported):
         if actuators:
             about = "commands to the actuators of each carrier"
             variables["actuation"] = over(("time", "carrier", "actuator"), record.actuation[rows], "N, N m", about)
-        if (gone := self.cut()).any():
+        if (gone := self._cut()).any():
             about = {"long_name": "1 once the cable is cut or released"}
             variables["cut"] = Variable(cable, gone.astype(np.int8), about)
         if self.wind is not None:
