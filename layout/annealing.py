@@ -2,7 +2,7 @@
 
 From random layouts the linear programs alone stop where the available wrench set is flat: the margin is 0 there, more
 than around. Coordinates drawn at their bounds, where good layouts have many, and swaps of attachments pass it. Cables
-cannot be moved through each other by small steps, so the clearance is part of the score.
+cannot be moved through each other by small steps, so the room between them is part of the score.
 """
 
 import time
@@ -14,20 +14,14 @@ from .goal import Goal
 
 MOVES = 8000
 _NEGATIVE = 0.05  # weight of the mean of negative margins
-_SPARE = 1.3  # times the clearance, since there are few poses
 _AT_BOUND = 0.5  # probability that a redrawn coordinate is at one of its bounds
 _SMALL = 0.1  # standard deviation of a small move, of the range of a coordinate
 _HOT, _WARM = 0.1, 0.01  # first temperature, of the force scale, from a random layout and near a good one
-_CLEARANCE_COSTS = 5.0  # force scales per metre of missing clearance
+_MISSING_COSTS = 5.0  # force scales per metre by which a bound of the room is missed
 
 
 def anneal(
-    evaluation: Evaluation,
-    goal: Goal,
-    clearance: float,
-    rng: np.random.Generator,
-    until: float,
-    near: np.ndarray | None = None,
+    evaluation: Evaluation, goal: Goal, rng: np.random.Generator, until: float, near: np.ndarray | None = None
 ) -> np.ndarray:
     """Return the variables of a good layout for the rows of an evaluation, (p,).
 
@@ -37,8 +31,6 @@ def anneal(
         An evaluation of few poses, because it is repeated thousands of times.
     goal
         What is maximised.
-    clearance
-        Smallest distance between cables [m].
     until
         Time of `time.perf_counter` at which it ends early [s].
     near
@@ -46,14 +38,14 @@ def anneal(
     """
     variables = evaluation.variables
     low, high, points = variables.low, variables.high, variables.points
-    force, wanted = variables.robot.force_scale, _SPARE * clearance
+    force = variables.robot.force_scale
     alike = _interchangeable(points, low, high)
 
     def score(y: np.ndarray, least: float) -> float:
         found = evaluation.margins(y)
         value = goal.value(float(found.min()), y) + _NEGATIVE * float(np.minimum(found, 0.0).mean())
-        if wanted > 0.0 and value > least and evaluation.pairs.size:  # else it is refused without the distances
-            value -= _CLEARANCE_COSTS * force * max(0.0, wanted - float(evaluation.distances(y).min()))
+        if value > least:  # else it is refused without the distances
+            value -= _MISSING_COSTS * force * evaluation.missing(y)
         return value
 
     y = rng.uniform(low, high) if near is None else near

@@ -18,8 +18,10 @@ from ..models.record import record_of
 from ..solvers.margins import Reserves, all_reserves, margins, reserves
 from ..workspace.conditions.interference import nearest_points
 from .requirements import Requirement
+from .room import Room
 from .variables import Variables, parts
 
+NO_BOUNDS = Room()
 _STEEP = 1e7  # times the length: slopes of a facet whose columns nearly depend on each other say nothing
 
 
@@ -79,11 +81,13 @@ class Evaluation:
         Those of the design.
     rows
         Poses and wrenches.
+    room
+        Bounds of distances and lengths (default: none).
     """
 
-    def __init__(self, variables: Variables, rows: Rows):
+    def __init__(self, variables: Variables, rows: Rows, room: Room = NO_BOUNDS):
         robot = variables.robot
-        self.variables, self.rows = variables, rows
+        self.variables, self.rows, self.room = variables, rows, room
         self._record = record_of(robot).copy()
         self._m, self._home = robot.m, np.ascontiguousarray(robot.carrier_home)
         self._kept = np.flatnonzero(robot.dof_mask)
@@ -137,6 +141,54 @@ class Evaluation:
         distances = np.empty((len(self._poses), self._m * (self._m - 1) // 2))
         core.cable_distances(self._record, self._poses, self._home, distances)
         return distances if self._all_pairs else distances[:, self._apart]
+
+    def lengths(self, y: np.ndarray) -> np.ndarray:
+        """Return the length of each cable at each pose, (N, m) [m]."""
+        self._place(y)
+        lengths = np.empty((len(self._poses), self._m))
+        core.lines(self._record, self._poses, self._home, lengths, None, None, None, None)
+        return lengths
+
+    def spaces(self, y: np.ndarray) -> np.ndarray:
+        """Return by how much the bounds of the room are kept at each pose, (N, k) [m]; negative where they are not."""
+        room, found = self.room, [np.zeros((len(self._poses), 0))]
+        if room.clearance > 0.0:
+            found.append(self.distances(y) - room.clearance)
+        if room.limits_lengths:
+            lengths = self.lengths(y)
+            found += [lengths - room.shortest, room.longest - lengths]
+        return np.hstack(found)
+
+    def missing(self, y: np.ndarray) -> float:
+        """Return how far the worst bound of the room is missed at some pose [m]."""
+        return max(0.0, -float(self.spaces(y).min(initial=np.inf)))
+
+    def space_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
+        """Return the smallest spaces `below` a value, up to `most` of distances and of lengths, with derivatives."""
+        room, found = self.room, [Slopes(np.zeros(0), np.zeros((0, self.variables.size)))]
+        if room.clearance > 0.0 and self.pairs.size:
+            near = self.distance_slopes(y, most, room.clearance + below)
+            found.append(Slopes(near.value - room.clearance, near.by_variables))
+        if room.limits_lengths:
+            found.append(self._length_slopes(y, most, below))
+        return Slopes(*(np.concatenate(part) for part in zip(*((f.value, f.by_variables) for f in found), strict=True)))
+
+    def _length_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
+        lengths, m = self.lengths(y), self._m
+        A = np.empty((len(self._poses), 6, m))
+        core.lines(self._record, self._poses, self._home, None, A, None, None, None)
+        every = np.stack([lengths - self.room.shortest, self.room.longest - lengths]).ravel()
+        chosen = np.argsort(every)[:most]
+        chosen = chosen[every[chosen] < below]
+        side, poses, cables = np.unravel_index(chosen, (2, *lengths.shape))
+        # A cable pulls the attachment towards the anchor along u: its length grows if either moves away from the other.
+        u = A[poses, :3, cables] * np.where(side == 0, 1.0, -1.0)[:, None]
+        by_layout, k = np.zeros((len(chosen), 8 * m)), np.arange(len(chosen))
+        by_points = np.einsum("kij,ki->kj", self._carried[cables], u), -np.einsum("kij,ki->kj", self._turn[poses], u)
+        for offset, slope in zip((0, 3 * m), by_points, strict=True):
+            for axis in range(3):
+                by_layout[k, offset + 3 * cables + axis] = slope[:, axis]
+        return Slopes(every[chosen], by_layout @ self.variables.S)
 
     def distance_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
         """Return up to `most` of the smallest distances `below` a value, with their derivatives."""

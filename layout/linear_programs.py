@@ -1,4 +1,4 @@
-"""Sequential linear programs: maximise a goal over all rows, inside bounds and with a clearance."""
+"""Sequential linear programs: maximise a goal over all rows, inside bounds and with room between cables."""
 
 import time
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from .goal import Goal
 from .variables import Variables
 
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
-_PER_METRE = 40.0  # force scales that a metre of missing clearance costs
+_PER_METRE = 40.0  # force scales that a metre costs by which a bound is missed
 _LARGEST = 1e7  # of the objective [N]
 _FOUND = 1e-5  # of the margin, or of 1 N: a smaller improvement ends the search
 
@@ -31,9 +31,7 @@ class Multipliers(NamedTuple):
 class _Program:
     """The linear program about a point, and its solution."""
 
-    def __init__(
-        self, evaluation: Evaluation, goal: Goal, y: np.ndarray, clearance: float, delta: float, every: np.ndarray
-    ):
+    def __init__(self, evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float, every: np.ndarray):
         variables = evaluation.variables
         span = variables.high - variables.low
         self.scale = np.where(span > 0.0, span, 1.0)
@@ -44,17 +42,15 @@ class _Program:
         self.found, slopes = evaluation.reserves(y, rows, normals)
         good = evaluation.usable(slopes)
         self.rows, self.good = rows[good], good
-        # Variables: steps as shares of the ranges, the margin, the missing clearance.
+        # Variables: steps as shares of the ranges, the margin, what the room misses.
         A = np.hstack([-slopes[good] * self.scale, np.ones((good.sum(), 1)), np.zeros((good.sum(), 1))])
         b = every.ravel()[chosen][good]
-        if clearance > 0.0 and evaluation.pairs.size:
-            near = evaluation.distance_slopes(
-                y, MOST_DISTANCES, clearance + 4.0 * delta * float(self.scale.max(initial=0.0))
-            )
+        near = evaluation.space_slopes(y, MOST_DISTANCES, 4.0 * delta * float(self.scale.max(initial=0.0)))
+        if near.value.size:
             by = np.hstack(
                 [-near.by_variables * self.scale, np.zeros((len(near.value), 1)), -np.ones((len(near.value), 1))]
             )
-            A, b = np.vstack([A, by]), np.r_[b, near.value - clearance]
+            A, b = np.vstack([A, by]), np.r_[b, near.value]
         cost = np.r_[goal.price * self.scale, -1.0, _PER_METRE * variables.robot.force_scale]
         below, above = (variables.low - y) / self.scale, (variables.high - y) / self.scale
         self.low, self.high = np.maximum(below, -delta), np.minimum(above, delta)
@@ -68,21 +64,8 @@ class _Program:
         return np.clip(y + self.solution.x[: y.size] * self.scale, variables.low, variables.high)
 
 
-def missing(evaluation: Evaluation, y: np.ndarray, clearance: float) -> float:
-    """Return how much of a clearance is missing at some pose [m]."""
-    if clearance <= 0.0 or not evaluation.pairs.size:
-        return 0.0
-    return max(0.0, clearance - float(evaluation.distances(y).min()))
-
-
 def maximise(
-    evaluation: Evaluation,
-    goal: Goal,
-    y: np.ndarray,
-    clearance: float,
-    until: float,
-    delta: float = 0.1,
-    most: int = 60,
+    evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1, most: int = 60
 ) -> None:
     """Move the variables to a local maximum of a goal, in place: an interrupt keeps what is reached.
 
@@ -94,8 +77,6 @@ def maximise(
         What is maximised.
     y
         Where to start, (p,); it is moved.
-    clearance
-        Smallest distance between cables [m].
     until
         Time of `time.perf_counter` at which it ends early [s].
     delta
@@ -107,13 +88,13 @@ def maximise(
 
     def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
         every = evaluation.all_reserves(z)
-        return goal.value(float(every.min()), z) - price * missing(evaluation, z, clearance), every
+        return goal.value(float(every.min()), z) - price * evaluation.missing(z), every
 
     value, every = merit(y)
     for _ in range(most):
         if delta < 1e-6 or time.perf_counter() > until or not np.isfinite(value):
             break
-        program = _Program(evaluation, goal, y, clearance, delta, every)
+        program = _Program(evaluation, goal, y, delta, every)
         predicted = program.value - value
         if not predicted > _FOUND * max(1.0, abs(value)):
             break
@@ -131,12 +112,10 @@ def maximise(
             delta *= 0.35
 
 
-def multipliers(
-    evaluation: Evaluation, goal: Goal, y: np.ndarray, clearance: float, delta: float = 1e-3
-) -> Multipliers:
+def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float = 1e-3) -> Multipliers:
     """Return the multipliers of the linear program at a point, within small steps."""
     every = evaluation.all_reserves(y)
-    program = _Program(evaluation, goal, y, clearance, delta, every)
+    program = _Program(evaluation, goal, y, delta, every)
     solution, p = program.solution, y.size
     if not solution.success:
         none = np.zeros(0)

@@ -46,10 +46,10 @@ class Reasons(NamedTuple):
     at_bounds: int
 
 
-def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray, clearance: float) -> Reasons:
+def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     """Return the reasons why the goal of a layout is not reached further."""
     variables, rows = evaluation.variables, evaluation.rows
-    robot, found = variables.robot, multipliers(evaluation, goal, y, clearance)
+    robot, found = variables.robot, multipliers(evaluation, goal, y)
     kept = np.flatnonzero(robot.dof_mask)
     direction = np.zeros((found.rows.size, 6))
     if found.rows.size:

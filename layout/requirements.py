@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from ..base.inputs import file_path
 from ..models.parsing import read_yaml, validate
 from ..models.part import Box, Name, NonNegative, Part, Pose, Positive, Rows, Vector3, Whole
-from ..models.ranges import Range
+from ..models.ranges import PositiveRange, Range
 from ..ocp.tasks.task import Task
 
 Wrench = Pose  # six finite numbers
@@ -168,6 +168,11 @@ class Requirements(Part):
         description="smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]",
     )
     clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: no limit")
+    cable_length: PositiveRange | None = Field(
+        default=None,
+        description="shortest and longest length of every cable at the required positions, as the winches have [m]; "
+        "default: no limit",
+    )
     maximise: Literal["margin"] = Field(default="margin", description="objective: the smallest capacity margin")
     minimise: Literal["t_max"] | None = Field(
         default=None,

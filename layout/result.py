@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..base.display import Displayed, Fact
-from ..base.text import quantity, quantity_row
+from ..base.text import quantity, quantity_range, quantity_row
 from ..figures.report import Part, Report, Reported, Section, Table
 from ..models import Robot
 from ..models.parsing import to_yaml
@@ -15,6 +15,7 @@ from ..solvers import Certificate, TensionProblem, capacity_margin
 from .impossibility import Impossibility
 from .reasons import Binding, Reasons
 from .requirements import Requirements
+from .room import room_of
 
 Status = Literal["feasible", "infeasible", "not-found"]
 MOST_LISTED = 8
@@ -33,13 +34,16 @@ class Design(Reported, Displayed):
     requirements
         The requirements of the design.
     status
-        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, its clearance and
-        the plans of its tasks are as required; infeasible if no layout inside the boxes meets the requirements, by
-        `impossibility`; otherwise not-found, which proves nothing.
+        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, its clearance, the
+        lengths of its cables and the plans of its tasks are as required; infeasible if no layout inside the boxes meets
+        the requirements, by `impossibility`; otherwise not-found, which proves nothing.
     margin, margin_before
         Smallest capacity margin of both robots at the same poses, with moments divided by `before.length` [N].
     clearance
         Smallest distance between two cables [m]; infinite for one cable.
+    lengths
+        Shortest and longest length of a cable at the required and at audited poses [m]; None if the requirements are
+        impossible.
     reasons
         Active constraints and the gain from relaxing them; None if the requirements are impossible.
     poses, audited
@@ -59,6 +63,7 @@ class Design(Reported, Displayed):
     margin: float
     margin_before: float
     clearance: float
+    lengths: tuple[float, float] | None
     reasons: Reasons | None
     impossibility: Impossibility | None
     poses: int
@@ -86,6 +91,8 @@ class Design(Reported, Displayed):
             text = f"mean t_max {mean} (before {before}), {text}"
         if self.requirements.clearance > 0.0:
             text += f", cables {quantity(self.clearance, 'm')} apart"
+        if self.requirements.cable_length is not None and self.lengths is not None:
+            text += f", cables of {quantity_range(self.lengths, 'm')}"
         return text
 
     def _headline(self) -> str:
@@ -113,7 +120,7 @@ class Design(Reported, Displayed):
         facts += [("task", each.report().splitlines()[0]) for each in self.plans]
         if self.status == "not-found":
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
-            wanted += [f"clearance of {quantity(self.requirements.clearance, 'm')}"] * (self.requirements.clearance > 0)
+            wanted += room_of(self.requirements).describe()
             wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
             facts.append(("wanted", f"{' and a '.join(wanted)}; this does not prove that no layout has it"))
         parts.append(Section("", facts))
@@ -157,6 +164,7 @@ class Design(Reported, Displayed):
             "margin_before": self.margin_before,
             "t_max": self.robot.t_max.tolist(),
             "clearance": self.clearance,
+            "cable_lengths": None if self.lengths is None else list(self.lengths),
             "length": self.before.length,
             "poses": self.poses,
             "audited": self.audited,

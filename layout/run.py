@@ -20,6 +20,7 @@ from .pairings import best_pairing, with_attachments
 from .reasons import reasons
 from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design, judged_margin
+from .room import room_of
 from .search import AUDITED, Progress, search
 from .task_rows import with_tasks
 from .variables import Variables, variables_of
@@ -59,7 +60,8 @@ def design(
     progress
         Called with a description of the step, the elapsed share of the time, and the best margin so far [N].
     **options
-        Other keys of `Requirements`: name, minimise, margin, clearance, start, time_limit, seed.
+        Other keys of `Requirements`: name, minimise, margin, clearance, cable_length, tasks, start,
+        time_limit, seed.
 
     Returns
     -------
@@ -96,12 +98,12 @@ def design(
         before = _judged(chosen, chosen.length, grid)
         return Design(
             chosen, chosen, wanted, "infeasible", before, before, _nearest(Evaluation(variables, grid), None), None,
-            impossible, len(grid.pose_of), 0, 0, False,
+            None, impossible, len(grid.pose_of), 0, 0, False,
         )  # fmt: skip
     if wanted.free[0].pairing:
         cables = tuple(number - 1 for number in wanted.free[0].cables or range(1, chosen.m + 1))
         grid = with_tasks(grid, chosen, wanted.tasks)
-        attachment_of, count = best_pairing(chosen, grid, cables, wanted.clearance)
+        attachment_of, count = best_pairing(chosen, grid, cables, room_of(wanted))
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
         return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)
     found = search(variables, wanted, progress or (lambda what, share, best: None))
@@ -125,18 +127,18 @@ def _designed(
     audited = rows_of(before, wanted.require, [each.sampled(per_demand, random) for each in wanted.require])
     every = rows.joined(audited)
     margin = _judged(robot, before.length, every)
-    evaluation = Evaluation(variables, rows)
-    nearest = _nearest(evaluation, y)
-    if wanted.clearance > 0.0:
-        some = np.unique(audited.pose_of, return_index=True)[1][:: max(1, len(audited.poses) // 10_000)]
-        nearest = min(nearest, _nearest(Evaluation(variables, audited.only(some)), y))
-    feasible = margin >= wanted.margin and nearest >= wanted.clearance
+    room = room_of(wanted)
+    some = np.unique(audited.pose_of, return_index=True)[1][:: max(1, len(audited.poses) // 10_000)]
+    placed = Evaluation(variables, rows.joined(audited.only(some)), room)
+    lengths = dynamics_of(robot).cable_lengths(placed.rows.poses)
+    feasible = margin >= wanted.margin and placed.missing(y) <= 0.0
     plans = tuple(plan(robot, task) for task in wanted.tasks) if feasible and not stopped else ()
     feasible &= len(plans) == len(wanted.tasks) and all(found.feasible for found in plans)
-    why = reasons(evaluation, goal_of(variables, wanted), y, wanted.clearance)
+    why = reasons(Evaluation(variables, rows, room), goal_of(variables, wanted), y)
     return Design(
         robot, before, wanted, "feasible" if feasible else "not-found", margin,
-        _judged(before, before.length, every), nearest, why, None, count, len(audited.pose_of), starts, stopped,
+        _judged(before, before.length, every), _nearest(placed, y), (float(lengths.min()), float(lengths.max())),
+        why, None, count, len(audited.pose_of), starts, stopped,
         plans,
     )  # fmt: skip
 

@@ -9,8 +9,9 @@ import numpy as np
 from .annealing import anneal
 from .evaluation import Evaluation, Rows, rows_of
 from .goal import Goal, goal_of
-from .linear_programs import maximise, missing
+from .linear_programs import maximise
 from .requirements import Requirements
+from .room import room_of
 from .task_rows import FEW_INSTANTS, with_tasks
 from .variables import Variables
 
@@ -24,7 +25,7 @@ _ROUNDS = 6
 _STARTING = 0.85  # of the time, for new starts
 _FIRST_STEP, _LATER_STEP = 0.1, 0.02  # longest steps of the first linear program, of the ranges
 _SAME = 1e-3  # of the margin: what an audit may find less
-_SPARE = 0.002  # of the clearance: what is searched for more than is asked
+_SPARE, _FEW_SPARE = 0.002, 0.3  # of the clearance: what is searched for more than is asked, and at few poses
 
 
 @dataclass
@@ -35,13 +36,13 @@ class Found:
     y: np.ndarray  # variables, (p,)
     rows: Rows  # all rows: those of the requirements, and what audits have added
     margin: float = -np.inf  # smallest margin over all rows and the audited poses [N]
-    missing: float = np.inf  # missing clearance at these poses [m]
+    missing: float = np.inf  # by how much a bound of the room is missed there [m]
     starts: int = 0  # layouts from which linear programs were run
     audit_agrees: bool = False  # whether the random poses of the last audit are no worse than the rows
     stopped: bool = False  # whether the search was interrupted
 
     def better(self, y: np.ndarray, margin: float, short: float) -> bool:
-        """Return whether another result is better: less clearance is missing, or none and its rank is higher."""
+        """Return whether another result is better: less of the room is missing, or none and its rank is higher."""
         if short > 0.0 or self.missing > 0.0:
             return (short, -margin) < (self.missing, -self.margin)
         return self.goal.rank(margin, y) > self.goal.rank(self.margin, self.y)
@@ -56,15 +57,15 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
     require, tasks = requirements.require, requirements.tasks
     rows = with_tasks(rows_of(robot, require, [each.places() for each in require]), robot, tasks)
     coarse = _few(rows_of(robot, require, _coarse(requirements)), rng)
-    few = Evaluation(variables, with_tasks(coarse, robot, tasks, FEW_INSTANTS))
-    clearance = requirements.clearance * (1.0 + _SPARE)
+    room = room_of(requirements)
+    few = Evaluation(variables, with_tasks(coarse, robot, tasks, FEW_INSTANTS), room.with_spare(_FEW_SPARE))
     goal = goal_of(variables, requirements)
     found = Found(goal, variables.of_robot(), rows)
 
     def improve(what: str, delta: float) -> None:
         share = (time.perf_counter() - started) / requirements.time_limit
         progress(what, min(share, 1.0), found.margin)
-        maximise(Evaluation(variables, found.rows), goal, y, clearance, until, delta)
+        maximise(Evaluation(variables, found.rows, room.with_spare(_SPARE)), goal, y, until, delta)
         _take(variables, requirements, found, y, rng)
 
     y = found.y.copy()
@@ -74,7 +75,7 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
                 improve("the robot's own layout", _FIRST_STEP)
             else:
                 near = found.y if found.starts % 2 and found.starts > 1 else None
-                y = anneal(few, goal, clearance, rng, until, near)
+                y = anneal(few, goal, rng, until, near)
                 improve(f"start {found.starts + 1}", _FIRST_STEP)
             found.starts += 1
         for number in range(_ROUNDS):
@@ -84,8 +85,8 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
             improve(f"audit {number + 1}", _LATER_STEP)
     except KeyboardInterrupt:
         found.stopped = True
-        evaluation = Evaluation(variables, found.rows)
-        if found.better(y, float(evaluation.margins(y).min()), missing(evaluation, y, requirements.clearance)):
+        evaluation = Evaluation(variables, found.rows, room)
+        if found.better(y, float(evaluation.margins(y).min()), evaluation.missing(y)):
             found.y = y
     return found
 
@@ -94,8 +95,8 @@ def _take(
     variables: Variables, requirements: Requirements, found: Found, y: np.ndarray, rng: np.random.Generator
 ) -> None:
     """Audit a layout, add the worst poses to the rows, and keep it if it is the best."""
-    evaluation = Evaluation(variables, found.rows)
-    promised, short = float(evaluation.margins(y).min()), missing(evaluation, y, requirements.clearance)
+    evaluation = Evaluation(variables, found.rows, room_of(requirements))
+    promised, short = float(evaluation.margins(y).min()), evaluation.missing(y)
     if not found.better(y, promised, short):
         return  # the audit can only find less
     margin, missed, worst = _audit(variables, requirements, y, rng)
@@ -110,7 +111,7 @@ def _take(
 def _audit(
     variables: Variables, requirements: Requirements, y: np.ndarray, rng: np.random.Generator
 ) -> tuple[float, float, Rows]:
-    """Return the smallest margin and the missing clearance at random poses, and the worst rows."""
+    """Return the smallest margin and what the room misses at random poses, and the worst rows."""
     require = requirements.require
     demands = sum(len(each.demands) for each in require)
     count = max(1000, AUDITED // demands)
@@ -118,15 +119,13 @@ def _audit(
     values = Evaluation(variables, rows).margins(y)
     picked = _apart(rows, np.argsort(values)[:300])
     short = 0.0
-    if requirements.clearance > 0.0:
-        some = rows.only(np.unique(rows.pose_of, return_index=True)[1][:CLEARANCE_AUDITED])
-        evaluation = Evaluation(variables, some)
-        distances = evaluation.distances(y)
-        if distances.size:
-            nearest = distances.min(axis=1)
-            short = max(0.0, requirements.clearance - float(nearest.min()))
-            closest = _apart(some, np.argsort(nearest)[:100])
-            return float(values.min()), short, rows.only(picked).joined(some.only(closest))
+    some = rows.only(np.unique(rows.pose_of, return_index=True)[1][:CLEARANCE_AUDITED])
+    spaces = Evaluation(variables, some, room_of(requirements)).spaces(y)
+    if spaces.size:
+        least = spaces.min(axis=1)
+        short = max(0.0, -float(least.min()))
+        closest = _apart(some, np.argsort(least)[:100])
+        return float(values.min()), short, rows.only(picked).joined(some.only(closest))
     return float(values.min()), short, rows.only(picked)
 
 

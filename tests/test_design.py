@@ -27,6 +27,7 @@ from towline.layout.impossibility import find_impossibility
 from towline.layout.linear_programs import maximise
 from towline.layout.pairings import with_attachments
 from towline.layout.reasons import reasons
+from towline.layout.room import Room
 from towline.layout.variables import variables_of
 from towline.models.points import placed, rotations
 from towline.models.record import record_of
@@ -177,12 +178,12 @@ def test_advice_is_the_slope_of_optima_solved_again():
         y = evaluation.variables.of_robot()
         goal = Goal(np.inf, np.zeros(y.size))
         for delta in (0.1, 0.02, 0.004):
-            maximise(evaluation, goal, y, 0.0, np.inf, delta)
+            maximise(evaluation, goal, y, np.inf, delta)
         return evaluation, goal, y, float(evaluation.margins(y).min())
 
     evaluation, goal, y, best = optimum()
     assert best > 1.0
-    found = reasons(evaluation, goal, y, 0.0)
+    found = reasons(evaluation, goal, y)
     assert found.local_optimum
     gains = {one.change: one.gain for one in found.advice}
     for change, step, name in (("stronger", 0.1, "t_max of every cable higher by 1 N"),
@@ -509,3 +510,56 @@ def test_winches_are_strong_enough_for_a_task_and_not_much_stronger():
     assert "feasible plan of each task" in weak.report()
     with pytest.raises(InputError, match=r"tasks\[0\]\.path"):
         design(robot, **given, tasks=[{"name": "pathless"}])
+
+
+@pytest.mark.parametrize("name", ["ipanema-2", "caroca-pulleys"])
+def test_slopes_of_lengths_are_those_of_differences(name):
+    """Of both bounds, at a tilted pose, over pulleys too."""
+    robot = load(name)
+    low, high = robot.home[:3] - 0.3, robot.home[:3] + 0.3
+    box = {"min": low.tolist(), "max": high.tolist()}
+    require = [{"box": box, "grid": [2, 2, 1], "attitudes": [[0.1, -0.2, 0.3]]}]
+    free = [{"part": part, "box": around(getattr(robot, f"{part}s"))} for part in ("anchor", "attachment")]
+    read = read_requirements({"free": free, "require": require})
+    variables = variables_of(robot, read)
+    lengths = Dynamics(robot).cable_lengths(read.require[0].places())
+    room = Room(shortest=float(lengths.min()) + 0.1, longest=float(lengths.max()) - 0.1)
+    evaluation = Evaluation(variables, rows_of(robot, read.require, [read.require[0].places()]), room)
+    y = variables.of_robot()
+    found = evaluation.space_slopes(y, 500, np.inf)
+    assert found.value.min() == pytest.approx(-0.1, abs=1e-9)
+    step = 1e-6
+    changes = [
+        np.sort(evaluation.spaces(y + step * e).ravel()) - np.sort(evaluation.spaces(y - step * e).ravel())
+        for e in np.eye(y.size)
+    ]
+    order = np.argsort(found.value)
+    gaps = np.diff(found.value[order])
+    alone = np.concatenate([[True], gaps > 1e-5]) & np.concatenate([gaps > 1e-5, [True]])
+    assert alone.sum() > 5
+    np.testing.assert_allclose(np.array(changes).T[alone] / (2 * step), found.by_variables[order][alone], atol=2e-8)
+
+
+def test_cables_are_as_long_as_the_winches_permit():
+    """The longest are at corners of the box, by distances of points alone."""
+    robot = load("ipanema-2")
+    low, high = BOXES["ipanema-2"]
+    corners = np.array(list(product(*np.transpose([low, high]))))
+
+    def reach(robot):
+        return np.linalg.norm(robot.anchors - robot.attachments - corners[:, None], axis=2).max()
+
+    longest = 0.97 * reach(robot)
+    anchors = {"part": "anchor", "box": {"min": [-4, -3, 1], "max": [4, 3, 5]}}
+    found = design(
+        robot, [anchors], [{"box": {"min": low, "max": high}, "grid": [3, 3, 2]}],
+        cable_length={"min": 0.2, "max": longest}, time_limit=1.0,
+    )  # fmt: skip
+    assert found.feasible, found.report()
+    assert 0.97 * longest < reach(found.robot) <= longest
+    assert found.lengths[1] == pytest.approx(reach(found.robot), abs=1e-9)
+    far = design(
+        robot, [anchors], [{"poses": [[0, 0, 2.5, 0, 0, 0]]}], cable_length={"min": 8, "max": 9}, time_limit=0.2
+    )
+    assert far.status == "not-found"
+    assert "cables of 8 to 9 m" in far.report()
