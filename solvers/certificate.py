@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.display import Displayed, Fact
 from ..base.inputs import finite_array, required
-from ..base.text import quantity
+from ..base.text import quantity, quantity_row
 from ..base.tolerances import CANCELLED, NEGLIGIBLE, ORTHOGONAL, RANK, ROUNDED_PULL
 from .box_least_squares import Projection, project
 from .exact_arithmetic import exact_optimum
@@ -70,6 +70,8 @@ class Certificate(Displayed):
         For a motion: start and end [s] of the time around `time` without tensions for the required wrench.
     wind :
         For a motion in a box of winds: the velocity of the air [m/s] in {G} at which w is required.
+    load :
+        For a motion with a load of uncertain mass or CoM: mass [kg] and CoM [m] with which w is required.
     """
 
     direction: Array  # (n,)
@@ -83,6 +85,7 @@ class Certificate(Displayed):
     time: float | None = None
     span: tuple[float, float] | None = None
     wind: tuple[float, float, float] | None = None
+    load: tuple[float, float, float, float] | None = None
 
     def _headline(self) -> str:
         when = "" if self.time is None else f" at t = {self.time:.3f} s"
@@ -160,7 +163,7 @@ class Certificate(Displayed):
     def describe(self, up: ArrayLike | None = None) -> str:
         """Describe the certificate in two lines: direction, needed, available, short by, and limits.
 
-        For a motion, time, span and wind come first. `up` is as in `text`.
+        For a motion, time, span, wind and load come first. `up` is as in `text`.
         """
         text = self.text(up)
         when = "" if self.time is None else f"at t = {self.time:.3f} s"
@@ -168,10 +171,19 @@ class Certificate(Displayed):
             when += f" (no tensions from {self.span[0]:.3f} s to {self.span[1]:.3f} s)"
         if self.wind is not None:
             when += f" in wind ({', '.join(f'{value + 0.0:g}' for value in self.wind)}) m/s"
+        when += "" if self.load is None else f" with {self.load_text}"
         return (
             f"{when.strip() + ', ' if when else ''}along {text.along}:\n"
             f"needed {text.needed}, available {text.available}, short by {text.short_by}; limits: {text.limits}"
         )
+
+    @property
+    def load_text(self) -> str:
+        """Return mass and CoM of the load as text: "a load of 22 kg, CoM (0, 0.02, -0.3) m"; empty if it is not set."""
+        if self.load is None:
+            return ""
+        mass, *com = self.load
+        return f"a load of {quantity(mass, 'kg')}, CoM ({quantity_row(com)}) m"
 
     def _along(self, up: Array | None) -> str:
         """Return the direction as text."""

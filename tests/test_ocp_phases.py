@@ -16,6 +16,7 @@ from towline.ocp import MotionStatus, Task, plan
 from towline.ocp.sweeps.axis import read_axes
 from towline.ocp.sweeps.cases import Cases
 from towline.ocp.tasks.lay_out import lay_out
+from towline.solvers import solve_batch
 from towline.viewer.replay import Replay
 
 COGIRO = load("cogiro")
@@ -439,3 +440,76 @@ def test_a_certificate_of_slack_cables_has_their_lower_limit():
 def test_a_phase_with_a_space_in_its_name_is_refused_in_words():
     with pytest.raises(InputError, match=r"phases\[0\].name must have only letters, digits, .* got 'pick up'"):
         Task.model_validate({"phases": [line(HIGH, LOW, name="pick up")]})
+
+
+UNSURE = {"mass": 300, "com": [0.1, 0, -0.4], "inertia": [20, 30, 40, 1, -2, 3], "mass_tolerance": 0.2}
+UNSURE |= {"com_tolerance": [0.2, 0.1, 0]}
+
+
+@pytest.mark.parametrize(("seconds", "tube"), [(2.4, 0), (2.1, 0.3)])
+def test_tensions_exist_for_every_load_within_its_tolerances(seconds, tube):
+    """A robot whose platform is one body with a load drawn from within them can follow the motion, too.
+
+    The inertia about the CoM as given is in proportion to the mass.
+    """
+    fast = line([-2, -1, 1], [2, 1, 1.6], name="carry", load=UNSURE) | {"duration": seconds}
+    task = {"phases": [fast], "tube": {"position": tube}, "steps": 40, "margin": 20}
+    planned = plan(COGIRO, task)
+    assert planned.feasible
+    assert plan(COGIRO, {**task, "tube": {}}).feasible == (tube == 0)  # the tube is what makes the faster one possible
+    assert "with any of its loads" in str(planned)
+    rng, rows = np.random.default_rng(5), slice(None, None, 50)
+    motion = [part[rows] for part in planned.audit.motion]
+    A = Dynamics(COGIRO).wrench_matrix(motion[0], None)
+    low, high = COGIRO.t_min + 20 - 1e-4, COGIRO.t_max - 20 + 1e-4
+    for mass, x, y in [(360, 0.2, 0.1), (240, -0.2, -0.1), *rng.uniform([240, -0.2, -0.1], [360, 0.2, 0.1], (10, 3))]:
+        off = np.array([x, y, 0.0])
+        xx, yy, zz, xy, xz, yz = UNSURE["inertia"]
+        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) * mass / 300
+        inertia -= mass * (off @ off * np.eye(3) - np.outer(off, off))
+        six = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        its = with_load(COGIRO, {"mass": mass, "com": np.array(UNSURE["com"]) + off, "inertia": six})
+        w = Dynamics(its).required_wrench(*motion)
+        arm = Rotation.from_euler("ZYX", motion[0][:, 5:2:-1]).apply(its.platform.com)
+        w[:, 3:] += np.cross(arm, w[:, :3])  # about the CoM of the platform alone
+        assert solve_batch(A, w, low, high, length=COGIRO.length).feasible.all()
+
+
+def test_a_load_is_as_uncertain_as_the_strongest_cable_permits():
+    """On one vertical cable at rest the tension is (M + m (1 + e)) g."""
+    data = load("point-mass-3").model_dump(mode="json")
+    cable = {**data["cables"][0], "anchor": [0, 0, 3], "t_min": 0, "t_max": 60}
+    hoist = Robot.model_validate({**data, "platform": {**data["platform"], "mass": 2.0}, "cables": [cable]})
+    largest = (60 / 9.81 - 2) / 3 - 1
+
+    def held(tolerance):
+        rest = {"name": "hold", "path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 1}
+        return plan(hoist, {"phases": [rest | {"load": {"mass": 3, "mass_tolerance": tolerance}}]})
+
+    assert held(largest - 1e-3).feasible
+    failed = held(largest + 1e-2)
+    assert failed.status is MotionStatus.INFEASIBLE
+    assert failed.certificate.load[0] == pytest.approx(3 * (1 + largest + 1e-2))
+    assert failed.certificate.shortfall == pytest.approx(0.03 * 9.81)
+    assert "with a load of 4.146 kg, CoM (0, 0, 0) m" in str(failed.report())
+
+
+@pytest.mark.parametrize(
+    ("load_keys", "keys", "message"),
+    [
+        ({"mass_tolerance": 1}, {}, "mass_tolerance must be less than 1, got 1"),
+        ({"mass_tolerance": -0.1}, {}, "mass_tolerance must be greater than or equal to 0"),
+        ({"mass_tolerance": float("nan")}, {}, "mass_tolerance"),
+        ({"com_tolerance": [0.1, 0]}, {}, "com_tolerance"),
+        ({"com_tolerance": [0, 0, -0.1]}, {}, r"com_tolerance\[2\] must be greater"),
+        ({"mass_tolerance": 0.1}, {"robust": 0.9}, "robust"),
+    ],
+)
+def test_wrong_tolerances_are_one_line(load_keys, keys, message):
+    carried = line(HIGH, LOW, name="carry", load={"mass": 5, **load_keys})
+    with pytest.raises(InputError, match=message) as caught:
+        plan(COGIRO, {"phases": [carried], **keys})
+    assert "\n" not in str(caught.value)
+    grounded = [{"name": "stand", "duration": 0.5, "ground": {}}, line(HIGH, LOW, name="lift", load={**UNSURE})]
+    with pytest.raises(InputError, match=r"phases\[1\].load.mass_tolerance must be left out with phases on the ground"):
+        plan(COGIRO, {"phases": [{**grounded[0], "path": {"kind": "rest", "pose": [*HIGH, 0, 0, 0]}}, grounded[1]]})

@@ -53,18 +53,19 @@ def worst_certificate(scenario: Scenario, time: float, platform: Motion, carrier
     """Return the proof that no tensions at a time give the required wrench, of the worst wind; None if some do.
 
     `platform` is its motion in {G}, (6,) each, `carriers` are the poses of all, (c, 6). Of a box of winds the proof has
-    its wind.
+    its wind, of extreme loads its load.
     """
     robot, phase = scenario.robot, scenario.phases.at(time)
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers)
     proofs = []
-    for wind in scenario.winds_at(platform.pose, platform.velocity):
+    for wind, extreme in scenario.cases_at(platform.pose, platform.velocity):
         motion = Motion(*(part[None] for part in platform))
-        w = scenario.required_wrench(np.array([time]), motion, wind=wind)
+        w = scenario.required_wrench(np.array([time]), motion, wind=wind, extreme=extreme)
         extended, limits, _ = _extended(scenario, phase, A[None], w, np.zeros((1, robot.m)))
         found = certify(wrench_problem(robot, extended[0], w[0], *limits))
         if found is not None:
-            proofs.append(replace(_of_cables(found, robot.m), wind=None if scenario.wind_box is None else wind))
+            about = None if scenario.wind_box is None else wind
+            proofs.append(replace(_of_cables(found, robot.m), wind=about, load=scenario.load_of(time, extreme)))
     return max(proofs, key=lambda proof: proof.shortfall, default=None)
 
 

@@ -15,7 +15,7 @@ from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from .by_phase import distribution, taken_up
-from .tensions import in_all_winds, scaled
+from .tensions import in_all_winds, scaled, with_all_loads
 
 OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "violation", "supports")
 MOTIONS = ("motion", "carriers")
@@ -64,6 +64,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     result = distribute(w, taken_up(scenario, times) if deviation is None else deviation.tensions_at(times))
     if (box := scenario.wind_box) is not None:
         result = in_all_winds(distribute, box, motion, w, result)
+    result = with_all_loads(distribute, times, motion, carriers, result)
     certificate = result.certificate
     if certificate is not None and result.row is not None:
         certificate = replace(certificate, time=float(times[result.row]))

@@ -172,6 +172,26 @@ def in_all_winds(
     return worst
 
 
+def with_all_loads(
+    distribute: Distribution, times: np.ndarray, motion: Motion, carriers: Motion, given: AuditedTensions
+) -> AuditedTensions:
+    """Return the result of the worst load within the tolerances at each of `times` (n,), whose certificate has it.
+
+    `given` is the result of the planned tensions, for the load as given. If tensions exist with the extreme loads, they
+    do with all (`Load.extremes`).
+    """
+    scenario, worst = distribute.scenario, given
+    for extreme in range(scenario.phases.extremes):
+        w = scenario.required_wrench(times, motion, carriers, scenario.wind, extreme)
+        result = distribute(w, np.nan_to_num(given.tensions))
+        if result.certificate is not None and result.row is not None and _shortfall(result) > _shortfall(worst):
+            load = scenario.load_of(float(times[result.row]), extreme)
+            worst = worst._replace(certificate=replace(result.certificate, load=load), row=result.row)
+        violation, beyond = np.maximum(worst.violation, result.violation), max(worst.beyond, result.beyond)
+        worst = worst._replace(violation=violation, beyond=beyond)
+    return worst
+
+
 def _nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return tensions inside the limits whose wrenches are nearest to w, (n, m), and their distances, (n,) [N]."""
     nearest = solve_batch(A, w, low, high, rho=NEAREST)

@@ -27,7 +27,7 @@ class Layout(Displayed):
     n, derivatives
         The number of free coordinates, and how many of these and their derivatives are unknowns.
     winds, grounds
-        The number of decisive winds of a box, and of forces of the ground.
+        The number of decisive winds of a box or of extreme loads, and of forces of the ground.
     soft, carried
         The names of the soft limits, and of what all nodes share.
     q, v, a
@@ -36,7 +36,8 @@ class Layout(Displayed):
         Jerk and snap of a smooth scheme, times the first and second power of an interval's length at the scenario's
         duration: so they are of the size of a. Empty for other schemes.
     tensions, wind_tensions
-        Tensions in units of the robot's force: the planned ones, and those in each decisive wind, one after another.
+        Tensions in units of the robot's force: the planned ones, and those in each decisive wind or with each extreme
+        load, one after another.
     supports
         The forces of the ground, in the same unit; zero where the platform hangs.
     missing
@@ -74,7 +75,7 @@ class Layout(Displayed):
         carried = [DURATION] * (scenario.duration_range is not None)
         carried += [MARGIN] * (scenario.task.objective.margin is not None)
         soft = tuple(dict.fromkeys(limit.name for limit in scenario.limits if limit.soft is not None))
-        n, m, winds, grounds = scenario.count, scenario.robot.m, scenario.decisive_winds, scenario.phases.supports
+        n, m, winds, grounds = scenario.count, scenario.robot.m, scenario.decisive, scenario.phases.supports
         smooth = n * scenario.scheme.smooth
         sizes = [n, n, n, smooth, smooth, m, winds * m, grounds, 6 * (1 + winds) * elastic, len(soft), len(carried)]
         ends = np.cumsum([0, *sizes]).tolist()

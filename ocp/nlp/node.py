@@ -24,7 +24,7 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
     """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant.
 
     The functions are for the nodes of these `references`, (18 (1 + c), nodes), with the load and the columns of the
-    ground of each, `carried` (10 + 6 s, nodes), or nothing (0, nodes).
+    ground of each and extreme loads, `carried` (10 + 6 s + 10 k, nodes), or nothing (0, nodes).
     """
     robot, dynamics = scenario.robot, scenario.dynamics
     x = ca.SX.sym("x", layout.width)
@@ -43,13 +43,16 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
     if scenario.phases.carry:
         w += _in_frame(scenario, dynamics.carried_wrench(*bodies[0], load=load[:10]), carriers)
     if layout.grounds:
-        w -= ca.reshape(load[10:], 6, layout.grounds) @ (robot.force_scale * x[layout.supports])
+        columns = ca.reshape(load[10 : 10 + 6 * layout.grounds], 6, layout.grounds)
+        w -= columns @ (robot.force_scale * x[layout.supports])
     scale = robot.force_scale / robot.wrench_scale
     moving = [int(row) for row in np.flatnonzero(robot.dof_mask)]
     balance = ((A @ tensions - w) / ca.DM(scale))[moving]
     balances = [balance]
-    for others, push in _in_decisive_winds(scenario, layout, x, bodies[0], carriers):
-        balances.append(((A @ others - w + push) / ca.DM(scale))[moving])
+    for i, less in enumerate(_decisive(scenario, load, bodies[0])):
+        start = layout.wind_tensions.start + i * robot.m
+        others = robot.force_scale * x[start : start + robot.m]
+        balances.append(((A @ others - w + _in_frame(scenario, less, carriers)) / ca.DM(scale))[moving])
     whole = [ca.vertcat(*body) for body in bodies]
     cost = _node_cost(scenario, layout, x, costs_at(scenario, layout, x, whole)[0])
     if mesh.elastic:
@@ -83,21 +86,19 @@ def _in_frame(scenario: Scenario, wrench: ca.SX, carriers: list[list[ca.SX]]) ->
     return ca.vertcat(R_A.T @ wrench[0:3], R_A.T @ wrench[3:6])
 
 
-def _in_decisive_winds(
-    scenario: Scenario, layout: Layout, x: ca.SX, platform: list[ca.SX], carriers: list[list[ca.SX]]
-) -> list[tuple[ca.SX, ca.SX]]:
-    """Return the tensions (m, 1) [N] in each decisive wind of a box, and its wrench less that of the box's middle."""
-    box, robot = scenario.wind_box, scenario.robot
-    if box is None:
+def _decisive(scenario: Scenario, load: ca.SX, platform: list[ca.SX]) -> list[ca.SX]:
+    """Return by how much less wrench the cables must give in {G} in each decisive wind, or with each extreme load."""
+    box, robot, (pose, velocity, _) = scenario.wind_box, scenario.robot, platform
+    if box is None and not scenario.phases.extremes:
         return []
-    pose, velocity, _ = platform
-    pairs = []
+    if box is None:
+        loads = [load[:10], *ca.vertsplit(load[-10 * scenario.phases.extremes :], 10)]
+        given, *others = [scenario.dynamics.carried_wrench(*platform, load=each) for each in loads]
+        return [given - other for other in others]
     middle = aerodynamic_wrench(robot, pose, velocity, ca.DM(box.middle))
-    for i, wind in enumerate(decisive_winds(box, robot, pose, velocity)):
-        push = _in_frame(scenario, aerodynamic_wrench(robot, pose, velocity, wind) - middle, carriers)
-        start = layout.wind_tensions.start + i * robot.m
-        pairs.append((robot.force_scale * x[start : start + robot.m], push))
-    return pairs
+    return [
+        aerodynamic_wrench(robot, pose, velocity, wind) - middle for wind in decisive_winds(box, robot, pose, velocity)
+    ]
 
 
 def _slack_cost(scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX) -> ca.SX | float:

@@ -256,12 +256,12 @@ def _parameters(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
 
 
 def _carried(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
-    """Return loads and columns of the ground, (10 + 6 s, nodes); (0, nodes) for a task without."""
+    """Return loads, columns of the ground and extreme loads, (10 + 6 s + 10 k, nodes); (0, nodes) for none."""
     phases = scenario.phases
     if not (phases.carry or phases.rest):
         return np.zeros((0, len(nodes)))
     columns = phases.columns_at(nodes).swapaxes(1, 2).reshape(len(nodes), -1)
-    return np.hstack([phases.loads_at(nodes), columns]).T
+    return np.hstack([phases.loads_at(nodes), columns, *(phases.loads_at(nodes, k) for k in range(phases.extremes))]).T
 
 
 def _bounds_of(block: Block, starts: np.ndarray, scenario: Scenario) -> np.ndarray:

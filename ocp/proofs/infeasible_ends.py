@@ -249,12 +249,13 @@ def _without_tensions(
         A = scenario.dynamics.wrench_matrix(platform.pose[one], carriers.pose[one])
         distribute = distribution(scenario, times[one], A)
         moving, bases = (Motion(*(part[one] for part in motion)) for motion in (platform, carriers))
-        for wind in scenario.winds_at(platform.pose[row], platform.velocity[row]):
-            result = distribute(scenario.required_wrench(times[one], moving, bases, wind), None)
+        for wind, extreme in scenario.cases_at(platform.pose[row], platform.velocity[row]):
+            result = distribute(scenario.required_wrench(times[one], moving, bases, wind, extreme), None)
             found = result.certificate
             if found is None or max(float(result.violation[0]), result.beyond) <= distribute.tolerance:
                 continue
             if worst is None or found.shortfall > worst.shortfall:
                 at = None if scenario.wind_box is None else wind
-                worst = replace(found, time=float(times[row]), wind=at)
+                time = float(times[row])
+                worst = replace(found, time=time, wind=at, load=scenario.load_of(time, extreme))
     return worst

@@ -10,6 +10,8 @@ from ..tasks.paths import FeedPath, PathBase, TimedPath
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox
 
+LOADS = "any within their tolerances; the tensions shown are those with the loads as given"
+
 
 def motion_facts(plan: PlanData) -> list[Fact]:
     """Return the facts of the platform's motion."""
@@ -26,6 +28,7 @@ def motion_facts(plan: PlanData) -> list[Fact]:
         *_feed(task.path),
         *_accuracy(plan),
         ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
+        *([("loads", LOADS)] if plan.scenario.phases.extremes else []),
         *_stop(plan),
         *([("wind", _task_wind(task))] if task.wind is not None else []),
     ]

@@ -158,9 +158,10 @@ def _of_the_motion(plan: PlanData) -> str:
     if plan.law is not None and plan.feasible:
         return f"shortest duration {quantity(plan.duration, 's', 6)}"
     if plan.feasible:
-        # The planned tensions are those of one wind; in the others of a range they exist, with the required margin.
-        ranges = plan.scenario.wind_box is not None
-        margin, where = (plan.scenario.hard_margin, ", in any of its winds") if ranges else (plan.margin, "")
+        # The planned tensions are those of one wind and load; with the others they exist, with the required margin.
+        where = ", in any of its winds" if plan.scenario.wind_box is not None else ""
+        where = ", with any of its loads" if plan.scenario.phases.extremes else where
+        margin = plan.scenario.hard_margin if where else plan.margin
         if margin is None or margin < WORTH_A_NUMBER:
             return f"every tension inside its limits{where}"
         return f"every tension at least {quantity(margin, 'N')} inside its limits{where}"
@@ -173,6 +174,7 @@ def _of_the_motion(plan: PlanData) -> str:
     short += _in_phase(plan, certificate.time)
     if certificate.wind is not None:
         short += f" in wind {wind(certificate.wind)}"
+    short += "" if certificate.load is None else f" with {certificate.load_text}"
     return f"{short}{_more(len(excess))}"
 
 
@@ -205,6 +207,7 @@ def _reasons(plan: PlanData) -> list[Fact]:
             ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}{phase}"),
             ("pose", _pose_then(plan, certificate.time)),
             *([("wind", wind(certificate.wind))] if certificate.wind is not None else []),
+            *([("load", certificate.load_text)] if certificate.load is not None else []),
             ("direction", text.along),
             ("needed", text.needed),
             ("available", text.available),

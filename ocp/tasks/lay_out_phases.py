@@ -35,6 +35,7 @@ def lay_out_phases(scenario: Scenario) -> Phases:
     grounds = [phase.ground for phase in task.phases]
     if any(grounds):
         _check_ground(robot, task, where)
+    _check_tolerances(task, where)
     loads = [np.zeros(10) if phase.load is None else phase.load.numbers for phase in task.phases]
     columns = [_columns(robot, ground, pose) for ground, pose in zip(grounds, poses, strict=True)]
     laid = []
@@ -58,7 +59,8 @@ def lay_out_phases(scenario: Scenario) -> Phases:
             ends[side] = np.stack([np.maximum(own - its, 0.0), free[1]])
         slack = phase.ground is not None and phase.ground.slack
         times = float(boundaries[index]), float(boundaries[index + 1])
-        laid.append(LaidPhase(phase.name, *times, loads[index], columns[index], slack, *ends))
+        extremes = np.zeros((0, 10)) if phase.load is None else phase.load.extremes
+        laid.append(LaidPhase(phase.name, *times, loads[index], columns[index], slack, ends[0], ends[1], extremes))
     phases = Phases(tuple(laid))
     _check_program(scenario, phases, where)
     _check_jumps(scenario, phases, where)
@@ -73,6 +75,22 @@ def _check_ground(robot: Robot, task: Task, where: str) -> None:
         raise InputError(f"{where}: phases.path.frame must be 'world' on the ground, got {task.path.frame!r}")
     if isinstance(task.wind, WindBox):
         raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with a phase on the ground, got a box")
+
+
+def _check_tolerances(task: Task, where: str) -> None:
+    """Refuse loads of unknown mass or CoM where one of several winds, robots or grounds would have to hold too."""
+    for index, phase in enumerate(task.phases or ()):
+        if phase.load is None or not len(phase.load.extremes):
+            continue
+        key = "mass_tolerance" if phase.load.mass_tolerance else "com_tolerance"
+        ground = any(other.ground is not None for other in task.phases or ())
+        for other, what in (
+            (ground, "phases on the ground"),
+            (isinstance(task.wind, WindBox), "a range of winds"),
+            (task.robust, "robust"),
+        ):
+            if other:
+                raise InputError(f"{where}: phases[{index}].load.{key} must be left out with {what}")
 
 
 def _columns(robot: Robot, ground: Ground | None, pose: np.ndarray) -> np.ndarray:

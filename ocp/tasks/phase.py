@@ -1,13 +1,14 @@
 """`Phase`: a part of a task with a path, a load and, optionally, the ground under it."""
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Annotated
 
 import numpy as np
 from pydantic import AfterValidator, Field
 
 from ...models.body import AnyBody
-from ...models.part import AT_ORIGIN, Inertia, Name, Part, Pose, Positive, Vector3, inertia_matrix
+from ...models.part import AT_ORIGIN, Inertia, Name, NonNegative, Part, Pose, Positive, Vector3, inertia_matrix
 from ...models.ranges import PositiveRange
 from .paths import RestPath, SequencePath, SinglePath
 from .paths.sequence import Piece, check_continuity, lasting
@@ -32,6 +33,17 @@ class Load(Part):
         description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs "
         "[kg m^2]",
     )
+    mass_tolerance: float = Field(
+        default=0.0,
+        ge=0,
+        lt=1,
+        description="part of the mass by which it may differ, such as 0.1: tensions exist for every mass in between",
+    )
+    com_tolerance: tuple[NonNegative, NonNegative, NonNegative] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="distance by which the CoM may differ along each axis of the platform [m]: tensions exist for "
+        "every CoM in this box",
+    )
     body: AnyBody | None = Field(
         default=None,
         description="convex body in the platform frame that the plan keeps out of regions, above the floor and in the "
@@ -42,6 +54,23 @@ class Load(Part):
     def numbers(self) -> np.ndarray:
         """Return mass, CoM and inertia, (10,), as `Dynamics.carried_wrench` takes them."""
         return np.array([self.mass, *self.com, *self.inertia])
+
+    @property
+    def extremes(self) -> np.ndarray:
+        """Return the loads that decide whether tensions exist for all within the tolerances, (k, 10); k is 0 without.
+
+        The wrench of a load is affine in its mass, and in its CoM, if its inertia about the nominal CoM is in
+        proportion to the mass. So each wrench is a mean of those of the corners, and the available ones are convex.
+        """
+        masses = np.unique([self.mass * (1 - self.mass_tolerance), self.mass * (1 + self.mass_tolerance)])
+        offsets = list(product(*(np.unique([-off, off]) + 0.0 for off in self.com_tolerance)))
+        loads = []
+        for mass, (x, y, z) in product(masses.tolist(), offsets):
+            # About its own CoM, from that about the nominal one (parallel axes).
+            nearer = mass * np.array([y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
+            inertia = np.array(self.inertia) * mass / self.mass - nearer
+            loads.append([mass, self.com[0] + x, self.com[1] + y, self.com[2] + z, *inertia])
+        return np.array(loads) if len(loads) > 1 else np.zeros((0, 10))
 
 
 class Ground(Part):

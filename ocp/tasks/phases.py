@@ -30,6 +30,7 @@ class LaidPhase(Displayed):
     slack: bool  # whether the lower limit of its tensions is 0
     at_start: np.ndarray  # bounds of the support forces at its ends, (2, s) [N]; the upper one may be infinite
     at_end: np.ndarray  # likewise
+    extremes: np.ndarray  # loads within the tolerances that decide, (k, 10), as `load`; k is 0 for one that is known
 
     @property
     def rests(self) -> bool:
@@ -86,9 +87,18 @@ class Phases(Displayed):
         which = self.index_at(times)
         return [(self.all[index], np.flatnonzero(which == index)) for index in np.unique(which)]
 
-    def loads_at(self, times: np.ndarray) -> np.ndarray:
-        """Return what the platform carries at `times`, (n, 10)."""
-        return np.array([phase.load for phase in self.all])[self.index_at(times)]
+    @cached_property
+    def extremes(self) -> int:
+        """Return the largest number of loads that decide within the tolerances of a phase."""
+        return max((len(phase.extremes) for phase in self.all), default=0)
+
+    def loads_at(self, times: np.ndarray, extreme: int | None = None) -> np.ndarray:
+        """Return what the platform carries at `times`, (n, 10): the loads as given, or an extreme of each phase."""
+        loads = [
+            phase.load if extreme is None or extreme >= len(phase.extremes) else phase.extremes[extreme]
+            for phase in self.all
+        ]
+        return np.array(loads)[self.index_at(times)]
 
     def columns_at(self, times: np.ndarray) -> np.ndarray:
         """Return S at `times`, (n, 6, s), zero without ground; s is `supports`."""

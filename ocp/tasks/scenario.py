@@ -99,21 +99,21 @@ class Scenario(Displayed):
         """Return the box of winds in which tensions must exist; None if the task has one wind or none."""
         return self.task.wind if isinstance(self.task.wind, WindBox) else None
 
-    def winds_at(self, pose: np.ndarray, velocity: np.ndarray) -> list[Vector3 | None]:
-        """Return the winds in which tensions must exist at a motion (6,) in {G}; of a box those that decide.
+    def cases_at(self, pose: np.ndarray, velocity: np.ndarray) -> list[tuple[Vector3 | None, int | None]]:
+        """Return the winds and the extreme loads with which tensions must exist at a motion (6,) in {G}.
 
-        [None]: no air.
+        Of a box those winds that decide. A wind of None is no air, a load of None the given one.
         """
         if self.wind_box is None:
-            return [self.wind]
+            return [(self.wind, load) for load in (None, *range(self.phases.extremes))]
         winds = decisive_winds_at(self.wind_box, self.robot, pose[None], velocity[None])
-        return [as_wind(values[0]) for values in winds]
+        return [(as_wind(values[0]), None) for values in winds]
 
     @property
-    def decisive_winds(self) -> int:
-        """Return how many winds of the box decide whether tensions exist in all."""
+    def decisive(self) -> int:
+        """Return how many winds of the box, or extreme loads, decide whether tensions exist with all."""
         aero, box = self.robot.platform.aero, self.wind_box
-        return 0 if aero is None or box is None else len(choices(box, aero))
+        return self.phases.extremes if aero is None or box is None else len(choices(box, aero))
 
     def lasting(self, seconds: float) -> Scenario:
         """Return the scenario with another duration [s]."""
@@ -184,11 +184,27 @@ class Scenario(Displayed):
         return np.where(slack[:, None], 0.0, low)
 
     def required_wrench(
-        self, times: np.ndarray, platform: Motion, carriers: Motion | None = None, wind: Vector3 | None = None
+        self,
+        times: np.ndarray,
+        platform: Motion,
+        carriers: Motion | None = None,
+        wind: Vector3 | None = None,
+        extreme: int | None = None,
     ) -> np.ndarray:
-        """Return the wrench that platform and load need at `times` for a motion in {G}, (n, 6) [N, N m]."""
+        """Return the wrench that platform and load need at `times` for a motion in {G}, (n, 6) [N, N m].
+
+        The load is the given one, or an `extreme` one.
+        """
         w = self.dynamics.required_wrench(*platform, *(carriers or ()), wind=wind)
-        return w + self.dynamics.carried_wrench(*platform, self.phases.loads_at(times)) if self.phases.carry else w
+        loads = self.phases.loads_at(times, extreme) if self.phases.carry else None
+        return w if loads is None else w + self.dynamics.carried_wrench(*platform, loads)
+
+    def load_of(self, time: float, extreme: int | None) -> tuple[float, float, float, float] | None:
+        """Return mass [kg] and CoM [m] of an extreme load at a time, for a certificate; None for the given one."""
+        if extreme is None:
+            return None
+        mass, x, y, z = self.phases.loads_at(np.array([time]), extreme)[0, :4].tolist()
+        return mass, x, y, z
 
     @property
     def hard_margin(self) -> float:
