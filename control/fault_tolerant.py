@@ -64,13 +64,13 @@ class Rest(NamedTuple):
 
 
 class FaultTolerant(Controller):
-    """Control a team of flying carriers with `Predictive`, and go on without a carrier that loses its thrust.
+    """Control a team of flying carriers with `Predictive`, also after one of them has lost its thrust.
 
     A carrier is lost if a force along gravity of 0.3 of its weight is not explained by its thrust, its weight and its
-    cables. From then on its cables are to be released (`Command.released`), and the others go to the formation with
-    which they carry the platform at the planned position, in 1 s. It is found at construction for each carrier, with a
-    controller, see `statics.formation`. If there is none, a warning says which wrench is missing, and nothing changes
-    when that carrier is lost.
+    cables. Its cables are then released (`Command.released`), and the others take 1 s to reach a formation in which
+    they carry the platform at the planned position. Formations and controllers are computed at construction for the
+    loss of each carrier, see `statics.formation`. If there is none, a warning gives the missing wrench, and nothing
+    changes when that carrier is lost.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class FaultTolerant(Controller):
         A `Robot`, the name of one in the library, or the path of a robot file, with flying carriers alone and cables of
         fixed length.
     options
-        Arguments of `Predictive`, of the team and of the others.
+        Arguments of `Predictive`, for the team and for the remaining carriers.
 
     Attributes
     ----------

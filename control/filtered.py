@@ -31,7 +31,7 @@ class Filter(Protocol):
 class Filtered(Controller):
     """Control a robot whose sensors report poses without velocities, such as motion capture.
 
-    The velocities of measured states are not used. A pose that equals the last one exactly is a held reading.
+    The velocities of measured states are not used. A pose that equals the last one is treated as a held reading.
 
     Parameters
     ----------

@@ -48,10 +48,10 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
 
 
 def longest_stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], period: float = 0.02) -> Stop:
-    """Return the stop that takes longest, of those from instants of a plan; first of all one beyond the limits.
+    """Return the longest of the stops that begin at regular instants of a plan, or the first one that is infeasible.
 
-    If it is feasible, so are all others, and the robot can stop within its duration from each of these instants. A stop
-    takes some 5 ms to compute.
+    If it is feasible, the robot can stop within its duration from each of these instants. Computing a stop takes some
+    5 ms.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ FAULTS = {
     "binary": "must be a CSV file in UTF-8, or NetCDF, got other bytes",
     "damaged NetCDF": "must be a NetCDF 4 file, got one that cannot be read",
     "text": r"line 5, column l1 \[m\] must be a number, got 'much'",
-    "truncated": "line 61 must have 15 columns as the header, got",
+    "truncated": "line 61 must have 15 values like the header, got",
 }
 
 

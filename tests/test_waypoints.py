@@ -304,7 +304,7 @@ WRONG = {
     "no z": ("a.csv", "x [m],y [m]\n0,0\n1,1\n", r"a.csv: column z is missing, such as 'z \[m\]'"),
     "word": ("a.csv", CSV.replace("500", "half"), r"a.csv: line 5, column x \[mm\] must be a number, got 'half'"),
     "infinite": ("a.csv", CSV.replace("500", "inf"), r"line 5, column x \[mm\] must be a number, got 'inf'"),
-    "short row": ("a.csv", CSV.replace("500;", ""), "line 5 must have 5 columns as the header, got 4"),
+    "short row": ("a.csv", CSV.replace("500;", ""), "line 5 must have 5 values like the header, got 4"),
     "time back": ("a.csv", CSV.replace(";3\n", ";1\n"), "line 6, column t must increase, got 1 s after 2 s"),
     "late start": ("a.csv", CSV.replace(";0;0\n", ";0;1\n"), "line 3, column t must start at 0 s, got 1 s"),
     "one line": ("a.csv", "x [m],y [m],z [m]\n0,0,0\n", "a header and two points or more, got 1"),

@@ -87,6 +87,6 @@ def _from_data(data: dict[str, Any], where: str, folder: Path | None) -> Event:
 
 def _accepted() -> str:
     """Return what is accepted."""
-    ends = {event: " for SECONDS" if "duration" in event.model_fields else "" for event in Event.kinds.values()}
-    lines = [f"'{event.short} at SECONDS{end}'" for event, end in ends.items() if event.short]
+    last = {event: "duration" in event.model_fields and event.said != "duration" for event in Event.kinds.values()}
+    lines = [f"'{event.short} at SECONDS{' [for SECONDS]' * lasts}'" for event, lasts in last.items() if event.short]
     return f"{', '.join(lines)}, a mapping with a kind, or the YAML file of a list of these"

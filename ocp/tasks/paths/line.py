@@ -15,8 +15,8 @@ class LinePath(PathBase):
     """A straight line from one pose to another, over the task's duration."""
 
     kind: Literal["line"]
-    start: PoseOrPosition = Field(description="first pose: (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
-    end: PoseOrPosition = Field(description="last pose: (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+    start: PoseOrPosition = Field(description="first pose, (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+    end: PoseOrPosition = Field(description="last pose, (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
     timing: Literal["smooth", "smoother", "uniform"] | None = Field(
         default=None,
         description="smooth: from rest to rest, acceleration and jerk zero there; smoother: the next two derivatives "

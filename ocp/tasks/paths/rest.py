@@ -14,7 +14,7 @@ class RestPath(PathBase):
     """A pose that is held."""
 
     kind: Literal["rest"]
-    pose: PoseOrPosition = Field(description="pose: (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
+    pose: PoseOrPosition = Field(description="pose, (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
