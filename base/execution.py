@@ -43,7 +43,7 @@ class ExecutionOptions(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Execution:
-    """A choice of where many jobs are computed and stored.
+    """Workers and checkpoint of many jobs.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Execution:
     checkpoint
         File to which results are written every few seconds.
     resume
-        Whether to continue the checkpoint if the file exists. It must be of the same jobs.
+        True to continue the checkpoint if the file exists. It must belong to the same jobs.
     progress
         Function that is called with (jobs done, jobs in total, those with a good result).
 

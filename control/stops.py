@@ -22,16 +22,16 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
 
     Platform and carriers stay on their path, each at the same fraction of the plan's velocity at any time, and never
     become faster than planned. Accelerations and tensions are continuous. Where no stop inside the limits was found,
-    the result is the one that misses least of the wrench that it needs, with its certificate. The
-    time to compute it depends on how long the robot takes to stop, not on the plan.
+    the result is the stop with the smallest missing wrench, with its certificate. The time to compute it depends on
+    how long the robot takes to stop, not on the plan.
 
     Parameters
     ----------
     plan
         A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
     time
-        Time in the plan at which the stop begins [s], at most its end. A plan that ends while the robot moves is taken
-        to go on with its last acceleration.
+        Time in the plan at which the stop begins [s], at most its end. A plan that ends while the robot moves is
+        continued with its last acceleration.
 
     Returns
     -------

@@ -33,8 +33,8 @@ class Free(Part):
     )
     box: Box | None = Field(
         default=None,
-        description="for anchor and attachment: where, in the frame of carrier or platform [m]; where min and max are "
-        "equal, the box is a face, a line or a point",
+        description="for anchor and attachment: box of allowed points in the frame of carrier or platform [m]; equal "
+        "bounds make it a face, a line or a point",
     )
     range: Range | None = Field(default=None, description="for t_min and t_max: smallest and largest value [N]")
     equal: bool = Field(default=False, description="true: the cables have one point or value in common")

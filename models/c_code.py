@@ -10,7 +10,7 @@ def to_c(robot: Robot) -> str:
     """Return C text with `wrench_matrix`, `cable_lengths`, `required_wrench` and `acceleration` of `robot`.
 
     Each is `int NAME(const double** arg, double** res, ...)` in CasADi's calling convention, with `NAME_n_in`,
-    `NAME_name_in`, `NAME_sparsity_in` and so on beside it; matrices are stored by columns. Units as in `Dynamics`.
+    `NAME_name_in`, `NAME_sparsity_in` and so on; matrices are stored by columns. Units as in `Dynamics`.
     """
     generator = ca.CodeGenerator(ca.Function.fix_name(robot.name), {"with_header": False})  # it begins what is private
     for function in Dynamics(robot).functions.values():

@@ -17,7 +17,7 @@ from .robot import Robot
 
 
 class RelativeDynamics(Displayed):
-    """Compute the dynamics as paper F does: in {A}, with the carrier's motion in a term of its own, D_B (Eq. 38).
+    """Compute the dynamics as paper F does: in {A}, with the carrier's motion in a separate term, D_B (Eq. 38).
 
     `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, in the axes of {A};
     `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.

@@ -75,7 +75,7 @@ class Uncertainty(Part):
 
     @property
     def factor(self) -> np.ndarray:
-        """Return S with S S^T equal to the covariance, (p, r) [m], r its rank: directions that vary on their own."""
+        """Return S with S S^T equal to the covariance, (p, r) [m], r its rank: independent directions."""
         eigenvalues, directions = np.linalg.eigh(self.matrix)
         kept = eigenvalues > ROUNDING * max(eigenvalues[-1], 0.0)
         return directions[:, kept] * np.sqrt(eigenvalues[kept])  # (p, r)

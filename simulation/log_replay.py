@@ -47,7 +47,7 @@ class Replay(Drawn, Reported, Displayed):
     matching
         The recording, compared with its plant.
     found
-        What each parameter alone explains, the largest share first.
+        Share of the residuals that each parameter alone explains, largest first.
     explained
         Residuals with the first one fitted, None if it explains nothing.
     fitted
@@ -176,7 +176,7 @@ class Replay(Drawn, Reported, Displayed):
         return self.windows.recorded.times[self.windows.rows]
 
     def figures(self) -> dict[str, Figure]:
-        """Draw "replay": residuals over the recording, and those with what explains most."""
+        """Draw "replay": residuals over the recording, and those after fitting the best parameter."""
         from ..figures.replay import replay as draw
 
         after = self.explained or {}
@@ -274,7 +274,7 @@ def replay(
     tolerance: float = 0.05,
     fit: bool = False,
 ) -> Replay:
-    """Replay a recording: simulate it by its commands, in windows that each start from the recorded state.
+    """Replay a recording: simulate its commands, in windows that each start from the recorded state.
 
     Parameters
     ----------
@@ -283,16 +283,16 @@ def replay(
     log, poses, fields
         As `path`, `poses` and `fields` of `read_measurements`.
     drive
-        What the plant is commanded: "lengths", "tensions", or "forces" of winches (default: recorded commands,
+        Type of the commands: "lengths", "tensions", or "forces" of winches (default: recorded commands,
         otherwise measured lengths of elastic cables, otherwise measured tensions).
     delay
-        Known time by which the robot follows its recorded commands later [s].
+        Known delay of the robot behind its recorded commands [s].
     window
         Duration of a window [s].
     tolerance
         Largest position residual for a pass, of 95 % of the samples [m].
     fit
-        Whether to fit what explains the residuals, and to validate the result in windows that were not fitted.
+        True to fit parameters to half of the windows, and to validate them on the other half.
 
     Raises
     ------

@@ -84,11 +84,11 @@ class Mismatch(Part):
 
     @property
     def stiffest(self) -> "Mismatch":
-        """Return the one of the robots whose cables let them vibrate fastest."""
+        """Return the robot with the fastest vibrations."""
         return Mismatch(mass=float(np.min(self.mass)), stiffness=float(np.max(self.stiffness)))
 
     def drawn(self, robot: Robot, seed: int) -> "Drawn":
-        """Return the numbers of a run. A key does not change what is drawn for others."""
+        """Return the numbers of a run. Each key has its own random numbers."""
         sizes = (1, 3, *4 * (robot.m,), *2 * (len(robot.carriers),))
         random, values = np.random.default_rng([seed, 2]), []
         for name, size in zip(Drawn._fields, sizes, strict=True):

@@ -30,9 +30,9 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
     plant
         The plant.
     history
-        What its `run` returned for one state, at equal times.
+        Result of its `run` for one state, at equal times.
     reference
-        What the position errors are measured against: a plan, the NetCDF file of one, a path or a pose (6,); default:
+        Reference of the position errors: a plan, the NetCDF file of one, a path or a pose (6,); default:
         the motion itself.
     tolerance
         Largest position error allowed for a pass [m].

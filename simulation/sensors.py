@@ -39,7 +39,7 @@ class Noise(Part):
     resolution: float = Field(default=0.0, ge=0, le=1e3, description="steps of the measured position [m]")
     attitude_resolution: float = Field(default=0.0, ge=0, le=10, description="steps of roll, pitch and yaw [rad]")
     tension_resolution: float = Field(default=0.0, ge=0, le=1e9, description="steps of the measured tensions [N]")
-    differenced: bool = Field(default=False, description="whether velocities are differences of the measured poses")
+    differenced: bool = Field(default=False, description="true: velocities are differences of the measured poses")
     rate: float | None = Field(
         default=None,
         ge=0.1,
@@ -50,7 +50,7 @@ class Noise(Part):
         default=0.0, ge=0, le=10, description="delay of all sensors [s]; rounded to whole control periods"
     )
     stamped: bool = Field(
-        default=False, description="whether states have the time of their measurement, from which controllers predict"
+        default=False, description="true: states have the time of their measurement, from which controllers predict"
     )
 
     @property

@@ -22,11 +22,11 @@ class Multipliers(NamedTuple):
     Attributes
     ----------
     dynamics :
-        Of A x + B u + c = x of the next stage, shape (N, n).
+        Multipliers of A x + B u + c = x of the next stage, shape (N, n).
     lower, upper :
-        Of the bounds of controls, shape (N, m), not negative.
+        Multipliers of the bounds of controls, shape (N, m), not negative.
     rows :
-        Of the soft rows, shape (N, p), from 0 to the slope of their penalty.
+        Multipliers of the soft rows, shape (N, p), from 0 to the slope of their penalty.
     """
 
     dynamics: Array  # (N, n)
@@ -43,13 +43,13 @@ class Residuals(NamedTuple):
     Attributes
     ----------
     stationarity :
-        Of the gradient of the Lagrangian.
+        Gradient of the Lagrangian.
     dynamics :
         Of the dynamics.
     complementarity :
-        Of the products of multipliers and distances to bounds.
+        Products of multipliers and distances to bounds.
     soft :
-        Of the multipliers of soft rows, which are to be slopes of the penalty.
+        Deviation of the multipliers of soft rows from slopes of the penalty.
     """
 
     stationarity: float
@@ -85,7 +85,7 @@ class Horizon(Displayed):
     Attributes
     ----------
     A, B, c :
-        Dynamics, shapes (N, n, n), (N, n, m) and (N, n). All arrays are zero at first, but for the bounds.
+        Dynamics, shapes (N, n, n), (N, n, m) and (N, n). All arrays except the bounds are zero at first.
     start :
         The state x of stage 0, shape (n,).
     Q, R, S :
@@ -110,7 +110,7 @@ class Horizon(Displayed):
     Raises
     ------
     InputError
-        If a size is no whole number in its range.
+        If a size is not a whole number in its range.
     """
 
     def __init__(self, N: int, n: int, m: int, rows: int = 0):
@@ -185,14 +185,14 @@ class Horizon(Displayed):
         Parameters
         ----------
         shifted :
-            Begin with the last solution moved by one stage, as a controller does that solves once a stage.
+            Begin with the last solution moved by one stage, for a controller that solves once per stage.
         warm :
             Begin with the last solution, or what is written into `states`, `controls` and `multipliers`.
 
         Raises
         ------
         InputError
-            If an argument is no truth.
+            If an argument is not a bool.
         """
         shifted, warm = flag("shifted", shifted), flag("warm", warm)
         beginning = SHIFTED if shifted else WARM if warm else COLD

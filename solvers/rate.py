@@ -13,12 +13,12 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
 
     The result is a problem like any other, for every method: `solve(limit_rate(problem, last.tensions, 5.0))`. If it is
     infeasible, its certificate refers to the reduced limits. A cable whose last tension is so far outside its limits
-    that they cannot be reached goes as far towards them as it may.
+    that they cannot be reached moves towards them as far as the rate allows.
 
     Parameters
     ----------
     problem :
-        The problem with the limits of the cables themselves.
+        The problem with its original limits.
     previous :
         The last tensions [N], shape (m,).
     rate_max :

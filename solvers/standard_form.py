@@ -40,7 +40,7 @@ class StandardForm(NamedTuple):
     moving :
         Indices of the cables with a choice, (k,).
     sigma :
-        What each row of Q s - b counts as a wrench error in newtons, up to one common factor, (r,).
+        Wrench error in newtons per unit of each row of Q s - b, up to one common factor, (r,).
     """
 
     Q: Array

@@ -44,7 +44,7 @@ class LogPoses(Displayed):
     estimate
         The poses with their covariances, of N samples.
     times
-        When they were, by the clock of the lengths [s], (N,), or None.
+        Times of the poses on the clock of the lengths [s], (N,), or None.
     """
 
     estimate: PoseEstimate
@@ -68,7 +68,7 @@ class LogPoses(Displayed):
 
     @cached_property
     def wrong(self) -> tuple[Wrong, ...]:
-        """Return the samples that no pose fits, those together that follow each other."""
+        """Return the samples that no pose fits, grouped into runs."""
         rows = np.flatnonzero(~self.fits)
         if not rows.size:
             return ()

@@ -106,7 +106,7 @@ class Limit(ABC):
         """Return the values at one instant, (k, 1), as an expression of its symbols."""
 
     def on_the_way(self, first: State, second: State) -> ca.SX | None:
-        """Return the least values that there are if all points move straight from one instant to another, (k, 1).
+        """Return the smallest values while all points move straight from one instant to another, (k, 1).
 
         The program keeps these instead of those at its nodes where a step may jump over a region; None if not known.
         """
@@ -127,19 +127,19 @@ class Limit(ABC):
         return Rows(values / self.scale, (self.low + reserve) / self.scale, (self.high - reserve) / self.scale)
 
     def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Return what is between the bounds at `times` (n,) [s], (n, k), from the values at these times."""
+        """Return the limited values at `times` (n,) [s], (n, k), from the values at these times."""
         return values
 
     def share_beyond(self, value: float) -> float:
-        """Return how far a value is beyond the bounds, as `rows` counts `shrink`."""
+        """Return how far a value is beyond the bounds, in the unit of `shrink` of `rows`."""
         return max(self.low - value, value - self.high, 0.0) / self.scale
 
     def about(self, index: int) -> str:
-        """Return what value `index` is about, for the sentence of a violation."""
+        """Return the subject of value `index`, for messages."""
         return self.labels[index]
 
     def is_about(self, about: str) -> bool:
-        """Return whether one of its values is about that."""
+        """Return whether one of its values has this subject."""
         return any(self.about(index) == about for index in range(len(self.labels)))
 
     @property
@@ -164,12 +164,12 @@ class Limit(ABC):
 
     @property
     def order(self) -> int:
-        """Return the derivative of the pose that a convex limit is about."""
+        """Return the derivative of the pose that a convex limit bounds."""
         return 0 if self.hull is None else self.hull.order
 
     @property
     def slack_weight(self) -> float:
-        """Return how many times `soft` a slack of one in the program is."""
+        """Return the value of a slack of 1 in the program, in units of `soft`."""
         return 0.0 if self.soft is None else self.scale / self.soft
 
     def softened(self, amount: float | None) -> Self:

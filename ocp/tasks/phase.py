@@ -37,7 +37,7 @@ class Load(Part):
         default=0.0,
         ge=0,
         lt=1,
-        description="part of the mass by which it may differ, such as 0.1: tensions exist for every mass in between",
+        description="relative tolerance of the mass, such as 0.1: tensions exist for every mass in between",
     )
     com_tolerance: tuple[NonNegative, NonNegative, NonNegative] = Field(
         default=(0.0, 0.0, 0.0),

@@ -46,7 +46,7 @@ class OfCable(Event, ABC):
 
     @override
     def begin(self, running: Running) -> None:
-        """Let it happen."""
+        """Apply the event."""
         running.states = type(self).change(running.plant, running.states, self.cable - 1)
 
 
@@ -99,7 +99,7 @@ class Lose(Event):
 
     @override
     def begin(self, running: Running) -> None:
-        """Let it happen."""
+        """Apply the event."""
         names = [carrier.name for carrier in running.plant.robot.carriers]
         running.periods.lose(names.index(self.carrier))
 
@@ -119,5 +119,5 @@ class Miss(Event):
 
     @override
     def begin(self, running: Running) -> None:
-        """Let it happen."""
+        """Apply the event."""
         running.silent_until = max(running.silent_until, self.at + self.duration)

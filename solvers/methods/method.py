@@ -13,7 +13,7 @@ __all__ = ["Array", "Method", "Proposal", "StandardForm"]
 
 
 class Proposal(NamedTuple):
-    """The proposal of a method; `towline.solvers.solve` judges it.
+    """The proposal of a method; `towline.solvers.solve` checks it.
 
     Attributes
     ----------
@@ -24,8 +24,8 @@ class Proposal(NamedTuple):
     detail :
         The reason when `s` is None.
     final :
-        True if this stands even if the problem is feasible, for example because the feasible tensions are unbounded:
-        `solve` does not compute in exact arithmetic what rounding may have lost.
+        True if the failure is the result even if the problem is feasible, for example because the feasible tensions
+        are unbounded: `solve` then does not try exact arithmetic.
     """
 
     s: Array | None
@@ -75,7 +75,7 @@ class Method(ABC):
         return []
 
     def for_options(self, problem: TensionProblem, options: dict[str, Any]) -> Method:
-        """Return the method that answers with these options; default: this one."""
+        """Return the method for these options; default: this one."""
         return self
 
     @abstractmethod

@@ -32,8 +32,8 @@ class Stiffest(Method):
     Attributes
     ----------
     value, bound
-        The smallest eigenvalue at the last proposal, and what no tensions inside the limits exceed, by the last linear
-        program; both are nan without a proposal.
+        The smallest eigenvalue at the last proposal, and its upper bound for all tensions inside the limits, by the
+        last linear program; both are nan without a proposal.
     """
 
     name = "stiffest"
@@ -50,7 +50,7 @@ class Stiffest(Method):
         self.value = self.bound = np.nan
 
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
-        """Cut off what eigenvectors exclude, until the linear program has nothing left to gain."""
+        """Add cutting planes from eigenvectors until the linear program no longer improves."""
         base = form.b @ form.Q
         t = form.origin.copy()
         t[form.moving] += form.unit * base

@@ -76,7 +76,7 @@ class PathBase(Part):
         return []
 
     def bends(self) -> np.ndarray:
-        """Return s where sharp bends begin and end, (n, 2): a grid needs many places there."""
+        """Return s where sharp bends begin and end, (n, 2): a grid needs many points there."""
         return np.zeros((0, 2))
 
     def jumps(self) -> np.ndarray:
@@ -84,7 +84,7 @@ class PathBase(Part):
         return np.zeros(0)
 
     def stations(self, duration: float) -> Stations:
-        """Return the poses that it was given to pass in a task that lasts `duration` [s]; none by default."""
+        """Return the poses through which a task that lasts `duration` [s] should pass; none by default."""
         return Stations()
 
     def at(self, times: np.ndarray, duration: float) -> Motion:
