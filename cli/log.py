@@ -22,6 +22,10 @@ def log(
         typer.Argument(metavar="LOG", help="CSV, NetCDF or MCAP files, or bags of ROS 1 (.bag) or ROS 2 (folder)."),
     ],
     fields: FieldsOption = None,
+    robot: Annotated[
+        str | None,
+        typer.Option(metavar="ROBOT", help="Robot of the logs, whose moving carriers have poses of their own."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """List what logs contain (topics, rates, gaps, fields, units), which fields towline uses, and what for.
@@ -30,9 +34,10 @@ def log(
     """
     from ..estimation.logs import read_map, recordings
     from ..estimation.logs.listing import listing, report
+    from ..models import load
 
     given = None if fields is None else read_map(fields)
-    data = listing(recordings(logs), given)
+    data = listing(recordings(logs), given, None if robot is None else load(robot))
     print_result(as_json, data, lambda: report(data).text())
-    if not data["fields"]["lengths"]:
+    if data["uses"]["pose from lengths"]:
         raise typer.Exit(1)

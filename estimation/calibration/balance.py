@@ -22,7 +22,7 @@ from ...core import columns_by_geometry, lines, wrench_by_axes
 from ...models import points
 from ...models.record import record_of
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, measured_poses
+from ..logs.measurements import Measurements, carriers_of, measured_poses
 from .motion import Motion, cross, motion_of
 from .parameters import Parameters
 
@@ -88,6 +88,12 @@ class Balance:
         return other
 
     @property
+    def _carriers(self) -> np.ndarray:
+        """Return the poses of the carriers, (N, c, 6) or (c, 6) [m, rad]."""
+        poses = carriers_of(self._robot, self._measurements)
+        return poses if self._chosen is None or poses.ndim == 2 else np.ascontiguousarray(poses[self._chosen])
+
+    @property
     def freedoms(self) -> int:
         """Return the number of equations for each sample beside unknown tensions."""
         few = 0 if self._measurements.tensions is not None else self._robot.m
@@ -148,7 +154,7 @@ class Balance:
         record["com"] = 0.0  # moments about the platform frame
         poses = np.concatenate([position, points.angles(rotation)], axis=1)
         A, lengths = np.empty((count, 6, m)), np.empty((count, m))
-        lines(record, poses, robot.carrier_home, lengths, A, None, None, None)
+        lines(record, poses, self._carriers, lengths, A, None, None, None)
         (tensions, by_tensions), variances = self.tensions(table, smooth), noise**2 * self._variances
         motion = self._of_log[0]
         if smooth and motion.smooth is not None:
@@ -231,7 +237,7 @@ class Balance:
         pull, by_arm = of_log.pull, of_log.by_arm
         raw = np.zeros((count, 6, of.count))
         S = np.empty((count, m, 6, 7))
-        columns_by_geometry(of_log.record, of_log.poses, robot.carrier_home, S)
+        columns_by_geometry(of_log.record, of_log.poses, self._carriers, S)
         S *= tensions[..., None, None]
         felt = np.einsum("nim,nmk->nimk", A, of_log.by_tensions)
         for i in range(m):
@@ -242,7 +248,7 @@ class Balance:
         by_com = mass * np.concatenate([by_arm, cross(arm) @ by_arm - cross(pull)], axis=1)
         raw[..., of.clock + 2 : of.clock + 5] = by_com @ rotation
         by_pose = np.empty((count, 6, 6))
-        wrench_by_axes(of_log.record, of_log.poses, robot.carrier_home, np.ascontiguousarray(tensions), by_pose)
+        wrench_by_axes(of_log.record, of_log.poses, self._carriers, np.ascontiguousarray(tensions), by_pose)
         by_pose[..., 3:] -= by_com @ cross(arm)
         raw[..., 13 : of.clock : of.clock // m] -= r[..., None] / (gain * m)
         weighted = inverse_root * (scale / gain)

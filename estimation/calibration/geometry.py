@@ -29,21 +29,26 @@ class Runs(NamedTuple):
     by_geometry: np.ndarray
 
 
-def runs(robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> Runs:
-    """Return the cable geometry with the carriers at home and the platform at positions (N, 3) and rotations (N, 3, 3).
+def runs(
+    robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray, carriers: np.ndarray | None = None
+) -> Runs:
+    """Return the cable geometry with the platform at positions (N, 3) and rotations (N, 3, 3).
 
     Parameters
     ----------
     table
         `Parameters.table`: anchors, attachments and, in its last column, radii, which replace the values of the robot,
         (m, 9). No cable is tangent to a negative radius.
+    carriers
+        Their poses, (N, c, 6) or (c, 6) [m, rad]; default: at home.
     """
     record, m, count = record_of(robot).copy(), robot.m, len(position)
     cables = record["cable"][:m]
     cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
     poses = np.concatenate([position, points.angles(rotation)], axis=1)
     lengths, A, by_geometry = np.empty((count, m)), np.empty((count, 6, m)), np.empty((count, m, 7))
-    lines(record, poses, robot.carrier_home, lengths, A, None, None, by_geometry)
+    carriers = robot.carrier_home if carriers is None else np.ascontiguousarray(carriers)
+    lines(record, poses, carriers, lengths, A, None, None, by_geometry)
     lengths[:, table[:, 8] < 0] = np.nan
     # Cables first, in this order also in memory, as the fit goes through them.
     directions = np.negative(A[:, :3].transpose(2, 0, 1), order="C")

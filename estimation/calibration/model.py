@@ -29,7 +29,7 @@ from scipy.spatial.transform import Rotation
 from ...base.display import Displayed
 from ...models import points
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, measured_poses
+from ..logs.measurements import Measurements, carriers_of, measured_poses
 from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .geometry import runs
@@ -273,7 +273,7 @@ class Model(Displayed):
         base_position, base_rotation, velocity, rate = self._base(state.x[parameters.clock])
         position, rotation = base_position + state.shift, state.turn @ base_rotation
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
-        run = runs(robot, table, position, rotation)
+        run = runs(robot, table, position, rotation, carriers_of(robot, self.measurements))
         slip, y = self.slips(state.x), self.measurements.lengths.T
         stretch, tensions, by_errors = self._stretch(state)
         scale0 = parameters.table(parameters.first)[:, 7:8]

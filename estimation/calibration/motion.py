@@ -9,11 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
+from ..logs.smoothing import FEWEST, SPAN, Parabolas, within
 from .parameters import Parameters
-
-SPAN = 0.1  # [s] to each side of a sample, over which a motion is a parabola
-FEWEST = 2  # samples to each side
-MOST = 25
 
 
 class Motion(NamedTuple):
@@ -72,7 +69,7 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
         return rest
     from scipy.special import erf
 
-    of, local = Parameters(robot, ()), Parabolas(times)
+    of, local = Parameters(robot, ()), Parabolas(times, within(times))
     lengths = local.fitted(measurements.lengths * of.table(of.first)[:, 7])
     signs = erf(lengths.slopes / np.maximum(np.sqrt(2) * lengths.noise[1], 1e-12))
     rest = rest._replace(signs=signs, smooth=local)
@@ -91,47 +88,6 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
         momentum, change = (np.einsum("nij,nj->ni", inertia, part) for part in (rate, spin))
         rest = rest._replace(turning=change + np.cross(rate, momentum))
     return rest._replace(gravity=gravity - placed.bends, rate=rate, spin=spin, sigma=sigma)
-
-
-class Fitted(NamedTuple):
-    """Values, first and second derivatives, (N, d), and the standard deviation of each, (3, d)."""
-
-    values: np.ndarray
-    slopes: np.ndarray
-    bends: np.ndarray
-    noise: np.ndarray
-
-
-class Parabolas:
-    """Parabolas by least squares through the neighbours of each sample, at times (N,) [s]."""
-
-    def __init__(self, times: np.ndarray):
-        count = len(times)
-        each = int(np.clip(SPAN / np.median(np.diff(times)), FEWEST, min(MOST, (count - 1) // 2)))
-        width = 2 * each + 1
-        self._rows = np.clip(np.arange(count) - each, 0, count - width)[:, None] + np.arange(width)  # (N, width)
-        apart = times[self._rows] - times[:, None]
-        self._unit = np.abs(apart).max(axis=1, keepdims=True)
-        basis = np.stack([np.ones_like(apart), apart / self._unit, (apart / self._unit) ** 2], axis=2)
-        transposed = np.swapaxes(basis, 1, 2)
-        self._shares = np.linalg.solve(transposed @ basis, transposed)  # (N, 3, width)
-
-    @property
-    def share(self) -> np.ndarray:
-        """Return the share of the variance of noise that smoothed values keep, (N,)."""
-        return (self._shares[:, 0] ** 2).sum(axis=1)
-
-    def values(self, values: np.ndarray) -> np.ndarray:
-        """Return smoothed values (k, N, d)."""
-        return np.stack([(self._shares[:, :1] @ one[self._rows])[:, 0] for one in values])
-
-    def fitted(self, values: np.ndarray) -> Fitted:
-        """Return values (N, d) as the parabolas have them."""
-        parts = self._shares @ values[self._rows]  # (N, 3, d)
-        noise = np.sqrt(((values - parts[:, 0]) ** 2).mean(axis=0))
-        units = (1.0, self._unit, self._unit**2 / 2)
-        spread = [np.median(np.linalg.norm(self._shares[:, k], axis=1) / np.ravel(units[k])) for k in range(3)]
-        return Fitted(parts[:, 0], parts[:, 1] / units[1], parts[:, 2] / units[2], np.outer(spread, noise))
 
 
 def _vector_of_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -182,12 +182,13 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
     lengths = model.measurements.lengths[sample] + model.slips(state.x)[:, sample] / scales
     position, rotation = model.poses(state)
     pose = np.concatenate([position[sample], points.angles(rotation[sample])])
-    given = model.measurements.poses
+    given, carriers = model.measurements.poses, model.measurements.carrier_poses
     copies = Measurements(
         np.tile(lengths, (m, 1)),
         None if given is None else np.tile(given[sample], (m, 1)),
         tensions=None if model.measurements.tensions is None else np.tile(model.measurements.tensions[sample], (m, 1)),
         sigma=model.measurements.sigma._asdict(),
+        carrier_poses=None if carriers is None else np.tile(carriers[sample], (m, 1, 1)),
     )
     used = np.tile(model.weights[:, sample, None], (1, m))
     felt = model.felt and model.felt.only(np.full(m, sample))

@@ -129,7 +129,9 @@ class Parameters(Displayed):
             if cable["pulley"] is not None:
                 cable["pulley"]["radius"] = row[8]
             reading = [row[k] for k in (6, 7, 9)]
-            if cable["encoder"] is not None or reading != before[i, [6, 7, 9]].tolist():
+            if self.robot.fixed_lengths is not None:
+                cable["length"] = row[6] + (row[7] + row[9] * cable["length"]) * cable["length"]
+            elif cable["encoder"] is not None or reading != before[i, [6, 7, 9]].tolist():
                 cable["encoder"] = dict(zip(("offset", "scale", "build_up"), reading, strict=True))
             if row[10] != before[i, 10]:
                 cable["stiffness"] = 1 / row[10] if row[10] > STIFFEST else None

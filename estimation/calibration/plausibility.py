@@ -109,7 +109,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     if len(rows) > MOST_SAMPLES:
         rows = rows[np.linspace(0, len(rows) - 1, MOST_SAMPLES).astype(int)]
     readings = given.lengths * table[:, 7]
-    if len(rows) < 4:
+    if len(rows) < 4 or given.carrier_poses is not None:  # moving carriers would have to be in each comparison
         return _too_large(robot, given, readings)
     angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
     sigma = given.sigma.lengths

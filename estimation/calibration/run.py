@@ -25,7 +25,7 @@ def calibrate(
 
     Exactly measured poses are fixed, poses measured with an error may move within it, and unmeasured poses are
     estimated along with the parameters, by lengths and, with tensions or fewer cables than coordinates, by the balance
-    of forces on the platform. Carriers are at home.
+    of forces on the platform. Carriers are at home, unless their poses were measured.
 
     Parameters
     ----------

@@ -42,7 +42,8 @@ class Solved(NamedTuple):
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
     """Return the default free parameters, with the clock offset if a motion was measured."""
     groups = ("anchors", "offsets", "clock")
-    known = measurements.times is not None and is_enough(robot, measurements, ("clock",))
+    moves = measurements.carrier_poses is not None
+    known = measurements.times is not None and not moves and is_enough(robot, measurements, ("clock",))
     return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
 
 
@@ -64,7 +65,7 @@ def solve(
     state = begin_with_clock(model, length) if "clock" in groups else model.begin()
     model = replace(model, ahead=float(state.x[model.parameters.clock]))
     result, fitted = fit_from(model, state, length, outliers)
-    model, result = _weighed(model, result, length)
+    model, result = _weighed(model, result, length, False)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
     limit = LARGEST_SHARE * model.weights.size
@@ -93,7 +94,7 @@ def solve(
             weights[one.cable, one.sample] = 0.0
         model = replace(model, weights=weights)
         result, fitted = fit(model, result.state, length), model.weights
-    model, result = _weighed(model, result, length)
+    model, result = _weighed(model, result, length, True)
     S = state_equations(model, result.state, scale := metric(model)).S
     seen = observability(S, model.parameters, result.state, scale, length)
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen)
@@ -120,8 +121,11 @@ def _surprise(result: Fit, weights: np.ndarray) -> float:
     return result.cost + LEAST_THRESHOLD**2 * float((weights == 0).sum())
 
 
-def _weighed(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
-    """Return the model with errors of forces as large as they turn out to be, and tensions in balance, and its fit."""
+def _weighed(model: Model, result: Fit, length: float, stretches: bool) -> tuple[Model, Fit]:
+    """Return the model with errors of forces as large as they turn out to be, and its fit.
+
+    With `stretches`, cables are also stretched by tensions in balance. Errors of these would fit wrong readings.
+    """
     for _ in range(ROUNDS_OF_WEIGHTS):
         before, state = model, result.state
         found = find_unbalanced(model, state)
@@ -130,7 +134,7 @@ def _weighed(model: Model, result: Fit, length: float) -> tuple[Model, Fit]:
             noise = float(np.clip(model.noise * found[0], *NOISE_OF_FORCES))
             clock = float(state.x[model.parameters.clock])
             model = replace(model, noise=noise, unbalanced=found[1], ahead=clock)
-        model = _stretched(model, state, length)
+        model = _stretched(model, state, length) if stretches else model
         if model is before:
             break
         result = fit(model, state._replace(errors=model.begin().errors), length)
@@ -177,7 +181,8 @@ def model_of(
     elif np.isinf(model.pose_sigmas[:, :3]).any():
         if start is None:
             table = parameters.table(parameters.first)
-            start = level_poses(robot, table[:, 6] + table[:, 7] * measurements.lengths, "offsets" in groups)
+            lengths = table[:, 6] + table[:, 7] * measurements.lengths
+            start = level_poses(robot, lengths, "offsets" in groups, measurements.carrier_poses)
         model = replace(model, start=start)
     return model
 
@@ -192,6 +197,8 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     parameters = Parameters(robot, groups)
     if "clock" in groups:
         known = measured_poses(robot, measurements)[2][:, robot.dof_mask > 0].all(axis=1)
+        if measurements.carrier_poses is not None:
+            raise InputError("free must not have clock where carriers move, whose clock is that of the lengths, got it")
         if measurements.times is None:
             raise InputError("measurements.times must be given to estimate a clock offset, got none")
         if known.sum() < 4:
@@ -247,7 +254,7 @@ def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
     model, x = solved.model, solved.fit.state.x
     given = model.measurements
     lengths = given.lengths + (model.slips(x) / model.parameters.table(x)[:, 7:8]).T
-    return Measurements(lengths, given.poses, None, given.tensions, given.times, given.sigma._asdict()), model.weights
+    return given.with_lengths(lengths), model.weights
 
 
 def lengths_of(model: Model, state: State) -> np.ndarray:

@@ -71,16 +71,17 @@ def fit_from(
     return result, clean.weights
 
 
-def level_poses(robot: Robot, lengths: np.ndarray, offsets: bool) -> np.ndarray:
+def level_poses(robot: Robot, lengths: np.ndarray, offsets: bool, carriers: np.ndarray | None = None) -> np.ndarray:
     """Return poses (N, 6) [m, rad] with the orientation at home and lengths closest to `lengths` (N, m) [m].
 
-    With unknown `offsets`, lengths are relative to home at the first sample if that fits better.
+    With unknown `offsets`, lengths are relative to home at the first sample if that fits better. `carriers` are the
+    poses of the carriers (N, c, 6); default: at home.
     """
-    problem, weights = problem_of(robot), np.ones(robot.m)
+    problem, weights = problem_of(robot, carriers), np.ones(robot.m)
 
     def level(of: np.ndarray) -> tuple[np.ndarray, float]:
         poses = level_platform(problem, np.maximum(of, SHORTEST), weights)
-        return poses, float(np.median(np.abs(dynamics_of(robot).cable_lengths(poses) - of)))
+        return poses, float(np.median(np.abs(dynamics_of(robot).cable_lengths(poses, carriers) - of)))
 
     poses, misfit = level(lengths)
     if offsets and misfit > FAR * float(lengths.mean()):
@@ -150,7 +151,9 @@ def _elsewhere(model: Model, state: State) -> State | None:
     turns = np.unique(turns, axis=0)  # (k, 3)
     starts = np.empty((len(bad), len(turns), 6))
     starts[..., :3], starts[..., 3:] = position[bad, None], robot.home[3:] + turns
-    found = pose_from_lengths(robot, np.repeat(lengths[:, None], len(turns), axis=1), sigma=sigma, start=starts)
+    of_carriers = model.measurements.carrier_poses
+    carriers = None if of_carriers is None else of_carriers[bad, None]
+    found = pose_from_lengths(robot, np.repeat(lengths[:, None], len(turns), axis=1), starts, carriers, sigma)
     costs = ((found.residuals / sigma) ** 2).sum(axis=2)
     best = np.argmin(np.where(np.isfinite(costs), costs, np.inf), axis=1)
     better = costs[np.arange(len(bad)), best] < squares[bad] - CLEARLY * noise

@@ -10,7 +10,8 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...figures.report import Part, Report, Section, Table
-from .mapping import Fields, LogMap, fields_of
+from ...models.robot import Robot
+from .mapping import Fields, LogMap, carrier_fields, fields_of
 from .names import UNITS, epoch_unit
 from .recording import GAP, Recording, Topic, plain
 
@@ -18,15 +19,21 @@ MOST_NAMED = 8  # fields of a topic
 ROLES = ("lengths", "position", "orientation", "tensions")
 
 
-def listing(recordings: Sequence[Recording], given: LogMap | None = None) -> dict[str, Any]:
+def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot: Robot | None = None) -> dict[str, Any]:
     """Return the contents of logs as plain data: files with topics, fields by their roles, and uses.
 
-    If a role cannot be found, `problem` is the reason, in one line.
+    If a role cannot be found, `problem` is the reason, in one line. With a robot there are the fields of its moving
+    carriers, too.
     """
+    moving = [] if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
+    carriers: dict[str, list[str]] = {}
     try:
-        found, problem = fields_of(recordings, given), None
+        found, problem = fields_of(recordings, given, robot and robot.m, moving), None
+        for name in moving:
+            of = carrier_fields(recordings, given, name)
+            carriers[name] = [f"{one.full} [{one.unit}]" for one in (*of.position, *of.orientation, *of.thrusts)]
     except InputError as error:
-        found, problem = Fields(), str(error)
+        found, problem = Fields(), f"{error}{', or give the robot (--robot)' if robot is None else ''}"
     return {
         "files": [
             {
@@ -37,8 +44,8 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None) -> dic
             }
             for one in recordings
         ],
-        "fields": {name: [f"{one.full} [{one.unit}]" for one in getattr(found, name)] for name in ROLES},
-        "uses": _uses(found),
+        "fields": {name: [f"{one.full} [{one.unit}]" for one in getattr(found, name)] for name in ROLES} | carriers,
+        "uses": _uses(found, robot is not None and robot.fixed_lengths is not None),
         "problem": problem,
     }
 
@@ -63,12 +70,11 @@ def _topic(topic: Topic, found: Fields) -> dict[str, Any]:
     }
 
 
-def _uses(found: Fields) -> dict[str, str | None]:
+def _uses(found: Fields, fixed: bool) -> dict[str, str | None]:
     """Return what logs can be used for, and None, or what is missing."""
-    timed = bool(found.lengths) and (
-        found.lengths[0].topic.times is not None or any(one.topic is found.lengths[0].topic for one in found.time)
-    )
-    no_lengths = None if found.lengths else "lengths"
+    first = found.lengths or (found.position if fixed else ())  # cables of fixed length have no readings
+    timed = bool(first) and (first[0].topic.times is not None or any(one.topic is first[0].topic for one in found.time))
+    no_lengths = None if first else "lengths"
     poses = bool(found.position or found.orientation)
     return {
         "calibration with poses": no_lengths or (None if poses else "poses (or give another file with --poses)"),

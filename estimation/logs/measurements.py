@@ -64,6 +64,8 @@ class Measurements(Displayed):
         Default: not measured, no elongation.
     times
         Times of the samples [s], (N,), increasing; a clock offset requires them.
+    carrier_poses
+        Measured poses of the carriers in {G}, (N, c, 6) [m, rad], exact. Default: at home.
     sigma
         Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m], `rotation` [rad] and
         `tensions` (relative). Default: 1 mm, poses that are exact, and 2 % of tensions.
@@ -74,7 +76,7 @@ class Measurements(Displayed):
         (N, m) [m].
     poses
         (N, 6) [m, rad], nan where not measured, or None.
-    tensions, times
+    tensions, times, carrier_poses
         As given, or None.
     sigma
         `Sigma`: of lengths, positions, rotations and tensions.
@@ -93,6 +95,7 @@ class Measurements(Displayed):
         tensions: ArrayLike | None = None,
         times: ArrayLike | None = None,
         sigma: float | Mapping[str, float] = SIGMA,
+        carrier_poses: ArrayLike | None = None,
     ):
         self.lengths = _table("lengths", lengths, None)  # (N, m)
         count = len(self.lengths)
@@ -104,6 +107,7 @@ class Measurements(Displayed):
         self.tensions = None if tensions is None else _table("tensions", tensions, self.lengths.shape)  # (N, m)
         self.times = None if times is None else _rising(times, count)  # (N,)
         self.sigma = _sigma(sigma)
+        self.carrier_poses = None if carrier_poses is None else _of_carriers(carrier_poses, count)  # (N, c, 6)
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -121,7 +125,7 @@ class Measurements(Displayed):
         InputError
             If `rows` are none of these.
         """
-        arrays = {"poses": self.poses, "tensions": self.tensions, "times": self.times}
+        arrays = {name: getattr(self, name) for name in ("poses", "tensions", "times", "carrier_poses")}
         try:
             chosen = {name: None if array is None else array[rows] for name, array in arrays.items()}
             return Measurements(self.lengths[rows], **chosen, sigma=self.sigma._asdict())
@@ -137,7 +141,29 @@ class Measurements(Displayed):
         InputError
             If they have a wrong value.
         """
-        return Measurements(self.lengths, self.poses, None, self.tensions, self.times, sigma)
+        return Measurements(self.lengths, self.poses, None, self.tensions, self.times, sigma, self.carrier_poses)
+
+    def with_lengths(self, lengths: ArrayLike) -> Measurements:
+        """Return the measurements with other lengths (N, m) [m].
+
+        Raises
+        ------
+        InputError
+            If they have a wrong shape or value.
+        """
+        given = self.poses, None, self.tensions, self.times, self.sigma._asdict(), self.carrier_poses
+        return Measurements(lengths, *given)
+
+    def with_carriers(self, carrier_poses: ArrayLike, tensions: ArrayLike | None = None) -> Measurements:
+        """Return the measurements with other poses of carriers (N, c, 6) [m, rad], and tensions (N, m) [N] if given.
+
+        Raises
+        ------
+        InputError
+            If they have a wrong shape or value.
+        """
+        pulls = self.tensions if tensions is None else tensions
+        return Measurements(self.lengths, self.poses, None, pulls, self.times, self.sigma._asdict(), carrier_poses)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save as NetCDF atomically, and return the path; `read_measurements` reads the file.
@@ -163,6 +189,12 @@ class Measurements(Displayed):
             about = {"units": "m, rad", "long_name": "of the platform in {G}; nan: not measured"}
             variables["pose"] = Variable((first, "coordinate"), self.poses, about)
             coordinates["coordinate"] = Variable(("coordinate",), np.array(COORDINATES))
+        if self.carrier_poses is not None:
+            about = {"units": "m, rad", "long_name": "of the carriers in {G}"}
+            names = [f"carrier {i + 1}" for i in range(self.carrier_poses.shape[1])]
+            variables["carrier_pose"] = Variable((first, "carrier", "coordinate"), self.carrier_poses, about)
+            coordinates["coordinate"] = Variable(("coordinate",), np.array(COORDINATES))
+            coordinates["carrier"] = Variable(("carrier",), np.array(names))
         if self.times is not None:
             coordinates["time"] = Variable(("time",), self.times, {"units": "s"})
         attributes = {f"sigma_{name}": value for name, value in self.sigma._asdict().items()}
@@ -176,7 +208,18 @@ def check_measurements(robot: Robot, measurements: object) -> Measurements:
         raise InputError(
             f"measurements.lengths must have a column for each of the {robot.m} cables of {robot.name}, got {given.m}"
         )
+    given_carriers = given.carrier_poses
+    if given_carriers is not None and given_carriers.shape[1] != len(robot.carriers):
+        raise InputError(
+            f"measurements.carrier_poses must have the shape (N, {len(robot.carriers)}, 6) of the carriers of "
+            f"{robot.name}, got {given_carriers.shape}"
+        )
     return given
+
+
+def carriers_of(robot: Robot, measurements: Measurements) -> np.ndarray:
+    """Return the poses of the carriers, (N, c, 6), or (c, 6) at home where they were not measured [m, rad]."""
+    return robot.carrier_home if measurements.carrier_poses is None else measurements.carrier_poses
 
 
 def measured_poses(robot: Robot, measurements: Measurements) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -207,6 +250,14 @@ def _check_finite(name: str, array: np.ndarray) -> None:
         at = tuple(int(i) for i in np.argwhere(wrong)[0])
         where = ", ".join(f"{word} {i}" for word, i in zip(("sample", "column"), at, strict=False))
         raise InputError(f"{name} must be finite numbers up to {LARGEST:g}, got {array[at]:g} at {where}")
+
+
+def _of_carriers(poses: Any, count: int) -> np.ndarray:
+    array = np.array(real_array("carrier_poses", poses), dtype=float)
+    if array.ndim != 3 or array.shape[::2] != (count, 6):
+        raise InputError(f"carrier_poses must have the shape ({count}, c, 6), got {array.shape}")
+    _check_finite("carrier_poses", array.reshape(count, -1))
+    return array
 
 
 def _poses(poses: Any, orientations: Any, count: int) -> np.ndarray:

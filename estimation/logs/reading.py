@@ -16,16 +16,16 @@ from ...models.dynamics import Dynamics
 from ...models.files import as_robot
 from ...models.robot import Robot
 from .alignment import Clock, align
+from .carrier_poses import carriers_at, tensions_by_thrust
 from .mapping import Field, Fields, LogMap, fields_of, read_map
 from .measurements import Measurements
-from .names import UNITS, epoch_unit
 from .opening import recordings
 from .pose_track import PoseTrack
-from .recording import GAP, Recording, Samples
+from .recording import Recording, Samples
+from .streams import Reader, at_times, check_rising, interpolated
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 COUNTED = 1e8  # [s]: times beyond count from 1970, and are read from the first one
-MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
 MOST_ALIGNED = 200_000  # poses
 
 
@@ -74,7 +74,7 @@ def read_measurements(
     poses
         Log of the poses, if they are in another file; its clock is aligned by cable speeds.
     robot
-        Robot of the log, to align clocks; not used otherwise.
+        Robot of the log, to align clocks and to find the poses of its moving carriers by their names.
     fields
         YAML file with the names of the fields, such as `lengths: /winches/position[*] [m]`; default: usual names.
 
@@ -93,8 +93,12 @@ def read_log(
     poses: Paths | None = None,
     robot: Robot | str | os.PathLike[str] | None = None,
     fields: str | os.PathLike[str] | None = None,
+    carriers: bool = True,
 ) -> Log:
-    """Read measurements as `read_measurements`, with the fields that they are from and notes."""
+    """Read measurements as `read_measurements`, with the fields that they are from and notes.
+
+    Without `carriers` the poses of carriers are not read.
+    """
     known = None if robot is None else as_robot(robot)
     given = None if fields is None else read_map(fields)
     first = recordings(path)
@@ -106,9 +110,43 @@ def read_log(
     try:
         found = _fields([*first, *others] if given else first, others, given, known)
         everything = [*first, *others]
-        return measurements_of(found, everything, sigma, known)._replace(recordings=everything)
+        read = measurements_of(found, everything, sigma, known)._replace(recordings=everything)
+        return _with_carriers(read, known, given) if carriers and known is not None else read
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
+    """Return the measurements with the poses of moving carriers, as far as they were recorded."""
+    moving = [i for i, carrier in enumerate(robot.carriers) if carrier.moves]
+    measured = read.measurements
+    if not moving:
+        return read
+    times = None if measured.times is None else measured.times + read.begin
+    poses, thrusts = carriers_at(robot, read.recordings, given, times, len(measured))
+    there = np.asarray(np.isfinite(poses[..., :3]).any(axis=(0, 2)))
+    lost = ", ".join(robot.carriers[i].name for i in moving if not there[i])
+    if lost:
+        read.notes.append(f"the log has no poses of {lost}, which are taken to be at home")
+    if not there[moving].any():
+        return read
+    poses[:, ~there], thrusts[:, ~there] = robot.carrier_home[~there], np.nan
+    still = np.isnan(poses[..., 3:]).all(axis=(0, 2))
+    if still.any():
+        names = ", ".join(robot.carriers[i].name for i in np.flatnonzero(still))
+        read.notes.append(f"the log has no attitudes of {names}, which are taken to be those at home")
+        poses[:, still, 3:], thrusts[:, still] = robot.carrier_home[still, 3:], np.nan
+    kept = np.asarray(np.isfinite(poses).all(axis=(1, 2)))
+    if not kept.any():
+        raise InputError("lengths and poses of carriers must have samples at the same times, got none")
+    if not kept.all():
+        read.notes.append(f"{quantity(int((~kept).sum()))} samples without poses of carriers are left out")
+    tensions = None
+    if measured.tensions is None:
+        tensions = tensions_by_thrust(robot, poses[kept], thrusts[kept], times if times is None else times[kept])
+    if tensions is not None:
+        read.notes.append("tensions are computed from thrusts, weights and accelerations of the carriers")
+    return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions))
 
 
 def _fields(
@@ -179,84 +217,6 @@ def _constant(robot: Robot | None, position: Samples | None) -> Samples:
     return Samples(position.times, np.tile(np.asarray(robot.fixed_lengths), (len(position.values), 1)))
 
 
-class Reader:
-    """Read each topic once."""
-
-    def __init__(self, found: Fields):
-        self._of: dict[int, list[str]] = {}
-        self._times: dict[int, Field] = {id(one.topic): one for one in found.time}
-        self._done: dict[int, Samples] = {}
-        for one in {one for of in found for one in of}:
-            self._of.setdefault(id(one.topic), []).append(one.name)
-
-    def stream(self, fields: Sequence[Field]) -> Samples:
-        """Return fields in SI units, those of other topics at the times of the first one's."""
-        parts: list[Samples] = []
-        for one in fields:
-            whole, names = self._topic(one), self._of[id(one.topic)]
-            factor = next(units[one.unit] for units in UNITS.values() if one.unit in units)
-            column = factor * whole.values[:, names.index(one.name)]
-            parts.append(Samples(whole.times, column[:, None]))
-        if all(one.topic is fields[0].topic for one in fields):
-            return Samples(parts[0].times, np.hstack([part.values for part in parts]))
-        several = [
-            parts[0],
-            *(at_times(parts[0].times, part, one) for part, one in zip(parts[1:], fields[1:], strict=True)),
-        ]
-        whole = np.hstack([part.values for part in several])
-        kept = np.isfinite(whole).all(axis=1)
-        return Samples(None if parts[0].times is None else parts[0].times[kept], whole[kept])
-
-    def _topic(self, one: Field) -> Samples:
-        key = id(one.topic)
-        if key not in self._done:
-            times, values = one.topic.read(self._of[key])
-            clock = self._times.get(key)
-            if clock is not None and one.topic.times is None:
-                column = values[:, self._of[key].index(clock.name)]
-                times = column * UNITS["time"][clock.unit or epoch_unit(float(np.nanmax(np.abs(column), initial=0.0)))]
-            elif times is not None:  # of messages, which may be recorded twice, or late
-                times, rows = np.unique(times, return_index=True)
-                kept = np.isfinite(values[rows]).any(axis=1)
-                times, values = times[kept], values[rows[kept]]
-            self._done[key] = Samples(times, values)
-        return self._done[key]
-
-
-def at_times(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:
-    """Return samples at other times, nan inside gaps and beyond the ends."""
-    if samples.times is None or times is None:
-        if len(samples.values) == (0 if times is None else len(times)) or times is samples.times:
-            return samples
-        raise InputError(f"{one.full} must have times, since it has more or fewer samples than others, got none")
-    if times is samples.times or np.array_equal(times, samples.times):
-        return Samples(times, samples.values)
-    return Samples(times, _interpolated(times, samples))
-
-
-def _interpolated(times: np.ndarray, samples: Samples) -> np.ndarray:
-    """Return values (N, k) at other times: by cubic splines, or by lines where samples are much denser."""
-    own, values = samples.times, samples.values
-    assert own is not None
-    good = np.isfinite(values).all(axis=1)
-    near = np.searchsorted(own[good], times[[0, -1]]) + np.array([-8, 8]) if len(times) else (0, 0)
-    own, values = (one[good][max(near[0], 0) : near[1]] for one in (own, values))
-    if len(own) < 2:
-        return np.full((len(times), values.shape[1]), np.nan)
-    _check_rising(own)
-    apart = float(np.median(np.diff(own)))
-    if len(own) >= 4 and len(times) > 1 and MUCH_FASTER * apart > float(np.median(np.diff(times))):
-        from scipy.interpolate import CubicSpline
-
-        result = CubicSpline(own, values)(times)
-    else:
-        result = np.column_stack([np.interp(times, own, column) for column in values.T])
-    after = np.clip(np.searchsorted(own, times), 1, len(own) - 1)
-    outside = (own[after] - own[after - 1] > GAP * apart) | (times < own[0]) | (times > own[-1])
-    result[outside] = np.nan
-    return result
-
-
 def _merged(
     lengths: Samples,
     tensions: Samples | None,
@@ -272,9 +232,14 @@ def _merged(
     assert times is not None
     assert pose_times is not None
     for one in (times, pose_times):
-        _check_rising(one)
+        check_rising(one)
     shared = min(times[-1], pose_times[-1]) - max(times[0], pose_times[0])
     if source.recording is not first.recording or shared < 0.5 * min(np.ptp(times), np.ptp(pose_times)):
+        if robot is not None and any(carrier.moves for carrier in robot.carriers):
+            raise InputError(
+                f"lengths and poses must have one clock, because the carriers of {robot.name} move and cable speeds "
+                f"cannot align two, got two"
+            )
         if robot is None:
             raise InputError("robot must be given to align the clocks of lengths and poses, got None")
         clock = _aligned(lengths, position, quaternions, robot)
@@ -300,7 +265,7 @@ def _merged(
         places, matrices = track.at(0.0)[:2]
         places = np.where(nowhere, np.nan, places)
         quaternions = None if quaternions is None else Rotation.from_matrix(matrices).as_quat()
-    moved = _interpolated(at, lengths) if at is not times else lengths.values
+    moved = interpolated(at, lengths) if at is not times else lengths.values
     forces = None if tensions is None else at_times(at, tensions, first).values
     kept = np.isfinite(moved).all(axis=1) & inside
     kept &= True if forces is None else np.isfinite(forces).all(axis=1)
@@ -351,13 +316,3 @@ def _check_finite(values: np.ndarray, fields: Sequence[Field]) -> None:
     if wrong.size:
         row, column = (int(i) for i in wrong[0])
         raise InputError(f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}")
-
-
-def _check_rising(times: np.ndarray) -> None:
-    falling = np.flatnonzero(~(np.diff(times) > 0))
-    if falling.size:
-        row = int(falling[0])
-        raise InputError(
-            f"times must increase from sample to sample, got {times[row]:.9g} s and then {times[row + 1]:.9g} s at "
-            f"sample {row + 1}"
-        )

@@ -11,14 +11,14 @@ import numpy as np
 from ...base.csv_columns import LENGTHS
 from ...base.display import Displayed
 from ...base.errors import InputError
-from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
 from ..calibration.plausibility import mistake
 from ..pose.from_log import lengths_of, poses_from_log
-from .mapping import Field, Fields, LogMap, carrier_fields, command_fields, read_map
-from .reading import Log, Paths, Reader, at_times, read_log
-from .recording import Recording, Samples
+from .carrier_poses import carriers_at, filled
+from .mapping import Field, command_fields, read_map
+from .reading import Log, Paths, read_log
+from .streams import Reader
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def read_recorded(
     """
     known = as_robot(robot)
     try:
-        read = read_log(log, None, poses, known, fields)
+        read = read_log(log, None, poses, known, fields, carriers=False)
     except InputError as error:
         raise (InputError(f"log: {error}") if isinstance(log, list | tuple) else error) from None
     given = None if fields is None else read_map(fields)
@@ -110,7 +110,7 @@ def read_recorded(
                 return None
             if len(which) != size:
                 raise InputError(f"{which[0].full} must be one of {size} fields, got {len(which)}")
-            return _filled(times, reader.stream(which), which[0])
+            return filled(times, reader.stream(which), which[0])
 
         efforts = at(found.efforts, known.m) if measured.tensions is None else None
         commands, is_length = at(found.commands, known.m), bool(found.commands) and found.commands[0].unit in LENGTHS
@@ -129,7 +129,7 @@ def read_recorded(
         if lengths is not None and not any(carrier.moves for carrier in known.carriers):
             wrong = mistake(known, measured)
             doubt = f"the log probably has an input error: {wrong.text}" if wrong and wrong.severe else None
-        carrier_pose, thrusts = _carriers(known, read.recordings, given, times)
+        carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times))
         flying = [i for i, carrier in enumerate(known.carriers) if carrier.actuators]
         if found.thrusts and not np.isfinite(thrusts).any():
             given_thrusts = at(found.thrusts, len(flying))
@@ -153,17 +153,6 @@ def read_recorded(
         raise InputError(text if text.startswith(where) else f"{where}: {text}") from None
 
 
-def _filled(times: np.ndarray, samples: Samples, field: Field) -> np.ndarray:
-    """Return samples at other times; before, after and inside gaps the nearest ones are held."""
-    values = at_times(times, samples, field).values
-    good = np.isfinite(values).all(axis=1)
-    if not good.any():
-        raise InputError(f"{field.full} must have samples at the times of the poses, got none")
-    if good.all():
-        return values
-    return np.column_stack([np.interp(times, times[good], column[good]) for column in values.T])
-
-
 def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Return poses (N, 6), and which of their coordinates were measured; locked ones are at home."""
     measured, moves = read.measurements, robot.dof_mask > 0
@@ -177,44 +166,3 @@ def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.nd
         poses[:, ~known] = computed[:, ~known]
         notes.append("coordinates of the pose that were not measured are computed from the lengths")
     return poses, known & moves
-
-
-def _carriers(
-    robot: Robot, recordings: Sequence[Recording], given: LogMap | None, times: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return poses (N, c, 6) and thrusts (N, c) of the carriers."""
-    poses = np.tile(robot.carrier_home, (len(times), 1, 1))
-    thrusts = np.full(poses.shape[:2], np.nan)
-    for index, carrier in enumerate(robot.carriers):
-        if not carrier.free_coordinates(robot.drive):
-            continue
-        found = carrier_fields(recordings, given, carrier.name)
-        reader = Reader(found)
-        poses[:, index, :3] = np.nan
-        if found.position:
-            poses[:, index, :3] = at_times(times, reader.stream(found.position), found.position[0]).values
-        if found.orientation:
-            poses[:, index, 3:] = _angles(times, reader, found)
-        elif not carrier.keeps_attitude:
-            poses[:, index, 3:] = np.nan
-        if found.thrusts:
-            values = _filled(times, reader.stream(found.thrusts), found.thrusts[0])
-            thrusts[:, index] = values[:, 0]
-    return poses, thrusts
-
-
-def _angles(times: np.ndarray, reader: Reader, found: Fields) -> np.ndarray:
-    samples = reader.stream(found.orientation)
-    if samples.values.shape[1] == 3:
-        samples = Samples(samples.times, np.unwrap(samples.values, axis=0))
-        return at_times(times, samples, found.orientation[0]).values
-    from scipy.spatial.transform import Rotation
-
-    values = samples.values.copy()
-    jumps = np.einsum("ni,ni->n", values[1:], values[:-1]) < 0  # q and -q are the same rotation
-    values[1:] *= np.cumprod(np.where(jumps, -1.0, 1.0))[:, None]
-    values = at_times(times, Samples(samples.times, values), found.orientation[0]).values
-    known = np.isfinite(values).all(axis=1) & (np.linalg.norm(values, axis=1) > 0.5)
-    angles = np.full((len(times), 3), np.nan)
-    angles[known] = points.angles(Rotation.from_quat(values[known]).as_matrix())
-    return angles

@@ -18,12 +18,14 @@ from ...base.text import quantity
 from ...base.writing import whole_file
 from ...models.part import COORDINATES
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, check_measurements
+from ..logs.measurements import Measurements, carriers_of, check_measurements
+from ..logs.smoothing import FEWEST, Parabolas, within
 from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
 
 MOST_TRACKED = 2000  # samples that are followed one by one; all others begin between them
 MOST_NAMED = 12
+VISIBLE = 1e-3  # of the cables' length, of a swing that is named
 TOLD_APART = 4.0  # standard deviations by which one cable is more likely wrong than another
 
 
@@ -80,8 +82,28 @@ class LogPoses(Displayed):
             wrong.append(Wrong(int(rows[run[0]]), int(rows[run[-1]]), tuple(cables.tolist())))
         return tuple(wrong)
 
+    @cached_property
+    def swing(self) -> float:
+        """Return how far accelerations move a platform that gravity holds, about, (rms) [m]; 0 without such samples."""
+        estimate, rows = self.estimate, np.asarray(self.estimate.by_gravity)
+        if self.times is None or len(self.times) <= 2 * FEWEST or not rows.any():
+            return 0.0
+        bends = Parabolas(self.times, within(self.times)).fitted(estimate.pose[:, :3]).bends
+        gravity = max(float(np.linalg.norm(estimate.robot.gravity)), 1e-9)
+        return float(np.sqrt((bends[rows] ** 2).sum(axis=1).mean()) / gravity * self._length)
+
+    @property
+    def _length(self) -> float:
+        robot = self.estimate.robot
+        return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+
     def lines(self) -> Iterator[str]:
-        """Yield the wrong samples, one line for each run of them."""
+        """Yield the wrong samples, one line for each run of them, and how far the platform may swing."""
+        if self.swing > VISIBLE * self._length:
+            yield (
+                "lengths do not determine the pose: poses are those at rest, but the platform accelerates, so they may "
+                f"be off by {quantity(1e3 * self.swing, 'mm', 2)} (rms), which the covariance does not include"
+            )
         for one in self.wrong[:MOST_NAMED]:
             which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
             at = "" if self.times is None else f" (from {quantity(float(self.times[one.first]), 's', 6)})"
@@ -120,6 +142,7 @@ class LogPoses(Displayed):
             "residual": float(np.sqrt(np.mean(np.square(self.estimate.residuals)))),
             "consistent": float(np.mean(self.fits)),
             "determined": float(np.mean(self.estimate.determined)),
+            "swing": self.swing,
             "wrong": [one._asdict() for one in self.wrong],
         }
 
@@ -143,7 +166,8 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     robot
         The robot.
     measurements
-        Readings; measured tensions stretch cables with a stiffness, measured poses are not used.
+        Readings; measured tensions stretch cables with a stiffness, and measured poses of carriers move their anchors.
+        Measured poses of the platform are not used.
     sigma
         Standard deviations of the lengths [m], one number or (m,).
     begin
@@ -158,10 +182,11 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     lengths = lengths_of(robot, given.lengths, given.tensions)
     rows = np.unique(np.linspace(0, len(lengths) - 1, min(len(lengths), MOST_TRACKED)).astype(int))
     some, last = list[PoseEstimate](), None
-    for row in lengths[rows]:
-        found = None if last is None else pose_from_lengths(robot, row, last, sigma=deviations)
+    carriers = np.broadcast_to(carriers_of(robot, given), (len(lengths), *robot.carrier_home.shape))
+    for row, places in zip(lengths[rows], carriers[rows], strict=True):
+        found = None if last is None else pose_from_lengths(robot, row, last, places, deviations)
         if found is None or not found.consistent:
-            found = pose_from_lengths(robot, row, sigma=deviations)
+            found = pose_from_lengths(robot, row, None, places, deviations)
         last = found.pose if found.consistent else last
         some.append(found)
     known = np.array([one.pose for one in some])
@@ -169,5 +194,5 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     good = np.array([bool(one.consistent) for one in some])
     good |= ~good.any()
     starts = np.column_stack([np.interp(np.arange(len(lengths)), rows[good], column[good]) for column in known.T])
-    estimate = pose_from_lengths(robot, lengths, starts, sigma=deviations)
+    estimate = pose_from_lengths(robot, lengths, starts, given.carrier_poses, deviations)
     return LogPoses(estimate, None if given.times is None else given.times + begin)

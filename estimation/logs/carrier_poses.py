@@ -1,0 +1,93 @@
+"""`carriers_at`: poses and thrusts of a robot's carriers over a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...models import points
+from ...models.robot import Robot
+from .mapping import Field, Fields, LogMap, carrier_fields
+from .recording import Recording, Samples
+from .smoothing import FEWEST, Parabolas, within
+from .streams import Reader, at_times
+
+
+def filled(times: np.ndarray | None, samples: Samples, field: Field) -> np.ndarray:
+    """Return samples at other times; before, after and inside gaps the nearest ones are held."""
+    values = at_times(times, samples, field).values
+    good = np.isfinite(values).all(axis=1)
+    if not good.any():
+        raise InputError(f"{field.full} must have samples at the times of the poses, got none")
+    if good.all() or times is None:
+        return values
+    return np.column_stack([np.interp(times, times[good], column[good]) for column in values.T])
+
+
+def tensions_by_thrust(
+    robot: Robot, poses: np.ndarray, thrusts: np.ndarray, times: np.ndarray | None
+) -> np.ndarray | None:
+    """Return the tension of each cable, (N, m) [N], if each is the only one of a carrier with recorded thrust.
+
+    It is what remains of thrust, weight and inertia of the carrier.
+    """
+    owner, known = robot.carrier_of_cable, np.asarray(np.isfinite(thrusts).all(axis=0))
+    if times is None or len(times) <= 2 * FEWEST or len(set(owner)) < len(owner) or not known[owner].all():
+        return None
+    parabolas = Parabolas(times, within(times))
+    pulls = np.empty((len(times), len(owner)))
+    for cable, index in enumerate(owner):
+        along = points.rotations(poses[:, index, 3:])[:, :, 2]
+        acceleration = parabolas.fitted(poses[:, index, :3]).bends
+        mass = robot.carriers[index].mass
+        force = thrusts[:, index, None] * along + mass * (np.array(robot.gravity) - acceleration)
+        pulls[:, cable] = np.linalg.norm(force, axis=1)
+    return pulls
+
+
+def carriers_at(
+    robot: Robot, recordings: Sequence[Recording], given: LogMap | None, times: np.ndarray | None, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (N, c, 6) [m, rad] and thrusts (N, c) [N] of the carriers at N = `count` times; nan: not recorded.
+
+    Carriers that cannot move are at home. Without times, there are as many samples as in the recording.
+    """
+    poses = np.tile(robot.carrier_home, (count, 1, 1))
+    thrusts = np.full(poses.shape[:2], np.nan)
+    for index, carrier in enumerate(robot.carriers):
+        if not carrier.free_coordinates(robot.drive):
+            continue
+        found = carrier_fields(recordings, given, carrier.name)
+        if not found.position:
+            found = carrier_fields(recordings, None, f"carrier {index + 1}")  # as `Measurements.save` names them
+        reader = Reader(found)
+        poses[:, index, :3] = np.nan
+        if found.position:
+            poses[:, index, :3] = at_times(times, reader.stream(found.position), found.position[0]).values
+        if found.orientation:
+            poses[:, index, 3:] = _angles(times, reader, found)
+        elif not carrier.keeps_attitude:
+            poses[:, index, 3:] = np.nan
+        if found.thrusts:
+            values = filled(times, reader.stream(found.thrusts), found.thrusts[0])
+            thrusts[:, index] = values[:, 0]
+    return poses, thrusts
+
+
+def _angles(times: np.ndarray | None, reader: Reader, found: Fields) -> np.ndarray:
+    samples = reader.stream(found.orientation)
+    if samples.values.shape[1] == 3:
+        samples = Samples(samples.times, np.unwrap(samples.values, axis=0))
+        return at_times(times, samples, found.orientation[0]).values
+    from scipy.spatial.transform import Rotation
+
+    values = samples.values.copy()
+    jumps = np.einsum("ni,ni->n", values[1:], values[:-1]) < 0  # q and -q are the same rotation
+    values[1:] *= np.cumprod(np.where(jumps, -1.0, 1.0))[:, None]
+    values = at_times(times, Samples(samples.times, values), found.orientation[0]).values
+    known = np.isfinite(values).all(axis=1) & (np.linalg.norm(values, axis=1) > 0.5)
+    angles = np.full((len(values), 3), np.nan)
+    angles[known] = points.angles(Rotation.from_quat(values[known]).as_matrix())
+    return angles

@@ -1,0 +1,103 @@
+"""`Reader`: fields of recordings as samples over time, and `at_times`: the same at other times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...base.errors import InputError
+from .mapping import Field, Fields
+from .names import UNITS, epoch_unit
+from .recording import GAP, Samples
+
+MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
+
+
+class Reader:
+    """Read each topic once."""
+
+    def __init__(self, found: Fields):
+        self._of: dict[int, list[str]] = {}
+        self._times: dict[int, Field] = {id(one.topic): one for one in found.time}
+        self._done: dict[int, Samples] = {}
+        for one in {one for of in found for one in of}:
+            self._of.setdefault(id(one.topic), []).append(one.name)
+
+    def stream(self, fields: Sequence[Field]) -> Samples:
+        """Return fields in SI units, those of other topics at the times of the first one's."""
+        parts: list[Samples] = []
+        for one in fields:
+            whole, names = self._topic(one), self._of[id(one.topic)]
+            factor = next(units[one.unit] for units in UNITS.values() if one.unit in units)
+            column = factor * whole.values[:, names.index(one.name)]
+            parts.append(Samples(whole.times, column[:, None]))
+        if all(one.topic is fields[0].topic for one in fields):
+            return Samples(parts[0].times, np.hstack([part.values for part in parts]))
+        several = [
+            parts[0],
+            *(at_times(parts[0].times, part, one) for part, one in zip(parts[1:], fields[1:], strict=True)),
+        ]
+        whole = np.hstack([part.values for part in several])
+        kept = np.isfinite(whole).all(axis=1)
+        return Samples(None if parts[0].times is None else parts[0].times[kept], whole[kept])
+
+    def _topic(self, one: Field) -> Samples:
+        key = id(one.topic)
+        if key not in self._done:
+            times, values = one.topic.read(self._of[key])
+            clock = self._times.get(key)
+            if clock is not None and one.topic.times is None:
+                column = values[:, self._of[key].index(clock.name)]
+                times = column * UNITS["time"][clock.unit or epoch_unit(float(np.nanmax(np.abs(column), initial=0.0)))]
+            elif times is not None:  # of messages, which may be recorded twice, or late
+                times, rows = np.unique(times, return_index=True)
+                kept = np.isfinite(values[rows]).any(axis=1)
+                times, values = times[kept], values[rows[kept]]
+            self._done[key] = Samples(times, values)
+        return self._done[key]
+
+
+def at_times(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:
+    """Return samples at other times, nan inside gaps and beyond the ends."""
+    if samples.times is None or times is None:
+        if len(samples.values) == (0 if times is None else len(times)) or times is samples.times:
+            return samples
+        raise InputError(f"{one.full} must have times, since it has more or fewer samples than others, got none")
+    if times is samples.times or np.array_equal(times, samples.times):
+        return Samples(times, samples.values)
+    return Samples(times, interpolated(times, samples))
+
+
+def interpolated(times: np.ndarray, samples: Samples) -> np.ndarray:
+    """Return values (N, k) at other times: by cubic splines, or by lines where samples are much denser."""
+    own, values = samples.times, samples.values
+    assert own is not None
+    good = np.isfinite(values).all(axis=1)
+    near = np.searchsorted(own[good], times[[0, -1]]) + np.array([-8, 8]) if len(times) else (0, 0)
+    own, values = (one[good][max(near[0], 0) : near[1]] for one in (own, values))
+    if len(own) < 2:
+        return np.full((len(times), values.shape[1]), np.nan)
+    check_rising(own)
+    apart = float(np.median(np.diff(own)))
+    if len(own) >= 4 and len(times) > 1 and MUCH_FASTER * apart > float(np.median(np.diff(times))):
+        from scipy.interpolate import CubicSpline
+
+        result = CubicSpline(own, values)(times)
+    else:
+        result = np.column_stack([np.interp(times, own, column) for column in values.T])
+    after = np.clip(np.searchsorted(own, times), 1, len(own) - 1)
+    outside = (own[after] - own[after - 1] > GAP * apart) | (times < own[0]) | (times > own[-1])
+    result[outside] = np.nan
+    return result
+
+
+def check_rising(times: np.ndarray) -> None:
+    """Raise InputError unless times (N,) increase."""
+    falling = np.flatnonzero(~(np.diff(times) > 0))
+    if falling.size:
+        row = int(falling[0])
+        raise InputError(
+            f"times must increase from sample to sample, got {times[row]:.9g} s and then {times[row + 1]:.9g} s at "
+            f"sample {row + 1}"
+        )

@@ -1,0 +1,119 @@
+"""Logs of a load under three quadrotors, whose motion plain NumPy computes: calibration and poses."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from towline import InputError, load
+from towline.estimation.calibration import Measurements, calibrate
+from towline.estimation.logs import read_measurements
+
+from .warm import towline as run
+
+NAME, MORE, MASS, GRAVITY = "multi-quadrotor-3", np.array([0.03, -0.02, 0.01]), 2.2, np.array([0, 0, 9.81])
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    """12 s at 50 Hz of a load of 2.2 kg, 2.4 kg in the file, on cables of other lengths than in the file."""
+    robot, draw = load(NAME), np.random.default_rng(0)
+    t = np.arange(0, 12, 0.02)
+    waves = np.sin(2 * np.pi * draw.uniform(0.1, 0.3, (6, 2, 1)) * t + draw.uniform(0, 6, (6, 2, 1))).sum(axis=1)
+    curve, h = CubicSpline(t, (np.array([0.5, 0.4, 0.2, 0.1, 0.1, 0.2])[:, None] * waves).T), 1e-3
+
+    def turned(at):
+        return Rotation.from_euler("xyz", curve(at)[:, 3:])
+
+    def spin(at):
+        return (turned(at + h) * turned(at - h).inv()).as_rotvec() / (2 * h)
+
+    R, w, dw = turned(t).as_matrix(), spin(t), (spin(t + h) - spin(t - h)) / (2 * h)
+    inertia = R @ robot.inertia @ R.transpose(0, 2, 1)
+    force = MASS * (curve(t, 2)[:, :3] + GRAVITY)
+    moment = np.einsum("nij,nj->ni", inertia, dw) + np.cross(w, np.einsum("nij,nj->ni", inertia, w))
+    arms = np.einsum("nij,mj->nmi", R, robot.attachments)
+    both = np.zeros((len(t), 6, 9))
+    for i in range(3):
+        both[:, :3, 3 * i : 3 * i + 3] = np.eye(3)
+        both[:, 3:, 3 * i : 3 * i + 3] = -np.cross(np.eye(3), arms[:, i, None]).transpose(0, 2, 1)
+    outward = robot.home_anchors - robot.home_attachments
+    level = (5 * outward / np.linalg.norm(outward, axis=1)[:, None]).ravel()
+    wrench = np.concatenate([force, moment], axis=1)
+    pulls = level + np.einsum("nij,nj->ni", np.linalg.pinv(both), wrench - both @ level)
+    pulls = pulls.reshape(-1, 3, 3)
+    np.testing.assert_allclose(np.cross(arms, pulls).sum(axis=1), moment, atol=1e-9)
+    u = pulls / np.linalg.norm(pulls, axis=2, keepdims=True)
+    quads = curve(t)[:, None, :3] + arms + (robot.fixed_lengths + MORE)[:, None] * u
+    thrusts = pulls + 1.5 * (CubicSpline(t, quads)(t, 2) + GRAVITY)
+    columns = {"t [s]": t}
+    seen = curve(t) + draw.normal(0, 1e-3, (len(t), 6))
+    columns |= dict(zip(("x [m]", "y [m]", "z [m]", "roll [rad]", "pitch [rad]", "yaw [rad]"), seen.T, strict=True))
+    for i in range(3):
+        size = np.linalg.norm(thrusts[:, i], axis=1)
+        up = thrusts[:, i] / size[:, None]
+        across = np.cross(up, [1.0, 0, 0])
+        across /= np.linalg.norm(across, axis=1)[:, None]
+        turn = Rotation.from_matrix(np.stack([np.cross(across, up), across, up], axis=2)).as_quat()
+        there = quads[:, i] + draw.normal(0, 1e-3, (len(t), 3))
+        columns |= {f"quad{i + 1}_{axis} [m]": there[:, k] for k, axis in enumerate("xyz")}
+        columns |= {f"quad{i + 1}_q{axis}": turn[:, k] for k, axis in enumerate("xyzw")}
+        columns[f"quad{i + 1}_thrust [N]"] = size * (1 + draw.normal(0, 0.02, len(t)))
+    return write(tmp_path_factory.mktemp("log") / "flight.csv", columns), columns
+
+
+def write(path, columns):
+    np.savetxt(path, np.column_stack(list(columns.values())), "%.8g", ",", header=",".join(columns), comments="")
+    return path
+
+
+def test_lengths_and_mass_of_a_flown_load(recording, tmp_path):
+    out, sigma = tmp_path / "built.yaml", "lengths=0.001,position=0.001,rotation=0.001"
+    done = run("calibrate", NAME, recording[0], "--free", "offsets,mass", "--sigma", sigma, "--json", "--out", out)
+    assert done.returncode == 0, done.stderr
+    data, built = json.loads(done.stdout), load(out)
+    assert data["notes"] == ["tensions are computed from thrusts, weights and accelerations of the carriers"]
+    assert built.platform.mass == pytest.approx(MASS, rel=0.01)
+    assert all(cable.encoder is None for cable in built.cables)
+    off = built.fixed_lengths - load(NAME).fixed_lengths - MORE
+    assert np.abs(off).max() < 1e-3
+    sigmas = [one["sigma"] for one in data["parameters"][:3]]
+    assert (np.abs(off) < 4 * np.array(sigmas)).all()
+    assert max(sigmas) < 3e-4
+
+
+def test_what_a_log_of_carriers_can_be_used_for(recording, tmp_path):
+    listed = run("log", recording[0])
+    assert listed.returncode == 1
+    assert "or give the robot (--robot)" in listed.stdout
+    listed = run("log", recording[0], "--robot", NAME, "--json")
+    assert listed.returncode == 0, listed.stderr
+    data = json.loads(listed.stdout)
+    assert data["fields"]["quad2"][-1] == "quad2_thrust [N]"
+    assert data["uses"]["calibration with poses"] is None
+    poses = run("pose", NAME, "--log", recording[0], "--out", tmp_path / "poses.csv")
+    assert poses.returncode == 0, poses.stderr
+    assert "lengths do not determine the pose: poses are those at rest" in poses.stdout
+
+
+def test_carriers_that_were_not_recorded_are_named(recording, tmp_path):
+    few = {name: column for name, column in recording[1].items() if not name.startswith("quad3")}
+    done = run("calibrate", NAME, write(tmp_path / "few.csv", few), "--free", "offsets", "--out", tmp_path / "few.yaml")
+    assert "the log has no poses of quad3, which are taken to be at home" in done.stdout
+
+
+def test_poses_of_carriers_are_saved_and_checked(recording, tmp_path):
+    log = read_measurements(recording[0], robot=NAME)
+    again = read_measurements(log.save(tmp_path / "log.nc"), robot=NAME)
+    np.testing.assert_allclose(again.carrier_poses, log.carrier_poses, atol=1e-12)
+    np.testing.assert_array_equal(log.only(slice(0, 5)).carrier_poses, log.carrier_poses[:5])
+    with pytest.raises(InputError, match="free must not have clock where carriers move"):
+        calibrate(NAME, log, "clock")
+    with pytest.raises(InputError, match=r"carrier_poses must have the shape \(2, c, 6\), got \(2, 6\)"):
+        Measurements(np.ones((2, 3)), carrier_poses=np.zeros((2, 6)))
+    with pytest.raises(InputError, match=r"carrier_poses must have the shape \(N, 3, 6\) of the carriers"):
+        calibrate(NAME, Measurements(np.ones((2, 3)), carrier_poses=np.zeros((2, 1, 6))), "offsets")
+    with pytest.raises(InputError, match="carrier_poses must be finite"):
+        Measurements(np.ones((2, 3)), carrier_poses=np.full((2, 3, 6), np.nan))
