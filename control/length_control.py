@@ -30,7 +30,8 @@ class LengthControl(Controller):
 
     with the planned pose x and tensions t at the time when the winches will have followed, the Jacobian J of the
     lengths, and the error e of the measured pose. The tensions of a robot with more cables than degrees of freedom
-    follow from the lengths; they are not controlled.
+    follow from the lengths; they are not controlled. With a lag, e and its integral are those at that time, to first
+    order.
 
     Parameters
     ----------
@@ -41,9 +42,10 @@ class LengthControl(Controller):
         stretch (also the default of a cable without a value in the file, if there are no more cables than degrees of
         freedom).
     lag
-        Delay with which the winches follow their commands [s]: lengths are commanded earlier by this time.
+        Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time, and
+        their corrections with as much lead.
     proportional, integral
-        P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 2 and 10 if
+        P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 4 and 10 if
         it is current, 0.3 and 2 up to 20 ms, less beyond. A pose that is late without a time of its measurement needs
         gains for that age: with others the oscillations of the platform on its cables grow.
     most
@@ -104,7 +106,8 @@ class LengthControl(Controller):
         time
             Time of the step [s], later than that of the last one.
         state
-            Measured state, of which the pose is used. With a time of its measurement it is compared with the plan then.
+            Measured state, of which the pose is used, and with a lag the velocity. With a time of its measurement it is
+            compared with the plan then.
         reference
             The plan at this time.
 
@@ -147,17 +150,20 @@ class LengthControl(Controller):
 
     def _correction(self, dt: float, age: float, state: State, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
         """Return the corrections of the lengths [m], (..., m), and where they are held at their bound, (...)."""
-        error = moved_on(reference[:3], -age)[0] - state.pose
+        pose, velocity, _ = moved_on(reference[:3], -age)
+        error = pose - state.pose
         error[..., 3:] = (error[..., 3:] + np.pi) % (2 * np.pi) - np.pi
-        known = np.asarray(np.isfinite(error).all(axis=-1))
-        error = np.where(known[..., None], error, 0.0) * self.robot.dof_mask
+        drift = velocity - state.velocity if self._lag else np.zeros_like(error)
+        known = np.asarray(np.isfinite(error + drift).all(axis=-1))
+        error, drift = (np.where(known[..., None], one, 0.0) * self.robot.dof_mask for one in (error, drift))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
         J = self._dynamics.length_jacobian(reference.pose, reference.carrier_pose)  # (..., m, 6)
         proportional, integral = _gains(age)
         proportional = proportional if self._proportional is None else self._proportional
         integral = integral if self._integral is None else self._integral
         total = before + dt * error
-        wanted = (J @ (proportional * error + integral * total)[..., None])[..., 0]
+        ahead = proportional * (error + self._lag * drift) + integral * (total + self._lag * error)
+        wanted = (J @ ahead[..., None])[..., 0]
         beyond = np.asarray((np.abs(wanted) > self._most).any(axis=-1))
         self._sum = np.where(beyond[..., None], before, total)
         return np.clip(wanted, -self._most, self._most), beyond | ~known
@@ -170,6 +176,6 @@ def _gains(age: float) -> tuple[float, float]:
     delay, which wants a large P; with one, P and the growth of the delayed phase limit both.
     """
     if age <= CURRENT:
-        return 2.0, 10.0
+        return 4.0, 10.0
     share = min(1.0, LATE / age)
     return 0.3 * share, 2.0 * share

@@ -6,7 +6,7 @@ one of three winches:
 
     source    t' = (gain u - t) / lag                                             whatever the cable does
     loop      t  = max(0, EA (l - L0) / L0 + C (dl/dt - dL0/dt)),  dL0/dt = (dl/dt, 2 ms late) + (t - u) L0 / (EA_n lag)
-    lengths   t  as for the loop,  dL0/dt = (l / (1 + u / EA_n) - L0) / lag
+    lengths   t  as for the loop,  dL0/dt = (l / (1 + u / EA_n) - L0) / lag, or from commanded lengths in place of those
 
 with the commanded tension u, and the stiffness EA_n that the winch takes for EA. Cables of a fixed length are the loop
 with dL0/dt = 0. Friction adds F tanh(dl/dt / 1 cm/s) where the cable meets the platform. A tension sensor reports what
@@ -198,6 +198,7 @@ class World:
     def run(self, command: Command, wrench: np.ndarray, forces: np.ndarray | None = None) -> None:
         """Let a period pass under a command, with a wrench about the platform's CoM (6,), and forces on carriers."""
         data, has, h = self._data, self._is, self._period / self._substeps
+        self._lengths = command.lengths
         wanted = np.asarray(command.tensions)
         data.xfrc_applied[1, :] = wrench  # the platform is the first body
         actuation = None if command.actuation is None else np.asarray(command.actuation).copy()
@@ -253,7 +254,8 @@ class World:
             self._late_rate += (1 - np.exp(-h / RATE_LAG)) * (self._rate - self._late_rate)
             turning = self._late_rate + (self._pull - has.gain * wanted) * self._own / (taken * has.lag)
         else:
-            turning = (length / (1 + wanted / taken) - self._own) / max(has.lag, h)
+            aim = length / (1 + wanted / taken) if self._lengths is None else self._lengths
+            turning = (aim - self._own) / max(has.lag, h)
         pulls = has.stiffness * (length - self._own) / self._own + has.damping * (self._rate - turning)
         self._pull = np.where(length > self._own, np.maximum(pulls, 0.0), 0.0)
         self._own = self._own + h * turning
