@@ -40,12 +40,12 @@ from .search.homotopy import from_easier
 from .search.passing_times import as_timed_by, passing_times
 from .search.phase_durations import shortest_phases
 from .search.refinement import refine
-from .search.relaxations import near_fixed_motion, near_motion
+from .search.relaxations import near_fixed_motion
 from .search.replanning import Replanner
 from .search.search import Search
 from .search.start import deviation_from
 from .search.stops_within import stopping_within
-from .search.stronger_or_nearer import stronger_or_nearer
+from .search.stronger_or_nearer import near_chosen_motion, stronger_or_nearer
 from .search.time_law import BOUND, fastest
 from .search.uncertain_robots import for_robots, judged
 from .tasks.deviation import Deviation
@@ -323,8 +323,8 @@ def _blocked(search: Search) -> Plan | None:
     motion = between_fixed_values(slowest)
     audited = audit(slowest, motion, to_show=True)
     seconds = time.perf_counter() - start
-    near = partial(near_motion, search, slowest, motion, audited, slower_helps=proof.by_rates)
-    offers = tuple if proof.by_weight else near
+    near = partial(near_chosen_motion, search, slowest, motion, audited, slower_helps=proof.by_rates)
+    offers = partial(stronger_or_nearer, search, slowest, audited) if proof.by_weight else near
     return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)
 
 
@@ -397,4 +397,4 @@ def _closest(search: Search, reason: str) -> Plan:
     plan = search.best(reason)
     if plan.feasible:
         return plan
-    return replace(plan, offers=partial(near_motion, search, plan.scenario, plan.deviation, plan.audit))
+    return replace(plan, offers=partial(near_chosen_motion, search, plan.scenario, plan.deviation, plan.audit))

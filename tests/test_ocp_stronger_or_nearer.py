@@ -9,6 +9,8 @@ WAYS = {
     "beyond the frame": ("cogiro", [0, 0, 2], [9, 0, 2], {}),
     "too high": ("ipanema-2", [0, 0, 2], [0.4, 0.3, 4.4], {}),
     "too high, too fast": ("cogiro", [-3, -2, 1], [3, 2, 5.5], {"limits": {"cable_speed": 2}}),
+    "in a tube": ("cogiro", [0, 0, 1], [9, 6, 1], {"tube": {"position": 0.1}}),
+    "any way": ("cogiro", [0, 0, 1], [9, 6, 1], {"tube": {"position": "free"}, "duration": {"min": 3, "max": 20}}),
     "a point mass": ("point-mass-3", [0, 0, 1], [1.5, 0.5, 1], {}),
 }
 

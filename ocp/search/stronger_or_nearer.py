@@ -1,4 +1,4 @@
-"""What else would make a fixed motion feasible: a nearer end, a lighter platform, or stronger cables."""
+"""What else would make a motion feasible: a nearer end of its path, a lighter platform, or stronger cables."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,12 +12,13 @@ from ...solvers import solve_batch
 from ..audits.audit import Audit
 from ..plan import Plan
 from ..result import Relaxed
+from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.paths import LinePath
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.wind_set import WindBox
-from .relaxations import LONGER, rounded, slower
+from .relaxations import LONGER, near_motion, rounded, slower
 from .search import Search
 
 INSTANTS = 120  # at which tensions are asked for before a motion is audited
@@ -29,14 +30,28 @@ Variation: TypeAlias = tuple[Scenario, float, str]
 """A varied task laid out, the value that it differs by, and what is said of it behind that."""
 
 
+def near_chosen_motion(
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, slower_helps: bool = True
+) -> list[Relaxed]:
+    """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one.
+
+    If no duration and no limit of the task does, it is what the platform could do exactly on its path.
+    """
+    found = near_motion(search, scenario, deviation, audit, slower_helps)
+    if found or scenario.carrier_free or audit.violation.max() <= audit.tolerance:
+        return found
+    return stronger_or_nearer(search, scenario, search.audit_motion(scenario, None, "audit of the path"))
+
+
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of what a task does not name: where its line ends, the platform's mass, t_max.
 
-    Each is one change; if speeds or accelerations are exceeded too, it may need a longer duration beside. The list is
-    empty if the motion exceeds other limits, or for tasks in phases, boxes of winds and uncertain robots.
+    `audit` is that of the motion exactly on the path. Each variation is one change; if speeds or accelerations are
+    exceeded too, it may need a longer duration beside. The list is empty if the motion exceeds other limits, or for
+    tasks in phases, boxes of winds and uncertain robots.
     """
     task = scenario.task
-    if task.phases is not None or isinstance(task.wind, WindBox) or task.robust is not None or scenario.count:
+    if task.phases is not None or isinstance(task.wind, WindBox) or task.robust is not None or scenario.carrier_free:
         return []
     others = [excess for excess in audit.excess if excess.limit != "tensions"]
     factors = [slower(excess) for excess in others]
