@@ -220,7 +220,7 @@ def _cluster(address: str) -> Iterator[Workers]:
             try:
                 client.wait_for_workers(1, timeout=WORKERS_WITHIN)
             except TimeoutError:
-                raise InputError(f"scheduler must have a worker at least, got {shown(address)} without any") from None
+                raise InputError(f"scheduler must have at least one worker, got {shown(address)} without any") from None
             # Not pure: Dask would take a hash of the job instead of a name of its own.
             executor = client.get_executor(pure=False)
             yield Workers(executor, lambda: AHEAD * max(sum(client.nthreads().values()), 1), failures, look)

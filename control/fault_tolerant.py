@@ -94,7 +94,7 @@ class FaultTolerant(Controller):
     def __init__(self, robot: Robot | str | os.PathLike[str], **options: Any):
         known = inspect.signature(Predictive).parameters
         if unknown := [name for name in options if name not in known or name == "robot"]:
-            raise InputError(f"{unknown[0]} is no argument of Predictive, which are {', '.join(list(known)[1:])}")
+            raise InputError(f"{unknown[0]} must be an argument of Predictive, one of {', '.join(list(known)[1:])}")
         self.robot = as_robot(robot)
         other = [carrier.name for carrier in self.robot.carriers if not carrier.actuators]
         if other or self.robot.fixed_lengths is None:

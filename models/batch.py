@@ -124,7 +124,7 @@ def _as_symbols(function: ca.Function, arguments: dict[str, Any]) -> dict[str, A
                 name, value.full().reshape(_core(size)) if isinstance(value, ca.DM) else value, _core(size)
             )
             if array.shape != _core(size):
-                raise InputError(f"{name} must have the shape {_core(size)} beside expressions, got {array.shape}")
+                raise InputError(f"{name} must have the shape {_core(size)} with expressions, got {array.shape}")
             result[name] = ca.DM(array)
     return result
 

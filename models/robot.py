@@ -151,7 +151,7 @@ class Robot(DisplayedRobot):
         except Exception:  # not iterable, as an array of CasADi is, which has `__iter__`
             listed = None
         if listed is None:
-            raise InputError(f"names must be a list of names of a robot's numbers, got {shown(names)}")
+            raise InputError(f"names must be a list of names of a robot's parameters, got {shown(names)}")
         numbers = {"anchor": self.anchors, "attachment": self.attachments, "radius": self.pulley_radii[:, None]}
         found = (parameters.located("names", name, self.cables) for name in listed)
         return np.array([numbers[one.part][one.cable, one.axis] for one in found])  # (p,)

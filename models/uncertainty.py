@@ -36,7 +36,7 @@ class Uncertainty(Part):
     def _are_different(cls, parameters: tuple[str, ...]) -> tuple[str, ...]:
         for index, name in enumerate(parameters):
             if name in parameters[:index]:
-                raise ValueError(f"must name each number once, {name} is there twice")
+                raise ValueError(f"must name each parameter once, got {name} twice")
         return parameters
 
     @model_validator(mode="after")

@@ -48,7 +48,7 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
     steps = np.diff(history.times)
     period = float(steps.mean())
     if np.abs(steps - period).max() > SAME * period:
-        raise InputError("history must have states at equal times, got others")
+        raise InputError("history must have equally spaced times, got others")
     count, error = len(states), number("tolerance", tolerance, 0.0, 1e6)
     record, lengths = Record(robot, count), np.zeros((count, 2, robot.m))
     sense(plant.record, np.ascontiguousarray(states), record.motions, lengths)

@@ -94,7 +94,7 @@ def test_a_slip_is_not_written(tmp_path):
     result = calibrate(robot, log)
     assert result.doubt == result.refused
     assert f"DO NOT USE THIS RESULT: {text}" in result.report()
-    with pytest.raises(InputError, match=f"got one refused: {text}"):
+    with pytest.raises(InputError, match=f"got one that is refused: {text}"):
         result.save(tmp_path / "robot.yaml")
     log.save(tmp_path / "log.nc")
     done = towline("calibrate", "cogiro", "log.nc", "--json", cwd=tmp_path)

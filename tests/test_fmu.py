@@ -321,7 +321,7 @@ def test_without_a_compiler_there_are_sources_only(tmp_path, monkeypatch):
         (["cogiro", "--fmu", "/proc/none/a.fmu"], "/proc/none/a.fmu: cannot be written"),
         (["cogiro", "--fmu", "a.fmu", "--fmu-of", "robot"], "part must be one of plant, controller, both, got 'robot'"),
         (["cogiro", "--fmu", "a.fmu", "--drive", "motors"], "drive must be one of lengths, rates, forces, tensions"),
-        (["cogiro", "--fmu", "a.fmu", "--drive", "rates", "--fmu-of", "both"], "drive must be one by which tensions"),
+        (["cogiro", "--fmu", "a.fmu", "--drive", "rates", "--fmu-of", "both"], "drive must accept commanded tensions"),
         (["cogiro", "--fmu", "a.fmu", "--drive", "rates", "--fmu-of", "controller"], "drive must be left out for part"),
         (["cogiro", "--fmu", "a.fmu", "--reference", "0 0 inf 0 0 0"], "--reference must be 6 finite numbers"),
         (["cogiro", "--fmu", "a.fmu", "--reference", "none.nc"], "no such file"),

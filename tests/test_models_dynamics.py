@@ -296,7 +296,7 @@ def test_wrong_symbols_are_named():
         ({"pose": pose, "carrier_pose": ca.SX.sym("c", 1, 6)}, "SX and MX in one call"),
         (
             {"pose": pose, "carrier_pose": np.zeros((4, 1, 6))},
-            "carrier_pose must have the shape .* beside expressions, got",
+            "carrier_pose must have the shape .* with expressions, got",
         ),
         ({"pose": pose, "carrier_pose": np.full((1, 6), np.nan)}, "carrier_pose must be finite numbers, got nan"),
     ):

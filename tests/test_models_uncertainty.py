@@ -44,7 +44,7 @@ def test_robots_are_changed_by_name():
 @pytest.mark.parametrize("names", ["cables[0].anchor.x", 3, ca.DM(1)])
 def test_names_of_numbers_are_a_list(names):
     """An array of CasADi has `__iter__`, and raises an exception of its own there."""
-    with pytest.raises(InputError, match=r"^names must be a list of names of a robot's numbers, got "):
+    with pytest.raises(InputError, match=r"^names must be a list of names of a robot's parameters, got "):
         known().parameter_values(names)
 
 
@@ -80,7 +80,7 @@ WRONG = {
     "shape": ({"covariance": [[1, 0], [0, 1]]}, r"must have 1 rows of 1 numbers, .* got 2 rows of 2 numbers"),
     "not finite": ({"covariance": [[float("nan")]]}, r"covariance\[0\]\[0\] must be a finite number, got nan"),
     "text": ({"covariance": "none"}, r"covariance must be a list, got 'none'"),
-    "twice": ({"parameters": ["cables[0].anchor.x"] * 2}, r"must name each number once, cables\[0\].anchor.x"),
+    "twice": ({"parameters": ["cables[0].anchor.x"] * 2}, r"must name each parameter once, got cables\[0\].anchor.x"),
     "skew": (
         {"parameters": ["cables[0].anchor.x", "cables[1].anchor.x"], "covariance": [[1, 0.5], [0.4, 1]]},
         r"covariance must be symmetric, got 0.5 in row 1 and 0.4 in row 2",

@@ -82,7 +82,7 @@ def test_what_is_no_run_is_one_line(swing):
         simulation_of(plant, history._replace(states=history.states[None]))
     with pytest.raises(InputError, match="history must be of one run"):
         simulation_of(Plant("cogiro"), history)
-    with pytest.raises(InputError, match="equal times"):
+    with pytest.raises(InputError, match="equally spaced times"):
         simulation_of(plant, history._replace(times=history.times**2))
     with pytest.raises(InputError, match="reference must be a plan of robot"):
         simulation_of(plant, history, plan("cogiro", {"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 1}))

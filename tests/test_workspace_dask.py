@@ -81,7 +81,7 @@ def test_a_cluster_without_workers_is_told(monkeypatch):
     monkeypatch.setattr(execution, "WORKERS_WITHIN", 0.5)
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None, host="127.0.0.1") as empty,
-        pytest.raises(InputError, match="scheduler must have a worker at least"),
+        pytest.raises(InputError, match="scheduler must have at least one worker"),
     ):
         sample(load("wang-flying"), StaticEquilibrium(), scheduler=empty.scheduler_address)
 

@@ -45,7 +45,7 @@ class Calibration(CalibrationData, Drawn, Reported):
             If the result is refused, or the file cannot be written.
         """
         if self.refused is not None:
-            raise InputError(f"calibration must not be refused to be saved, got one refused: {self.refused}")
+            raise InputError(f"calibration must be usable to be saved, got one that is refused: {self.refused}")
         from ...models.parsing import save_yaml
 
         return save_yaml(self.robot, path, "path")

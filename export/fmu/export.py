@@ -106,7 +106,7 @@ def unit_files(robot: Robot, part: str = "plant", drive: str | None = None, refe
     if part == "both" and (
         plant.drive == "rates" or (by_lengths and not plant.record["cable"]["stiffness"][: robot.m].all())
     ):
-        raise InputError(f"drive must be one by which tensions can be commanded for part 'both', got {plant.drive!r}")
+        raise InputError(f"drive must accept commanded tensions for part 'both', got {plant.drive!r}")
     winches = plant.drive if part == "plant" and (drive is not None or is_fixed) else None
     trajectory = read_trajectory(robot, robot.home if reference is None else reference, None)
     data = data_at(robot, plant, references_at(robot, trajectory, np.zeros(1))[0])
