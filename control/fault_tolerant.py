@@ -1,4 +1,4 @@
-"""`FaultTolerant`: control of a team of flying carriers that goes on with the others if one loses its thrust."""
+"""`FaultTolerant`: control of a team of flying carriers that continues without one that has lost its thrust."""
 
 import inspect
 import os

@@ -1,7 +1,7 @@
-"""Plan a circle under a quadrotor and fly it in gusty wind; run `python examples/flying_in_gusts.py`.
+"""Plan a circle under a quadrotor and simulate it in gusty wind; run `python examples/flying_in_gusts.py`.
 
-The plan does not know of the wind. It keeps every tension 1.2 N above its limit of 0.5 N, and the controller uses this
-margin against the gusts. Other seeds have other gusts.
+The plan ignores the wind. It keeps every tension 1.2 N above its limit of 0.5 N, and the controller uses this
+margin against the gusts. Each seed has different gusts.
 """
 
 import numpy as np
