@@ -23,7 +23,7 @@ from .reference import Reference
 from .state import State
 from .watch import HandOver
 
-NOTICED = 0.3  # of a carrier's weight: force along gravity that nothing explains
+NOTICED = 0.6  # of a carrier's weight: force along gravity that nothing explains; lags and noise make 0.4 of it
 BLENDED = 1.0  # [s], in which the others go to their new formation
 APART = 0.01  # [s], of references that are announced
 SETTLED = 3.0  # [s], from which their motion is as predicted again
@@ -66,7 +66,7 @@ class Rest(NamedTuple):
 class FaultTolerant(Controller):
     """Control a team of flying carriers with `Predictive`, also after one of them has lost its thrust.
 
-    A carrier is lost if a force along gravity of 0.3 of its weight is not explained by its thrust, its weight and its
+    A carrier is lost if a force along gravity of 0.6 of its weight is not explained by its thrust, its weight and its
     cables. Its cables are then released (`Command.released`), and the others take 1 s to reach a formation in which
     they carry the platform at the planned position. Formations and controllers are computed at construction for the
     loss of each carrier, see `statics.formation`. If there is none, a warning gives the missing wrench, and nothing
