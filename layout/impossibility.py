@@ -56,7 +56,8 @@ class Impossibility(Displayed):
         """Describe the proof in one line."""
         text = self.certificate.text(up)
         return (
-            f"no layout inside the boxes can do it: at pose ({quantity_row(self.pose)}) along {text.along}, needed "
+            f"no layout inside the boxes meets the requirements: at pose ({quantity_row(self.pose)}) "
+            f"along {text.along}, needed "
             f"{text.needed}, available in the best layout {text.available}"
         )
 

@@ -113,8 +113,10 @@ class Design(Reported, Displayed):
             return Report(about, self.status, self._summary(), parts)
         pairing = self.requirements.free[0].pairing
         searched = quantity(self.starts) + (" pairings" if pairing else f" start{'s' * (self.starts != 1)}")
-        searched += f", {quantity(self.poses)} pairs of pose and wrench"
-        facts = [("searched", f"{searched}, audited at {quantity(self.audited)} random pairs")]
+        searched += f", {quantity(self.poses)} pair{'s' * (self.poses != 1)} of pose and wrench"
+        facts = [
+            ("searched", f"{searched}, audited at {quantity(self.audited)} random pair{'s' * (self.audited != 1)}")
+        ]
         if self.stopped:
             facts.append(("", "INTERRUPTED: this is the best layout so far"))
         facts += [("task", each.report().splitlines()[0]) for each in self.plans]

@@ -49,7 +49,7 @@ class Replay(Drawn, Reported, Displayed):
     found
         Share of the residuals that each parameter alone explains, largest first.
     explained
-        Residuals with the first one fitted, None if it explains nothing.
+        Residuals with the first one fitted; None if it does not reduce them.
     fitted
         Parameters after a fit, or None.
     validation
@@ -254,13 +254,14 @@ class Replay(Drawn, Reported, Displayed):
     def _explanation_table(self) -> Table:
         rows = []
         for one in self.found:
-            remark = "" if one.named else "explains nothing" if one.shown else "not shown by this recording"
+            remark = "" if one.named else "no reduction" if one.shown else "not shown by this recording"
             if one.name in self.named[1:]:
                 remark = "not distinguished from the first"
             sigma = quantity(one.sigma * (1e3 if one.name == "delay" else 1.0), digits=2)
             value = f"{_value(one.name, one.value)} +- {sigma}" if one.shown else "-"
             rows.append((one.name, _value(one.name, one.before), value, _share(one) if one.named else "-", remark))
-        return Table("What explains them, each alone", ("", "model", "best", "explains", ""), rows, (1, 2, 3))
+        title, columns = "Parameters that may explain them, each fitted alone", ("", "model", "best", "explains", "")
+        return Table(title, columns, rows, (1, 2, 3))
 
 
 def replay(
