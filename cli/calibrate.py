@@ -78,8 +78,8 @@ def calibrate(
 ) -> None:
     """Estimate anchors, offsets and more from measured cable lengths, and write a calibrated robot file.
 
-    The file includes the covariance of its new parameters. Moving carriers are where the log has them, others at
-    home. Nothing is written, and the exit code
+    The file includes the covariance of its new parameters. Moving carriers have their recorded poses, others are
+    at home. Nothing is written, and the exit code
     is 1, if the log probably has an input error (order of cables, units, conventions of angles, frames), the fit did
     not converge, or validation samples fit worse than with the robot's file. --fix corrects input errors of the log.
     """

@@ -24,7 +24,7 @@ def log(
     fields: FieldsOption = None,
     robot: Annotated[
         str | None,
-        typer.Option(metavar="ROBOT", help="Robot of the logs, whose moving carriers have poses of their own."),
+        typer.Option(metavar="ROBOT", help="Robot of the logs; the poses of its moving carriers are then listed too."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
