@@ -18,9 +18,9 @@ from ..tasks.paths import RestPath, WaypointPath
 from ..tasks.scenario import ATTITUDE, Scenario
 from .search import Search
 
-STEPS, LEAST_STEPS = 10, 4  # of each leg
+STEPS, LEAST_STEPS = 7, 4  # of each leg
 ROUNDING = 1e-9  # of the duration
-GAIN = 2e-3  # of the objective: less is not worth other times
+GAIN = 0.015  # of the objective: of less, finer steps may leave nothing
 
 
 def passing_times(search: Search) -> Deviation | None:
@@ -64,7 +64,9 @@ def as_timed_by(start: object, scenario: Scenario) -> Scenario:
 def _leaves_times(scenario: Scenario, path: WaypointPath) -> bool:
     """Return whether the planner may choose when the platform passes the inner points, and enough steps show it."""
     legs, still = len(path.points) - 1, all(isinstance(other, RestPath) for other in scenario.carrier_paths.values())
-    own = path.stretches and path.shares is None and scenario.duration_range is not None
+    tube = scenario.task.tube
+    passes = np.isfinite(tube.radius) or tube.waypoints == "exact"  # else the path is only a guess
+    own = passes and path.stretches and path.shares is None and scenario.duration_range is not None
     few = scenario.count <= MANY and scenario.task.steps >= LEAST_STEPS * legs
     return own and legs > 1 and still and few and bool(scenario.platform_free) and not scenario.phases.all
 
