@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from towline import InputError, load, plan, simulate
 from towline.cli.main import app
-from towline.control import ComputedTorque, Controller
+from towline.control import ComputedTorque, Controller, references
 from towline.control.open_loop import planned_command
 from towline.simulation.drives import Drives
 from towline.simulation.flights import report, share_interval, summary
@@ -174,3 +174,20 @@ def test_what_cannot_differ_is_refused_in_one_line(name, differs, message):
         simulate(robot, robot.home, duration=0.01, mismatch=differs)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_mismatch_does_the_same_on_another_plant(crane):
+    """In MuJoCo, with lag, gain, friction and mass at once: the same error of the same controller."""
+    pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
+    from .soak.control_mujoco import Task, fly
+    from .soak.mujoco_plant import Hardware
+
+    found = plan(crane, {"path": {"kind": "line", "start": [-1.8, 0, 2], "end": [1.8, 0, 2.3]}, "duration": 2.5})
+    differs = {"winch_lag": 0.02, "friction": 20.0, "tension_gain": 0.9, "mass": 1.1}
+    here = simulate(crane, found, mismatch=differs).error
+    hardware = Hardware(stiffness=2e5, damping=500.0, lag=0.02, friction=20.0, gain=0.9, mass=1.1)
+    task = Task(crane, references(found, PERIOD)[:2500], None, hardware, (1e-6, 0, 0), 0.0, 0.0)
+    there = fly(task, ComputedTorque(crane)).error
+    assert here.max() > 5e-3
+    assert np.sqrt(np.mean(here**2)) == pytest.approx(np.sqrt(np.mean(there**2)), rel=0.05)
+    assert here.max() == pytest.approx(there.max(), rel=0.05)

@@ -218,6 +218,7 @@ class World:
         for k in range(self._substeps):
             s = k * h
             self._put_mocaps(poses + s * rates + s * s / 2 * bends)
+            self._mj.mj_step1(self._model, data)  # lengths of now
             ends = self._tensions(wanted, h)
             if command.released is not None:
                 ends = np.where(command.released, 0.0, ends)
@@ -229,10 +230,9 @@ class World:
                 if has.lost is not None and self._time >= has.lost[1] - 1e-9:
                     self._rotors[has.lost[0]] = 0.0
                 data.ctrl[m:] = self._rotors[flying].ravel()
-            self._mj.mj_step(self._model, data)
+            self._mj.mj_step2(self._model, data)
         self._put_mocaps(poses + self._period * rates + self._period**2 / 2 * bends)
         self._moving = rates + self._period * bends
-        self._mj.mj_forward(self._model, data)
         self.pulls, self._time = mean, self._time + self._period
 
     def _tensions(self, wanted: np.ndarray, h: float) -> np.ndarray:
