@@ -38,7 +38,7 @@ def demo(
         flight, flown = flying_circle.fly(folder, result.free, form)
     passed = result.as_expected and flight.passed
     if as_json:
-        parts = {"hovering": result.hovering.to_dict(), "free": result.free.to_dict(), "flight": flight.to_dict()}
+        parts = {"hovering": result.hovering.to_dict(), "free": result.free.to_dict(), "simulation": flight.to_dict()}
         print_json({"as_expected": passed, **parts, "files": [*result.pictures, *result.files, *flown]})
     else:
         typer.echo(flight.report().splitlines()[0])

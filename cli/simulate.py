@@ -115,8 +115,8 @@ def simulate(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default: PLAN-flight.nc in this folder, "
-            "with --runs PLAN-flights.nc, of a recording LOG-replay.nc. An existing file is overwritten."
+            help="NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default: PLAN-simulation.nc in this "
+            "folder, with --runs PLAN-runs.nc, of a recording LOG-replay.nc. An existing file is overwritten."
         ),
     ] = None,
     figures: Annotated[
@@ -212,12 +212,10 @@ def simulate(
         loaded = load(robot)
         if not os.path.isfile(plan):  # `Path.is_file` raises where the name is too long
             raise InputError(f"{printable(str(plan))}: no such file")
-        end = "" if runs is None else "s"
-        target = check_ending(
-            "--out", out or Path(f"{plan.stem}-flight{end}.nc"), *((".nc",) if runs else (".nc", ".mcap"))
-        )
+        what, figure = ("simulation", "simulation") if runs is None else ("runs", "errors")
+        target = check_ending("--out", out or Path(f"{plan.stem}-{what}.nc"), *((".nc",) if runs else (".nc", ".mcap")))
         outputs = {"the checkpoint": stored, "--out": target, "--animate": animate, "--report": report}
-        outputs["--figures"] = figures and figures / f"error{end}.{form}"
+        outputs["--figures"] = figures and figures / f"{figure}.{form}"
         check_outputs(outputs, {"the plan": plan, "--noise": noise, "--mismatch": mismatch})
         kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop, FaultTolerant)
         pilot = dict(zip(CONTROLLERS, kinds, strict=True))[controller](loaded)

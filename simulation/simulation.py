@@ -142,10 +142,10 @@ class Simulation(SimulationData, Filmed, Reported):
         return save_motion(self.robot, self._contents(), file)
 
     def figures(self) -> dict[str, Figure]:
-        """Draw "flight" (error, controller status, wind and carriers over time) and "tensions", by file names."""
+        """Draw "simulation" (error, controller status, wind and carriers over time) and "tensions", by file names."""
         from ..figures import flight
 
-        return {"flight": flight.flight(self.trajectory), "tensions": flight.tensions(self.trajectory)}
+        return {"simulation": flight.flight(self.trajectory), "tensions": flight.tensions(self.trajectory)}
 
     @property
     def _film_duration(self) -> float:

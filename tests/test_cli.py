@@ -36,11 +36,11 @@ def test_demo_shows_both_halves(demo):
     assert "FEASIBLE" in free
     assert "INFEASIBLE" not in free
     names = sorted(path.name for path in (folder / "towline-demo").iterdir())
-    files = ["circle-flight.nc", "circle-free.nc", "circle-hovering.nc"]
-    assert names == sorted(["base.png", "flight.png", "path.png", "tensions.png", *files])
+    files = ["circle-free.nc", "circle-hovering.nc", "circle-simulation.nc"]
+    assert names == sorted(["base.png", "path.png", "simulation.png", "tensions.png", *files])
     assert all(f"towline-demo/{name}" in done.stdout for name in names)
     assert "wang-flying, simulation of 10 s: PASSED" in free
-    flight = xr.load_dataset(folder / "towline-demo" / "circle-flight.nc")
+    flight = xr.load_dataset(folder / "towline-demo" / "circle-simulation.nc")
     assert np.linalg.norm(flight["pose"].values[:, :2] - 50, axis=1) == pytest.approx(
         1, abs=0.05
     )  # the circle, in wind

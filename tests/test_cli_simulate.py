@@ -52,7 +52,7 @@ def test_a_flight_prints_the_promised_keys_and_writes_what_it_says(folder):
     assert answer["passed"]
     assert sum(answer["answered"].values()) == round(DURATION / PERIOD)
     assert [str(folder / name) for name in answer["figures"]] == [
-        str(folder / "drawn" / f"{name}.png") for name in ("flight", "tensions")
+        str(folder / "drawn" / f"{name}.png") for name in ("simulation", "tensions")
     ]
     for name in answer["figures"]:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
@@ -102,9 +102,9 @@ def test_many_flights_have_one_table(folder):
     done = simulate(folder, *options, "--json", "--figures", "many")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
-    assert (answer["runs"], answer["passed"], answer["file"]) == (4, 4, "step-flights.nc")
+    assert (answer["runs"], answer["passed"], answer["file"]) == (4, 4, "step-runs.nc")
     assert (folder / "many" / "errors.png").exists()
-    with xr.open_dataset(folder / "step-flights.nc") as table:
+    with xr.open_dataset(folder / "step-runs.nc") as table:
         assert table.seed.values.tolist() == [7, 8, 9, 10]
         worst = table.error_max.values
         assert answer["error_max"]["worst"] == pytest.approx(worst.max())
@@ -172,7 +172,7 @@ def test_the_viewer_plays_a_flight(folder):
     assert (folder / "short.gif").read_bytes().startswith(b"GIF8")
     done = run("view", "short.nc", "--html", "short.html", "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["kind"] == "flight"
+    assert json.loads(done.stdout)["kind"] == "simulation"
     page = (folder / "short.html").read_text()
     assert "wang-flying, simulation: passed" in page
     assert "reference of the platform" in page

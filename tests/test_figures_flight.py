@@ -139,4 +139,4 @@ def test_a_motion_that_no_numbers_hold_is_a_flight_that_failed(force):
     assert not flown.passed
     assert "FAILED" in flown.report().splitlines()[0]
     assert len(flown.trajectory["time"]) >= 1
-    assert set(flown.figures()) == {"flight", "tensions"}
+    assert set(flown.figures()) == {"simulation", "tensions"}

@@ -60,9 +60,9 @@ class Subject(Displayed):
 
     @property
     def kind(self) -> str:
-        """Return "robot", "plan", "flight" or "workspace"."""
+        """Return "robot", "plan", "simulation" or "workspace"."""
         if self.replay is not None and self.replay.reference is not None:
-            return "flight"
+            return "simulation"
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
     def other_at(self, instant: Snapshot) -> Snapshot | None:

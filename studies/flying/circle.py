@@ -68,5 +68,5 @@ def run(folder: Path, progress: Progress | None = None, form: str = "png") -> Fl
 def fly(folder: Path, planned: Plan, form: str = "png") -> tuple[Simulation, list[Path]]:
     """Fly a plan in gusts; return the flight, and the NetCDF file and the picture written into `folder`."""
     flight = simulate(planned.scenario.robot, planned, wind=WIND, gusts=GUSTS)
-    file = flight.save(folder / "circle-flight.nc")
-    return flight, [file, style.save(flight.figures()["flight"], folder / f"flight.{form}")]
+    file = flight.save(folder / "circle-simulation.nc")
+    return flight, [file, style.save(flight.figures()["simulation"], folder / f"simulation.{form}")]
