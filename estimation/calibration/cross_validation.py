@@ -15,6 +15,7 @@ from ...base.errors import InputError
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .balance import needs_balance
+from .fit import fit
 from .model import Model, State
 from .parameters import IN_BALANCE, Parameters
 from .solving import (
@@ -36,6 +37,7 @@ from .starts import fit_from
 REGIONS = 6  # of the workspace
 MOST_COMPARED = 1500  # samples
 ENOUGH = 1e-6  # of the sum of squares, of a step that a fit need not take
+MOST_STEPS = 40  # of a fit with measured poses, which is nearly linear: others do not converge
 FEWEST = 40  # samples in all; of fewer, every other sample is left out
 CHANCE = 3.0  # times the logarithm of the number of residuals, by which a parameter of forces must reduce their squares
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
@@ -187,7 +189,6 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
         whole = model_of(of.robot, measurements, ("clock",) if clock else (), {})
         of_forces = {name: getattr(of, name) for name in ("noise", "unbalanced", "ahead", "felt")}
         wholes[clock] = replace(whole, weights=weights, weighs=weighs, **of_forces)
-    offset = float(solved.fit.state.x[of.parameters.clock])
     if len(measurements) > MOST_COMPARED:
         rows = np.linspace(0, len(measurements) - 1, MOST_COMPARED).astype(int)
         wholes = {clock: whole.only(rows) for clock, whole in wholes.items()}
@@ -200,7 +201,7 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
             continue
         own = {name: value for name, value in prior.items() if name in free}
         whole = wholes["clock" in free]
-        results = [_predict(whole, free, own, offset, parts[i], parts[1 - i]) for i in range(2)]
+        results = [_predict(whole, free, own, solved, parts[i], parts[1 - i]) for i in range(2)]
         known = [result for result in results if result is not None]
         means = np.sqrt(np.mean(known, axis=0)) if len(known) == 2 else np.full(3, np.inf)
         compared.append(Compared(free, *means.tolist()))
@@ -211,7 +212,7 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
 
 
 def _predict(
-    whole: Model, free: tuple[str, ...], prior: dict[str, float], clock: float, fitted: np.ndarray, left: np.ndarray
+    whole: Model, free: tuple[str, ...], prior: dict[str, float], solved: Solved, fitted: np.ndarray, left: np.ndarray
 ) -> tuple[float, float, float] | None:
     """Return the mean squares of training and validation [m^2], and of the balance of forces in the latter.
 
@@ -227,14 +228,17 @@ def _predict(
     model = replace(whole.only(fitted), parameters=parameters, prior=prior)
     length = length_of(whole.robot)
     begin = model.begin()
-    begin.x[parameters.clock] = clock if "clock" in free else 0.0
-    found = fit_from(model, begin, length, enough=ENOUGH)[0]
+    begin.x[parameters.varies] = solved.fit.state.x[: parameters.count][parameters.varies]
+    if np.isinf(model.pose_sigmas).any():
+        found = fit_from(model, begin, length, enough=ENOUGH)[0]
+    else:
+        found = fit(model, begin, length, MOST_STEPS, ENOUGH)
     if not found.converged:
         return None
     weighs = whole.weighs or not set(IN_BALANCE).isdisjoint(free)
     nothing = replace(whole.only(left), parameters=Parameters(whole.robot, ()), weighs=weighs)
     state = nothing.begin()._replace(x=found.state.x)
-    state = fit_from(nothing, state, length)[0].state
+    state = fit_from(nothing, state, length, enough=ENOUGH)[0].state
     return _mean_square(model, found.state), _mean_square(nothing, state), _unbalanced(nothing, state)
 
 
