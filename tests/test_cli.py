@@ -336,7 +336,7 @@ def test_wrong_arguments_are_one_line_and_exit_code_2(arguments, message):
 def test_version_and_help():
     """The version by a process of its own, as users start it."""
     version = subprocess.run([TOWLINE, "--version"], capture_output=True, text=True, check=True).stdout
-    assert version.strip() == "towline 0.2.0"
+    assert version.strip() == "towline 0.3.0"
     for command in ("demo", "robots", "tension", "plan", "simulate", "export"):
         assert run(command, "--help").returncode == 0
     # Units are in brackets, which a mark-up may take for its own.
