@@ -29,7 +29,6 @@ from .parameters import Parameters
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
 UNMEASURED = 3.0  # times the weight: standard deviation of a tension that was not measured
-SMALL = 0.01  # of the largest mean variance of tensions, of directions whose errors are none
 MOST_CAPSTAN = 30.0  # of which exp is no overflow
 
 
@@ -56,7 +55,7 @@ class FeltTensions(NamedTuple):
 
 
 class _Forces(NamedTuple):
-    """Forces on the platform at samples: what `Balance.at` and `Balance.felt` share, with their names there."""
+    """Forces on the platform at samples: with the names of `Balance.at`."""
 
     record: np.ndarray
     poses: np.ndarray
@@ -137,13 +136,7 @@ class Balance:
         return (self._measurements.sigma.tensions * size) ** 2 + (1e-9 * max(weight, 1.0)) ** 2
 
     def _forces(
-        self,
-        of: Parameters,
-        x: np.ndarray,
-        placed: tuple[np.ndarray, np.ndarray],
-        clock: float,
-        noise: float,
-        smooth: bool = False,
+        self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float, noise: float
     ) -> _Forces:
         (position, rotation), robot, rows = placed, self._robot, self._rows
         table, m, count = of.table(x), robot.m, len(position)
@@ -155,10 +148,8 @@ class Balance:
         poses = np.concatenate([position, points.angles(rotation)], axis=1)
         A, lengths = np.empty((count, 6, m)), np.empty((count, m))
         lines(record, poses, self._carriers, lengths, A, None, None, None)
-        (tensions, by_tensions), variances = self.tensions(table, smooth), noise**2 * self._variances
+        (tensions, by_tensions), variances = self.tensions(table), noise**2 * self._variances
         motion = self._of_log[0]
-        if smooth and motion.smooth is not None:
-            variances = variances * motion.smooth.share[:, None]
         motion = motion.ahead(self._measurements.times, clock)
         if self._chosen is not None:
             variances, motion = variances[self._chosen], motion.only(self._chosen)
@@ -177,33 +168,16 @@ class Balance:
         inverse_root = np.linalg.inv(np.linalg.cholesky(M)) if finite else None
         return _Forces(record, poses, tensions, by_tensions, A, r, inner, variances, inverse_root, pull, motion.by_arm)
 
-    def felt(
-        self,
-        of: Parameters,
-        x: np.ndarray,
-        placed: tuple[np.ndarray, np.ndarray],
-        clock: float,
-        noise: float,
-        balances: np.ndarray | None,
-    ) -> FeltTensions:
-        """Return the most likely tensions, by the measured ones, smoothed, and the balance of forces.
+    def felt(self, table: np.ndarray, noise: float) -> FeltTensions:
+        """Return the measured tensions, smoothed, with errors that make cables seem stiffer unless they are unknowns.
 
-        Arguments are those of `at`; `balances` marks the samples that are in balance, (N,) of bool, or is None if the
-        balance is not part of the fit. Noise of tensions would make a cable seem stiffer, so errors that the balance
-        does not correct have to be unknowns: one force of a platform in a plane on four cables, two of one on eight.
+        Corrections by the balance of forces would have the errors of accelerations, which those of poses cause.
         """
-        of_log = self._forces(of, x, placed, clock, noise, smooth=True)
-        tensions, P = of_log.tensions, of_log.variances[..., None] * np.eye(self._robot.m)
-        if balances is not None and of_log.inverse_root is not None:
-            known = of_log.inverse_root @ of_log.inner * balances[:, None, None]  # L^-1 A
-            K = of_log.variances[..., None] * np.swapaxes(known, 1, 2)
-            reduced = of_log.inverse_root @ (of_log.r[:, self._rows] * self._scale)[..., None]
-            tensions = tensions - (K @ reduced)[..., 0]
-            P = P - K @ np.swapaxes(K, 1, 2)
-        values, vectors = np.linalg.eigh(P)
-        mean = values.mean(axis=0)
-        kept = mean > SMALL * mean.max()
-        return FeltTensions(tensions, vectors[..., kept] * np.sqrt(np.maximum(values[:, None, kept], 0.0)))
+        tensions, _ = self.tensions(table, smooth=True)
+        variances, smooth = self._variances, self._of_log[0].smooth
+        variances = variances if smooth is None else variances * smooth.share[:, None]
+        variances = variances if self._chosen is None else variances[self._chosen]
+        return FeltTensions(tensions, noise * np.sqrt(variances)[..., None] * np.eye(self._robot.m))
 
     def at(
         self,

@@ -228,11 +228,11 @@ def _predict(
     model = replace(whole.only(fitted), parameters=parameters, prior=prior)
     length = length_of(whole.robot)
     begin = model.begin()
-    begin.x[parameters.varies] = solved.fit.state.x[: parameters.count][parameters.varies]
+    begin.x[parameters.clock] = solved.fit.state.x[parameters.clock] if "clock" in free else 0.0
     if np.isinf(model.pose_sigmas).any():
         found = fit_from(model, begin, length, enough=ENOUGH)[0]
     else:
-        found = fit(model, begin, length, MOST_STEPS, ENOUGH)
+        found = fit(model, begin, length, MOST_STEPS, enough=ENOUGH)
     if not found.converged:
         return None
     weighs = whole.weighs or not set(IN_BALANCE).isdisjoint(free)

@@ -124,7 +124,7 @@ def _surprise(result: Fit, weights: np.ndarray) -> float:
 def _weighed(model: Model, result: Fit, length: float, stretches: bool) -> tuple[Model, Fit]:
     """Return the model with errors of forces as large as they turn out to be, and its fit.
 
-    With `stretches`, cables are also stretched by tensions in balance. Errors of these would fit wrong readings.
+    With `stretches`, cables are also stretched by tensions with errors. These would fit wrong readings.
     """
     for _ in range(ROUNDS_OF_WEIGHTS):
         before, state = model, result.state
@@ -149,10 +149,7 @@ def _stretched(model: Model, state: State, length: float) -> Model:
     compliance, known = model.parameters.table(state.x)[:, 10], model.felt_tensions
     if known is None or model.forces is None or not compliance.any():
         return model
-    balances = None
-    if model.balanced is not None:
-        balances = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
-    felt = model.forces.felt(model.parameters, state.x, model.poses(state), model.ahead, model.noise, balances)
+    felt = model.forces.felt(model.parameters.table(state.x), model.noise)
     by_newtons = compliance * length / model.measurements.sigma.lengths
     matters = np.abs(felt.errors * by_newtons[:, None]).max(initial=0.0) > NEGLIGIBLE
     if "stiffness" not in model.parameters.groups or not matters:
