@@ -27,7 +27,7 @@ cables:
 
 # A change to the file above, and what the one line must name: the field, the value, what is accepted.
 WRONG = {
-    "missing mass": ("mass: 1.2, ", "", r"platform\.mass is missing: \[kg\]"),
+    "missing mass": ("mass: 1.2, ", "", r"platform\.mass is missing: mass \[kg\]"),
     "no mass": ("mass: 1.2", "mass: 0", r"platform\.mass must be greater than 0, got 0"),
     "mass in words": ("mass: 1.2", "mass: heavy", r"platform\.mass must be a number, got 'heavy'"),
     "mass NaN": ("mass: 1.2", "mass: .nan", r"platform\.mass must be .*finite number, got nan"),
