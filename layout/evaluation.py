@@ -183,12 +183,14 @@ class Evaluation:
         side, poses, cables = np.unravel_index(chosen, (2, *lengths.shape))
         # A cable pulls the attachment towards the anchor along u: its length grows if either moves away from the other.
         u = A[poses, :3, cables] * np.where(side == 0, 1.0, -1.0)[:, None]
-        by_layout, k = np.zeros((len(chosen), 8 * m)), np.arange(len(chosen))
-        by_points = np.einsum("kij,ki->kj", self._carried[cables], u), -np.einsum("kij,ki->kj", self._turn[poses], u)
-        for offset, slope in zip((0, 3 * m), by_points, strict=True):
-            for axis in range(3):
-                by_layout[k, offset + 3 * cables + axis] = slope[:, axis]
-        return Slopes(every[chosen], by_layout @ self.variables.S)
+        return Slopes(every[chosen], self._by_ends(poses, cables, u, -u))
+
+    def _by_ends(self, poses: np.ndarray, cables: np.ndarray, by_anchor: np.ndarray, by_end: np.ndarray) -> np.ndarray:
+        """Return derivatives by the variables, (k, p), of those by anchor and attachment of a cable in {G}, (k, 3)."""
+        by_points, k = np.zeros((2, len(cables), self._m, 3)), np.arange(len(cables))
+        by_points[0, k, cables] = np.einsum("kij,ki->kj", self._carried[cables], by_anchor)
+        by_points[1, k, cables] = np.einsum("kij,ki->kj", self._turn[poses], by_end)
+        return np.hstack(by_points.reshape(2, len(cables), 3 * self._m)) @ self.variables.S[: 6 * self._m]
 
     def distance_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
         """Return up to `most` of the smallest distances `below` a value, with their derivatives."""
@@ -198,17 +200,12 @@ class Evaluation:
         chosen = chosen[distance[chosen] < below]
         poses, pairs = np.unravel_index(chosen, s.shape)
         u = gap[poses, pairs] / np.maximum(distance[chosen], 1e-9)[:, None]
-        m, k = self._m, np.arange(len(chosen))
-        by_layout = np.zeros((len(chosen), 8 * m))
-        for cables, share, sign in ((self.pairs[pairs, 0], s, 1.0), (self.pairs[pairs, 1], t, -1.0)):
-            # The nearest point is (1 - share) of the attachment and `share` of the anchor.
-            part = share[poses, pairs][:, None]
-            by_anchor = sign * part * np.einsum("kij,ki->kj", self._carried[cables], u)
-            by_attachment = sign * (1.0 - part) * np.einsum("kij,ki->kj", self._turn[poses], u)
-            for offset, slope in ((0, by_anchor), (3 * m, by_attachment)):
-                for axis in range(3):
-                    by_layout[k, offset + 3 * cables + axis] += slope[:, axis]
-        return Slopes(distance[chosen], by_layout @ self.variables.S)
+        # The nearest point is (1 - share) of the attachment and `share` of the anchor.
+        i, j = self.pairs[pairs].T
+        of_i, of_j = (share[poses, pairs][:, None] for share in (s, t))
+        slopes = self._by_ends(poses, i, of_i * u, (1.0 - of_i) * u)
+        slopes -= self._by_ends(poses, j, of_j * u, (1.0 - of_j) * u)
+        return Slopes(distance[chosen], slopes)
 
     def _place(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Put a layout into the record; return the tension limits."""
