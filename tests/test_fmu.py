@@ -47,9 +47,8 @@ def unit(tmp_path_factory):
     return make
 
 
-@pytest.mark.parametrize(
-    ("robot", "part"), [*((ROBOTS[0], part) for part in PARTS), *((robot, "both") for robot in ROBOTS[1:])]
-)
+@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_fmpy_finds_no_fault(robot, part, unit, tmp_path_factory):
     import fmpy
     from fmpy.validation import validate_fmu

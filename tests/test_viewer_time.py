@@ -117,6 +117,30 @@ def test_the_worst_instant_is_marked_and_one_click_away(wire, folder):
 
 
 @pytest.mark.parametrize("wire", ["line"], indirect=True)
+@pytest.mark.parametrize(
+    ("view", "along"), [("top", [0, 0, 1]), ("front", [0, -1, 0]), ("side", [1, 0, 0]), ("all", [0.38, -0.84, 0.38])]
+)
+def test_the_camera_looks_at_the_middle_from_each_side(wire, folder, view, along):
+    moved = {}
+    wire.set(view, label="view")
+    while wire.read(0.3):
+        moved |= {part["type"]: part for part in wire.messages if part["type"].startswith("SetCamera")}
+    arm = np.subtract(moved["SetCameraPositionMessage"]["position"], moved["SetCameraLookAtMessage"]["look_at"])
+    np.testing.assert_allclose(arm / np.linalg.norm(arm), along, atol=0.01)
+    extent = read(str(folder / "line.nc")).replay.extent
+    np.testing.assert_allclose(moved["SetCameraLookAtMessage"]["look_at"], extent.centre, atol=1e-6)
+
+
+@pytest.mark.parametrize("wire", ["line"], indirect=True)
+def test_charts_have_the_limits_that_tensions_come_near(wire):
+    wire.set("next", label="step")
+    assert wire.read()
+    chart, robot = wire.element(title="tensions [N]")[1], load("wang-flying")
+    at = [series["label"] for series in chart["series"]].index("limit")
+    assert set(wire.array(chart["data"][at]).tolist()) == set(robot.t_min)
+
+
+@pytest.mark.parametrize("wire", ["line"], indirect=True)
 def test_a_film_of_the_saved_instants_is_sent_while_the_view_goes_on(wire, folder):
     wire.set(True, label="Save film")
     content, moved = b"", None
