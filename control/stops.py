@@ -56,7 +56,7 @@ def longest_stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], peri
     Parameters
     ----------
     plan
-        As for `stop`.
+        A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
     period
         Time between two instants [s].
 

@@ -30,7 +30,7 @@ def anneal(
     evaluation
         An evaluation of few poses, because it is repeated thousands of times.
     goal
-        What is maximised.
+        The objective.
     until
         Time of `time.perf_counter` at which it ends early [s].
     near

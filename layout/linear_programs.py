@@ -74,7 +74,7 @@ def maximise(
     evaluation
         Of all rows that count.
     goal
-        What is maximised.
+        The objective.
     y
         Where to start, (p,); it is moved.
     until

@@ -13,7 +13,7 @@ INSTANTS, FEW_INSTANTS = 41, 9  # of each task, and for annealing
 def with_tasks(rows: Rows, robot: Robot, tasks: tuple[Task, ...], count: int = INSTANTS) -> Rows:
     """Return the rows, followed by those of each task that fixes its motion and leaves the carriers at home.
 
-    What other tasks require depends on what the planner chooses, so they are only planned at the end.
+    The wrenches of other tasks depend on the planner's choices, so these tasks are only planned at the end.
     """
     for task in tasks:
         scenario = lay_out(robot, task)

@@ -94,13 +94,13 @@ class Posing:
         nearest.on_click(lambda _: self._approach())
         home.on_click(lambda _: self._go(self._home, self._robot.carrier_home))
 
-        self._dragged_name = lambda owner: drag.value == names[owner]
+        self._drag, self._names = drag, names
         drag.on_update(lambda _: self._show_handles())
         self._go(self._pose, self._carriers)
 
     def _show_handles(self) -> None:
         for owner, handle in self._handles.items():
-            handle.visible = self._dragged_name(owner)
+            handle.visible = self._drag.value == self._names[owner]
 
     @contextmanager
     def without_handles(self) -> Iterator[None]:

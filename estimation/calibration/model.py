@@ -58,7 +58,7 @@ class State(NamedTuple):
 class Residuals(NamedTuple):
     """Differences over their standard deviations.
 
-    Of readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,), balance of forces (N, 6).
+    Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,), balance of forces (N, 6).
     """
 
     readings: np.ndarray

@@ -31,7 +31,7 @@ SIGMA = {"lengths": 1e-3, "position": 1e-3, "rotation": 1e-3, "rate": 1e-2, "acc
 SIGMA |= {"tensions": 0.02, "forces": 0.02, "rate_bias": 0.02, "acceleration_bias": 0.2}
 SMALLEST, MOST = 1e-9, 1e6
 JERK = 10.0  # [m/s^2.5], which the bandwidths of controllers need
-BEGIN = 0.02, 0.1  # of the standard deviations of velocities and accelerations: what is left with a reference
+BEGIN = 0.02, 0.1  # factors of the first standard deviations of velocities and accelerations, with a reference
 WALK = 1e-4, 1e-3  # of biases: [rad/s^1.5], [m/s^2.5]
 LARGEST_ERROR = 5.0  # standard deviations of a length; larger ones are wrong readings
 SHIFT, TURN, SPEED, SPIN, PUSH, TWIRL = (slice(3 * k, 3 * k + 3) for k in range(6))
@@ -231,8 +231,7 @@ class PoseFilter(Displayed):
 
     def _accelerations(self) -> np.ndarray:
         """Return the linear and angular acceleration in {G}, (6,)."""
-        own = np.concatenate([self._x[PUSH], self._x[TWIRL]])
-        return own if self._input is None else own + self._input
+        return np.concatenate([self._x[PUSH], self._x[TWIRL]]) + (0.0 if self._input is None else self._input)
 
     def _predict(self, dt: float, ahead: np.ndarray | None) -> None:
         """Move on by `dt` [s]; the acceleration of the reference is the mean of those at both ends."""

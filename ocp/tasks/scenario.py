@@ -102,7 +102,7 @@ class Scenario(Displayed):
     def cases_at(self, pose: np.ndarray, velocity: np.ndarray) -> list[tuple[Vector3 | None, int | None]]:
         """Return the winds and the extreme loads with which tensions must exist at a motion (6,) in {G}.
 
-        Of a box those winds that decide. A wind of None is no air, a load of None the given one.
+        For a box of winds, these are the ones that decide. A wind of None means no air, a load of None the given load.
         """
         if self.wind_box is None:
             return [(self.wind, load) for load in (None, *range(self.phases.extremes))]
