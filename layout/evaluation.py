@@ -187,10 +187,10 @@ class Evaluation:
 
     def _by_ends(self, poses: np.ndarray, cables: np.ndarray, by_anchor: np.ndarray, by_end: np.ndarray) -> np.ndarray:
         """Return derivatives by the variables, (k, p), of those by anchor and attachment of a cable in {G}, (k, 3)."""
-        by_points, k = np.zeros((2, len(cables), self._m, 3)), np.arange(len(cables))
-        by_points[0, k, cables] = np.einsum("kij,ki->kj", self._carried[cables], by_anchor)
-        by_points[1, k, cables] = np.einsum("kij,ki->kj", self._turn[poses], by_end)
-        return np.hstack(by_points.reshape(2, len(cables), 3 * self._m)) @ self.variables.S[: 6 * self._m]
+        by_points, k = np.zeros((len(cables), 2, self._m, 3)), np.arange(len(cables))
+        by_points[k, 0, cables] = np.einsum("kij,ki->kj", self._carried[cables], by_anchor)
+        by_points[k, 1, cables] = np.einsum("kij,ki->kj", self._turn[poses], by_end)
+        return by_points.reshape(len(cables), 6 * self._m) @ self.variables.S[: 6 * self._m]
 
     def distance_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
         """Return up to `most` of the smallest distances `below` a value, with their derivatives."""
