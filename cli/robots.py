@@ -60,7 +60,7 @@ def robots(
         box = resting_box(robot)
         result = _to_dict(robot, diagnose(robot), at_home, box)
         if figure is not None:
-            _draw(robot, at_home, figure)
+            _draw(robot, at_home, box, figure)
             result["figure"] = figure
         if as_json:
             print_json(result)
@@ -185,18 +185,15 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
     return [*lines, f"    ({quantity(box.samples)} positions sampled, spaced by {steps} m along the axes)"]
 
 
-def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
+def _draw(robot: Robot, at_home: TensionSolution, box: RestingBox | None, file: Path) -> None:
     import numpy as np
 
     from ..figures import robot as figure
     from ..figures import style
-    from ..models import Dynamics
     from ..models.body import surface
     from ..models.points import placed
     from ..statics.scene import rotor_discs
-    from ..workspace import hints
 
-    positions, feasible = hints(Dynamics(robot))
     moving = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.body]
     body = robot.platform.body
     sketch = figure.RobotSketch(
@@ -212,7 +209,7 @@ def _draw(robot: Robot, at_home: TensionSolution, file: Path) -> None:
         surface=None if body is None else placed(robot.home, surface(body)),
         bodies=[robot.home_anchors[robot.carrier_of_cable == index] for index in moving],
         fixed=np.array([not robot.carriers[index].moves for index in robot.carrier_of_cable]),
-        resting=positions[feasible],
+        resting=np.zeros((0, 3)) if box is None else box.resting,
         rotors=rotor_discs(robot, robot.carrier_home[None])[0],
     )
     style.save(figure.draw(sketch), file)

@@ -1,4 +1,4 @@
-"""One pose as a tension problem, and the first look at where a robot can rest."""
+"""One pose as a tension problem, and the samples at which a robot can rest."""
 
 import numpy as np
 import pytest
@@ -6,17 +6,15 @@ import pytest
 from towline.models import Dynamics, Robot, load
 from towline.solvers import solve
 from towline.statics.distribution import pose_problem
-from towline.workspace import hints
+from towline.workspace.resting_box import resting_box
 
 
-def test_hints_of_a_suspended_robot_lie_inside_its_anchors():
+def test_a_suspended_robot_rests_inside_its_anchors():
     """No cable can push: a platform that hangs from a ring rests only where its CoM is under the ring."""
-    robot = load("wang-flying")
-    positions, feasible = hints(Dynamics(robot), count=150)
-    assert 5 < feasible.sum() < 150
-    radius = np.linalg.norm(positions[feasible, :2], axis=1)
-    assert radius.max() < 0.52
-    assert (positions[feasible, 2] < -0.07).all()
+    box = resting_box(load("wang-flying"))
+    assert 5 < len(box.resting) < box.samples
+    assert np.linalg.norm(box.resting[:, :2], axis=1).max() < 0.52
+    assert (box.resting[:, 2] < -0.07).all()
 
 
 def test_a_point_mass_balances_forces_only():

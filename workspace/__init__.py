@@ -1,7 +1,6 @@
 """Workspaces: conditions, evaluated at 10^3 to 10^9 configurations of platform and carriers.
 
-Conditions can be joined by & and |. `sample` evaluates them, `boundary` computes a mesh of the region where they hold,
-`hints` takes a first look.
+Conditions can be joined by & and |. `sample` evaluates them, `boundary` computes a mesh of the region where they hold.
 """
 
 from . import conditions
@@ -9,7 +8,6 @@ from .boundary_mesh import boundary
 from .condition import AllOf, AnyOf, Condition, TensionCondition, condition_from
 from .conditions import *  # noqa: F403  the only list of them is there
 from .dataset import save
-from .first_look import hints
 from .metrics import METRICS, metric_values
 from .places import Places
 from .region import Region
@@ -25,7 +23,6 @@ __all__ = [
     "TensionCondition",
     "boundary",
     "condition_from",
-    "hints",
     "metric_values",
     "sample",
     "save",

@@ -25,6 +25,8 @@ class RestingBox(NamedTuple):
         How many positions were tried; 0 where none is needed, since carriers move along with the platform.
     spacing
         Distance of neighbouring samples in the box along each axis, (3,) [m].
+    resting
+        The samples about home and anchors at which it can rest, (k, 3) in {G} [m].
     """
 
     low: np.ndarray
@@ -32,6 +34,7 @@ class RestingBox(NamedTuple):
     centre: np.ndarray
     samples: int
     spacing: np.ndarray
+    resting: np.ndarray
 
 
 def resting_box(robot: Robot) -> RestingBox | None:
@@ -60,7 +63,8 @@ def resting_box(robot: Robot) -> RestingBox | None:
     axes = _grid(robot, low, centre, high)
     finer = _can_rest(robot, axes) | (_nodes(axes) == centre).all(axis=-1)  # as the first grid has found
     low, high = largest_box(finer, axes, centre)
-    return RestingBox(low, high, centre, able.size + finer.size, np.array([np.diff(a).max(initial=0.0) for a in axes]))
+    spacing = np.array([np.diff(a).max(initial=0.0) for a in axes])
+    return RestingBox(low, high, centre, able.size + finer.size, spacing, resting)
 
 
 def largest_box(
@@ -111,7 +115,8 @@ def _moved_along(robot: Robot) -> RestingBox | None:
             low = np.maximum(low, np.subtract(reach.min, carrier.home[:3]))
             high = np.minimum(high, np.subtract(reach.max, carrier.home[:3]))
     moving, home = robot.dof_mask[:3] > 0, robot.home[:3]
-    return RestingBox(np.where(moving, home + low, home), np.where(moving, home + high, home), home, 0, np.zeros(3))
+    low, high = np.where(moving, home + low, home), np.where(moving, home + high, home)
+    return RestingBox(low, high, home, 0, np.zeros(3), np.zeros((0, 3)))
 
 
 def _grid(robot: Robot, low: np.ndarray, centre: np.ndarray, high: np.ndarray) -> list[np.ndarray]:
