@@ -20,6 +20,7 @@ _LONGEST = 60  # letters of a value in a message
 LONGEST_TEXT = 240  # letters of a path or of a part of a message
 MOST_DIMENSIONS = 32  # leading ones, with which NumPy combines arrays
 MOST_ROWS = 100_000  # of a list of rows of numbers in a field
+TINY, HUGE = 1e-300, 1e300  # between which a number above zero has an inverse
 
 
 def shown(value: object) -> str:
@@ -132,13 +133,15 @@ def float64(array: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def finite_array(name: str, value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return a float64 copy of `value` of this shape, or raise InputError unless all its numbers are finite."""
+    """Return a float64 copy of `value` of this shape, -1 for any length, or raise InputError unless it is finite."""
     given = real_array(name, value)
-    if given.shape != shape:  # before the copy: a view of one number may have any shape
-        raise InputError(f"{name} must be an array of shape {shape} of finite numbers, got one of shape {given.shape}")
+    accepted = f"{name} must be an array of shape {str(shape).replace('-1', 'n')} of finite numbers"
+    # Before the copy: a view of one number may have any shape.
+    if given.ndim != len(shape) or any(want not in (-1, have) for want, have in zip(shape, given.shape, strict=True)):
+        raise InputError(f"{accepted}, got one of shape {given.shape}")
     array = np.array(given, dtype=np.float64)
     if not np.isfinite(array).all():
-        raise InputError(f"{name} must be an array of shape {shape} of finite numbers, got {shown(array.tolist())}")
+        raise InputError(f"{accepted}, got {shown(array.tolist())}")
     return array
 
 

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 
 from ..base.display import Displayed
 from ..base.errors import InputError
-from ..base.inputs import required, whole_number
+from ..base.inputs import finite_array, required, whole_number
 from ..models import points
 from ..models.dynamics import Dynamics, dynamics_of
 from ..models.robot import Robot
@@ -94,19 +94,12 @@ def equilibria(
     """
     robot = required("robot", robot, Robot)
     starts = whole_number("starts", starts, 1, 1_000_000)
-    try:
-        longest = np.asarray(lengths, dtype=float)
-    except (TypeError, ValueError):
-        longest = np.empty(0)
-    if longest.shape != (robot.m,) or not (np.isfinite(longest) & (longest > 0)).all():
-        raise InputError(f"lengths must be {robot.m} finite numbers > 0 [m], got {lengths!r}")
+    longest, home = finite_array("lengths", lengths, (robot.m,)), robot.carrier_home
+    if not (longest > 0).all():
+        raise InputError(f"lengths must be numbers > 0 [m], got {longest.min():g}")
     if robot.weight == 0:
         raise InputError(f"gravity must not be zero, got none for robot {robot.name!r}")
-    dynamics = dynamics_of(robot)
-    carriers = robot.carrier_home if carrier_pose is None else carrier_pose
-    if dynamics.cable_lengths(robot.home, carriers).ndim != 1:  # checks shape and values too
-        raise InputError(f"carrier_pose must have the shape {robot.carrier_home.shape}, got {np.shape(carriers)}")
-    carriers = np.asarray(carriers, dtype=float)
+    carriers = finite_array("carrier_pose", home if carrier_pose is None else carrier_pose, home.shape)
     poses: list[Equilibrium] = []
     for start in _starts(robot, starts, seed):
         candidate = _descend(robot, start, carriers, longest)

@@ -276,10 +276,7 @@ def share_of_robots(
 
 def _places(robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Return poses (n, 6) and carriers (n, c, 6) as arrays of finite numbers, or raise InputError."""
-    home = required("robot", robot, Robot).carrier_home
-    poses = real_array("pose", pose).astype(float)
-    if poses.ndim != 2 or poses.shape[1] != 6 or not np.isfinite(poses).all():
-        raise InputError(f"pose must be an array of shape (n, 6) of finite numbers, got {shown(poses)}")
+    home, poses = required("robot", robot, Robot).carrier_home, finite_array("pose", pose, (-1, 6))
     if carrier_pose is None:
         return poses, np.broadcast_to(home, (len(poses), *home.shape))
     return poses, finite_array("carrier_pose", carrier_pose, (len(poses), *home.shape))

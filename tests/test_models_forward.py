@@ -243,8 +243,12 @@ def test_three_robots_hold_the_load_at_rest():
 
 def test_wrong_lengths_are_named():
     robot = load("wang-ctmrts")
-    for lengths in ([1.0, 1.0], [1.0, -1.0, 1.0], [1.0, np.nan, 1.0]):
-        with pytest.raises(InputError, match=r"lengths must be 3 finite numbers > 0 \[m\], got"):
+    for lengths, message in (
+        ([1.0, 1.0], r"lengths must be an array of shape \(3,\) of finite numbers, got"),
+        ([1.0, np.nan, 1.0], r"lengths must be an array of shape \(3,\) of finite numbers, got"),
+        ([1.0, -1.0, 1.0], r"lengths must be numbers > 0 \[m\], got -1"),
+    ):
+        with pytest.raises(InputError, match=message):
             equilibria(robot, lengths)
     # Cables too short to meet: no equilibrium, and no exception.
     assert equilibria(robot, np.full(3, 0.2), starts=4) == []

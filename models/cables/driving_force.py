@@ -16,12 +16,12 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...base.errors import InputError
-from ...base.inputs import one_of, whole_number
+from ...base.inputs import HUGE, TINY, number, one_of, whole_number
 from ..batch import as_array
 from ..dynamics import Dynamics
 from ..points import rotations
 from ..robot import Robot
-from . import checks, element_chain
+from . import element_chain
 
 SINGULAR = 1e-9  # of the largest singular value of A: what is below counts as zero
 
@@ -121,8 +121,8 @@ def driving_force(
     cable without stiffness or damping.
     """
     stiffness, damping = _cable_constants(robot)
-    time_step = checks.positive("time_step", time_step)
-    elements = whole_number("elements", elements, 1, checks.MOST_PARTS)
+    time_step = number("time_step", time_step, TINY, HUGE)
+    elements = whole_number("elements", elements, 1, element_chain.MOST)
     pose = as_array("pose", pose, (6,))
     if pose.ndim != 2:
         raise InputError(f"pose must have the shape (N, 6), one row per instant, got {pose.shape}")

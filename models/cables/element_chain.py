@@ -33,12 +33,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.display import Displayed
-from ...base.inputs import whole_number
+from ...base.inputs import HUGE, TINY, number, whole_number
 from ..batch import as_array
-from . import checks
 
 if TYPE_CHECKING:  # scipy.sparse takes a tenth of a second to import
     from scipy.sparse import csr_array
+
+MOST = 1_000_000  # elements
 
 
 @dataclass(frozen=True)
@@ -71,11 +72,10 @@ class ElementChain(Displayed):
     def __post_init__(self):
         for name in ("anchor", "attachment"):
             object.__setattr__(self, name, as_array(name, getattr(self, name), (3,)).reshape(3))
-        checks.positive("stiffness", self.stiffness)
-        whole_number("elements", self.elements, 1, checks.MOST_PARTS)
-        if self.pretension != np.inf:
-            checks.non_negative("pretension", self.pretension)
-        checks.positive("the distance of anchor and attachment", self.length)
+        number("stiffness", self.stiffness, TINY, HUGE)
+        whole_number("elements", self.elements, 1, MOST)
+        number("pretension", self.pretension, 0.0, np.inf)
+        number("the distance of anchor and attachment", self.length, TINY, HUGE)
 
     @property
     def length(self) -> float:

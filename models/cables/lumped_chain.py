@@ -24,9 +24,11 @@ import casadi as ca
 import numpy as np
 
 from ...base.display import Displayed
-from ...base.inputs import whole_number
+from ...base.inputs import HUGE, TINY, number, whole_number
 from ..batch import as_array
-from . import checks, elastic
+from . import elastic
+
+MOST = 1_000_000  # segments
 
 
 @dataclass(frozen=True)
@@ -63,9 +65,9 @@ class LumpedChain(Displayed):
 
     def __post_init__(self):
         for name in ("length", "stiffness", "density"):
-            checks.positive(name, getattr(self, name))
-        checks.non_negative("damping", self.damping)
-        whole_number("segments", self.segments, 2, checks.MOST_PARTS)
+            number(name, getattr(self, name), TINY, HUGE)
+        number("damping", self.damping, 0.0, HUGE)
+        whole_number("segments", self.segments, 2, MOST)
         as_array("gravity", self.gravity, (3,))
 
     @property

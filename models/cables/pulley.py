@@ -30,9 +30,9 @@ import casadi as ca
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.inputs import HUGE, TINY, number
 from ..batch import as_array
 from ..rotation import Matrix
-from . import checks
 
 
 class Exit(NamedTuple):
@@ -133,8 +133,8 @@ def pulley_motion(anchor: Any, axis: Any, radius: float) -> ca.Function:
     """
     anchor = as_array("anchor", anchor, (3,)).reshape(3)
     axis = as_array("axis", axis, (3,)).reshape(3)
-    axis = axis / checks.positive("the length of axis", np.linalg.norm(axis))
-    radius = checks.non_negative("radius", radius)
+    axis = axis / number("the length of axis", np.linalg.norm(axis), TINY, HUGE)
+    radius = number("radius", radius, 0.0, HUGE)
     motion = [ca.SX.sym(name, 3) for name in ("attachment", "velocity", "acceleration")]
     leaving = exit_points(ca.DM(anchor), ca.DM(axis), radius, motion[0])
     outputs = [

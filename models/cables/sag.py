@@ -23,9 +23,8 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...base.errors import InputError, SolverError
-from ...base.inputs import leading
+from ...base.inputs import HUGE, TINY, leading, number
 from ..batch import as_array
-from . import checks
 
 TOLERANCE = 1e-14  # how exactly the ends have to meet, in unstrained lengths or spans, the longer ones
 ITERATIONS = 200
@@ -129,10 +128,10 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
     SolverError
         If Newton's method did not meet the ends within 1e-14 of the length.
     """
-    stiffness = checks.positive("stiffness", stiffness, infinite=True)
-    weight = checks.positive("weight", weight)
+    stiffness = number("stiffness", stiffness, TINY, np.inf)
+    weight = number("weight", weight, TINY, HUGE)
     upward = as_array("up", up, (3,)).reshape(3)
-    upward = upward / checks.positive("the length of up", np.linalg.norm(upward))
+    upward = upward / number("the length of up", np.linalg.norm(upward), TINY, HUGE)
     start, end, length = as_array("start", start, (3,)), as_array("end", end, (3,)), as_array("length", length, ())
     batch = leading({"start": start.shape[:-1], "end": end.shape[:-1], "length": length.shape})
     start, length = np.broadcast_to(start, (*batch, 3)), np.broadcast_to(length, batch)
