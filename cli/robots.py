@@ -186,30 +186,9 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
 
 
 def _draw(robot: Robot, at_home: TensionSolution, box: RestingBox | None, file: Path) -> None:
-    import numpy as np
-
-    from ..figures import robot as figure
     from ..figures import style
-    from ..models.body import surface
-    from ..models.points import placed
-    from ..statics.scene import rotor_discs
+    from ..figures.robot import draw
+    from ..statics.scene import scene_at
 
-    moving = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.body]
-    body = robot.platform.body
-    sketch = figure.RobotSketch(
-        title=robot.name,
-        anchors=robot.home_anchors,
-        attachments=robot.home_attachments,
-        carriers=robot.carrier_home[moving, :3],
-        names=[robot.carriers[index].name for index in moving],
-        boxes=[(np.array(box.min), np.array(box.max)) for c in robot.carriers for box in c.drawing.boxes],
-        tensions=at_home.tensions,
-        t_min=robot.t_min,
-        t_max=robot.t_max,
-        surface=None if body is None else placed(robot.home, surface(body)),
-        bodies=[robot.home_anchors[robot.carrier_of_cable == index] for index in moving],
-        fixed=np.array([not robot.carriers[index].moves for index in robot.carrier_of_cable]),
-        resting=np.zeros((0, 3)) if box is None else box.resting,
-        rotors=rotor_discs(robot, robot.carrier_home[None])[0],
-    )
-    style.save(figure.draw(sketch), file)
+    scene = scene_at(robot, robot.home, at_home.tensions, robot.name)
+    style.save(draw(scene, None if box is None else box.resting), file)

@@ -4,7 +4,6 @@ Fixed parts are drawn once; each frame is a copy of them with the moving parts a
 take ten times as long.
 """
 
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +16,7 @@ from .cut_cables import drawn_ends
 from .hull import faces
 from .perspective import Perspective
 from .robot import BODY, POST, box_edges
+from .scene import Scene
 from .tension_colours import mark, place, scale, shades
 
 SIZE = (7.0, 5.2)  # [inches]
@@ -33,38 +33,6 @@ class Timing(NamedTuple):
     times: np.ndarray  # times of the motion, one for each frame, (k,) [s]
     rate: float  # frames per second of the film
     speed: float  # seconds of the motion per second of the film
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A robot at each frame; everything in {G} [m]."""
-
-    title: str
-    anchors: np.ndarray  # (k, m, 3)
-    attachments: np.ndarray  # likewise
-    # Origin of the platform's frame (n, 3) over times [s] of their own, fine enough for a smooth trail.
-    path: np.ndarray
-    path_times: np.ndarray  # likewise
-    path_missing: np.ndarray  # where no tensions give the motion, (n,)
-    # Origins of the carriers' frames (k, c, 3), and their names; ground carriers are not among them.
-    carriers: np.ndarray
-    names: list[str]  # likewise
-    bodies: list[np.ndarray]  # for each carrier the indices of its cables; three or more anchors are drawn as a body
-    boxes: list[tuple[np.ndarray, np.ndarray]]  # corners (low, high) of reach boxes
-    obstacles: list[list[np.ndarray]]  # for each region to keep out of, the lines that outline it, (n, 3) each
-    tensions: np.ndarray  # (k, m) [N], nan where there are none
-    t_min: np.ndarray  # (m,) [N]
-    t_max: np.ndarray  # likewise
-    # Circles in which rotors turn, (k, r, p, 3); default: none.
-    rotors: np.ndarray = field(default_factory=lambda: np.zeros((1, 0, 2, 3)))
-    cut: np.ndarray | None = None  # which cables have been cut, (k, m); None if none are
-    # Points of the platform's surface, (k, n, 3), whose hull is drawn; default: the attachments.
-    surface: np.ndarray | None = None
-
-    @property
-    def platform(self) -> np.ndarray:
-        """Return the points whose hull is drawn as the platform, (k, n, 3)."""
-        return self.attachments if self.surface is None else self.surface
 
 
 def check_film(path: Path, speed: float, fps: float) -> float:
@@ -160,8 +128,7 @@ class _Stage:
             dotted.set_label("path of a carrier")
             if len(named) == 1 and np.ptp(scene.carriers[:, index], axis=0).max() > 1e-9:
                 named.append(dotted)
-        resting = np.setdiff1d(np.arange(scene.anchors.shape[1]), np.concatenate([*scene.bodies, np.array([], int)]))
-        for anchor in scene.anchors[0, resting]:
+        for anchor in scene.anchors[0, scene.standing]:
             if anchor[2] > seen.floor:
                 ax.plot(*seen(np.array([anchor, [*anchor[:2], seen.floor]])).T, color=POST, linewidth=1.0)
         edges = [edge for low, high in scene.boxes for edge in box_edges(low, high)]

@@ -14,7 +14,7 @@ from .drawing import Drawing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .animation import Scene
+    from .scene import Scene
 
 
 class Drawn:

@@ -6,7 +6,6 @@ Farther parts are drawn first, so that nearer ones cover them. A robot in a vert
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from ..base.text import quantity
 from . import style
 from .hull import faces, outline
 from .perspective import Perspective
+from .scene import Scene
 from .tension_colours import mark, place, scale, shades
 
 if TYPE_CHECKING:
@@ -32,37 +32,11 @@ LETTERS = 6.0  # [points]: numbers and tensions of cables
 LETTER, LINE = 0.58, 1.25
 
 
-@dataclass(frozen=True)
-class RobotSketch:
-    """The parts of a robot to draw; everything in {G} [m]."""
-
-    title: str
-    anchors: np.ndarray  # (m, 3)
-    attachments: np.ndarray  # likewise
-    carriers: np.ndarray  # (c, 3) origins of the frames of carriers that move, and their names
-    names: list[str]
-    boxes: list[tuple[np.ndarray, np.ndarray]]  # corners (low, high) of reach boxes
-    tensions: np.ndarray | None  # (m,) [N], or None for grey cables
-    t_min: np.ndarray  # (m,) [N]
-    t_max: np.ndarray  # likewise
-    # Points of the platform's body, (k, 3); default: the attachments.
-    surface: np.ndarray | None = None
-    # Anchors of each carrier that moves, whose hull is drawn; default: none.
-    bodies: list[np.ndarray] = field(default_factory=list)
-    # Cables whose anchor never moves, (m,): a post is below it; default: none.
-    fixed: np.ndarray | None = None
-    # Positions at which the platform can rest, (k, 3); default: none.
-    resting: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    # Circles in which rotors turn, (r, p, 3); default: none.
-    rotors: np.ndarray = field(default_factory=lambda: np.zeros((0, 2, 3)))
-
-
-def draw(sketch: RobotSketch) -> Figure:
-    """Draw a robot."""
-    corners = [np.array(box) for box in sketch.boxes]
-    points = np.vstack([sketch.anchors, sketch.attachments, *sketch.rotors, *corners])
-    fixed = np.zeros(len(sketch.anchors), bool) if sketch.fixed is None else sketch.fixed
-    seen = Perspective(points, bool(fixed.any()))
+def draw(scene: Scene, resting: np.ndarray | None = None) -> Figure:
+    """Draw a robot at the first instant of a scene, and the outline of positions of its platform, `resting` (n, 3)."""
+    anchors, attachments, rotors, tensions = scene.anchors[0], scene.attachments[0], scene.rotors[0], scene.tensions[0]
+    corners = [np.array(box) for box in scene.boxes]
+    seen = Perspective(np.vstack([anchors, attachments, *rotors, *corners]), bool(scene.standing.size))
     flat, floor = seen.flat, seen.floor
     canvas = style.figure(height=HIGH)
     ax = style.axes(canvas, "x [m]", "z [m]") if flat else canvas.add_subplot()
@@ -84,56 +58,51 @@ def draw(sketch: RobotSketch) -> Figure:
         if not faces(corners) and len(corners) > 1:
             line(corners, color=colour, linewidth=3.0)
 
-    if len(sketch.resting):
-        on_floor = (
-            sketch.resting if flat else np.column_stack([sketch.resting[:, :2], np.full(len(sketch.resting), floor)])
-        )
+    if resting is not None and len(resting):
+        on_floor = resting if flat else np.column_stack([resting[:, :2], np.full(len(resting), floor)])
         edge = outline(on_floor[:, [0, 2]] if flat else on_floor[:, :2])
         if len(edge) > 2:
             around = np.insert(edge, 1, 0.0, axis=1) if flat else np.column_stack([edge, np.full(len(edge), floor)])
             label = "can rest here (outline)" if flat else "can rest above here (outline)"
             ax.fill(*seen(around).T, color=style.colour(2), alpha=0.18, linewidth=0, label=label)
-    for anchor in sketch.anchors[fixed]:
+    for anchor in anchors[scene.standing]:
         if anchor[2] > floor:
             line(np.array([anchor, [*anchor[:2], floor]]), color=POST, linewidth=0.8)
-    tensions = sketch.tensions
-    known = np.full(len(sketch.anchors), np.nan) if tensions is None else tensions
-    colours = shades(place(known, sketch.t_min, sketch.t_max)) / 255.0
-    for anchor, attachment, shade in zip(sketch.anchors, sketch.attachments, colours, strict=True):
+    colours = shades(place(tensions, scene.t_min, scene.t_max)) / 255.0
+    for anchor, attachment, shade in zip(anchors, attachments, colours, strict=True):
         way = anchor + np.linspace(0.0, 1.0, PARTS + 1)[:, None] * (attachment - anchor)
         for part in pairwise(way):
             line(np.array(part), color=shade, linewidth=1.5)
-    body(sketch.attachments if sketch.surface is None else sketch.surface, style.colour(4))
-    for corners in sketch.bodies:
-        body(corners, BODY)
-    for low_corner, high_corner in sketch.boxes:
+    body(scene.platform[0], style.colour(4))
+    for cables in scene.bodies:
+        body(anchors[cables], BODY)
+    for low_corner, high_corner in scene.boxes:
         for edge in box_edges(low_corner, high_corner):
             line(edge, color=style.colour(3), linewidth=0.6)
-    for circle in sketch.rotors:
+    for circle in rotors:
         line(circle, color="#000000", linewidth=0.7)
     for _, paint in sorted(pieces, key=lambda piece: -piece[0]):
         for artist in paint():
             artist.set_zorder(IN_ORDER)  # otherwise lines are before faces
-    ax.plot(*seen(sketch.anchors).T, "o", color="#000000", markersize=1.8, zorder=IN_ORDER)
+    ax.plot(*seen(anchors).T, "o", color="#000000", markersize=1.8, zorder=IN_ORDER)
     seen.fit(ax, AIR)
     if flat:
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(style.few_ticks(5))
-    _number(ax, seen(sketch.anchors), seen(sketch.attachments), tensions)
-    for position, name in zip(sketch.carriers, sketch.names, strict=True):
+    _number(ax, seen(anchors), seen(attachments), tensions)
+    for position, name in zip(scene.carriers[0], scene.names, strict=True):
         ax.annotate(name, tuple(seen(position)), (0, 5), textcoords="offset points", ha="center", fontsize=LETTERS)
-    style.heading(ax, sketch.title if flat else f"{sketch.title}; cells of the floor: {quantity(seen.cell, 'm')}")
-    if len(sketch.resting):
-        style.legend_below(canvas, ax)
-    if tensions is not None:
+    style.heading(ax, scene.title if flat else f"{scene.title}; cells of the floor: {quantity(seen.cell, 'm')}")
+    style.legend_below(canvas, ax)
+    if np.isfinite(tensions).all():
         bar = style.colour_bar(
             canvas, scale(), ax, "tension [N] from t_min to t_max", location="bottom", aspect=40, pad=0.02
         )
-        mark(bar, sketch.t_min, sketch.t_max, LETTERS)
+        mark(bar, scene.t_min, scene.t_max, LETTERS)
     return canvas
 
 
-def _number(ax: Axes, starts: np.ndarray, ends: np.ndarray, tensions: np.ndarray | None) -> None:
+def _number(ax: Axes, starts: np.ndarray, ends: np.ndarray, tensions: np.ndarray) -> None:
     """Write number and tension beside each cable near its anchor, where it covers no other."""
     from matplotlib.patheffects import withStroke
 
@@ -141,7 +110,7 @@ def _number(ax: Axes, starts: np.ndarray, ends: np.ndarray, tensions: np.ndarray
     points = 72.0 * min(0.95 * style.COLUMN / wide, (HIGH - BARS) / high)  # for a unit, about
     taken: list[tuple[np.ndarray, float]] = []
     for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        text = f"{index + 1}" if tensions is None else f"{index + 1}: {quantity(float(tensions[index]), 'N', 3)}"
+        text = f"{index + 1}" + ("" if np.isnan(tensions[index]) else f": {quantity(float(tensions[index]), 'N', 3)}")
         wide, high = LETTERS * LETTER * len(text) / points, LETTERS * LINE / points
         at = start + 0.3 * (end - start)
         while any(abs(at[0] - x) < (wide + other) / 2 and abs(at[1] - y) < high for (x, y), other in taken):

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .animation import Scene
+    from .scene import Scene
 
 SWEPT = 15  # instants at which rotors are drawn
 NEAR = 0.3  # of the robot's extent
@@ -66,9 +66,9 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
             _body(ax, scene.anchors[k, cables][:, axes], shade, style.colour(index + 1))
             ax.plot(*scene.carriers[k, index, axes], "s", color=style.colour(index + 1), markersize=3)
     _rotors(ax, scene.rotors[..., axes])
-    fixed = np.setdiff1d(np.arange(scene.anchors.shape[1]), np.concatenate([[], *scene.bodies]))
-    if len(fixed):
-        ax.plot(*scene.anchors[0, fixed][:, axes].T, "^", color="#000000", markersize=3, label="anchors on the ground")
+    if scene.standing.size:
+        on_ground = scene.anchors[0, scene.standing][:, axes]
+        ax.plot(*on_ground.T, "^", color="#000000", markersize=3, label="anchors on the ground")
     for index, name in enumerate(scene.names):
         curve, look = scene.carriers[:, index][:, axes], style.look(index + 1)
         if np.ptp(scene.carriers[:, index], axis=0).max() < 1e-9:

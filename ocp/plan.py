@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from ..figures.animation import Scene
+    from ..figures.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from ..figures.animation import Scene
+    from ..figures.scene import Scene
 from typing import NamedTuple
 
 RESOLVED = 0.01  # [mm]: the digits of a smaller position error mean nothing

@@ -10,12 +10,13 @@ import xarray as xr
 
 from towline import load
 from towline.figures import calibration, flight, limits, phase_plane, plan, robot, sweep, workspace
-from towline.figures.animation import Scene
 from towline.figures.convergence import convergence
 from towline.figures.curve_in_space import curve_in_space
 from towline.figures.curves import Panel, curves
 from towline.figures.metric_map import metric_map
+from towline.figures.scene import Scene
 from towline.figures.views import views
+from towline.statics.scene import scene_at
 from towline.studies.flying.pairing import from_above
 
 if TYPE_CHECKING:
@@ -91,21 +92,11 @@ def scene(height: float = 2.0) -> Scene:
     )
 
 
-def sketch(name: str) -> robot.RobotSketch:
-    """Return a robot of the library with made tensions."""
+def still(name: str) -> Figure:
+    """Draw a robot of the library with made tensions."""
     model = load(name)
-    return robot.RobotSketch(
-        title=f"{name}, at rest",
-        anchors=model.home_anchors,
-        attachments=model.home_attachments,
-        carriers=model.carrier_home[:, :3],
-        names=[carrier.name for carrier in model.carriers],
-        boxes=[(np.array(box.min), np.array(box.max)) for c in model.carriers for box in c.drawing.boxes],
-        tensions=np.linspace(1, 40, len(model.cables)),
-        t_min=model.t_min,
-        t_max=model.t_max,
-        resting=model.home_com + 0.1 * np.eye(3)[:2],
-    )
+    at_home = scene_at(model, model.home, np.linspace(1, 40, model.m), f"{name}, at rest")
+    return robot.draw(at_home, model.home_com + 0.1 * np.eye(3)[:2])
 
 
 def flown(cables: int = 6, wind: bool = True) -> xr.Dataset:
@@ -243,9 +234,9 @@ RUNS = [(k, 3.0 / (k + 1), 10.0**-k) for _ in range(3) for k in range(6)]
 SQUARE = np.array([[1, 1, 1.0], [-1, 1, 1], [-1, -1, 1], [1, -1, 1]])
 
 FIGURES: dict[str, Callable[[], Figure]] = {
-    "robot-cogiro": lambda: robot.draw(sketch("cogiro")),
-    "robot-simulator": lambda: robot.draw(sketch("the-cable-robot-simulator")),
-    "robot-ctmrts": lambda: robot.draw(sketch("wang-ctmrts")),
+    "robot-cogiro": lambda: still("cogiro"),
+    "robot-simulator": lambda: still("the-cable-robot-simulator"),
+    "robot-ctmrts": lambda: still("wang-ctmrts"),
     "path": lambda: plan.path(planned()),
     "tensions": lambda: plan.tensions(planned()),
     "tensions-16": lambda: plan.tensions(planned(cables=16, far=False)),

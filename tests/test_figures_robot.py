@@ -10,26 +10,13 @@ from towline import available, load
 from towline.figures import projection, style
 from towline.figures import robot as figure
 from towline.figures.hull import faces, outline
-
-
-def sketch(robot):
-    return figure.RobotSketch(
-        title=robot.name,
-        anchors=robot.home_anchors,
-        attachments=robot.home_attachments,
-        carriers=robot.carrier_home[:, :3],
-        names=[carrier.name for carrier in robot.carriers],
-        boxes=[],
-        tensions=None,
-        t_min=robot.t_min,
-        t_max=robot.t_max,
-    )
+from towline.statics.scene import scene_at
 
 
 def drawn_faces(robot):
     """Draw a robot, and return the corners (c, 3) of each face of the platform."""
     found = [robot.home_attachments[face] for face in faces(robot.home_attachments)]
-    ax = figure.draw(sketch(robot)).axes[0]
+    ax = figure.draw(scene_at(robot, robot.home, None, robot.name)).axes[0]
     blue = [patch for patch in ax.patches if to_hex(patch.get_facecolor()).upper() == style.colour(4)]
     assert sorted(len(patch.get_xy()) - 1 for patch in blue) == sorted(map(len, found))
     return found

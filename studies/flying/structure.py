@@ -5,9 +5,10 @@ from scipy.spatial.transform import Rotation
 
 from ...figures.curve_in_space import curve_in_space
 from ...figures.drawing import Drawing
-from ...figures.robot import RobotSketch, draw
+from ...figures.robot import draw
 from ...models import Dynamics, load
 from ...models.points import rotations
+from ...statics.scene import scene_at
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim
 from .claims import claim
@@ -86,10 +87,8 @@ def _displaced(samples: Instants) -> Claim:
 def _structure() -> Drawing:
     robot = load("wang-flying-printed")
     tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home), rcond=RANK)[:, 2] * robot.weight
-    places = robot.anchors, robot.home_attachments, robot.carrier_home[:, :3]
-    names, title = [carrier.name for carrier in robot.carriers], "the printed pairing at home"
-    sketch = RobotSketch(title, *places, names, [], tensions, robot.t_min, robot.t_max)
-    return Drawing("Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1", draw(sketch))
+    scene = scene_at(robot, robot.home, tensions, "the printed pairing at home")
+    return Drawing("Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1", draw(scene))
 
 
 def _frames() -> Drawing:

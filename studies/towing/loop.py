@@ -9,9 +9,10 @@ from functools import cache
 import numpy as np
 
 from ...figures.drawing import Drawing
-from ...figures.robot import RobotSketch, draw
+from ...figures.robot import draw
 from ...models import Dynamics, load
 from ...statics.equilibria import Equilibrium, equilibria
+from ...statics.scene import scene_at
 from ...workspace import ForceBalance, Places
 from ..accounts.account import Chapter
 from ..accounts.claim import Claim, Verdict
@@ -165,9 +166,6 @@ def _bounded(poses: np.ndarray, forces: np.ndarray) -> list[Claim]:
 
 
 def _figure(found: Equilibrium) -> Drawing:
-    mover = robot("wang-ctmrts", "both")
-    ends, names = mover.home_anchors, [carrier.name for carrier in mover.carriers]
-    places = ends, ends - lines(mover, found.pose)[0], mover.carrier_home[:, :3]
-    boxes, title = list(zip(*reach(mover), strict=True)), "three robots, cables of 1.2 m, at rest"
-    sketch = RobotSketch(title, *places, names, boxes, found.tensions, mover.t_min, mover.t_max)
-    return Drawing("Figure 1: robot-ends in their boxes (widths inferred), cables and load", draw(sketch))
+    title = "three robots, cables of 1.2 m, at rest"
+    scene = scene_at(robot("wang-ctmrts", "both"), found.pose, found.tensions, title)
+    return Drawing("Figure 1: robot-ends in their boxes (widths inferred), cables and load", draw(scene))
