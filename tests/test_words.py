@@ -10,6 +10,7 @@ import json
 import re
 import tomllib
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -85,43 +86,46 @@ MODULES = [
     str(file.relative_to(ROOT)) for package in PACKAGES for file in ROOT.joinpath(*package.split(".")[1:]).glob("*.py")
 ]
 PAGES = [
-    str(file.relative_to(ROOT))
-    for file in (
-        ROOT / "README.md",
-        ROOT / "CHANGELOG.md",
-        ROOT / "CONTRIBUTING.md",
-        ROOT / "mkdocs.yml",
-        ROOT / "Makefile",
-        *(ROOT / "docs").rglob("*.md"),
-        *(ROOT / "examples").glob("*.py"),
-        *(ROOT / "notebooks").glob("*.ipynb"),
-        *(ROOT / "models" / "library").glob("*.yaml"),
-        *(ROOT / "cli" / "templates").glob("*.yaml"),
-    )
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "mkdocs.yml",
+    ROOT / "Makefile",
+    *(ROOT / "docs").rglob("*.md"),
+    *(ROOT / "examples").glob("*.py"),
+    *(ROOT / "notebooks").glob("*.ipynb"),
+    *(ROOT / "models" / "library").glob("*.yaml"),
+    *(ROOT / "cli" / "templates").glob("*.yaml"),
 ]
 
 
-def literals(file):
-    """Return line and text of each docstring and of each string literal that is prose."""
-    tree = ast.parse(file.read_text())
+@cache
+def nodes():
+    """Return the nodes of the syntax tree of each module."""
+    return {module: list(ast.walk(ast.parse((ROOT / module).read_text()))) for module in MODULES}
+
+
+def literals():
+    """Yield place and text of each docstring and of each string literal that is prose."""
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    docstrings = {
-        id(node.body[0].value)
-        for node in ast.walk(tree)
-        if isinstance(node, documented) and node.body and isinstance(node.body[0], ast.Expr)
-    }
-    return [
-        (node.lineno, node.value)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        if id(node) in docstrings or " " in node.value
-    ]
+    for module, found in nodes().items():
+        docstrings = {
+            id(node.body[0].value)
+            for node in found
+            if isinstance(node, documented) and node.body and isinstance(node.body[0], ast.Expr)
+        }
+        for node in found:
+            text = node.value if isinstance(node, ast.Constant) else None
+            if isinstance(text, str) and (id(node) in docstrings or " " in text):
+                yield f"{module}:{node.lineno}", text
 
 
-def openings(file, kind):
-    """Return line and first word of each docstring of a kind of node."""
-    nodes = [node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, kind)]
-    return [(node.lineno, ast.get_docstring(node).split()[0]) for node in nodes if ast.get_docstring(node)]
+def openings(kind):
+    """Yield place and first word of each docstring of a kind of node."""
+    for module, found in nodes().items():
+        for node in found:
+            if isinstance(node, kind) and (told := ast.get_docstring(node)):
+                yield f"{module}:{node.lineno}", told.split()[0]
 
 
 def cells(file):
@@ -169,30 +173,26 @@ def test_the_list_leaves_plain_english_alone(text):
     assert not offences(text)
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_pages(page):
-    file = ROOT / page
-    assert not offences(cells(file) if file.suffix == ".ipynb" else file.read_text())
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_docstrings_and_messages(module):
-    hits = [f"{module}:{line}: {hit}" for line, text in literals(ROOT / module) for hit in offences(text)]
+def test_pages():
+    texts = {page: cells(page) if page.suffix == ".ipynb" else page.read_text() for page in PAGES}
+    hits = [f"{page.relative_to(ROOT)}: {hit}" for page, text in texts.items() for hit in offences(text)]
     assert not hits, "\n".join(hits)
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_docstrings_of_functions_begin_with_a_verb(module):
-    functions = openings(ROOT / module, ast.FunctionDef)
-    hits = [f"{module}:{line}: {word} ..." for line, word in functions if NO_VERB.fullmatch(word)]
+def test_docstrings_and_messages():
+    hits = [f"{place}: {hit}" for place, text in literals() for hit in offences(text)]
     assert not hits, "\n".join(hits)
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_docstrings_of_classes_do_or_are_something(module):
+def test_docstrings_of_functions_begin_with_a_verb():
+    hits = [f"{place}: {word} ..." for place, word in openings(ast.FunctionDef) if NO_VERB.fullmatch(word)]
+    assert not hits, "\n".join(hits)
+
+
+def test_docstrings_of_classes_do_or_are_something():
     """Check that a class that does something begins with a verb, and data with the noun for them."""
-    classes = openings(ROOT / module, ast.ClassDef)
-    hits = [f"{module}:{line}: {word} ..." for line, word in classes if re.fullmatch("What|How|Where|When|Which", word)]
+    classes = openings(ast.ClassDef)
+    hits = [f"{place}: {word} ..." for place, word in classes if re.fullmatch("What|How|Where|When|Which", word)]
     assert not hits, "\n".join(hits)
 
 
