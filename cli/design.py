@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ..base.errors import InputError
 from ..base.inputs import check_ending
 from .options import JsonOption, ReportOption, RobotArgument, print_json, print_result
 from .outputs import check_outputs
@@ -73,7 +74,10 @@ def design(
             known = f"best margin {best:.4g} N" if best > -1e30 else ""
             move(what, round(100 * share), 100, known)
 
-        found = find(loaded, requirements=read, progress=progress)
+        try:
+            found = find(loaded, requirements=read, progress=progress)
+        except InputError as error:  # what does not fit the robot
+            raise InputError(f"{requirements}: {error}") from None
     if requested():  # SIGTERM, which ends the command
         raise KeyboardInterrupt
     written = {"file": found.robot.save(target)} if found.feasible else {}

@@ -32,7 +32,7 @@ def anneal(
     goal
         The objective.
     until
-        Time of `time.perf_counter` at which it ends early [s].
+        Time of `time.perf_counter` at which it ends [s]: where an evaluation takes long, with fewer moves.
     near
         Initial layout, annealed at a lower temperature; default: random ones.
     """
@@ -43,7 +43,8 @@ def anneal(
 
     def score(y: np.ndarray, least: float) -> float:
         found = evaluation.margins(y)
-        value = goal.value(float(found.min()), y) + _NEGATIVE * float(np.minimum(found, 0.0).mean())
+        frequency = evaluation.lowest_frequency(y, goal) if found.min() > 0.0 else 0.0
+        value = goal.value(float(found.min()), y, frequency) + _NEGATIVE * float(np.minimum(found, 0.0).mean())
         if value > least:  # else it is refused without the distances
             value -= _MISSING_COSTS * force * evaluation.missing(y)
         return value
@@ -52,8 +53,9 @@ def anneal(
     hot = force * (_HOT if near is None else _WARM)
     value = score(y, -np.inf)
     best, best_value = y, value
+    started, moves = time.perf_counter(), MOVES
     for number in range(MOVES):
-        temperature = hot * (1.0 - number / MOVES) ** 2 + 1e-9
+        temperature = hot * max(0.0, 1.0 - number / moves) ** 2 + 1e-9
         least = value + temperature * float(np.log(rng.random() + 1e-300))  # by Metropolis
         candidate = _moved(y, low, high, points, alike, rng)
         candidate_value = score(candidate, least)
@@ -61,8 +63,11 @@ def anneal(
             y, value = candidate, candidate_value
             if value > best_value:
                 best, best_value = y, value
-        if number % 100 == 0 and time.perf_counter() > until:
-            break
+        if number % 100 == 99:
+            now = time.perf_counter()
+            moves = min(MOVES, round(number * (until - started) / (now - started)))
+            if now > until:
+                break
     return best
 
 

@@ -1,4 +1,4 @@
-"""`Evaluation`: margins and distances of cables of many layouts of a robot at given poses, with their derivatives.
+"""`Evaluation`: margins, distances and frequencies of many layouts of a robot at given poses, with derivatives.
 
 The characteristic length stays that of the robot's file, whatever the attachments become: a design would otherwise
 change the unit in which it is measured.
@@ -13,15 +13,22 @@ import numpy as np
 from .. import core
 from ..models import Robot
 from ..models.dynamics import dynamics_of
+from ..models.mechanics import Mechanics
 from ..models.points import rotations
 from ..models.record import record_of
+from ..solvers import solve_batch
 from ..solvers.margins import Reserves, all_reserves, margins, reserves
+from ..statics.stiffness import frequencies_of
 from ..workspace.conditions.interference import nearest_points
+from .goal import Goal, Outcome
+from .regions import Region
 from .requirements import Requirement
 from .room import Room
 from .variables import Variables, parts
 
 NO_BOUNDS = Room()
+MOST_SLOW = 40  # lowest frequencies, which a linear program has
+_STEP = 1e-6  # of the range of a variable, for differences of frequencies
 _STEEP = 1e7  # times the length: slopes of a facet whose columns nearly depend on each other say nothing
 
 
@@ -89,6 +96,7 @@ class Evaluation:
         robot = variables.robot
         self.variables, self.rows, self.room = variables, rows, room
         self._record = record_of(robot).copy()
+        self._mechanics = Mechanics(robot, self._record)
         self._m, self._home = robot.m, np.ascontiguousarray(robot.carrier_home)
         self._kept = np.flatnonzero(robot.dof_mask)
         self._scale = robot.wrench_scale[self._kept]
@@ -149,14 +157,53 @@ class Evaluation:
         core.lines(self._record, self._poses, self._home, lengths, None, None, None, None)
         return lengths
 
+    def frequencies(self, y: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """Return up to two lowest natural frequencies of some rows, default: of all, (k, 2) [Hz].
+
+        They are those with the tensions of least norm that balance each wrench, and 0 where there are none.
+        """
+        A, w, t_min, t_max = self._problem(y, rows)
+        poses = self._poses[self.rows.pose_of if rows is None else self.rows.pose_of[rows]]
+        solved = solve_batch(A, w, t_min, t_max, threads=1)
+        tensions = np.where(solved.feasible[:, None], solved.tensions, 0.0)
+        K = self._mechanics.stiffness(poses, tensions, None, True)
+        return np.where(solved.feasible[:, None], frequencies_of(self.variables.robot, K, poses)[:, :2], 0.0)
+
+    def outcome(self, y: np.ndarray, goal: Goal) -> Outcome:
+        """Return what counts of a layout."""
+        return Outcome(float(self.margins(y).min()), self.missing(y), self.lowest_frequency(y, goal))
+
+    def lowest_frequency(self, y: np.ndarray, goal: Goal) -> float:
+        """Return the lowest natural frequency of all rows if it has a value for a goal, otherwise 0 [Hz]."""
+        return float(self.frequencies(y).min()) if goal.per_hertz else 0.0
+
+    def frequency_slopes(self, y: np.ndarray) -> Slopes:
+        """Return the lowest frequencies of some rows with their derivatives, by differences."""
+        rows = np.argsort(self.frequencies(y)[:, 0])[:MOST_SLOW]
+        value = self.frequencies(y, rows)
+        steps = _STEP * np.maximum(self.variables.high - self.variables.low, _STEP)
+        changes = [self.frequencies(y + step, rows) - value for step in np.diag(steps)]
+        by_variables = np.array(changes).reshape(y.size, value.size).T / steps
+        usable = self.usable(by_variables)
+        return Slopes(value.ravel()[usable], by_variables[usable])
+
     def spaces(self, y: np.ndarray) -> np.ndarray:
-        """Return by how much the bounds of the room are kept at each pose, (N, k) [m]; negative where they are not."""
+        """Return by how much the bounds of the room are kept at each pose, (N, k) [m]; negative where they are not.
+
+        A frequency counts as a share of its bound.
+        """
         room, found = self.room, [np.zeros((len(self._poses), 0))]
         if room.clearance > 0.0:
             found.append(self.distances(y) - room.clearance)
         if room.limits_lengths:
             lengths = self.lengths(y)
             found += [lengths - room.shortest, room.longest - lengths]
+        found += [self._ends(y)[..., 2] - room.lowest] * (room.lowest > -np.inf)
+        found += [each.spaces(*self._ends_for(y, each)).reshape(-1, self._m) for each in room.regions]
+        if room.frequency > 0.0:
+            least = np.full(len(self._poses), np.inf)
+            np.minimum.at(least, self.rows.pose_of, self.frequencies(y)[:, 0])
+            found.append(least[:, None] / room.frequency - 1.0)
         return np.hstack(found)
 
     def missing(self, y: np.ndarray) -> float:
@@ -171,6 +218,12 @@ class Evaluation:
             found.append(Slopes(near.value - room.clearance, near.by_variables))
         if room.limits_lengths:
             found.append(self._length_slopes(y, most, below))
+        if room.lowest > -np.inf:
+            found.append(self._height_slopes(y, most, below))
+        found += [self._region_slopes(y, region, most, below) for region in room.regions]
+        if room.frequency > 0.0:
+            slow = self.frequency_slopes(y)
+            found.append(Slopes(slow.value / room.frequency - 1.0, slow.by_variables / room.frequency))
         return Slopes(*(np.concatenate(part) for part in zip(*((f.value, f.by_variables) for f in found), strict=True)))
 
     def _length_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
@@ -178,12 +231,29 @@ class Evaluation:
         A = np.empty((len(self._poses), 6, m))
         core.lines(self._record, self._poses, self._home, None, A, None, None, None)
         every = np.stack([lengths - self.room.shortest, self.room.longest - lengths]).ravel()
-        chosen = np.argsort(every)[:most]
-        chosen = chosen[every[chosen] < below]
+        chosen = _smallest(every, most, below)
         side, poses, cables = np.unravel_index(chosen, (2, *lengths.shape))
         # A cable pulls the attachment towards the anchor along u: its length grows if either moves away from the other.
         u = A[poses, :3, cables] * np.where(side == 0, 1.0, -1.0)[:, None]
         return Slopes(every[chosen], self._by_ends(poses, cables, u, -u))
+
+    def _height_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
+        heights = self._ends(y)[..., 2] - self.room.lowest
+        chosen = _smallest(heights.ravel(), most, below)
+        poses, ends = np.unravel_index(chosen, heights.shape)
+        up = np.array([0.0, 0.0, 1.0])
+        of_anchor = (ends < self._m)[:, None]
+        return Slopes(heights.ravel()[chosen], self._by_ends(poses, ends % self._m, of_anchor * up, ~of_anchor * up))
+
+    def _region_slopes(self, y: np.ndarray, region: Region, most: int, below: float) -> Slopes:
+        ends, anchors = self._ends_for(y, region)
+        spaces = region.distances(ends, anchors) - region.least
+        chosen = _smallest(spaces, most, below)
+        poses, cables = np.divmod(chosen, self._m)
+        by_end, by_anchor = region.slopes(ends[chosen], anchors[chosen])
+        if region.riding:
+            by_end, by_anchor = (np.einsum("kij,kj->ki", self._turn[poses], each) for each in (by_end, by_anchor))
+        return Slopes(spaces[chosen], self._by_ends(poses, cables, by_anchor, by_end))
 
     def _by_ends(self, poses: np.ndarray, cables: np.ndarray, by_anchor: np.ndarray, by_end: np.ndarray) -> np.ndarray:
         """Return derivatives by the variables, (k, p), of those by anchor and attachment of a cable in {G}, (k, 3)."""
@@ -196,8 +266,7 @@ class Evaluation:
         """Return up to `most` of the smallest distances `below` a value, with their derivatives."""
         gap, s, t = self._gaps(y)
         distance = np.sqrt((gap**2).sum(axis=2)).ravel()
-        chosen = np.argpartition(distance, most)[:most] if distance.size > most else np.arange(distance.size)
-        chosen = chosen[distance[chosen] < below]
+        chosen = _smallest(distance, most, below)
         poses, pairs = np.unravel_index(chosen, s.shape)
         u = gap[poses, pairs] / np.maximum(distance[chosen], 1e-9)[:, None]
         # The nearest point is (1 - share) of the attachment and `share` of the anchor.
@@ -227,11 +296,25 @@ class Evaluation:
             A = A[self.rows.pose_of]
         return A, self._w if rows is None else self._w[rows], t_min, t_max
 
-    def _gaps(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return vectors between the nearest points of pairs of cables, and these as shares of the cables."""
+    def _ends(self, y: np.ndarray) -> np.ndarray:
+        """Return the anchors and then the attachments in {G}, (N, 2 m, 3) [m]."""
         self._place(y)
         anchors, attachments = (np.empty((len(self._poses), self._m, 3)) for _ in range(2))
         core.ends(self._record, self._poses, self._home, anchors, attachments)
+        return np.concatenate([anchors, attachments], axis=1)
+
+    def _ends_for(self, y: np.ndarray, region: Region) -> tuple[np.ndarray, np.ndarray]:
+        """Return attachments and anchors in the frame of a region, (N m, 3) each [m]."""
+        ends = self._ends(y)
+        if region.riding:
+            ends = np.einsum("nji,nkj->nki", self._turn, ends - self._poses[:, None, :3])
+        anchors, attachments = ends[:, : self._m].reshape(-1, 3), ends[:, self._m :].reshape(-1, 3)
+        return np.ascontiguousarray(attachments), np.ascontiguousarray(anchors)
+
+    def _gaps(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return vectors between the nearest points of pairs of cables, and these as shares of the cables."""
+        ends = self._ends(y)
+        anchors, attachments = ends[:, : self._m], ends[:, self._m :]
         i, j = self.pairs.T
         return nearest_points(attachments[:, i], anchors[:, i], attachments[:, j], anchors[:, j])
 
@@ -243,3 +326,9 @@ class Evaluation:
         i, j = self.pairs.T
         apart = [np.linalg.norm(part[i] - part[j], axis=1) > 1e-9 for part in points]
         return ~(apart[0] & apart[1]) & ~(apart[2] & apart[3])
+
+
+def _smallest(values: np.ndarray, most: int, below: float) -> np.ndarray:
+    """Return the indices of up to `most` of the smallest values that are below a value."""
+    chosen = np.argsort(values)[:most]
+    return chosen[values[chosen] < below]

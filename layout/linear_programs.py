@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from .evaluation import Evaluation
+from .evaluation import Evaluation, Slopes
 from .goal import Goal
 from .variables import Variables
 
@@ -42,20 +42,26 @@ class _Program:
         self.found, slopes = evaluation.reserves(y, rows, normals)
         good = evaluation.usable(slopes)
         self.rows, self.good = rows[good], good
-        # Variables: steps as shares of the ranges, the margin, what the room misses.
-        A = np.hstack([-slopes[good] * self.scale, np.ones((good.sum(), 1)), np.zeros((good.sum(), 1))])
-        b = every.ravel()[chosen][good]
-        near = evaluation.space_slopes(y, MOST_DISTANCES, 4.0 * delta * float(self.scale.max(initial=0.0)))
-        if near.value.size:
-            by = np.hstack(
-                [-near.by_variables * self.scale, np.zeros((len(near.value), 1)), -np.ones((len(near.value), 1))]
-            )
-            A, b = np.vstack([A, by]), np.r_[b, near.value]
-        cost = np.r_[goal.price * self.scale, -1.0, _PER_METRE * variables.robot.force_scale]
+        parts = [Slopes(every.ravel()[chosen][good], slopes[good])]
+        parts.append(evaluation.space_slopes(y, MOST_DISTANCES, 4.0 * delta * float(self.scale.max(initial=0.0))))
+        if goal.per_hertz:
+            parts.append(evaluation.frequency_slopes(y))
+        # Variables: steps as shares of the ranges, the margin, what the room misses, the lowest frequency.
+        A = np.vstack(
+            [
+                np.hstack([-part.by_variables * self.scale, np.tile(column, (len(part.value), 1))])
+                for part, column in zip(parts, ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]), strict=False)
+            ]
+        )
+        b = np.concatenate([part.value for part in parts])
+        cost = np.r_[goal.price * self.scale, -1.0, _PER_METRE * variables.robot.force_scale, -goal.per_hertz]
         below, above = (variables.low - y) / self.scale, (variables.high - y) / self.scale
         self.low, self.high = np.maximum(below, -delta), np.minimum(above, delta)
         self.at_low, self.at_high = below >= -delta, above <= delta
-        bounds = np.vstack([np.c_[self.low, self.high], [-_LARGEST, min(goal.enough, _LARGEST)], [0.0, _LARGEST]])
+        most = _LARGEST if goal.per_hertz else 0.0
+        bounds = np.vstack(
+            [np.c_[self.low, self.high], [-_LARGEST, min(goal.enough, _LARGEST)], [0.0, _LARGEST], [-most, most]]
+        )
         options = {"presolve": False}  # of which such small dense programs have nothing
         self.solution = linprog(cost, A_ub=A, b_ub=b, bounds=bounds, method="highs", options=options)
         self.value = -self.solution.fun - float(goal.price @ y) if self.solution.success else -np.inf
@@ -88,7 +94,8 @@ def maximise(
 
     def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
         every = evaluation.all_reserves(z)
-        return goal.value(float(every.min()), z) - price * evaluation.missing(z), every
+        frequency = evaluation.lowest_frequency(z, goal)
+        return goal.value(float(every.min()), z, frequency) - price * evaluation.missing(z), every
 
     value, every = merit(y)
     for _ in range(most):
@@ -134,5 +141,5 @@ def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float 
         program.found.direction[program.good][keep],
         np.where(program.at_high, upper, 0.0),
         np.where(program.at_low, lower, 0.0),
-        program.value - goal.value(float(every.min()), y),
+        program.value - goal.value(float(every.min()), y, evaluation.lowest_frequency(y, goal)),
     )

@@ -7,9 +7,10 @@ import numpy as np
 from ..models import Robot
 from ..models.dynamics import dynamics_of
 from ..solvers.margins import margins
-from ..workspace import Interference, Places
-from .evaluation import Rows
-from .room import Room
+from .evaluation import Evaluation, Rows
+from .requirements import Requirements
+from .room import room_of
+from .variables import variables_of
 
 _FIRST = 8  # rows that all pairings are computed at; the best are then computed at all
 _AT_ONCE = 32
@@ -24,7 +25,9 @@ def with_attachments(robot: Robot, attachment_of: np.ndarray) -> Robot:
     return Robot.model_validate({**robot.model_dump(), "cables": cables})
 
 
-def best_pairing(robot: Robot, rows: Rows, cables: tuple[int, ...], room: Room) -> tuple[np.ndarray, int]:
+def best_pairing(
+    robot: Robot, rows: Rows, cables: tuple[int, ...], requirements: Requirements
+) -> tuple[np.ndarray, int]:
     """Return whose attachment each cable gets, (m,), for the largest smallest margin, and the number of pairings.
 
     The least margin over a few rows bounds the one over all. So pairings are computed at all rows in the order of this
@@ -36,9 +39,10 @@ def best_pairing(robot: Robot, rows: Rows, cables: tuple[int, ...], room: Room) 
         The robot with its points, and the rows that count.
     cables
         Cables that exchange their attachments, at most `MOST_PAIRED`.
-    room
-        Bounds of distances and lengths. If no pairing has it, the robot's own is returned.
+    requirements
+        Their room is kept. If no pairing has it, the robot's own is returned.
     """
+    room = room_of(robot, requirements)
     own, kept = np.arange(robot.m), np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[kept]
     w = rows.wrenches[:, kept] * scale
@@ -71,20 +75,10 @@ def best_pairing(robot: Robot, rows: Rows, cables: tuple[int, ...], room: Room) 
             break
         least = values(pairings[some], all_rows).min(axis=1)
         for k in np.argsort(-least):
-            if least[k] > value and _keeps(robot, rows, pairings[some[k]], room):
+            if least[k] <= value:
+                break
+            paired = variables_of(with_attachments(robot, pairings[some[k]]), requirements)
+            if Evaluation(paired, rows, room).missing(np.zeros(0)) <= 0.0:
                 best, value = pairings[some[k]], float(least[k])
                 break
     return best, len(pairings)
-
-
-def _keeps(robot: Robot, rows: Rows, attachment_of: np.ndarray, room: Room) -> bool:
-    """Return whether the cables keep their distance and their lengths at all poses."""
-    paired = with_attachments(robot, attachment_of)
-    if room.limits_lengths:
-        lengths = dynamics_of(paired).cable_lengths(rows.poses)
-        if lengths.min() < room.shortest or lengths.max() > room.longest:
-            return False
-    if room.clearance <= 0.0:
-        return True
-    apart = Interference(between_cables=room.clearance)
-    return bool(apart.evaluate(paired, Places.at_home(paired, rows.poses)).all())

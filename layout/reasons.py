@@ -30,7 +30,7 @@ class Binding(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """The gain per unit of a change, to first order: of margin, or by which the mean t_max falls [N per unit]."""
+    """The gain per unit of a change, to first order: of margin or frequency, or by which the mean t_max falls."""
 
     change: str
     gain: float
@@ -70,14 +70,18 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     margin = float(evaluation.margins(y).min())
     span = variables.high - variables.low
     bound = (span > 0.0) & (np.minimum(y - variables.low, variables.high - y) <= 1e-9 * np.maximum(span, 1.0))
-    least_cost = np.isfinite(goal.wanted)
-    unit = PRICE if least_cost else 1.0  # of the goal, what a newton of margin or of t_max is
-    advice = _advice(robot, found.weights / unit, found.pull, direction, rows.accelerations[found.rows])
-    if least_cost:
-        advice[:1] = [Advice("margin lower by 1 N", total / unit, "N/N")]
+    wants_margin = np.isfinite(goal.wanted)  # so much, of which the rest is for t_max or the frequency
+    value = goal.per_hertz or (PRICE if wants_margin else 1.0)  # in the goal, of a unit of what is improved
+    advice = _advice(robot, found.weights, found.pull, direction, rows.accelerations[found.rows])
+    if wants_margin:
+        advice[:1] = [Advice("margin lower by 1 N", total, "N/N")]
+    if goal.per_hertz or evaluation.room.frequency:
+        del advice[1:]  # t_min and mass change the frequencies, too
+    advice += _of_boxes(variables, found.by_high, found.by_low)
+    unit = "Hz" if goal.per_hertz else "N"
     return Reasons(
         tuple(binding),
-        (*advice, *_of_boxes(variables, found.by_high / unit, found.by_low / unit)),
+        tuple(Advice(one.change, one.gain / value, one.unit.replace("N/", f"{unit}/", 1)) for one in advice),
         bool(found.left <= _CONVERGED * max(1.0, abs(margin))),
         int(bound.sum()),
     )

@@ -12,6 +12,7 @@ from ..models.parsing import read_yaml, validate
 from ..models.part import Box, Name, NonNegative, Part, Pose, Positive, Rows, Vector3, Whole
 from ..models.ranges import PositiveRange, Range
 from ..ocp.tasks.task import Task
+from ..ocp.tasks.task_limits import AnyKeepOut
 
 Wrench = Pose  # six finite numbers
 NO_WRENCH: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -126,11 +127,16 @@ class Requirement(Part):
         return np.array([(*position, *attitude) for attitude in self.attitudes for position in product(*axes)])
 
     def sampled(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Return random poses of the box with its attitudes, (count, 6); of a list all poses."""
+        """Return random poses of the box with its attitudes, (count, 6); of a list all poses.
+
+        Of each coordinate a third is at a bound, since the worst poses often are on faces, edges and corners.
+        """
         if self.box is None:
             return np.array(self.poses)
         poses = np.empty((count, 6))
-        poses[:, :3] = rng.uniform(self.box.min, self.box.max, (count, 3))
+        low, high = np.array(self.box.min), np.array(self.box.max)
+        beyond = (high - low) / 4
+        poses[:, :3] = np.clip(rng.uniform(low - beyond, high + beyond, (count, 3)), low, high)
         poses[:, 3:] = np.array(self.attitudes)[rng.integers(len(self.attitudes), size=count)]
         return poses
 
@@ -168,12 +174,32 @@ class Requirements(Part):
         description="smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]",
     )
     clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: no limit")
+    keep_out: Annotated[tuple[AnyKeepOut, ...], Field(max_length=20)] = Field(
+        default=(),
+        description="regions, with the keys of task files, from which the cables keep the distance `cables` at the "
+        "required positions; default: none",
+    )
+    cable_platform_clearance: Positive | None = Field(
+        default=None, description="smallest distance of cables from the platform's body [m]; default: no limit"
+    )
+    cable_floor_clearance: NonNegative | None = Field(
+        default=None, description="smallest height of cables above the robot's floor [m]; default: no limit"
+    )
+    natural_frequency: Positive | None = Field(
+        default=None,
+        description="smallest accepted natural frequency of the platform on elastic cables, with the tensions of least "
+        "norm that balance each required wrench [Hz]; default: no limit",
+    )
     cable_length: PositiveRange | None = Field(
         default=None,
         description="shortest and longest length of every cable at the required positions, as the winches have [m]; "
         "default: no limit",
     )
-    maximise: Literal["margin"] = Field(default="margin", description="objective: the smallest capacity margin")
+    maximise: Literal["margin", "natural_frequency"] = Field(
+        default="margin",
+        description="objective: the smallest capacity margin, or the lowest natural frequency with the smallest margin "
+        "`margin`",
+    )
     minimise: Literal["t_max"] | None = Field(
         default=None,
         description="objective instead: the mean t_max of the cables with which the smallest margin is `margin`; t_max "
@@ -191,6 +217,15 @@ class Requirements(Part):
             raise ValueError(f"free must have no item besides a pairing, got {len(self.free) - 1} more")
         if self.minimise is not None and not any(each.part == "t_max" for each in self.free):
             raise ValueError("free must have an item with part t_max for minimise: t_max, got none")
+        if self.maximise != "margin" and self.minimise is not None:
+            raise ValueError(f"maximise must be left out with minimise, got {self.maximise!r}")
+        if self.maximise != "margin" and any(each.pairing for each in self.free):
+            raise ValueError(f"maximise must be margin with a pairing, got {self.maximise!r}")
+        for number, place in enumerate(self.keep_out):
+            for name in {"platform", "carriers"} & place.model_fields_set:
+                raise ValueError(
+                    f"keep_out[{number}].{name} must be left out: a design places cables, got {getattr(place, name)}"
+                )
         size = sum(each.size for each in self.require)
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} pairs of pose and wrench, got {size}")

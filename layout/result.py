@@ -11,8 +11,9 @@ from ..figures.report import Part, Report, Reported, Section, Table
 from ..models import Robot
 from ..models.parsing import to_yaml
 from ..ocp.plan import Plan
-from ..solvers import Certificate, TensionProblem, capacity_margin
+from ..solvers import Certificate
 from .impossibility import Impossibility
+from .judgement import Judgement
 from .reasons import Binding, Reasons
 from .requirements import Requirements
 from .room import room_of
@@ -34,16 +35,16 @@ class Design(Reported, Displayed):
     requirements
         The requirements of the design.
     status
-        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, its clearance, the
-        lengths of its cables and the plans of its tasks are as required; infeasible if no layout inside the boxes meets
-        the requirements, by `impossibility`; otherwise not-found, which proves nothing.
+        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, the distances and
+        lengths of its cables, its lowest natural frequency and the plans of its tasks are as required; infeasible if no
+        layout inside the boxes meets the requirements, by `impossibility`; otherwise not-found, which proves nothing.
     margin, margin_before
         Smallest capacity margin of both robots at the same poses, with moments divided by `before.length` [N].
     clearance
         Smallest distance between two cables [m]; infinite for one cable.
-    lengths
-        Shortest and longest length of a cable at the required and at audited poses [m]; None if the requirements are
-        impossible.
+    judgement, judgement_before
+        Lengths and heights of cables, distances from regions, and lowest natural frequency of both robots at the
+        required and at audited poses; None if the requirements are impossible.
     reasons
         Active constraints and the gain from relaxing them; None if the requirements are impossible.
     poses, audited
@@ -63,7 +64,8 @@ class Design(Reported, Displayed):
     margin: float
     margin_before: float
     clearance: float
-    lengths: tuple[float, float] | None
+    judgement: Judgement | None
+    judgement_before: Judgement | None
     reasons: Reasons | None
     impossibility: Impossibility | None
     poses: int
@@ -82,6 +84,11 @@ class Design(Reported, Displayed):
         """Return the certificate that no layout meets the requirements, or None."""
         return None if self.impossibility is None else self.impossibility.certificate
 
+    @property
+    def lengths(self) -> tuple[float, float] | None:
+        """Return the shortest and the longest length of a cable [m], or None if the requirements are impossible."""
+        return None if self.judgement is None else self.judgement.lengths
+
     def _summary(self) -> str:
         if self.impossibility is not None:
             return self.impossibility.describe(self._up())
@@ -89,11 +96,25 @@ class Design(Reported, Displayed):
         if self.requirements.minimise is not None:
             mean, before = (quantity(robot.t_max.mean(), "N") for robot in (self.robot, self.before))
             text = f"mean t_max {mean} (before {before}), {text}"
+        frequency = self._frequency()
+        if self.requirements.maximise == "natural_frequency":
+            text, frequency = f"{frequency}, {text}", ""
+        text += f", {frequency}" * bool(frequency)
         if self.requirements.clearance > 0.0:
             text += f", cables {quantity(self.clearance, 'm')} apart"
         if self.requirements.cable_length is not None and self.lengths is not None:
             text += f", cables of {quantity_range(self.lengths, 'm')}"
+        if self.judgement is not None:
+            text += "".join(f", {quantity(distance, 'm')} from {name}" for name, distance in self.judgement.distances)
+            if self.requirements.cable_floor_clearance is not None:
+                text += f", not below z = {quantity(self.judgement.height, 'm')}"
         return text
+
+    def _frequency(self) -> str:
+        """Return the lowest natural frequency of both robots as a text; empty if it does not count."""
+        values = [None if found is None else found.frequency for found in (self.judgement, self.judgement_before)]
+        now, before = ("" if value is None else quantity(value, "Hz") for value in values)
+        return f"lowest natural frequency {now} (before {before})" if now else ""
 
     def _headline(self) -> str:
         return self._report().headline
@@ -122,7 +143,7 @@ class Design(Reported, Displayed):
         facts += [("task", each.report().splitlines()[0]) for each in self.plans]
         if self.status == "not-found":
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
-            wanted += room_of(self.requirements).describe()
+            wanted += room_of(self.before, self.requirements).describe()
             wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
             facts.append(("wanted", f"{' and a '.join(wanted)}; this does not prove that no layout has it"))
         parts.append(Section("", facts))
@@ -136,7 +157,7 @@ class Design(Reported, Displayed):
         if self.requirements.free[0].pairing:
             state, bounds = "the best of all pairings at the poses of the grid", "all points are given"
         facts = [("layout", f"{state}; {bounds}")]
-        gain = "margin +" if self.requirements.minimise is None else "mean t_max -"
+        gain = "mean t_max -" if self.requirements.minimise else f"{self.requirements.maximise.replace('_', ' ')} +"
         facts += [
             (one.change, f"{gain}{quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
             for one in found.advice
@@ -167,6 +188,9 @@ class Design(Reported, Displayed):
             "t_max": self.robot.t_max.tolist(),
             "clearance": self.clearance,
             "cable_lengths": None if self.lengths is None else list(self.lengths),
+            "cable_distances": [] if self.judgement is None else [list(one) for one in self.judgement.distances],
+            "cable_height": None if self.judgement is None else self.judgement.height,
+            "natural_frequency": None if self.judgement is None else self.judgement.frequency,
             "length": self.before.length,
             "poses": self.poses,
             "audited": self.audited,
@@ -193,11 +217,3 @@ def _direction(one: Binding, robot: Robot) -> str:
     none = np.zeros(0, dtype=int)
     certificate = Certificate(one.direction, 0.0, 0.0, 0.0, none, none, np.zeros(robot.m), robot.length)
     return certificate.text(-np.array(robot.gravity)).along.partition(";")[0]
-
-
-def judged_margin(robot: Robot, A: np.ndarray, wrenches: np.ndarray) -> float:
-    """Return the smallest `capacity_margin` of wrenches (k, n) with their matrices (k, n, m), rows in newtons [N]."""
-    return min(
-        capacity_margin(TensionProblem(each, w, robot.t_min, robot.t_max)).value
-        for each, w in zip(A, wrenches, strict=True)
-    )

@@ -1,21 +1,29 @@
-"""`Room`: what a layout keeps besides the margin: the distance between cables, and how long they may be."""
+"""`Room`: the bounds of a layout besides the margin: distances and lengths of cables, and the lowest frequency."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from ..base.errors import InputError
 from ..base.text import quantity, quantity_range
+from ..models import Robot
+from .regions import Region
 from .requirements import Requirements
 
 _SPARE = 1e-3  # of a length: how much stricter a search is
+_LEAST_SPARE = 0.1  # [m], of which a share is spare at least, where a distance of zero is enough
 
 
 class Room(NamedTuple):
-    """Bounds of distances and lengths."""
+    """Bounds of distances, lengths, heights and frequencies."""
 
     clearance: float = 0.0  # smallest distance between two cables [m]; 0: no limit
     shortest: float = 0.0  # lengths of cables [m]
     longest: float = np.inf
+    regions: tuple[Region, ...] = ()
+    lowest: float = -np.inf  # height of cables in {G} [m]
+    frequency: float = 0.0  # lowest natural frequency [Hz]; 0: no limit
 
     @property
     def limits_lengths(self) -> bool:
@@ -23,16 +31,54 @@ class Room(NamedTuple):
         return self.shortest > 0.0 or self.longest < np.inf
 
     def with_spare(self, share: float) -> "Room":
-        """Return stricter bounds: a clearance that is larger by a share, and lengths a little inside."""
-        return Room(self.clearance * (1.0 + share), self.shortest * (1.0 + _SPARE), self.longest * (1.0 - _SPARE))
+        """Return stricter bounds: distances and a frequency that are larger by a share, lengths a little inside."""
+        return Room(
+            self.clearance * (1.0 + share),
+            self.shortest * (1.0 + _SPARE),
+            self.longest * (1.0 - _SPARE),
+            tuple(each._replace(least=each.least + share * max(each.least, _LEAST_SPARE)) for each in self.regions),
+            self.lowest,
+            self.frequency * (1.0 + share),
+        )
 
     def describe(self) -> list[str]:
         """Return each bound as a text."""
         found = [f"clearance of {quantity(self.clearance, 'm')}"] * (self.clearance > 0.0)
-        return found + [f"cables of {quantity_range((self.shortest, self.longest), 'm')}"] * self.limits_lengths
+        found += [f"cables of {quantity_range((self.shortest, self.longest), 'm')}"] * self.limits_lengths
+        found += [f"distance of cables from {each.name} of {quantity(each.least, 'm')}" for each in self.regions]
+        found += [f"height of cables of {quantity(self.lowest, 'm')}"] * (self.lowest > -np.inf)
+        return found + [f"natural frequency of {quantity(self.frequency, 'Hz')}"] * (self.frequency > 0.0)
 
 
-def room_of(requirements: Requirements) -> Room:
-    """Return the room of a design."""
-    lengths = requirements.cable_length
-    return Room(requirements.clearance, *((0.0, np.inf) if lengths is None else (lengths.min, lengths.max)))
+def room_of(robot: Robot, requirements: Requirements) -> Room:
+    """Return the room of a design.
+
+    Raises `InputError` if a requirement is about a body or a floor that the robot's file does not have.
+    """
+    lengths, height = requirements.cable_length, requirements.cable_floor_clearance
+    if height is not None and robot.floor is None:
+        raise InputError(
+            f"cable_floor_clearance must be left out without a floor, which robot {robot.name!r} does not have, got "
+            f"{height:g}"
+        )
+    return Room(
+        requirements.clearance,
+        *((0.0, np.inf) if lengths is None else (lengths.min, lengths.max)),
+        regions=tuple(_regions(robot, requirements)),
+        lowest=-np.inf if height is None or robot.floor is None else robot.floor + height,
+        frequency=requirements.natural_frequency or 0.0,
+    )
+
+
+def _regions(robot: Robot, requirements: Requirements) -> Iterator[Region]:
+    for place in requirements.keep_out:
+        if place.cables is not None:
+            yield Region(place.name, place, place.frame == "platform", place.cables)
+    distance = requirements.cable_platform_clearance
+    if distance is not None:
+        if robot.platform.body is None:
+            raise InputError(
+                f"cable_platform_clearance must be left out without platform.body, which robot {robot.name!r} does not "
+                f"have, got {distance:g}"
+            )
+        yield Region("the platform", robot.platform.body, True, distance)

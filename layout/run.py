@@ -7,25 +7,22 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.inputs import one_of, shown
+from ..base.inputs import shown
 from ..models import Robot
-from ..models.dynamics import dynamics_of
 from ..models.files import as_robot
 from ..ocp.planner import plan
-from ..solvers.margins import margins
 from .evaluation import Evaluation, Rows, rows_of
 from .goal import goal_of
 from .impossibility import find_impossibility
+from .judgement import judge, judged_margin
 from .pairings import best_pairing, with_attachments
 from .reasons import reasons
 from .requirements import Free, Requirement, Requirements, read_requirements
-from .result import Design, judged_margin
+from .result import Design
 from .room import room_of
-from .search import AUDITED, Progress, search
+from .search import AUDITED, ROOM_AUDITED, Progress, few, search
 from .task_rows import with_tasks
 from .variables import Variables, variables_of
-
-_JUDGED = 100  # worst poses, by `capacity_margin`
 
 
 def design(
@@ -75,11 +72,10 @@ def design(
     """
     chosen = as_robot(robot)
     if requirements is not None:
-        given = {"free": free, "require": require, **options}
+        given = {"free": free, "require": require, "maximise": None if maximise == "margin" else maximise, **options}
         for name, value in given.items():
             if value is not None:
                 raise InputError(f"{name} must be left out with requirements, which contain it")
-        one_of("maximise", maximise, ("margin",))
         wanted = read_requirements(requirements)
     else:
         parts = {"free": free, "require": require}
@@ -90,20 +86,20 @@ def design(
     if chosen.m < (count := int(chosen.dof_mask.sum())):
         wanted_cables = f"at least {count} cables for its {count} coordinates"
         raise InputError(f"robot {chosen.name!r} must have {wanted_cables}, got {chosen.m}")
-    variables = variables_of(chosen, wanted)
+    variables, _ = variables_of(chosen, wanted), room_of(chosen, wanted)
     grid = rows_of(chosen, wanted.require, [each.places() for each in wanted.require])
     # Of other pairings the boxes of the robot's own points prove nothing.
     impossible = None if wanted.free[0].pairing else find_impossibility(variables, grid)
     if impossible is not None:
-        before = _judged(chosen, chosen.length, grid)
+        before = judged_margin(chosen, chosen.length, grid)
         return Design(
             chosen, chosen, wanted, "infeasible", before, before, _nearest(Evaluation(variables, grid), None), None,
-            None, impossible, len(grid.pose_of), 0, 0, False,
+            None, None, impossible, len(grid.pose_of), 0, 0, False,
         )  # fmt: skip
     if wanted.free[0].pairing:
         cables = tuple(number - 1 for number in wanted.free[0].cables or range(1, chosen.m + 1))
         grid = with_tasks(grid, chosen, wanted.tasks)
-        attachment_of, count = best_pairing(chosen, grid, cables, room_of(wanted))
+        attachment_of, count = best_pairing(chosen, grid, cables, wanted)
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
         return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)
     found = search(variables, wanted, progress or (lambda what, share, best: None))
@@ -126,36 +122,20 @@ def _designed(
     per_demand = max(1000, AUDITED // sum(len(each.demands) for each in wanted.require))
     audited = rows_of(before, wanted.require, [each.sampled(per_demand, random) for each in wanted.require])
     every = rows.joined(audited)
-    margin = _judged(robot, before.length, every)
-    room = room_of(wanted)
-    some = np.unique(audited.pose_of, return_index=True)[1][:: max(1, len(audited.poses) // 10_000)]
-    placed = Evaluation(variables, rows.joined(audited.only(some)), room)
-    lengths = dynamics_of(robot).cable_lengths(placed.rows.poses)
-    feasible = margin >= wanted.margin and placed.missing(y) <= 0.0
+    margin = judged_margin(robot, before.length, every)
+    room, goal = room_of(before, wanted), goal_of(variables, wanted)
+    placed = Evaluation(variables, rows.joined(few(audited, random, ROOM_AUDITED)), room)
+    counts = room.frequency > 0.0 or goal.per_hertz > 0.0
+    judgement = judge(robot, placed.rows, room, counts)
+    feasible = margin >= wanted.margin and placed.missing(y) <= 0.0 and judgement.keeps(room)
     plans = tuple(plan(robot, task) for task in wanted.tasks) if feasible and not stopped else ()
     feasible &= len(plans) == len(wanted.tasks) and all(found.feasible for found in plans)
-    why = reasons(Evaluation(variables, rows, room), goal_of(variables, wanted), y)
+    why = reasons(Evaluation(variables, rows, room), goal, y)
     return Design(
         robot, before, wanted, "feasible" if feasible else "not-found", margin,
-        _judged(before, before.length, every), _nearest(placed, y), (float(lengths.min()), float(lengths.max())),
-        why, None, count, len(audited.pose_of), starts, stopped,
-        plans,
+        judged_margin(before, before.length, every), _nearest(placed, y), judgement,
+        judge(before, placed.rows, room, counts), why, None, count, len(audited.pose_of), starts, stopped, plans,
     )  # fmt: skip
-
-
-def _problems(robot: Robot, length: float, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-    """Return matrices (k, n, m) and wrenches (k, n), with moments divided by the length."""
-    kept = np.flatnonzero(robot.dof_mask)
-    scale = np.repeat([1.0, 1.0 / length], 3)[kept]
-    A = dynamics_of(robot).wrench_matrix(rows.poses)[:, kept] * scale[:, None]
-    return A[rows.pose_of], rows.wrenches[:, kept] * scale
-
-
-def _judged(robot: Robot, length: float, rows: Rows) -> float:
-    """Return the smallest margin, by `capacity_margin` at the worst rows."""
-    A, w = _problems(robot, length, rows)
-    worst = np.argsort(margins(A, w, robot.t_min, robot.t_max))[:_JUDGED]
-    return judged_margin(robot, A[worst], w[worst])
 
 
 def _nearest(evaluation: Evaluation, y: np.ndarray | None) -> float:

@@ -8,20 +8,21 @@ import numpy as np
 
 from .annealing import anneal
 from .evaluation import Evaluation, Rows, rows_of
-from .goal import Goal, goal_of
+from .goal import NOTHING, Goal, Outcome, goal_of
 from .linear_programs import maximise
 from .requirements import Requirements
-from .room import room_of
+from .room import Room, room_of
 from .task_rows import FEW_INSTANTS, with_tasks
 from .variables import Variables
 
 Progress = Callable[[str, float, float], None]  # what is being done, the share of time, the best margin so far [N]
 
 AUDITED = 100_000  # random poses
-CLEARANCE_AUDITED = 10_000
+ROOM_AUDITED = 10_000  # of them, for distances and frequencies
 FEW = 32  # rows for annealing
 _ADDED, _APART = 20, 0.15  # worst poses that an audit adds, and how far apart they are [m]
-_ROUNDS = 6
+_SOON, _ROUNDS = 2, 6  # audits after a start that does not meet the requirements, and at the end
+_ANNEALING, _IMPROVING = 0.3, 0.4  # of the time at most, for each start and each sequence of linear programs
 _STARTING = 0.85  # of the time, for new starts
 _FIRST_STEP, _LATER_STEP = 0.1, 0.02  # longest steps of the first linear program, of the ranges
 _SAME = 1e-3  # of the margin: what an audit may find less
@@ -35,17 +36,14 @@ class Found:
     goal: Goal
     y: np.ndarray  # variables, (p,)
     rows: Rows  # all rows: those of the requirements, and what audits have added
-    margin: float = -np.inf  # smallest margin over all rows and the audited poses [N]
-    missing: float = np.inf  # by how much a bound of the room is missed there [m]
+    outcome: Outcome = NOTHING  # over all rows and the audited poses
     starts: int = 0  # layouts from which linear programs were run
     audit_agrees: bool = False  # whether the random poses of the last audit are no worse than the rows
     stopped: bool = False  # whether the search was interrupted
 
-    def better(self, y: np.ndarray, margin: float, short: float) -> bool:
-        """Return whether another result is better: less of the room is missing, or none and its rank is higher."""
-        if short > 0.0 or self.missing > 0.0:
-            return (short, -margin) < (self.missing, -self.margin)
-        return self.goal.rank(margin, y) > self.goal.rank(self.margin, self.y)
+    def better(self, y: np.ndarray, outcome: Outcome) -> bool:
+        """Return whether another layout is better."""
+        return self.goal.better(y, outcome, self.y, self.outcome)
 
 
 def search(variables: Variables, requirements: Requirements, progress: Progress) -> Found:
@@ -56,17 +54,26 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
     rng = np.random.default_rng(requirements.seed)
     require, tasks = requirements.require, requirements.tasks
     rows = with_tasks(rows_of(robot, require, [each.places() for each in require]), robot, tasks)
-    coarse = _few(rows_of(robot, require, _coarse(requirements)), rng)
-    room = room_of(requirements)
-    few = Evaluation(variables, with_tasks(coarse, robot, tasks, FEW_INSTANTS), room.with_spare(_FEW_SPARE))
+    coarse = few(rows_of(robot, require, _coarse(requirements)), rng, FEW)
+    room = room_of(robot, requirements)
+    annealed = Evaluation(variables, with_tasks(coarse, robot, tasks, FEW_INSTANTS), room.with_spare(_FEW_SPARE))
     goal = goal_of(variables, requirements)
     found = Found(goal, variables.of_robot(), rows)
 
     def improve(what: str, delta: float) -> None:
         share = (time.perf_counter() - started) / requirements.time_limit
-        progress(what, min(share, 1.0), found.margin)
-        maximise(Evaluation(variables, found.rows, room.with_spare(_SPARE)), goal, y, until, delta)
+        progress(what, min(share, 1.0), found.outcome.margin)
+        ends = min(until, time.perf_counter() + _IMPROVING * requirements.time_limit)
+        maximise(Evaluation(variables, found.rows, room.with_spare(_SPARE)), goal, y, ends, delta)
         _take(variables, requirements, found, y, rng)
+
+    def settle(rounds: int) -> None:
+        nonlocal y
+        for _ in range(rounds):
+            if found.audit_agrees or time.perf_counter() > until:
+                break
+            y = found.y.copy()
+            improve(f"audit of start {found.starts}", _LATER_STEP)
 
     y = found.y.copy()
     try:
@@ -75,18 +82,16 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
                 improve("the robot's own layout", _FIRST_STEP)
             else:
                 near = found.y if found.starts % 2 and found.starts > 1 else None
-                y = anneal(few, goal, rng, until, near)
+                ends = min(until, time.perf_counter() + _ANNEALING * requirements.time_limit)
+                y = anneal(annealed, goal, rng, ends, near)
                 improve(f"start {found.starts + 1}", _FIRST_STEP)
             found.starts += 1
-        for number in range(_ROUNDS):
-            if found.audit_agrees or time.perf_counter() > until:
-                break
-            y = found.y.copy()
-            improve(f"audit {number + 1}", _LATER_STEP)
+            if found.outcome.missing > 0.0 or found.outcome.margin < requirements.margin:
+                settle(_SOON)
+        settle(_ROUNDS)
     except KeyboardInterrupt:
         found.stopped = True
-        evaluation = Evaluation(variables, found.rows, room)
-        if found.better(y, float(evaluation.margins(y).min()), evaluation.missing(y)):
+        if found.better(y, Evaluation(variables, found.rows, room).outcome(y, goal)):
             found.y = y
     return found
 
@@ -95,38 +100,48 @@ def _take(
     variables: Variables, requirements: Requirements, found: Found, y: np.ndarray, rng: np.random.Generator
 ) -> None:
     """Audit a layout, add the worst poses to the rows, and keep it if it is the best."""
-    evaluation = Evaluation(variables, found.rows, room_of(requirements))
-    promised, short = float(evaluation.margins(y).min()), evaluation.missing(y)
-    if not found.better(y, promised, short):
+    room, goal = room_of(variables.robot, requirements), found.goal
+    promised = Evaluation(variables, found.rows, room).outcome(y, goal)
+    if not found.better(y, promised):
         return  # the audit can only find less
-    margin, missed, worst = _audit(variables, requirements, y, rng)
-    agrees = margin >= promised - _SAME * abs(promised) and missed <= short
+    audited, worst = _audit(variables, requirements, room, goal, y, rng)
+    agrees = audited.missing <= promised.missing and all(
+        found >= wanted - _SAME * abs(wanted)
+        for found, wanted in ((audited.margin, promised.margin), (audited.frequency, promised.frequency))
+    )
     if not agrees:
         found.rows = found.rows.joined(worst)
-    margin, short = min(margin, promised), max(short, missed)
-    if found.better(y, margin, short):
-        found.y, found.margin, found.missing, found.audit_agrees = y.copy(), margin, short, agrees
+    outcome = Outcome(
+        min(audited.margin, promised.margin),
+        max(audited.missing, promised.missing),
+        min(audited.frequency, promised.frequency),
+    )
+    if found.better(y, outcome):
+        found.y, found.outcome, found.audit_agrees = y.copy(), outcome, agrees
 
 
 def _audit(
-    variables: Variables, requirements: Requirements, y: np.ndarray, rng: np.random.Generator
-) -> tuple[float, float, Rows]:
-    """Return the smallest margin and what the room misses at random poses, and the worst rows."""
+    variables: Variables, requirements: Requirements, room: Room, goal: Goal, y: np.ndarray, rng: np.random.Generator
+) -> tuple[Outcome, Rows]:
+    """Return the result at random poses, and the worst rows."""
     require = requirements.require
     demands = sum(len(each.demands) for each in require)
     count = max(1000, AUDITED // demands)
     rows = rows_of(variables.robot, require, [each.sampled(count, rng) for each in require])
     values = Evaluation(variables, rows).margins(y)
-    picked = _apart(rows, np.argsort(values)[:300])
-    short = 0.0
-    some = rows.only(np.unique(rows.pose_of, return_index=True)[1][:CLEARANCE_AUDITED])
-    spaces = Evaluation(variables, some, room_of(requirements)).spaces(y)
+    worst, margin = rows.only(_apart(rows, np.argsort(values)[:300])), float(values.min())
+    some = few(rows, rng, ROOM_AUDITED)
+    evaluation = Evaluation(variables, some, room)
+    spaces, short, frequency = evaluation.spaces(y), 0.0, 0.0
     if spaces.size:
         least = spaces.min(axis=1)
         short = max(0.0, -float(least.min()))
-        closest = _apart(some, np.argsort(least)[:100])
-        return float(values.min()), short, rows.only(picked).joined(some.only(closest))
-    return float(values.min()), short, rows.only(picked)
+        worst = worst.joined(some.only(_apart(some, np.argsort(least)[:100])))
+    if goal.per_hertz:
+        frequencies = evaluation.frequencies(y)[:, 0]
+        frequency = float(frequencies.min())
+        worst = worst.joined(some.only(_apart(some, np.argsort(frequencies)[:100])))
+    return Outcome(margin, short, frequency), worst
 
 
 def _apart(rows: Rows, order: np.ndarray) -> np.ndarray:
@@ -146,6 +161,7 @@ def _coarse(requirements: Requirements) -> list[np.ndarray]:
     return [each.places(tuple(min(count, 3) for count in each.grid)) for each in requirements.require]
 
 
-def _few(rows: Rows, rng: np.random.Generator) -> Rows:
+def few(rows: Rows, rng: np.random.Generator, most: int) -> Rows:
+    """Return the rows or, if there are more, a random choice of `most`."""
     count = len(rows.pose_of)
-    return rows if count <= FEW else rows.only(np.sort(rng.choice(count, FEW, replace=False)))
+    return rows if count <= most else rows.only(np.sort(rng.choice(count, most, replace=False)))

@@ -28,10 +28,13 @@ class Mechanics:
     ----------
     robot
         One that `record.fits`.
+    record
+        The record to read at each call, whose ends of cables may change; default: that of the robot.
     """
 
-    def __init__(self, robot: Robot):
-        self._record, self._home, self._m = record_of(robot), robot.carrier_home, robot.m
+    def __init__(self, robot: Robot, record: np.ndarray | None = None):
+        self._record = record_of(robot) if record is None else record
+        self._home, self._m = robot.carrier_home, robot.m
         self._stiffness = np.array([cable.stiffness or 0.0 for cable in robot.cables])
 
     def wrench_matrix(self, pose: Array, carrier_pose: Array | None) -> np.ndarray:

@@ -50,7 +50,12 @@ def natural_frequencies(
     """
     robot = as_robot(robot)
     K = dynamics_of(robot).stiffness(pose, tensions, carrier_pose)
-    C = whitening(robot, np.asarray(pose, dtype=float))
+    return frequencies_of(robot, K, np.asarray(pose, dtype=float))
+
+
+def frequencies_of(robot: Robot, K: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Return the natural frequencies (..., k) [Hz] of a platform with stiffnesses (..., 6, 6) at poses (..., 6)."""
+    C = whitening(robot, pose)
     if not robot.dof_mask.all():
         rows = np.flatnonzero(robot.dof_mask)
         K = K[..., rows[:, None], rows]

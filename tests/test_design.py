@@ -405,6 +405,10 @@ def test_the_command_writes_a_robot_and_says_no(tmp_path):
         assert len(str(error.value).splitlines()) == 1
     done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    file.write_text(json.dumps(wanted(robot) | {"free": [winches(robot) | {"cables": [9]}]}))
+    done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
+    assert done.returncode == 2
+    assert f"{file}: free[0].cables must be cables of the robot, 1 to 8, got 9" in done.stderr
 
 
 def test_distances_of_the_core_are_those_of_interference():
@@ -479,7 +483,7 @@ def test_the_weakest_winches_are_those_of_a_bisection(name, margin):
 
 def test_weaker_winches_are_enough_for_a_better_layout(tmp_path):
     robot = load("ipanema-2")
-    requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=1.0)
+    requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=2.0)
     fixed = design(robot, requirements=requirements | {"free": [winches(robot)], "time_limit": 0.5})
     (tmp_path / "wanted.yaml").write_text(json.dumps(requirements | {"free": [*requirements["free"], winches(robot)]}))
     done = towline("design", "ipanema-2", str(tmp_path / "wanted.yaml"), "--json", "--out", str(tmp_path / "out.yaml"))

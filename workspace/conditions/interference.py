@@ -57,7 +57,7 @@ class Interference(Condition):
                 free &= ~_enters(low, high, robot.attachments[cable], in_frame(places.pose, starts[:, cable]))
         for obstacle in self.obstacles:
             for cable in range(robot.m):
-                distance = _outside(obstacle, starts[:, cable], ends[:, cable])
+                distance = outside(obstacle, starts[:, cable], ends[:, cable])
                 # Inside a box the distance is zero, which is interference without any clearance too.
                 free &= (distance > 0.0) & (distance >= self.clearance)
         return free
@@ -98,7 +98,7 @@ def least_distance(robot: Robot, starts: np.ndarray, ends: np.ndarray) -> np.nda
     return least
 
 
-def _outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
+def outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
     """Return the distance of the segments p to p_end (n, 3) from an obstacle, (n,) [m]; at most 0 where they meet."""
     if isinstance(obstacle, Block):
         before_turn = [(end - obstacle.centre) @ obstacle.axes for end in (p, p_end)]
