@@ -222,10 +222,10 @@ class Requirements(Part):
         if self.maximise != "margin" and any(each.pairing for each in self.free):
             raise ValueError(f"maximise must be margin with a pairing, got {self.maximise!r}")
         for number, place in enumerate(self.keep_out):
-            for name in {"platform", "carriers"} & place.model_fields_set:
-                raise ValueError(
-                    f"keep_out[{number}].{name} must be left out: a design places cables, got {getattr(place, name)}"
-                )
+            for name in ("platform", "carriers"):
+                value = getattr(place, name)
+                if value != type(place).model_fields[name].default:
+                    raise ValueError(f"keep_out[{number}].{name} must be left out: a design places cables, got {value}")
         size = sum(each.size for each in self.require)
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} pairs of pose and wrench, got {size}")

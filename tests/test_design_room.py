@@ -111,6 +111,7 @@ def test_slopes_of_the_room_are_those_of_differences():
     places = [{**LAMP, "cables": 3.0}, {**BEAM, "cables": 3.0}]
     asked = {"cable_platform_clearance": 1.0, "cable_floor_clearance": 3.0, "keep_out": places}
     read = read_requirements(wanted(robot, **asked, natural_frequency=20.0) | {"require": tilted})
+    assert read_requirements(read.model_dump()) == read  # as the command does for --seconds
     variables = variables_of(robot, read)
     rows = rows_of(robot, read.require, [each.places() for each in read.require])
     y, step = variables.of_robot(), 1e-6
