@@ -125,12 +125,15 @@ class Distribution:
 def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
     """Return whether some matrix of A (n, 6, m) has fewer than `dof` independent columns, and the inverses (n, m, 6).
 
-    Nothing else in an audit takes as long as a decomposition of each matrix. Square ones that are far from singular by
-    their condition in the Frobenius norm, which is never less than that of the singular values, need none.
+    Nothing else in an audit takes as long as a decomposition of each matrix. Those that are far from losing a row by
+    their condition in the Frobenius norm, which is never less than that of the singular values, need none: the inverse
+    by A A^T has lost the square of the condition, and one step of Newton's method (Schulz 1933) brings that back.
     """
-    if A.shape[1] == A.shape[2] == dof:
+    if A.shape[1] == dof <= A.shape[2]:
+        transposed = A.swapaxes(1, 2)
         with suppress(np.linalg.LinAlgError):
-            inverse = np.linalg.inv(A)
+            inverse = transposed @ np.linalg.inv(A @ transposed)
+            inverse += inverse @ (np.eye(dof) - A @ inverse)
             if (np.linalg.norm(A, axis=(1, 2)) * np.linalg.norm(inverse, axis=(1, 2)) * INDEPENDENT < 1.0).all():
                 return False, inverse
     U, sigma, Vt = np.linalg.svd(A, full_matrices=False)
