@@ -88,17 +88,18 @@ def _moved(
         y[one], y[other] = y[other], y[one]
     elif kind == 1 or kind == 2:
         for each in (point,) if kind == 1 else (point, points[rng.integers(len(points))]):
-            y[each] = _drawn(low[each], high[each], rng)
+            y[each] = drawn(low[each], high[each], rng)
     elif kind == 3:
         one = point[rng.integers(point.size), None]
-        y[one] = _drawn(low[one], high[one], rng)
+        y[one] = drawn(low[one], high[one], rng)
     else:
         step = _SMALL * rng.standard_normal(point.size) * (high[point] - low[point])
         y[point] = np.minimum(np.maximum(y[point] + step, low[point]), high[point])
     return y
 
 
-def _drawn(low: np.ndarray, high: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def drawn(low: np.ndarray, high: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return random numbers inside bounds, about half of them at one."""
     share = rng.random(low.size)
     at_bound = rng.random(low.size) < _AT_BOUND
     return low + np.where(at_bound, share < 0.5, share) * (high - low)
