@@ -103,7 +103,12 @@ def design(
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
         return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)
     found = search(variables, wanted, progress or (lambda what, share, best: None))
-    return _designed(chosen, variables, wanted, found.y, found.rows, len(grid.pose_of), found.starts, found.stopped)
+    result = _designed(chosen, variables, wanted, found.y, found.rows, len(grid.pose_of), found.starts, found.stopped)
+    if not result.feasible:  # the robot itself may meet the requirements, as nearly as its numbers may be chosen
+        own = variables.of_robot()
+        kept = _designed(chosen, variables, wanted, own, found.rows, len(grid.pose_of), found.starts, found.stopped)
+        result = kept if kept.feasible else result
+    return result
 
 
 def _designed(

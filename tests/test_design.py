@@ -20,7 +20,7 @@ from towline import (
     plan,
     read_requirements,
 )
-from towline.layout import Free
+from towline.layout import Free, run
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import Goal
 from towline.layout.impossibility import find_impossibility
@@ -28,6 +28,7 @@ from towline.layout.linear_programs import maximise
 from towline.layout.pairings import with_attachments
 from towline.layout.reasons import reasons
 from towline.layout.room import Room
+from towline.layout.search import search
 from towline.layout.variables import variables_of
 from towline.models.points import placed, rotations
 from towline.models.record import record_of
@@ -494,6 +495,23 @@ def test_weaker_winches_are_enough_for_a_better_layout(tmp_path):
     assert fixed.report().startswith("ipanema-2, design: FEASIBLE, mean t_max")
     with pytest.raises(InputError, match="free must have an item with part t_max for minimise: t_max, got none"):
         design(robot, requirements=requirements)
+
+
+def test_a_robot_that_meets_the_requirements_is_never_replaced_by_one_that_does_not(monkeypatch):
+    """A search that has no time may end anywhere."""
+
+    def lost(variables, *others):
+        found = search(variables, *others)
+        found.y = variables.low.copy()
+        return found
+
+    monkeypatch.setattr(run, "search", lost)
+    robot = load("ipanema-2")
+    requirements = wanted(robot, minimise="t_max", margin=12.0, time_limit=1e-3) | {"free": [winches(robot)]}
+    hardly = design(robot, requirements=requirements)
+    assert hardly.feasible, hardly.report()
+    assert np.allclose(hardly.robot.t_max, robot.t_max)
+    assert not design(robot, requirements=requirements | {"margin": 30.0}).feasible
 
 
 def test_winches_are_strong_enough_for_a_task_and_not_much_stronger():
