@@ -72,9 +72,9 @@ def design(
     """
     chosen = as_robot(robot)
     if requirements is not None:
-        given = {"free": free, "require": require, "maximise": None if maximise == "margin" else maximise, **options}
+        given = {"free": free, "require": require, "maximise": maximise, **options}
         for name, value in given.items():
-            if value is not None:
+            if value is not None and not (name == "maximise" and isinstance(value, str) and value == "margin"):
                 raise InputError(f"{name} must be left out with requirements, which contain it")
         wanted = read_requirements(requirements)
     else:

@@ -213,6 +213,13 @@ class Robot(DisplayedRobot):
 
         return save_yaml(self, file)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with changed fields, without the numbers that were computed from the old ones."""
+        copy = super().model_copy(update=update, deep=deep)
+        for name in vars(copy).keys() - type(self).model_fields.keys():
+            del vars(copy)[name]
+        return copy
+
     def __hash__(self) -> int:
         """Return a hash of the numbers of the robot, the same in each process."""
         return self._hash
@@ -326,7 +333,7 @@ class Robot(DisplayedRobot):
         """Return the factors that convert a wrench to newtons, (6,): 1 for forces, 1 / `length` for moments [1/m]."""
         return np.repeat([1.0, 1.0 / self.length], 3)  # (6,)
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Return the characteristic length [m]: the largest distance from the CoM to an attachment."""
         arms = np.linalg.norm(self.attachments - np.array(self.platform.com), axis=1)

@@ -258,3 +258,13 @@ def test_diagnosis_counts_the_rows_that_move():
     assert (planar.rank, planar.reason) == (3, "")
     assert (point.rank, point.reason) == (3, "")
     assert len(planar.singular_values) == 3
+
+
+def test_a_changed_copy_keeps_nothing_computed_from_the_old_numbers():
+    robot = load("cogiro")
+    known = robot.length, hash(robot)
+    changes = {"platform": robot.platform.model_copy(update={"com": (1.0, 1.0, 1.0)}), "cables": robot.cables[:7]}
+    copy = robot.model_copy(update=changes)
+    anew = Robot.model_validate(copy.model_dump())
+    assert (copy, copy.length, hash(copy)) == (anew, anew.length, hash(anew))
+    assert (robot.length, hash(robot)) == known != (copy.length, hash(copy))
