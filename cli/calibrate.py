@@ -50,8 +50,9 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="SIGMA|NAME=SIGMA,...",
-            help="Standard deviation of the lengths [m], or of lengths [m], position [m], rotation [rad] and tensions "
-            "(relative), as 'lengths=0.001,tensions=0.05'; default: the log's, or 1 mm, exact poses and 2 %.",
+            help="Standard deviation of the lengths [m], or of lengths [m], position [m], rotation [rad], tensions "
+            "(relative) and directions [rad], as 'lengths=0.001,tensions=0.05'; default: the log's, or 1 mm, exact "
+            "poses, 2 % and 0.02 rad.",
         ),
     ] = None,
     outliers: Annotated[
@@ -92,7 +93,7 @@ def calibrate(
     one_of("--format", form, FORMATS)
     names = None if free is None else [name.strip() for name in free.split(",")]
     stated = None if sigma is None else _sigma(sigma)
-    known = None if prior is None else _by_name("--prior", prior)
+    known = None if prior is None else by_name("--prior", prior)
     loaded = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
     check_outputs(
@@ -124,16 +125,17 @@ def calibrate(
 
 def _sigma(text: str) -> Any:
     if "=" in text:
-        return _by_name("--sigma", text)
+        return by_name("--sigma", text)
     try:
         return float(text)
     except ValueError:
         raise InputError(
-            f"--sigma must be a number [m], or NAME=NUMBER of lengths, position, rotation, tensions, got {text!r}"
+            f"--sigma must be a number [m], or NAME=NUMBER of lengths, position, rotation, tensions, directions, "
+            f"got {text!r}"
         ) from None
 
 
-def _by_name(option: str, text: str) -> dict[str, float]:
+def by_name(option: str, text: str) -> dict[str, float]:
     """Read "anchors=0.02,offsets=0.05" as a mapping.
 
     Raises `InputError` if the text is anything else.

@@ -9,6 +9,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of
+from .calibrate import by_name
 from .log import FieldsOption
 from .options import (
     CarrierPoseOption,
@@ -60,7 +61,12 @@ def pose(
     ] = None,
     carrier_pose: CarrierPoseOption = None,
     sigma: Annotated[
-        str, typer.Option(metavar="S", help="Standard deviation of the lengths [m]: one number, or one per cable.")
+        str,
+        typer.Option(
+            metavar="S",
+            help="Standard deviation of the lengths [m]: one number, or one per cable; with --log also "
+            "'lengths=0.001,directions=0.01,rotation=0.01'.",
+        ),
     ] = "0.001",
     as_json: JsonOption = False,
 ) -> None:
@@ -113,6 +119,7 @@ def _of_log(
 
     from ..base.text import quantity
     from ..estimation.logs import read_log
+    from ..estimation.pose.from_lengths import SIGMA
     from ..estimation.pose.from_log import poses_from_log
     from ..figures import calibration, style
 
@@ -120,8 +127,10 @@ def _of_log(
     check_ending("--out", out, ".csv")
     picture = figures and figures / f"consistency.{form}"
     check_outputs({"--out": out, "--figures": picture}, {"the log": log})
+    stated = by_name("--sigma", sigma) if "=" in sigma else {}
+    sigma = str(stated.get("lengths", SIGMA)) if stated else sigma
     deviations = numbers("--sigma", sigma, robot.m if len(sigma.replace(",", " ").split()) > 1 else 1)
-    read = read_log(log, None, None, robot, fields)
+    read = read_log(log, stated or None, None, robot, fields)
     found = poses_from_log(robot, read.measurements, deviations if len(deviations) > 1 else deviations[0], read.begin)
     files = [found.save(out)]
     if picture is not None:

@@ -45,7 +45,7 @@ def test_csv_has_units(built, tmp_path):
     np.testing.assert_allclose(log.lengths, built.readings, atol=1e-10)
     np.testing.assert_allclose(log.poses, built.poses, atol=1e-10)
     np.testing.assert_allclose(log.times, np.arange(60) / 2)
-    assert log.sigma == (1e-3, 0, 0, 0.02)
+    assert log.sigma == (1e-3, 0, 0, 0.02, 0.02)
     semicolons = (tmp_path / "log.csv").read_text().replace(",", ";")
     (tmp_path / "other.csv").write_text("\ufeff" + semicolons.replace("\n", "\r\n"))
     np.testing.assert_array_equal(read_measurements(tmp_path / "other.csv").lengths, log.lengths)
@@ -69,7 +69,7 @@ def test_quaternions_and_empty_fields(built, tmp_path):
 
 
 def test_netcdf_there_and_back(built, tmp_path):
-    sigma = {"lengths": 2e-3, "position": 1e-3, "rotation": 3e-3, "tensions": 0.05}
+    sigma = {"lengths": 2e-3, "position": 1e-3, "rotation": 3e-3, "tensions": 0.05, "directions": 0.03}
     poses = built.poses.copy()
     poses[3] = np.nan
     tensions = np.full((60, 8), 300.0)
@@ -117,7 +117,7 @@ def spoiled(what):
     elif what == "nan":
         rows[5, 4] = np.nan
     elif what == "times":
-        rows[20, 0] = rows[19, 0]
+        rows[20, 0] = rows[18, 0]
     elif what == "no lengths":
         header, rows = HEADER[9:], rows[:, 9:]
     elif what == "part of a position":
@@ -147,7 +147,7 @@ FAULTS = {
     "twice": "must have each column once, got l1 twice",
     "a gap": "must have columns l0 to l7 without a gap, got no l2",
     "nan": "l3 must be a finite number at sample 5, got nan",
-    "times": "times must increase from sample to sample, got 9.5 s and then 9.5 s at sample 20",
+    "times": "times must increase from sample to sample, got 9.5 s and then 9 s at sample 20",
     "no lengths": "must have columns l0, l1, ... of lengths, got x, y, z, roll, pitch, yaw",
     "part of a position": "must have all columns x, y, z or none of them, got x, y",
     "half a pose": "poses must have rows that are finite or nan as a whole, got both at sample 5",
@@ -203,7 +203,7 @@ def test_a_cut_netcdf_file_is_refused(built, tmp_path):
         ({"times": [0, 1]}, r"times must have the shape \(1,\), got \(2,\)"),
         ({"tensions": [[1]]}, r"tensions must have the shape \(1, 2\), got \(1, 1\)"),
         ({"sigma": 0}, "sigma must be a number from 1e-09 to 100, or a mapping of .*, got 0"),
-        ({"sigma": {"length": 1}}, "sigma must have the keys lengths, position, rotation, tensions, got 'length'"),
+        ({"sigma": {"length": 1}}, "sigma must have the keys lengths, position, rotation, tensions, directions, got 'length'"),
         ({"sigma": {"position": -1}}, "sigma.position must be a number from 0 to 100, got -1"),
     ],
 )

@@ -415,6 +415,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "Measurements.with_carriers.tensions": lambda: None,
     "Measurements.times": lambda: np.arange(9.0),
     "carrier_poses": lambda: np.zeros((9, 1, 6)),
+    "directions": lambda: None,
     "free": lambda: ("offsets",),
     "prior": lambda: None,
     "outliers": lambda: True,

@@ -237,5 +237,7 @@ class Balance:
 
 def needs_balance(robot: Robot, measurements: Measurements) -> bool:
     """Return whether gravity tells more of unknown poses than lengths do: with tensions, or with few cables."""
+    if measurements.directions is not None:  # which tell more, also in motion
+        return False
     unknown = not measured_poses(robot, measurements)[2][:, robot.dof_mask > 0].all()
     return unknown and robot.weight > 0 and (measurements.tensions is not None or robot.m < robot.dof_mask.sum())

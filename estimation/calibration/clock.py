@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, measured_poses
+from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .fit import held
 from .model import Model, State
@@ -50,8 +50,8 @@ def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:
     It is false if the platform was moved from pose to pose, or did not move.
     """
     assert measurements.times is not None
-    position, rotation, known = measured_poses(robot, measurements)
-    rows = np.flatnonzero(known[:, robot.dof_mask > 0].all(axis=1))
+    position, rotation, _ = measured_poses(robot, measurements)
+    rows = np.flatnonzero(tracked(robot, measurements))
     used = np.zeros(len(measurements), dtype=bool)
     used[rows[::2]] = True
     if used.sum() < 4:

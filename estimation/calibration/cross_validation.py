@@ -256,8 +256,8 @@ def _mean_square(model: Model, state: State) -> float:
     squares = float((lengths_of(model, state).T[used] ** 2).sum())
     unknown = np.isinf(model.pose_sigmas)
     absorbed = unknown.sum(axis=1)
-    if model.balanced:
-        # Of poses that need forces too, lengths cannot absorb more errors than there are of them.
+    if model.balanced or model.measurements.directions is not None:
+        # Of poses that need forces or directions too, lengths cannot absorb more errors than there are of them.
         absorbed = np.minimum(absorbed, model.robot.m - 1)
     return squares / max(int(used.sum()) - int(absorbed.sum()), 1)
 

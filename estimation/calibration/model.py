@@ -11,7 +11,7 @@ best. With known poses the first is a linear regression, which readings that har
 (`FeltTensions`), up to errors that are further unknowns of the sample, treated as coordinates of its pose.
 
 Where forces tell more than lengths, or parameters of theirs are free, the balance of the platform (`balance`) is a
-further residual of each sample.
+further residual of each sample. So are measured directions of cables (`sightings`).
 
 The pose of sample k is the pose measured at t_k + clock, or an initial one, plus a translation and a small rotation in
 {G}. These increments are unknowns if the pose was measured with an error or not at all.
@@ -34,6 +34,7 @@ from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .geometry import runs
 from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, prior_sigmas
+from .sightings import sightings
 
 
 class State(NamedTuple):
@@ -58,13 +59,15 @@ class State(NamedTuple):
 class Residuals(NamedTuple):
     """Differences over their standard deviations.
 
-    Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,), balance of forces (N, 6).
+    Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,), balance of forces (N, 6),
+    directions (N, 3 m).
     """
 
     readings: np.ndarray
     poses: np.ndarray
     parameters: np.ndarray
     balance: np.ndarray
+    directions: np.ndarray
 
     @property
     def cost(self) -> float:
@@ -75,12 +78,13 @@ class Residuals(NamedTuple):
     @property
     def of_samples(self) -> np.ndarray:
         """Return the sum of squares of each sample, (N,), inf where a cable has no length."""
-        total = (self.readings**2).sum(axis=0) + (self.poses**2).sum(axis=1) + (self.balance**2).sum(axis=1)
+        by_sample = (self.poses, self.balance, self.directions)
+        total = (self.readings**2).sum(axis=0) + sum((part**2).sum(axis=1) for part in by_sample)
         return np.where(np.isfinite(total), total, np.inf)
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of the residuals of readings, and the balance with its own.
+    """Derivatives of the residuals of readings, and balance and directions with their own.
 
     Attributes
     ----------
@@ -100,6 +104,16 @@ class Derivatives(NamedTuple):
     arms: np.ndarray
     lengths: np.ndarray
     balance: Balanced | None = None
+    directions: Balanced | None = None
+
+    @property
+    def blocks(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Return residuals (N, k), derivatives by parameters (N, k, P) and by poses (N, k, 6 + d) of both."""
+        found = []
+        for one in (self.balance, self.directions):
+            if one is not None and one.by_parameters is not None and one.by_pose is not None:
+                found.append((one.residuals, one.by_parameters, one.by_pose))
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +142,8 @@ class Model(Displayed):
         Tensions that stretch the cables; default: the measured ones, without errors.
     ahead
         Clock offset of the platform's accelerations, near that of its poses [s].
+    interpolates
+        True if poses between measured ones are known, as with a track.
     """
 
     parameters: Parameters
@@ -143,6 +159,7 @@ class Model(Displayed):
     weighs: bool = False
     felt: FeltTensions | None = None
     ahead: float = 0.0
+    interpolates: bool = False
 
     @property
     def robot(self) -> Robot:
@@ -160,7 +177,8 @@ class Model(Displayed):
         Inf: not measured; 0: exact, or locked by `platform.dof`.
         """
         sigma = self.measurements.sigma
-        known = self._given[2] | (self.track is not None)
+        known = self._given[2]
+        known = known | (known.any(axis=0) & (self.interpolates or self.track is not None))
         unknown = np.repeat([np.inf, self.upright], 3)
         result = np.where(known, np.repeat([sigma.position, sigma.rotation], 3), unknown)
         result[:, np.flatnonzero(self.robot.dof_mask == 0)] = 0.0
@@ -297,7 +315,9 @@ class Model(Displayed):
         weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
         in_balance = np.zeros((len(position), 6)) if forces is None else forces.residuals * weighs[:, None]
         by_prior = (state.x - parameters.first) / self.prior_sigmas
-        residuals = Residuals(readings, poses, by_prior, in_balance)
+        seen = sightings(parameters, state.x, (position, rotation), run, self.measurements, derive)
+        seen_residuals = np.zeros((len(position), 0)) if seen is None else seen.residuals * inside[:, None]
+        residuals = Residuals(readings, poses, by_prior, in_balance, seen_residuals)
         if not derive:
             return residuals, None
         gain = weights * ratio
@@ -318,17 +338,21 @@ class Model(Displayed):
         if velocity is not None and rate is not None:
             twist = np.concatenate([velocity, rate], axis=1)
             others[..., 0] = np.einsum("mni,ni->mn", by_pose, twist)
-            if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
-                forces.by_parameters[..., parameters.clock] = (forces.by_pose @ twist[..., None])[..., 0]
+            for one in (forces, seen):
+                if one is not None and one.by_parameters is not None and one.by_pose is not None:
+                    one.by_parameters[..., parameters.clock] = (one.by_pose @ twist[..., None])[..., 0]
         for column, (cable, first) in enumerate(parameters.slips, start=OF_ROBOT):
             others[cable, first:, column] = -gain[cable, first:]
-        if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
-            kept = weighs[:, None, None]
-            by_forces = np.zeros((len(position), 6, sigmas.shape[1]))
-            by_forces[..., :6] = forces.by_pose * kept
-            forces = Balanced(in_balance, forces.by_parameters * kept, by_forces)
+        forces, seen = self._kept(forces, weighs), self._kept(seen, inside)
         by_pose = np.concatenate([by_pose, np.broadcast_to(by_errors, (*by_pose.shape[:2], self._open))], axis=2)
-        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces)
+        return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces, seen)
+
+    def _kept(self, one: Balanced | None, rows: np.ndarray) -> Balanced | None:
+        """Return residuals of samples with their derivatives, zero except in some rows (N,) of bool."""
+        if one is None or one.by_parameters is None or one.by_pose is None:
+            return one
+        kept, more = rows[:, None, None], ((0, 0), (0, 0), (0, self._open))
+        return Balanced(one.residuals * rows[:, None], one.by_parameters * kept, np.pad(one.by_pose * kept, more))
 
     def slips(self, x: np.ndarray) -> np.ndarray:
         """Return the sum of each cable's slips so far, (m, N) [m]."""

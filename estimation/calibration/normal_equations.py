@@ -8,7 +8,8 @@ With J and G the derivatives of all residuals by parameters and by the pose of e
 
 with prior standard deviations as residuals of their own. With L_k L_k' = C_k, the sum is one product Y'Y of the matrix
 Y of all L_k^-1 E_k on top of each other. Parameters are multiplied by `metric`, so that each is a length [m]. Damping
-adds to the diagonals of J'J and of C_k. Rows of the balance of forces have derivatives by the parameters of all cables.
+adds to the diagonals of J'J and of C_k. Rows of the balance of forces and of directions have
+derivatives by all parameters.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from .parameters import OF_CABLE
 from .products import inner
 
 NEARLY_SINGULAR = 1e-10  # added to C_k, relative to its mean, where it has no inverse: the lengths leave the pose open
+LARGEST_VARIANCE = 1e4  # [m^2, rad^2] of a pose that is determined
 FLATTEST = 0.1  # share of C_k that second derivatives leave
 SLOWEST = 1e-3  # [m/s]; a platform that moves less makes a clock offset no better known
 
@@ -107,12 +109,10 @@ class NormalEquations(Displayed):
         right[m * width :] = inner(flat, e.reshape(-1, 1))[:, 0]
         S, b = full[np.ix_(keep, keep)], right[keep]
         sigma = model.prior_sigmas[varies] * scale[varies]
-        H = None
-        forces = derivatives.balance
-        if forces is not None and forces.by_parameters is not None:
-            H = forces.by_parameters[..., varies] / scale[varies]  # (N, 6, p)
-            flat = H.reshape(6 * count, -1)
-            S, b = S + inner(flat, flat), b + inner(flat, residuals.balance.reshape(-1, 1))[:, 0]
+        blocks = [(e, by_x[..., varies] / scale[varies], by_pose) for e, by_x, by_pose in derivatives.blocks]
+        for e, H, _ in blocks:  # (N, k), (N, k, p)
+            flat = H.reshape(e.size, -1) if len(b) else np.zeros((e.size, 0))
+            S, b = S + inner(flat, flat), b + inner(flat, e.reshape(-1, 1))[:, 0]
         S[np.diag_indices(len(b))] += 1 / sigma**2
         b += residuals.parameters[varies] / sigma
         own = np.diag(S).copy()
@@ -125,8 +125,8 @@ class NormalEquations(Displayed):
         E[..., : m * width] = (G[..., None] * np.swapaxes(J, 0, 1)[:, None]).reshape(*G.shape[:2], m * width)
         E[..., m * width :] = G @ np.swapaxes(others, 0, 1)
         E = E if keep.all() else E[..., keep]
-        if H is not None and forces is not None and forces.by_pose is not None:
-            E = E + np.swapaxes(forces.by_pose * model.poses_vary[:, None], 1, 2) @ H
+        for _, H, by_pose in blocks:
+            E = E + np.swapaxes(by_pose * model.poses_vary[:, None], 1, 2) @ H
         Y = np.matmul(inverse_root, E)
         y = np.matmul(inverse_root, g[..., None])[..., 0]
         stacked = Y.reshape(y.size, Y.shape[2])
@@ -159,9 +159,9 @@ def _poses(
     G = np.ascontiguousarray(derivatives.poses.transpose(1, 2, 0)) * vary[..., None]
     C = G @ np.swapaxes(G, 1, 2)
     g = (G @ np.ascontiguousarray(residuals.readings.T)[..., None])[..., 0]
-    if derivatives.balance is not None and derivatives.balance.by_pose is not None:
-        K = np.swapaxes(derivatives.balance.by_pose * vary[:, None], 1, 2)
-        C, g = C + K @ np.swapaxes(K, 1, 2), g + (K @ residuals.balance[..., None])[..., 0]
+    for e, _, by_pose in derivatives.blocks:
+        K = np.swapaxes(by_pose * vary[:, None], 1, 2)
+        C, g = C + K @ np.swapaxes(K, 1, 2), g + (K @ e[..., None])[..., 0]
     inverse = np.divide(1.0, sigmas, out=np.zeros_like(sigmas), where=vary)
     g += residuals.poses * inverse
     diagonal = np.arange(C.shape[1])
@@ -189,6 +189,19 @@ def pose_steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> 
     )
     y = np.matmul(inverse_root, g[..., None])
     return -np.matmul(np.swapaxes(inverse_root, 1, 2), y)[..., 0], (y[..., 0] ** 2).sum(axis=1)
+
+
+def pose_covariances(model: Model, state: State) -> np.ndarray:
+    """Return the covariances of the poses with parameters as they are, (N, 6, 6) [m^2, m rad, rad^2].
+
+    They are infinite where nothing determines a coordinate, and zero where it cannot move.
+    """
+    inverse_root = _poses(model, *model.linearised(state), None)[0]
+    varies = model.poses_vary[:, :, None] & model.poses_vary[:, None, :]
+    covariance = np.where(varies, np.swapaxes(inverse_root, 1, 2) @ inverse_root, 0.0)[:, :6, :6]
+    unknown = np.trace(covariance, axis1=1, axis2=2) > LARGEST_VARIANCE
+    covariance[unknown] = np.inf
+    return covariance
 
 
 def state_equations(model: Model, state: State, scale: np.ndarray) -> NormalEquations:

@@ -98,23 +98,23 @@ def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess:
     for i, row in enumerate(found.residuals):
         scores = without_poses(model, found, i) * row[:, None]
         total += np.add.reduceat(scores, edges, axis=0)
-    total += np.add.reduceat(_of_balance(model, state, found), edges, axis=0)
+    total += np.add.reduceat(_of_samples(model, found), edges, axis=0)
     # The sums add up to 0 in a minimum, which takes one of them away.
     ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
     return ratio if ratio > 1 + BY_CHANCE else 1.0
 
 
-def _of_balance(model: Model, state: State, found: _Projected) -> np.ndarray:
-    """Return J'e of each sample's balance of forces, minus the part of its pose, (N, p) [1/m]."""
-    forces, varies = found.derivatives.balance, model.parameters.varies
-    count = found.residuals.shape[1]
-    if forces is None or forces.by_parameters is None or forces.by_pose is None:
-        return np.zeros((count, int(varies.sum())))
-    rows = forces.by_parameters[..., varies] / found.scale[varies]
-    if found.equations.inverse_root is not None and found.equations.Y is not None:
-        K = forces.by_pose * model.poses_vary[:, None]
-        rows = rows - K @ np.swapaxes(found.equations.inverse_root, 1, 2) @ found.equations.Y
-    return np.einsum("nip,ni->np", rows, forces.residuals)
+def _of_samples(model: Model, found: _Projected) -> np.ndarray:
+    """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (N, p) [1/m]."""
+    varies = model.parameters.varies
+    total = np.zeros((found.residuals.shape[1], int(varies.sum())))
+    for e, by_parameters, by_pose in found.derivatives.blocks:
+        rows = by_parameters[..., varies] / found.scale[varies]
+        if found.equations.inverse_root is not None and found.equations.Y is not None:
+            K = by_pose * model.poses_vary[:, None]
+            rows = rows - K @ np.swapaxes(found.equations.inverse_root, 1, 2) @ found.equations.Y
+        total += np.einsum("nip,ni->np", rows, e)
+    return total
 
 
 def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | None:
@@ -183,12 +183,14 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
     position, rotation = model.poses(state)
     pose = np.concatenate([position[sample], points.angles(rotation[sample])])
     given, carriers = model.measurements.poses, model.measurements.carrier_poses
+    directions = model.measurements.directions
     copies = Measurements(
         np.tile(lengths, (m, 1)),
         None if given is None else np.tile(given[sample], (m, 1)),
         tensions=None if model.measurements.tensions is None else np.tile(model.measurements.tensions[sample], (m, 1)),
         sigma=model.measurements.sigma._asdict(),
         carrier_poses=None if carriers is None else np.tile(carriers[sample], (m, 1, 1)),
+        directions=None if directions is None else np.tile(directions[sample], (m, 1, 1)),
     )
     used = np.tile(model.weights[:, sample, None], (1, m))
     felt = model.felt and model.felt.only(np.full(m, sample))

@@ -23,7 +23,7 @@ from ...base.text import quantity
 from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, check_measurements, measured_poses
+from ..logs.measurements import Measurements, check_measurements, measured_poses, tracked
 from .frames import displaced_frames, fitted_frames
 from .geometry import runs
 from .interpretations import FACTORS, Interpretation, interpretations
@@ -105,7 +105,8 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     parameters = Parameters(robot, ())
     table = parameters.table(parameters.first)
     position, rotation, known = measured_poses(robot, given)
-    rows = np.flatnonzero(known[:, robot.dof_mask > 0].all(axis=1))
+    rows = np.flatnonzero(tracked(robot, given))
+    turning = bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())  # else it is taken to be as at home
     if len(rows) > MOST_SAMPLES:
         rows = rows[np.linspace(0, len(rows) - 1, MOST_SAMPLES).astype(int)]
     readings = given.lengths * table[:, 7]
@@ -119,13 +120,13 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     e = (lengths - y[order, order])[:, : len(rows)]
     noise = sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
     if max(map(_root_mean_square, e)) <= sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / len(rows))):
-        return _displaced(log, given, noise)
+        return _displaced(log, given, noise) if turning else None
     ways, as_given = _explanations(log, e, noise)
     best = min((way for way in ways if way.text), key=lambda way: way[:2])
     change = float(np.median(np.abs(log.y - np.median(log.y, axis=0))))
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
-    if far and len(rows) >= FEWEST[1]:
+    if far and turning and len(rows) >= FEWEST[1]:
         frames = fitted_frames(robot, table, log.position, log.rotation, log.y)
         moved = frames.of(position, rotation)
         lengths, y = _parts(log._replace(position=moved[0][rows], rotation=moved[1][rows]), Interpretation(""))
@@ -138,7 +139,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             None if best.several else _corrected(given, *whole.at(best.way), best.columns, best.signs * best.way.factor)
         )
         return Mistake(_better(best.text, as_given, best.size), corrected)
-    return None if far else _displaced(log, given, noise)
+    return None if far or not turning else _displaced(log, given, noise)
 
 
 def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:

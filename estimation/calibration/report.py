@@ -13,6 +13,7 @@ from .result import CalibrationData, Parameter
 
 MOST_LISTED = 12
 MOST_NAMED = 4
+LACKS = 3.0  # times the stated standard deviation, of residuals that noise alone does not cause
 LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually better than
 HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
 
@@ -103,6 +104,8 @@ def _of_noise(result: CalibrationData) -> list[str]:
             f"lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the standard deviations "
             f"below are multiplied by {quantity(result.noise / stated, digits=3)}"
         )
+    if result.noise > LACKS * stated and "scales" not in result.free:
+        lines.append("the model lacks something: --free auto tries scales, attachments and others")
     if result.alike > 1:
         lines.append(
             "residuals are autocorrelated, because the model is incomplete: the standard deviations "

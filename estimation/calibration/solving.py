@@ -7,7 +7,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, measured_poses
+from ..logs.cable_directions import placed
+from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .balance import Balance
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
@@ -17,8 +18,10 @@ from .normal_equations import metric, state_equations
 from .observability import Observability, observability
 from .outliers import LEAST_THRESHOLD, Outlier, Slip, alike, find_outliers, find_slips, find_unbalanced
 from .parameters import IN_BALANCE, OF_ROBOT, Parameters
+from .sightings import sighted
 from .starts import LARGEST_SHARE, fit_from, level_poses
 
+WINDING = 10.0  # standard deviations of readings that change, and so show a clock offset
 EXCEEDS = 0.05  # by which residuals may exceed the stated sigma, beside chance
 
 ROUNDS = 30  # of fits, each without the wrong readings of those before
@@ -42,7 +45,8 @@ class Solved(NamedTuple):
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
     """Return the default free parameters, with the clock offset if a motion was measured."""
     groups = ("anchors", "offsets", "clock")
-    moves = measurements.carrier_poses is not None
+    still = float(measurements.lengths.std(axis=0).max()) < WINDING * measurements.sigma.lengths
+    moves = measurements.carrier_poses is not None or still
     known = measurements.times is not None and not moves and is_enough(robot, measurements, ("clock",))
     return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
 
@@ -171,15 +175,16 @@ def model_of(
     weights = np.ones((robot.m, len(measurements)))
     model = Model(parameters, measurements, prior, weights, forces=Balance(robot, measurements))
     if "clock" in groups:
-        position, rotation, known = measured_poses(robot, measurements)
+        position, rotation, _ = measured_poses(robot, measurements)
         assert measurements.times is not None
-        rows = np.all(known[:, robot.dof_mask > 0], axis=1)
-        model = replace(model, track=PoseTrack(measurements.times, position, rotation, rows))
+        track = PoseTrack(measurements.times, position, rotation, tracked(robot, measurements))
+        model = replace(model, track=track)
     elif np.isinf(model.pose_sigmas[:, :3]).any():
         if start is None:
             table = parameters.table(parameters.first)
             lengths = table[:, 6] + table[:, 7] * measurements.lengths
             start = level_poses(robot, lengths, "offsets" in groups, measurements.carrier_poses)
+            start = placed(robot, measurements, start)
         model = replace(model, start=start)
     return model
 
@@ -193,7 +198,7 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     """Raise InputError unless there are at least as many equations as unknowns, and times and poses for a clock."""
     parameters = Parameters(robot, groups)
     if "clock" in groups:
-        known = measured_poses(robot, measurements)[2][:, robot.dof_mask > 0].all(axis=1)
+        known = tracked(robot, measurements)
         if measurements.carrier_poses is not None:
             raise InputError("free must not have clock where carriers move, whose clock is that of the lengths, got it")
         if measurements.times is None:
@@ -211,11 +216,12 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     if measurements.tensions is None and of_forces not in ([], ["com"]):
         raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}, got none")
     model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements))))
+    model = replace(model, interpolates="clock" in groups)
     if not set(IN_BALANCE).isdisjoint(groups) and (robot.weight == 0.0 or model.balanced is None):
         needed = "gravity" if robot.weight == 0.0 else "fewer cables than coordinates, or tensions"
         raise InputError(f"free must not have {', '.join(of_forces)} without {needed}, got robot {robot.name}")
-    unknown = np.isinf(model.pose_sigmas) & ("clock" not in groups)
-    spare = robot.m + (model.balanced.freedoms if model.balanced else 0) - unknown.sum(axis=1)
+    unknown = np.isinf(model.pose_sigmas)
+    spare = robot.m + (model.balanced.freedoms if model.balanced else 0) + sighted(measurements) - unknown.sum(axis=1)
     equations = int(np.maximum(spare, 0).sum())
     wanted = int((parameters.varies & np.isinf(model.prior_sigmas)).sum())
     if equations < wanted or equations == 0:
@@ -239,6 +245,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     if model.balanced:
         rests = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
         used += model.balanced.freedoms * int(rests.sum())
+    used += int(sighted(model.measurements)[model.inside(state)].sum())
     redundancy = used + int(np.isfinite(sigmas).sum()) - sigmas.size + int(priors.sum()) - found
     if redundancy <= 0:
         return np.nan, 1.0, redundancy

@@ -127,7 +127,7 @@ def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:
 
 def _elsewhere(model: Model, state: State) -> State | None:
     """Return the state with clearly better poses for samples that fit badly, or None without such poses."""
-    unknown = np.isinf(model.pose_sigmas).any(axis=1)
+    unknown = np.isinf(model.pose_sigmas[:, np.flatnonzero(model.robot.dof_mask)]).all(axis=1)
     spare = (model.weights > 0).sum(axis=0) - int((model.robot.dof_mask > 0).sum())
     squares = (model.residuals(state).readings ** 2).sum(axis=0)
     tested = unknown & (spare > 0)

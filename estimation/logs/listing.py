@@ -11,12 +11,12 @@ from ...base.errors import InputError
 from ...base.text import quantity
 from ...figures.report import Part, Report, Section, Table
 from ...models.robot import Robot
-from .mapping import Fields, LogMap, carrier_fields, fields_of
+from .mapping import Fields, LogMap, carrier_fields, fields_of, free_axes
 from .names import UNITS, epoch_unit
 from .recording import GAP, Recording, Topic, plain
 
 MOST_NAMED = 8  # fields of a topic
-ROLES = ("lengths", "position", "orientation", "tensions")
+ROLES = ("lengths", "position", "orientation", "tensions", "directions")
 
 
 def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot: Robot | None = None) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
     moving = [] if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
     carriers: dict[str, list[str]] = {}
     try:
-        found, problem = fields_of(recordings, given, robot and robot.m, moving), None
+        found, problem = fields_of(recordings, given, robot and robot.m, moving, free_axes(robot)), None
         for name in moving:
             of = carrier_fields(recordings, given, name)
             carriers[name] = [f"{one.full} [{one.unit}]" for one in (*of.position, *of.orientation, *of.thrusts)]
@@ -72,7 +72,8 @@ def _topic(topic: Topic, found: Fields) -> dict[str, Any]:
 
 def _uses(found: Fields, fixed: bool) -> dict[str, str | None]:
     """Return what logs can be used for, and None, or what is missing."""
-    first = found.lengths or (found.position if fixed else ())  # cables of fixed length have no readings
+    # Cables of fixed length have no readings.
+    first = found.lengths or ((found.position or found.directions) if fixed else ())
     timed = bool(first) and (first[0].topic.times is not None or any(one.topic is first[0].topic for one in found.time))
     no_lengths = None if first else "lengths"
     poses = bool(found.position or found.orientation)

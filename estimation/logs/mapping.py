@@ -5,20 +5,23 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field as Key
 
 from ...base.errors import InputError
 from ...base.inputs import file_path
 from ...models.parsing import read_yaml
-from ...models.part import Part
+from ...models.part import COORDINATES, Part
+from ...models.robot import Robot
 from .names import UNITS, Role, measured_name, role
 from .recording import Recording, Topic, plain
 
 AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
+OF_DIRECTION = ("x", "y", "z", "swivel", "azimuth", "elevation")
 TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
-COORDINATES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
+OF_STRUCTURES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
 MOST_LISTED = 12
 
 
@@ -47,6 +50,7 @@ class Fields(NamedTuple):
     commands: tuple[Field, ...] = ()
     thrusts: tuple[Field, ...] = ()
     efforts: tuple[Field, ...] = ()
+    directions: tuple[Field, ...] = ()  # x, y, z of each cable, or its azimuth and elevation, or its azimuth alone
 
 
 class LogMap(Part):
@@ -60,6 +64,10 @@ class LogMap(Part):
     time: str | None = Key(None, description="time of the columns of a table")
     commands: str | list[str] = Key([], description="commanded lengths [m] or tensions [N], as `lengths`")
     thrusts: str | list[str] = Key([], description="thrust of each flying carrier, as `lengths`")
+    directions: str | list[str] = Key([], description="x, y, z of each cable's unit vector, or azimuth and elevation")
+    directions_in: Literal["world", "carrier", "platform"] | None = Key(
+        None, description="frame of `directions`; default: found by the robot's file"
+    )
     carriers: dict[str, str] = Key({}, description="topic or beginning of the names of each moving carrier's fields")
 
 
@@ -68,8 +76,17 @@ def read_map(path: str | os.PathLike[str]) -> LogMap:
     return read_yaml(file_path("map", path), LogMap)
 
 
+def free_axes(robot: Robot | None) -> str:
+    """Return the coordinates that can move, between spaces; those of a planar robot suffice in a log."""
+    return "" if robot is None else " ".join(np.array(COORDINATES)[robot.dof_mask > 0])
+
+
 def fields_of(
-    recordings: Sequence[Recording], given: LogMap | None = None, m: int | None = None, carriers: Sequence[str] = ()
+    recordings: Sequence[Recording],
+    given: LogMap | None = None,
+    m: int | None = None,
+    carriers: Sequence[str] = (),
+    free: str = "",
 ) -> Fields:
     """Return the fields of logs: those that a map names, and for all other roles those with usual names.
 
@@ -83,6 +100,8 @@ def fields_of(
         Number of cables, which decides among several candidates.
     carriers
         Names of carriers, whose poses are not the platform's.
+    free
+        `free_axes` of the robot.
 
     Raises
     ------
@@ -90,19 +109,19 @@ def fields_of(
         If a name of the map is not there, part of a position or an orientation is missing, or there are several
         candidates.
     """
-    roles = ("lengths", "tensions", "position", "orientation", "time")
-    found = {name: _named(recordings, name, given) for name in roles} if given else {}
+    roles = ("lengths", "tensions", "position", "orientation", "time", "directions")
+    found = {name: _named(recordings, name, given, free) for name in roles} if given else {}
     if given and given.pose:
         parts = _below(recordings, given.pose)
         for name in ("position", "orientation"):
-            found[name] = found[name] or _usual(parts, name, m, ())
+            found[name] = found[name] or _usual(parts, name, m, (), free=free)
     everything = _everything(recordings)
     others = [_prefix(given, name) for name in carriers]
     of_platform = [one for one in everything if not any(_within(one[1].full(one[2]), name) for name in others)]
     for name in roles:
         if not found.get(name) and not (given and given.pose and name in ("position", "orientation")):
-            fields = of_platform if name in ("position", "orientation") else everything
-            found[name] = _usual(fields, name, m, found.get("position", ()))
+            fields = of_platform if name in ("position", "orientation", "directions") else everything
+            found[name] = _usual(fields, name, m, found.get("position", ()), free=free)
     return Fields(**found)
 
 
@@ -130,7 +149,7 @@ def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrie
     """Return the fields of a carrier: its pose and its thrust. Raises `InputError` as `fields_of`."""
     prefix, everything = _prefix(given, carrier), _everything(recordings)
     parts = [one for one in everything if _within(one[1].full(one[2]), prefix)]
-    roles = ("position", "orientation", "thrusts")
+    roles = ("position", "orientation", "thrusts", "directions")
     found = {name: _usual(parts, name, None, (), prefix) for name in roles}
     return Fields(**found, time=_usual(everything, "time", None, ()))
 
@@ -156,9 +175,11 @@ def _usual(
     m: int | None,
     position: Sequence[Field],
     prefix: str = "",
+    free: str = "",
 ) -> tuple[Field, ...]:
     """Return the fields of a role by their usual names, those after `prefix` if there is one, in order."""
     several = {"orientation": ("quaternion", "angles"), "commands": ("lengths", "tensions")}
+    several["directions"] = ("directions", "azimuths")
     roles = several.get(what, (what,))
     groups: dict[tuple[int, str, str, str], list[tuple[Role, Field]]] = {}
     for recording, topic, name in everything:
@@ -178,12 +199,21 @@ def _usual(
     for (_, _, kind, _), members in groups.items():
         by_name = {found.which: one for found, one in members}
         if kind in AXES:
-            missing = set(AXES[kind]) - set(by_name)
+            axes = tuple(axis for axis in AXES[kind] if axis in free.split())
+            axes = axes if set(axes) == set(by_name) else AXES[kind]
+            missing = set(axes) - set(by_name)
             if missing and not members[0][1].topic.name:
                 names = ", ".join(one.full for _, one in members)
-                wanted = ", ".join(_like(members[0], axis) for axis in AXES[kind])
+                wanted = ", ".join(_like(members[0], axis) for axis in axes)
                 raise InputError(f"must have all columns {wanted} or none of them, got {names}")
-            complete += [] if missing else [tuple(by_name[axis] for axis in AXES[kind])]
+            complete += [] if missing else [tuple(by_name[axis] for axis in axes)]
+        elif what == "directions":
+            order = sorted(by_name, key=_of_direction)
+            cables, axes = (len(set(part)) for part in zip(*map(_of_direction, order), strict=True))
+            if cables * axes != len(order):
+                names = ", ".join(by_name[which].full for which in order[:MOST_LISTED])
+                raise InputError(f"must have directions with the same axes for each cable, got {names}")
+            complete.append(tuple(by_name[which] for which in order))
         else:
             order = sorted(by_name, key=lambda which: int(which or 0))
             first, count = int(order[0] or 0), len(order)
@@ -195,7 +225,7 @@ def _usual(
             complete.append(tuple(by_name[i] for i in order))
     if len(complete) > 1 and m is not None and what in ("lengths", "tensions", "commands"):
         complete = [one for one in complete if len(one) == m] or complete
-    if len(complete) > 1 and what in ("lengths", "tensions"):
+    if len(complete) > 1 and what in ("lengths", "tensions", "directions"):
         complete = [one for one in complete if measured_name(one[0].full) is None] or complete
     if len(complete) > 1 and what == "position":  # messages of poses rather than transforms and scenes
         complete = [one for one in complete if "Pose" in one[0].topic.kind] or complete
@@ -207,6 +237,12 @@ def _usual(
         names = "; ".join(f"{one[0].full} ..." for one in complete[:MOST_LISTED])
         raise InputError(f"must have one candidate for {what}, got {names}: choose one in a map (--fields)")
     return complete[0] if complete else ()
+
+
+def _of_direction(which: str) -> tuple[int, int]:
+    """Return the number of the cable, 0 if there is none, and that of the axis."""
+    *number, axis = which.split()
+    return int(number[0]) if number else 0, OF_DIRECTION.index(axis)
 
 
 def _like(member: tuple[Role, Field], which: str) -> str:
@@ -223,7 +259,7 @@ def _in_units(one: Field, kind: str, stated: bool) -> Field:
     return one
 
 
-def _named(recordings: Sequence[Recording], what: str, given: LogMap) -> tuple[Field, ...]:
+def _named(recordings: Sequence[Recording], what: str, given: LogMap, free: str = "") -> tuple[Field, ...]:
     """Return the fields that a map names for a role."""
     texts = getattr(given, what)
     texts = [texts] if isinstance(texts, str) else texts or []
@@ -238,10 +274,12 @@ def _named(recordings: Sequence[Recording], what: str, given: LogMap) -> tuple[F
             raise InputError(f"map: {what} must name fields of the log, got {plain(name)}; the log has {there}")
         for recording, topic, field in found:
             result.append(Field(recording, topic, field, unit or topic.fields[field]))
-    sizes = {"position": (0, 3), "orientation": (0, 3, 4)}.get(what)
-    if sizes and len(result) not in sizes:
+    sizes = {"position": [0, 3], "orientation": [0, 3, 4]}.get(what)
+    if sizes and len(result) not in [*sizes, *(len(set(axes) & set(free.split())) for axes in AXES.values())]:
         raise InputError(f"map: {what} must name {' or '.join(map(str, sizes[1:]))} fields, got {len(result)}")
     kind = "quaternion" if len(result) == 4 and what == "orientation" else "angles" if what == "orientation" else what
+    if what == "directions" and any(one.unit in UNITS["azimuths"] for one in result):
+        kind = "azimuths"
     return tuple(_in_units(one, kind, any(other.unit for other in result)) for one in result)
 
 
@@ -256,10 +294,8 @@ def _matching(recordings: Sequence[Recording], name: str) -> Iterator[tuple[Reco
                 if found := re.fullmatch(pattern, full):
                     numbers = re.findall(r"\d+", "".join(found.groups()))
                     hits.append(((int(numbers[-1]) if numbers else 0,), field))
-                elif (found := re.fullmatch(rf"{pattern}/({'|'.join(COORDINATES)})", full)) is not None:
-                    hits.append(
-                        ((["x", "y", "z", "w", "roll", "pitch", "yaw"].index(found[found.lastindex or 0]),), field)
-                    )
+                elif (found := re.fullmatch(rf"{pattern}/({'|'.join(OF_STRUCTURES)})", full)) is not None:
+                    hits.append(((OF_STRUCTURES.index(found[found.lastindex or 0]),), field))
             if "*" in name and len({key for key, _ in hits}) < len(hits):
                 hits = [((place,), field) for place, (_, field) in enumerate(hits)]  # names without numbers
             yield from ((recording, topic, field) for _, field in sorted(hits))

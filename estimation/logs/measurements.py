@@ -22,7 +22,9 @@ from ...models.robot import Robot
 SIGMA = 1e-3  # [m] of lengths
 LARGEST_SIGMA = 100.0  # [m], [rad] or [-]
 OF_TENSIONS = 0.02  # of tensions, relative
+OF_DIRECTIONS = 0.02  # [rad]
 MOST = 10_000_000  # samples
+ARRAYS = ("lengths", "poses", "tensions", "times", "carrier_poses", "directions")  # of `Measurements`
 
 
 class Sigma(NamedTuple):
@@ -38,12 +40,15 @@ class Sigma(NamedTuple):
         Standard deviation of measured orientations, about each axis [rad]; 0: exact.
     tensions
         Standard deviation of each tension, relative to it [-].
+    directions
+        Standard deviation of cable directions, about each axis across the cable [rad].
     """
 
     lengths: float = SIGMA
     position: float = 0.0
     rotation: float = 0.0
     tensions: float = OF_TENSIONS
+    directions: float = OF_DIRECTIONS
 
 
 class Measurements(Displayed):
@@ -67,8 +72,11 @@ class Measurements(Displayed):
     carrier_poses
         Measured poses of the carriers in {G}, (N, c, 6) [m, rad], exact. Default: at home.
     sigma
-        Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m], `rotation` [rad] and
-        `tensions` (relative). Default: 1 mm, poses that are exact, and 2 % of tensions.
+        Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m], `rotation` [rad],
+        `tensions` (relative) and `directions` [rad]. Default: 1 mm, poses that are exact, 2 % of tensions, 0.02 rad.
+    directions
+        Unit vectors in {G} along the cables, from the anchor to the platform, (N, m, 3). Cables with nan were not
+        measured; if only z is nan, x and y are the direction seen from above (a swivel angle). Default: not measured.
 
     Attributes
     ----------
@@ -76,10 +84,10 @@ class Measurements(Displayed):
         (N, m) [m].
     poses
         (N, 6) [m, rad], nan where not measured, or None.
-    tensions, times, carrier_poses
-        As given, or None.
+    tensions, times, carrier_poses, directions
+        As given, or None; directions have unit length, seen from above if that was measured.
     sigma
-        `Sigma`: of lengths, positions, rotations and tensions.
+        `Sigma`: of lengths, positions, rotations, tensions and directions.
 
     Raises
     ------
@@ -96,6 +104,7 @@ class Measurements(Displayed):
         times: ArrayLike | None = None,
         sigma: float | Mapping[str, float] = SIGMA,
         carrier_poses: ArrayLike | None = None,
+        directions: ArrayLike | None = None,
     ):
         self.lengths = _table("lengths", lengths, None)  # (N, m)
         count = len(self.lengths)
@@ -108,6 +117,7 @@ class Measurements(Displayed):
         self.times = None if times is None else _rising(times, count)  # (N,)
         self.sigma = _sigma(sigma)
         self.carrier_poses = None if carrier_poses is None else _of_carriers(carrier_poses, count)  # (N, c, 6)
+        self.directions = None if directions is None else _directions(directions, self.lengths.shape)  # (N, m, 3)
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -125,10 +135,9 @@ class Measurements(Displayed):
         InputError
             If `rows` are none of these.
         """
-        arrays = {name: getattr(self, name) for name in ("poses", "tensions", "times", "carrier_poses")}
+        arrays = {name: getattr(self, name) for name in ARRAYS}
         try:
-            chosen = {name: None if array is None else array[rows] for name, array in arrays.items()}
-            return Measurements(self.lengths[rows], **chosen, sigma=self.sigma._asdict())
+            return self._with(**{name: None if array is None else array[rows] for name, array in arrays.items()})
         except (IndexError, TypeError, ValueError):
             accepted = f"indices below {len(self)} that rise, flags ({len(self)},) or a slice"
             raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
@@ -141,7 +150,7 @@ class Measurements(Displayed):
         InputError
             If they have a wrong value.
         """
-        return Measurements(self.lengths, self.poses, None, self.tensions, self.times, sigma, self.carrier_poses)
+        return self._with(sigma=sigma)
 
     def with_lengths(self, lengths: ArrayLike) -> Measurements:
         """Return the measurements with other lengths (N, m) [m].
@@ -151,8 +160,7 @@ class Measurements(Displayed):
         InputError
             If they have a wrong shape or value.
         """
-        given = self.poses, None, self.tensions, self.times, self.sigma._asdict(), self.carrier_poses
-        return Measurements(lengths, *given)
+        return self._with(lengths=lengths)
 
     def with_carriers(self, carrier_poses: ArrayLike, tensions: ArrayLike | None = None) -> Measurements:
         """Return the measurements with other poses of carriers (N, c, 6) [m, rad], and tensions (N, m) [N] if given.
@@ -162,8 +170,25 @@ class Measurements(Displayed):
         InputError
             If they have a wrong shape or value.
         """
-        pulls = self.tensions if tensions is None else tensions
-        return Measurements(self.lengths, self.poses, None, pulls, self.times, self.sigma._asdict(), carrier_poses)
+        return self._with(carrier_poses=carrier_poses, tensions=self.tensions if tensions is None else tensions)
+
+    def with_directions(self, directions: ArrayLike | None) -> Measurements:
+        """Return the measurements with other directions of cables in {G}, (N, m, 3), as for the class, or without any.
+
+        Raises
+        ------
+        InputError
+            If they have a wrong shape or value.
+        """
+        return self._with(directions=directions)
+
+    def without_poses(self) -> Measurements:
+        """Return the measurements without poses of the platform."""
+        return self._with(poses=None)
+
+    def _with(self, **new: Any) -> Measurements:
+        given: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS}
+        return Measurements(**{**given, "sigma": self.sigma._asdict(), **new})
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save as NetCDF atomically, and return the path; `read_measurements` reads the file.
@@ -195,6 +220,10 @@ class Measurements(Displayed):
             variables["carrier_pose"] = Variable((first, "carrier", "coordinate"), self.carrier_poses, about)
             coordinates["coordinate"] = Variable(("coordinate",), np.array(COORDINATES))
             coordinates["carrier"] = Variable(("carrier",), np.array(names))
+        if self.directions is not None:
+            about = {"units": "1", "long_name": "unit vectors in {G} from anchor to platform"}
+            variables["cable_directions"] = Variable((*cable, "axis"), self.directions, about)
+            coordinates["axis"] = Variable(("axis",), np.array(COORDINATES[:3]))
         if self.times is not None:
             coordinates["time"] = Variable(("time",), self.times, {"units": "s"})
         attributes = {f"sigma_{name}": value for name, value in self.sigma._asdict().items()}
@@ -234,6 +263,14 @@ def measured_poses(robot: Robot, measurements: Measurements) -> tuple[np.ndarray
     return poses[:, :3], points.rotations(poses[:, 3:]), known
 
 
+def tracked(robot: Robot, measurements: Measurements) -> np.ndarray:
+    """Return the samples with a position, and an orientation if any was measured, (N,) of bool."""
+    known, moves = measured_poses(robot, measurements)[2], robot.dof_mask > 0
+    there = known.any(axis=0) & moves
+    placed = bool(there[:3].sum() == moves[:3].sum() and there.any())
+    return np.asarray(known[:, there].all(axis=1) & placed)
+
+
 def _table(name: str, value: Any, shape: tuple[int, ...] | None) -> np.ndarray:
     array = np.array(real_array(name, value), dtype=float)
     if array.ndim != 2 or (shape is not None and array.shape != shape) or (array.ndim == 2 and array.shape[1] == 0):
@@ -250,6 +287,21 @@ def _check_finite(name: str, array: np.ndarray) -> None:
         at = tuple(int(i) for i in np.argwhere(wrong)[0])
         where = ", ".join(f"{word} {i}" for word, i in zip(("sample", "column"), at, strict=False))
         raise InputError(f"{name} must be finite numbers up to {LARGEST:g}, got {array[at]:g} at {where}")
+
+
+def _directions(directions: Any, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.array(real_array("directions", directions), dtype=float)
+    if array.shape != (*shape, 3):
+        raise InputError(f"directions must have the shape {(*shape, 3)}, got {array.shape}")
+    array[np.isnan(array[..., :2]).any(axis=2)] = np.nan
+    size = np.linalg.norm(np.nan_to_num(array, nan=0.0, posinf=np.inf, neginf=np.inf), axis=2)
+    known = np.isfinite(array[..., 0])
+    wrong = known & ~((size > 0.5) & (size < 1.5) | np.isnan(array[..., 2]) & (size > 1e-3) & (size < 1.5))
+    if wrong.any():
+        row, cable = np.argwhere(wrong)[0]
+        got = f"{shown(array[row, cable].tolist())} at sample {row} of cable {cable + 1}"
+        raise InputError(f"directions must be unit vectors, got {got}")
+    return array / np.where(known, size, 1.0)[..., None]
 
 
 def _of_carriers(poses: Any, count: int) -> np.ndarray:
@@ -324,9 +376,9 @@ def _sigma(sigma: Any) -> Sigma:
         f"{name}": number(
             f"sigma.{name}" if isinstance(sigma, Mapping) else "sigma",
             value,
-            {"lengths": 1e-9, "tensions": 1e-6}.get(name, 0.0),
+            {"lengths": 1e-9, "tensions": 1e-6, "directions": 1e-6}.get(name, 0.0),
             LARGEST_SIGMA,
-            "" if isinstance(sigma, Mapping) else ", or a mapping of lengths, position, rotation and tensions",
+            "" if isinstance(sigma, Mapping) else f", or a mapping of {', '.join(Sigma._fields)}",
         )
         for name, value in given.items()
     }

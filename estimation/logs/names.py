@@ -17,11 +17,16 @@ UNITS = {
     "time": TIMES,
     "thrusts": FORCES,
     "commands": {**LENGTHS, **FORCES},
+    "directions": NUMBERS,
+    "azimuths": ANGLES,
 }
 _BEFORE = r"(?:.*[./_ ])?"
 _AFTER = r"(?:[./_ ](?:length|position|pos|data|value))*"
 _OF = r"(?:(?:cable|rope|wire|winch)[_ ]?)?"
-# The group is what tells the fields of a role apart: the cable's number or name, or the axis.
+_BODY = r"(?:payload|load|platform|end[_ ]?effector|ee|mp|mocap|vicon|optitrack|body|object|pose)"
+_DIRECTION = r"(?:dir(?:ection)?s?|unit[_ ]?vec(?:tor)?s?)"
+_VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
+# The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
 PATTERNS = {
     "lengths": (
         rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|encoders?|enc)[_ ]?\[?(\d+)\]?{_AFTER}",
@@ -34,11 +39,24 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:tensions?|forces?)[./_ ](?:data|values?|effort)\[(\d+)\]",
         r".*(?:cable|rope|wire|winch)[_ ]?(\d+)[./_ ](?:tension|force)(?:[./_ ](?:data|value))*",
     ),
-    "position": (rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])", r"/?[pt]?[_ ]?([xyz])"),
+    "position": (
+        rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])",
+        r"/?[pt]?[_ ]?([xyz])",
+        rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ][pt]?([xyz])",
+    ),
     "quaternion": (rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",),
     "angles": (rf"{_BEFORE}(roll|pitch|yaw)",),
     "thrusts": (rf"{_BEFORE}thrusts?(?:[./_ ](?:data|value))*[_ ]?\[?(\d*)\]?(?:[./_ ](?:data|value))*",),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
+    "directions": (
+        rf"{_BEFORE}{_OF}(?:{_DIRECTION}|q)[_ ./]?\[?(\d+)\]?{_VECTOR}",
+        rf".*(?:cable|rope|wire|tether)s?[_ ./]?\[?(?:cable )?(\d+)\]?[_ ./](?:{_DIRECTION}|q){_VECTOR}",
+        rf"{_BEFORE}(?:(?:cable|rope|wire|tether)[_ ]?)?{_DIRECTION}(\b){_VECTOR}",  # of the only cable of a carrier
+    ),
+    "azimuths": (
+        r".*(?:cable|rope|wire|tether|winch)[_ ]?(\d+)[./_ ](azimuth|elevation|swivel)",
+        rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
+    ),
     "time": (rf"%?(t|times?|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds|elapsed(?:[_ ]time)?)",),
 }
 # What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
@@ -50,7 +68,10 @@ _EXACT = {unit.lower(): unit for units in UNITS.values() for unit in units}
 
 
 class Role(NamedTuple):
-    """Role of a field, which of its fields it is, the name with "#" in place of that, and a unit in the name."""
+    """Role of a field, which of its fields it is, the name with "#" in place of that, and a unit in the name.
+
+    Of a direction, it is the cable's number, empty if there is none, and the axis: "1 x".
+    """
 
     role: str
     which: str
@@ -66,8 +87,11 @@ def role(name: str) -> Role | None:
             for pattern in patterns:
                 match = re.fullmatch(pattern, text)
                 if match and (not unit or unit in UNITS[which]):
-                    group = f"{text[: match.start(1)]}#{text[match.end(1) :]}"
-                    return Role(which, match[1], group, unit)
+                    group = text
+                    for first, last in reversed(match.regs[1:]):
+                        group = f"{group[:first]}#{group[last:]}"
+                    parts = sorted(match.groups(), key=lambda part: not (part.isdigit() or not part))
+                    return Role(which, " ".join(parts), group, unit)
     return None
 
 

@@ -16,8 +16,9 @@ from ...models.dynamics import Dynamics
 from ...models.files import as_robot
 from ...models.robot import Robot
 from .alignment import Clock, align
+from .cable_directions import in_world, vectors
 from .carrier_poses import carriers_at, tensions_by_thrust
-from .mapping import Field, Fields, LogMap, fields_of, read_map
+from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, read_map
 from .measurements import Measurements
 from .opening import recordings
 from .pose_track import PoseTrack
@@ -27,6 +28,7 @@ from .streams import Reader, at_times, check_rising, interpolated
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 COUNTED = 1e8  # [s]: times beyond count from 1970, and are read from the first one
 MOST_ALIGNED = 200_000  # poses
+AHRS = np.radians(0.5)  # sigma of orientations that no motion capture measured
 
 
 class Log(NamedTuple):
@@ -97,7 +99,7 @@ def read_log(
 ) -> Log:
     """Read measurements as `read_measurements`, with the fields that they are from and notes.
 
-    Without `carriers` the poses of carriers are not read.
+    Without `carriers` the poses of carriers are not read, nor the directions of cables.
     """
     known = None if robot is None else as_robot(robot)
     given = None if fields is None else read_map(fields)
@@ -111,7 +113,9 @@ def read_log(
         found = _fields([*first, *others] if given else first, others, given, known)
         everything = [*first, *others]
         read = measurements_of(found, everything, sigma, known)._replace(recordings=everything)
-        return _with_carriers(read, known, given) if carriers and known is not None else read
+        if not carriers:
+            return read
+        return _with_directions(read if known is None else _with_carriers(read, known, given), known, given)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
@@ -149,17 +153,44 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions))
 
 
+def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Log:
+    """Return the measurements with directions of the cables, if they were recorded, by the `robot` converted to {G}."""
+    found, measured = read.fields.directions, read.measurements
+    m = measured.m
+    if not found or (robot is not None and m != robot.m):
+        return read
+    reader = Reader(Fields(directions=found, time=read.fields.time))
+    times = None if measured.times is None else measured.times + read.begin
+    samples = reader.stream(found)
+    recorded = vectors(found, samples.values, m)
+    for name, part in recorded.items():
+        flat = bool(np.isnan(part[..., 2]).all())  # azimuths alone
+        part = part[..., :2] if flat else part
+        part = at_times(times, Samples(samples.times, part.reshape(len(part), -1)), found[0]).values
+        part = part.reshape(len(part), m, -1)
+        recorded[name] = np.pad(part, ((0, 0), (0, 0), (0, 1)), constant_values=np.nan) if flat else part
+    world, note = next(iter(recorded.values())), None
+    if robot is not None:
+        world, note = in_world(robot, measured, recorded, given and given.directions_in)
+    return read._replace(measurements=measured.with_directions(world), notes=[*read.notes, *([note] if note else [])])
+
+
 def _fields(
     all_: Sequence[Recording], others: Sequence[Recording], given: LogMap | None, robot: Robot | None
 ) -> Fields:
     m = None if robot is None else robot.m
     moving = () if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
-    found = fields_of(all_, given, m, moving)
+    found = fields_of(all_, given, m, moving, free_axes(robot))
+    if not found.directions and robot is not None:  # those of the carriers, in the order of their cables
+        names = dict.fromkeys(robot.carriers[i].name for i in robot.carrier_of_cable)
+        of = [carrier_fields(all_, given, name).directions for name in names]
+        found = found._replace(directions=tuple(field for one in of for field in one if all(of)))
     if others and not given:
-        of_poses = fields_of(others, None, m, moving)
+        of_poses = fields_of(others, None, m, moving, free_axes(robot))
         times = found.time + of_poses.time
         found = found._replace(position=of_poses.position, orientation=of_poses.orientation, time=times)
-    if not found.lengths and not (robot is not None and robot.fixed_lengths is not None and found.position):
+    seen = found.position or found.directions
+    if not found.lengths and not (robot is not None and robot.fixed_lengths is not None and seen):
         names = [topic.full(name) for one in all_ for topic in one.topics.values() for name in topic.fields]
         listed = ", ".join(names[:12]) + (" ..." if len(names) > 12 else "")
         raise InputError(f"must have columns l0, l1, ... of lengths, got {listed or 'none'}")
@@ -171,20 +202,23 @@ def measurements_of(
 ) -> Log:
     """Return the measurements of some fields, at the times of whichever of lengths and poses has fewer samples."""
     notes = [note for one in from_ for note in one.notes]
-    main = (found.lengths or found.position)[0]
+    main_fields = found.lengths or found.position or found.directions
+    main = main_fields[0]
     stated = main.recording.sigma
     sigmas: dict[str, Any] = {"sigma": sigma} if sigma is not None else {"sigma": dict(stated)} if stated else {}
     read = Reader(found)
-    position = read.stream(found.position) if found.position else None
-    lengths = read.stream(found.lengths) if found.lengths else _constant(robot, position)
+    position = _whole(robot, read.stream(found.position), 0) if found.position else None
+    lengths = read.stream(main_fields)
+    if not found.lengths:
+        lengths = _constant(robot, lengths)
     tensions = read.stream(found.tensions) if found.tensions else None
-    orientation = read.stream(found.orientation) if found.orientation else None
+    orientation = _whole(robot, read.stream(found.orientation), 3) if found.orientation else None
     times = lengths.times
     begin = float(times[0]) if times is not None and times[0] > COUNTED else 0.0
     if position is not None and orientation is not None:
         orientation = at_times(position.times, orientation, found.orientation[0])
     pose = position or orientation
-    source = (found.position or found.orientation or found.lengths)[0]
+    source = (found.position or found.orientation or (main,))[0]
     together = source.topic is main.topic
     if pose is not None and not together:
         if times is None or pose.times is None:
@@ -207,14 +241,29 @@ def measurements_of(
         arguments["poses"] = position.values
     if orientation is not None:
         arguments["orientations"] = orientation.values
-    return Log(Measurements(lengths.values, **arguments, **sigmas), found, notes, begin)
+    if position is None and orientation is not None and "rotation" not in (sigmas.get("sigma") or {}):
+        notes.append(f"orientations without positions are taken to be good to {quantity(np.degrees(AHRS), 'deg', 2)}")
+        known = sigmas.get("sigma", {})
+        sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
+    return Log(Measurements(lengths.values, **arguments, **sigmas), found, [*notes, *read.notes], begin)
 
 
-def _constant(robot: Robot | None, position: Samples | None) -> Samples:
-    """Return the constant lengths of a robot without winches at the times of its positions."""
+def _whole(robot: Robot | None, samples: Samples, first: int) -> Samples:
+    """Return positions or orientations of which a planar robot's log has only the coordinates that can move."""
+    if robot is None:
+        return samples
+    free = robot.dof_mask[first : first + 3] > 0
+    if samples.values.shape[1] != free.sum() or free.all():
+        return samples
+    values = np.tile(robot.home[first : first + 3], (len(samples.values), 1))
+    values[:, free] = samples.values
+    return Samples(samples.times, np.where(np.isfinite(values).all(axis=1, keepdims=True), values, np.nan))
+
+
+def _constant(robot: Robot | None, others: Samples) -> Samples:
+    """Return the constant lengths of a robot without winches at the times of other samples."""
     assert robot is not None
-    assert position is not None
-    return Samples(position.times, np.tile(np.asarray(robot.fixed_lengths), (len(position.values), 1)))
+    return Samples(others.times, np.tile(np.asarray(robot.fixed_lengths), (len(others.values), 1)))
 
 
 def _merged(

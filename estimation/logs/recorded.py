@@ -14,8 +14,9 @@ from ...base.errors import InputError
 from ...models.files import as_robot
 from ...models.robot import Robot
 from ..calibration.plausibility import mistake
-from ..pose.from_log import lengths_of, poses_from_log
+from ..pose.from_log import poses_from_log
 from .carrier_poses import carriers_at, filled
+from .encoders import lengths_of
 from .mapping import Field, command_fields, read_map
 from .reading import Log, Paths, read_log
 from .streams import Reader

@@ -7,10 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.text import quantity
 from .mapping import Field, Fields
 from .names import UNITS, epoch_unit
 from .recording import GAP, Samples
 
+MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
 MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
 
 
@@ -21,6 +23,7 @@ class Reader:
         self._of: dict[int, list[str]] = {}
         self._times: dict[int, Field] = {id(one.topic): one for one in found.time}
         self._done: dict[int, Samples] = {}
+        self.notes: list[str] = []
         for one in {one for of in found for one in of}:
             self._of.setdefault(id(one.topic), []).append(one.name)
 
@@ -50,6 +53,10 @@ class Reader:
             if clock is not None and one.topic.times is None:
                 column = values[:, self._of[key].index(clock.name)]
                 times = column * UNITS["time"][clock.unit or epoch_unit(float(np.nanmax(np.abs(column), initial=0.0)))]
+                again = np.diff(times, prepend=np.nan) == 0
+                if 0 < again.mean() <= MOST_REPEATED:
+                    self.notes.append(f"left out, with the time of the sample before: {quantity(int(again.sum()))}")
+                    times, values = times[~again], values[~again]
             elif times is not None:  # of messages, which may be recorded twice, or late
                 times, rows = np.unique(times, return_index=True)
                 kept = np.isfinite(values[rows]).any(axis=1)
@@ -98,6 +105,6 @@ def check_rising(times: np.ndarray) -> None:
     if falling.size:
         row = int(falling[0])
         raise InputError(
-            f"times must increase from sample to sample, got {times[row]:.9g} s and then {times[row + 1]:.9g} s at "
+            f"times must increase from sample to sample, got {times[row]:.15g} s and then {times[row + 1]:.15g} s at "
             f"sample {row + 1}"
         )

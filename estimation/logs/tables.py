@@ -22,6 +22,7 @@ ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compre
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 OF_CARRIERS = {"carrier_pose": (POSE, POSE_UNITS), "actuation": (("thrust",), ("N",))}  # of a simulation
+OTHERS = ("carrier", "pose", "tensions_commanded", "cable_directions")
 WRITTEN = {"cable_lengths": ("l", LENGTHS), "tensions": ("tension", FORCES), "time": ("t", TIMES)}  # by towline
 
 
@@ -87,6 +88,9 @@ def from_netcdf(content: bytes, where: str) -> Recording:
             one = values.ndim < 2
             names = [prefix] if one else [f"{prefix}{i}" for i in range(values.shape[1])]
             _add(columns, units, names, values[:, None] if one else values, [unit] * len(names))
+        elif name == "cable_directions" and values.ndim == 3:
+            names = [f"direction_{i}_{axis}" for i in range(values.shape[1]) for axis in "xyz"]
+            _add(columns, units, names, values.reshape(len(values), -1), ["1"] * len(names))
         elif name == "tensions_commanded":
             names = [f"tension_command_{i}" for i in range(values.shape[-1])]
             _add(columns, units, names, values, ["N"] * len(names))
@@ -136,7 +140,14 @@ def _add(columns: dict, units: dict, names: Sequence[str], values: np.ndarray, s
 
 
 def _is_read(name: str) -> bool:
-    return bool(role(name)) or name in (*WRITTEN, *OF_CARRIERS, "carrier", "pose", "tensions_commanded")
+    return bool(role(name)) or name in (
+        *WRITTEN,
+        *OF_CARRIERS,
+        "carrier",
+        "pose",
+        "tensions_commanded",
+        "cable_directions",
+    )
 
 
 def _attributes(of: Any) -> dict[str, Any]:

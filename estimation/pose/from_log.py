@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,8 +16,10 @@ from ...base.display import Displayed
 from ...base.inputs import check_ending, file_path
 from ...base.text import quantity
 from ...base.writing import whole_file
+from ...models import points
 from ...models.part import COORDINATES
 from ...models.robot import Robot
+from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, carriers_of, check_measurements
 from ..logs.smoothing import FEWEST, Parabolas, within
 from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
@@ -25,6 +27,7 @@ from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
 
 MOST_TRACKED = 2000  # samples that are followed one by one; all others begin between them
 MOST_NAMED = 12
+CERTAIN = 4.0  # standard deviations by which residuals must exceed the stated ones
 VISIBLE = 1e-3  # of the cables' length, of a swing that is named
 TOLD_APART = 4.0  # standard deviations by which one cable is more likely wrong than another
 
@@ -47,20 +50,31 @@ class LogPoses(Displayed):
         The poses with their covariances, of N samples.
     times
         Times of the poses on the clock of the lengths [s], (N,), or None.
+    squares
+        Sum of squared residuals of each sample, in standard deviations, (N,), if there are others than of lengths.
+    more
+        Number of the others in a sample.
+    excess
+        Factor by which the others exceed their standard deviations.
     """
 
     estimate: PoseEstimate
     times: np.ndarray | None
+    squares: np.ndarray | None = None
+    more: int = 0
+    excess: float = 1.0
 
     @property
     def cost(self) -> np.ndarray:
         """Return the sum of squared residuals of each sample, in standard deviations, (N,)."""
+        if self.squares is not None:
+            return self.squares
         return np.sum(np.square(self.estimate.residuals / self.estimate.sigma), axis=-1)
 
     @property
     def largest(self) -> float:
         """Return the sum of squares that one sound log in a hundred exceeds; nan without redundant cables."""
-        redundancy = self.estimate.robot.m - int(self.estimate.robot.dof_mask.sum())
+        redundancy = self.estimate.robot.m - int(self.estimate.robot.dof_mask.sum()) + self.more
         return largest_cost(redundancy, FALSE_ALARM / len(self.estimate.pose)) if redundancy > 0 else np.nan
 
     @property
@@ -99,11 +113,19 @@ class LogPoses(Displayed):
 
     def lines(self) -> Iterator[str]:
         """Yield the wrong samples, one line for each run of them, and how far the platform may swing."""
-        if self.swing > VISIBLE * self._length:
-            yield (
-                "lengths do not determine the pose: poses are those at rest, but the platform accelerates, so they may "
-                f"be off by {quantity(1e3 * self.swing, 'mm', 2)} (rms), which the covariance does not include"
-            )
+        if self.excess > 1.0:
+            yield f"residuals are {quantity(self.excess, digits=3)} times as large as stated, and so are the sigmas"
+        if len(self.wrong) == 1 and not self.fits.any():
+            yield "no pose fits the lengths of any sample: the robot file is not that of the log, or not calibrated"
+            return
+        if np.any(self.estimate.by_gravity):
+            moves = ""
+            if self.swing > VISIBLE * self._length:
+                moves = (
+                    ", but the platform accelerates, so they may be off by "
+                    f"{quantity(1e3 * self.swing, 'mm', 2)} (rms), which the covariance does not include"
+                )
+            yield f"lengths do not determine the pose: poses are those at rest{moves}"
         for one in self.wrong[:MOST_NAMED]:
             which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
             at = "" if self.times is None else f" (from {quantity(float(self.times[one.first]), 's', 6)})"
@@ -147,17 +169,6 @@ class LogPoses(Displayed):
         }
 
 
-def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None = None) -> np.ndarray:
-    """Return cable lengths (..., m) [m] of readings, by the encoders of the file, under tensions [N] where measured."""
-    encoders = [cable.encoder for cable in robot.cables]
-    offset = np.array([one.offset if one else 0.0 for one in encoders])
-    scale = np.array([one.scale if one else 1.0 for one in encoders])
-    by = np.array([1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables])
-    stretch = 1.0 if tensions is None else 1 + np.maximum(tensions, 0.0) * by
-    build_up = np.array([one.build_up if one else 0.0 for one in encoders])
-    return (offset + (scale + build_up * readings) * readings) * stretch
-
-
 def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = SIGMA, begin: float = 0.0) -> LogPoses:
     """Estimate the pose of the platform at each sample of a log, from its readings by the encoders of the file.
 
@@ -167,7 +178,7 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
         The robot.
     measurements
         Readings; measured tensions stretch cables with a stiffness, and measured poses of carriers move their anchors.
-        Measured poses of the platform are not used.
+        Directions of cables and orientations of the platform are used, and tensions with these, but no positions.
     sigma
         Standard deviations of the lengths [m], one number or (m,).
     begin
@@ -179,6 +190,9 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
         If an argument has a wrong value, or a length is not above zero.
     """
     given, deviations = check_measurements(robot, measurements), checked_sigma(sigma, robot.m)
+    alone = given.poses is not None and not np.isfinite(given.poses[:, :3]).any()  # orientations, as of an AHRS
+    if given.directions is not None or alone:
+        return _by_more(robot, given, deviations, begin, alone)
     lengths = lengths_of(robot, given.lengths, given.tensions)
     rows = np.unique(np.linspace(0, len(lengths) - 1, min(len(lengths), MOST_TRACKED)).astype(int))
     some, last = list[PoseEstimate](), None
@@ -196,3 +210,37 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     starts = np.column_stack([np.interp(np.arange(len(lengths)), rows[good], column[good]) for column in known.T])
     estimate = pose_from_lengths(robot, lengths, starts, given.carrier_poses, deviations)
     return LogPoses(estimate, None if given.times is None else given.times + begin)
+
+
+def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float, oriented: bool) -> LogPoses:
+    """Return poses by lengths, directions of cables and, if `oriented`, measured orientations; by least squares."""
+    from ..calibration.normal_equations import pose_covariances
+    from ..calibration.sightings import sighted
+    from ..calibration.solving import length_of, model_of
+    from ..calibration.solving import lengths_of as lengths_left
+    from ..calibration.starts import fit_from
+
+    measured = given.with_sigma(given.sigma._asdict() | {"lengths": float(sigma.min())})
+    model = model_of(robot, measured if oriented else measured.without_poses(), (), {})
+    model = replace(model, weights=np.repeat(sigma.min() / sigma[:, None], len(given), axis=1))
+    found = fit_from(model, model.begin(), length_of(robot))[0]
+    residuals = model.residuals(found.state)
+    more = int(np.median(sighted(measured))) + 3 * oriented + (model.balanced.freedoms if model.balanced else 0)
+    redundancy = robot.m - int(robot.dof_mask.sum()) + more
+    excess = 1.0
+    if redundancy > 0:
+        ratio = float(np.sqrt(np.median(residuals.of_samples) / largest_cost(redundancy, 0.5)))
+        excess = ratio if ratio > 1 + CERTAIN / np.sqrt(2 * redundancy * len(given)) else 1.0
+    position, rotation = model.poses(found.state)
+    estimate = PoseEstimate(
+        robot=robot,
+        pose=np.hstack([position, points.angles(rotation)]),
+        residuals=lengths_left(replace(model, weights=np.ones_like(model.weights)), found.state),
+        converged=np.full(len(given), found.converged),
+        sigma=sigma,
+        carrier_pose=given.carrier_poses,
+        by_gravity=np.full(len(given), model.balanced is not None and robot.m < robot.dof_mask.sum()),
+        known_covariance=excess**2 * pose_covariances(model, found.state),
+    )
+    times = None if given.times is None else given.times + begin
+    return LogPoses(estimate, times, residuals.of_samples / excess**2, more, excess)

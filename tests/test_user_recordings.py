@@ -1,0 +1,103 @@
+"""Recordings as users have them, from other simulations, through the command line: what is found, and what is said."""
+
+import json
+
+import numpy as np
+import pytest
+
+from towline import load, read_measurements
+from towline.estimation.calibration.plausibility import mistake
+from towline.estimation.calibration.solving import usual
+
+from . import user_recordings as user
+from .warm import towline
+
+
+def called(*arguments, cwd, code=0):
+    done = towline(*arguments, cwd=cwd)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout
+
+
+def found(text):
+    told = json.loads(text)
+    return {one["name"]: (one["value"], one["sigma"]) for one in told["parameters"]}, told
+
+
+def test_four_cables_with_a_motion_capture_of_another_clock(tmp_path):
+    anchors, offsets = user.four_cables(tmp_path)
+    robot = user.hanging_robot(tmp_path)
+    files = (robot, "winches.csv", "--poses", "mocap.csv")
+    values, told = found(called("calibrate", *files, "--json", cwd=tmp_path))
+    assert any("left out, with the time of the sample before: 1" in note for note in told["notes"])
+    clock = next(note for note in told["notes"] if "clock of the poses is" in note)
+    assert float(clock.split(" is ")[1].split(" s ahead")[0]) + told["clock"] == pytest.approx(0.041, abs=2e-4)
+    for i in range(4):
+        for k, axis in enumerate("xyz"):
+            value, sigma = values[f"cables[{i}].anchor.{axis}"]
+            assert abs(value - anchors[i, k]) < 4 * sigma + 1e-4
+            assert sigma < 5e-3
+        assert abs(values[f"cables[{i}].offset"][0] - offsets[i]) < 4 * values[f"cables[{i}].offset"][1] + 1e-4
+    # Poses by the calibrated robot, from the readings alone, are those of a slow motion.
+    said = called("simulate", "hanging-calibrated.yaml", *files[1:], cwd=tmp_path)
+    assert "PASSED" in said
+
+
+def test_locked_winches_have_no_clock(tmp_path):
+    user.locked(tmp_path)
+    robot = user.hanging_robot(tmp_path)
+    told = json.loads(towline("calibrate", robot, "locked.csv", "--json", cwd=tmp_path).stdout)
+    assert told["free"] == ["anchors", "offsets"]
+    values, told = found(called("calibrate", robot, "locked.csv", "--free", "offsets", "--json", cwd=tmp_path))
+    for value, sigma in values.values():
+        assert abs(value) < 4 * sigma + 1e-4
+    said = called("pose", robot, "--log", "locked.csv", cwd=tmp_path)
+    assert "lengths do not determine the pose: poses are those at rest" in said
+
+
+def test_rests_with_an_ahrs_and_load_cells(tmp_path):
+    robot, offsets = user.hanging_robot(tmp_path), np.array([0.06, 0.006, -0.02, -0.01])
+    places = user.statics(tmp_path, offsets)
+    said = called("pose", robot, "--log", "statics.csv", cwd=tmp_path)
+    assert "times as large as stated" in said  # because of the offsets
+    text = called("calibrate", robot, "statics.csv", "--free", "offsets", "--json", cwd=tmp_path)
+    values, told = found(text)
+    assert any("taken to be good to 0.5 deg" in note for note in told["notes"])
+    for i in range(4):
+        value, sigma = values[f"cables[{i}].offset"]
+        assert abs(value - offsets[i]) < 4 * sigma
+        assert sigma < 6e-3
+    said = called("pose", "hanging-calibrated.yaml", "--log", "statics.csv", cwd=tmp_path)
+    assert "times as large as stated" not in said
+    poses = np.loadtxt(tmp_path / "statics-poses.csv", delimiter=",", skiprows=1)
+    errors = np.linalg.norm(poses[:, :3] - places, axis=1)
+    assert np.sqrt((errors**2).mean()) < 0.01
+
+
+def test_a_planar_robot_with_a_drum_scale_and_positions_alone(tmp_path):
+    robot, anchors = user.planar(tmp_path)
+    said = called("log", "planar.csv", "--robot", robot, cwd=tmp_path)
+    assert "ee_x [m], ee_z [m]" in said
+    assert "(--robot)" in called("log", "planar.csv", cwd=tmp_path, code=1)
+    assert "clock" in usual(load(robot), read_measurements(tmp_path / "planar.csv", robot=robot))
+    free = "anchors,offsets,scales,clock"
+    values, told = found(called("calibrate", robot, "planar.csv", "--free", free, "--json", cwd=tmp_path))
+    assert told["clock"] == pytest.approx(-0.034, abs=5e-4)
+    assert told["noise"] < 3e-4
+    for i in range(4):
+        assert abs(values[f"cables[{i}].scale"][0] - 1.02) < 4 * values[f"cables[{i}].scale"][1] + 1e-4
+        for k, axis in ((0, "x"), (2, "z")):
+            value, sigma = values[f"cables[{i}].anchor.{axis}"]
+            assert abs(value - anchors[i, k]) < 4 * sigma + 1e-3
+    called("pose", "planar-calibrated.yaml", "--log", "planar.csv", cwd=tmp_path)
+    wrong = called("pose", robot, "--log", "planar.csv", cwd=tmp_path, code=1)
+    assert "no pose fits the lengths of any sample" in wrong
+
+
+def test_positions_alone_have_input_errors_too(tmp_path):
+    robot, _ = user.planar(tmp_path)
+    text = (tmp_path / "planar.csv").read_text()
+    (tmp_path / "swapped.csv").write_text(text.replace("cable_len_0,cable_len_1", "cable_len_1,cable_len_0"))
+    found = mistake(load(robot), read_measurements(tmp_path / "swapped.csv", robot=robot))
+    assert "l0 and l1 look exchanged" in found.text
+    assert found.severe
