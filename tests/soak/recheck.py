@@ -108,17 +108,17 @@ class _Motion:
         self._platform = [dataset[name].values for name in ("pose", "velocity", "acceleration")]
         self._carriers = [dataset[f"carrier_{name}"].values for name in ("pose", "velocity", "acceleration")]
 
-    def platform(self, times: np.ndarray) -> list[np.ndarray]:
-        """Return pose, velocity and acceleration, (n, 6) each."""
+    def platform(self, times: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield pose, velocity and acceleration, (n, 6) each."""
         return _quintic(self.times, self._platform, times)
 
-    def carriers(self, times: np.ndarray) -> list[np.ndarray]:
-        """Return the same of all carriers, (n, c, 6) each."""
+    def carriers(self, times: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield the same of all carriers, (n, c, 6) each."""
         return _quintic(self.times, self._carriers, times)
 
     def on_platform(self, times: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Return points (k, 3) of the platform in {G}, (n, k, 3)."""
-        pose = self.platform(times)[0]
+        pose = next(self.platform(times))
         return pose[:, None, :3] + points @ rotation(pose[:, 3:]).swapaxes(1, 2)
 
     def attachments(self, times: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ class _Motion:
 
     def anchors(self, times: np.ndarray) -> np.ndarray:
         """Return the anchors in {G}, (n, m, 3)."""
-        pose = self.carriers(times)[0][:, self.robot.carrier_of_cable]
+        pose = next(self.carriers(times))[:, self.robot.carrier_of_cable]
         return pose[..., :3] + np.einsum("nmij,mj->nmi", rotation(pose[..., 3:]), self.robot.anchors)
 
     def cables(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -135,8 +135,8 @@ class _Motion:
         return self.attachments(times), self.anchors(times)
 
 
-def _quintic(saved: np.ndarray, motion: list[np.ndarray], times: np.ndarray) -> list[np.ndarray]:
-    """Return position, velocity and acceleration at `times` of the polynomials of degree 5 between saved instants."""
+def _quintic(saved: np.ndarray, motion: list[np.ndarray], times: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield position, velocity and acceleration at `times` of the polynomials of degree 5 between saved instants."""
     i = np.clip(np.searchsorted(saved, times, side="right") - 1, 0, len(saved) - 2)
     wide = (-1, *[1] * (motion[0].ndim - 1))
     h, s = (saved[i + 1] - saved[i]).reshape(wide), ((times - saved[i]) / (saved[i + 1] - saved[i])).reshape(wide)
@@ -145,11 +145,9 @@ def _quintic(saved: np.ndarray, motion: list[np.ndarray], times: np.ndarray) -> 
     c1, c2 = h * v, h**2 * a / 2
     d, e, f = x_end - x - c1 - c2, h * v_end - c1 - 2 * c2, h**2 * a_end - 2 * c2
     c3, c4, c5 = 10 * d - 4 * e + f / 2, -15 * d + 7 * e - f, 6 * d - 3 * e + f / 2
-    return [
-        x + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5)))),
-        (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h,
-        (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2,
-    ]
+    yield x + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
+    yield (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
+    yield (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2
 
 
 def _consistent(dataset: Any) -> Iterator[str]:
@@ -174,14 +172,14 @@ def _near(motion: _Motion, place: Mapping[str, Any]) -> list[str]:
     def own(times: np.ndarray, points: np.ndarray) -> np.ndarray:
         if not riding:
             return points
-        pose = motion.platform(times)[0]
+        pose = next(motion.platform(times))
         return (points - pose[:, None, :3]) @ rotation(pose[:, 3:])
 
     def of_platform(times: np.ndarray) -> np.ndarray:
         return point_distance(place, motion.on_platform(times, np.vstack([robot.attachments, robot.platform.com])))
 
     def of_carriers(times: np.ndarray) -> np.ndarray:
-        return point_distance(place, own(times, motion.carriers(times)[0][:, moving, :3]))
+        return point_distance(place, own(times, next(motion.carriers(times))[:, moving, :3]))
 
     def of_cables(times: np.ndarray) -> np.ndarray:
         return cable_distance(place, *(own(times, ends) for ends in motion.cables(times)))
@@ -203,7 +201,7 @@ def _apart(motion: _Motion, limits: Mapping[str, Any]) -> list[str]:
         i, j = np.triu_indices(len(robot.carriers), 1)
 
         def of_carriers(times: np.ndarray) -> np.ndarray:
-            at = motion.carriers(times)[0][..., :3]
+            at = next(motion.carriers(times))[..., :3]
             return np.linalg.norm(at[:, i] - at[:, j], axis=-1)
 
         least = robot.carrier_radius[i] + robot.carrier_radius[j] if least == "radius" else least
@@ -256,7 +254,7 @@ def _kept(motion: _Motion, distances: Points, least: float | np.ndarray, about: 
 def _bounded(motion: _Motion, robot: Robot, task: Mapping[str, Any], limits: Mapping[str, Any]) -> list[str]:
     """Return speeds, accelerations, lengths and places that are beyond their bounds."""
     fine = np.linspace(motion.times[0], motion.times[-1], FINER * (len(motion.times) - 1) + 1)
-    (pose, velocity, acceleration), carried = motion.platform(fine), motion.carriers(fine)
+    pose, velocity, acceleration = motion.platform(fine)
     wrong = []
 
     def check(name: str, values: np.ndarray, low: Any, high: Any, scale: float) -> None:
@@ -271,18 +269,19 @@ def _bounded(motion: _Motion, robot: Robot, task: Mapping[str, Any], limits: Map
         check("platform_acceleration", np.linalg.norm(acceleration[:, :3], axis=1), -np.inf, most, most)
     if (box := limits.get("platform_box")) is not None:
         check("platform_box", pose[:, :3], np.array(box["min"]), np.array(box["max"]), 1.0)
-    ends, anchors = motion.cables(fine)
-    lengths = np.linalg.norm(ends - anchors, axis=-1)
     if (span := limits.get("cable_length")) is not None and not robot.pulley_radii.any():
+        lengths = np.linalg.norm(np.subtract(*motion.cables(fine)), axis=-1)
         check("cable_length", lengths, span["min"], span["max"], span["max"])
     if (most := limits.get("cable_speed")) is not None and not robot.pulley_radii.any():
         middle = (fine[1:] + fine[:-1]) / 2
         step = 1e-6
         later, sooner = (np.linalg.norm(np.subtract(*motion.cables(middle + k)), axis=-1) for k in (step, -step))
         check("cable_speed", np.abs(later - sooner) / (2 * step), -np.inf, most, most + 1e-3)
+    free = (task.get("base") or {}).get("kind") == "free"
+    carried = [*motion.carriers(fine)] if free else []
     for i, carrier in enumerate(robot.carriers):
         own = carrier.motion_limits
-        if not carrier.moves or (task.get("base") or {}).get("kind") != "free":
+        if not carrier.moves or not free:
             continue
         for name, most, k in (("speed", own.speed, 1), ("acceleration", own.acceleration, 2)):
             if most is not None:
@@ -302,7 +301,7 @@ def _ends(motion: _Motion, task: Mapping[str, Any]) -> list[str]:
         return []
     rests = (task.get("tube") or {}).get("ends") in (None, "rest")
     ends = [(0, given["pose"] if given else path["start"]), (-1, path["end"])]
-    pose = motion.platform(motion.times[[0, -1]])[0]
+    pose = next(motion.platform(motion.times[[0, -1]]))
     far = [float(np.abs(pose[end, :3] - np.array(at)[:3]).max()) for end, at in ends]
     return ["an end of the line is missed"] if rests and not task.get("final") and max(far) > 1e-6 else []
 
