@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 from scipy.optimize import linprog
 from scipy.sparse import block_diag
+from scipy.spatial import KDTree
 
 from towline import Dynamics, InputError, Planner, Robot, load, plan, simulate
 from towline.control import Stop, longest_stop, references, stop
@@ -28,10 +29,13 @@ def made(request):
 def have_tensions(robot, dynamics, references):
     """Ask one linear program for which references tensions inside their limits give the wrench."""
     mask = robot.dof_mask > 0
-    scale, blocks, wrenches = robot.wrench_scale[mask][:, None], [], []
-    for each in references:
-        A = scale * dynamics.wrench_matrix(each.pose, each.carrier_pose)[mask]
-        w = scale[:, 0] * dynamics.required_wrench(each.pose, each.velocity, each.acceleration)[mask]
+    scale, blocks, wrenches = robot.wrench_scale[mask], [], []
+    pose, carriers, velocity, acceleration = (
+        np.stack([getattr(each, name) for each in references])
+        for name in ("pose", "carrier_pose", "velocity", "acceleration")
+    )
+    matrices = dynamics.wrench_matrix(pose, carriers)[:, mask] * scale[:, None]
+    for A, w in zip(matrices, dynamics.required_wrench(pose, velocity, acceleration)[:, mask] * scale, strict=True):
         blocks.append(np.hstack([np.vstack([A, -A]), -np.ones((2 * len(w), 1))]))
         wrenches.append(np.r_[w, -w])
     bounds = [*zip(robot.t_min, robot.t_max, strict=True), (0, None)] * len(blocks)
@@ -43,15 +47,14 @@ def have_tensions(robot, dynamics, references):
 def test_stops_keep_the_path_and_the_limits_and_end_at_rest(made):
     robot, found = made
     dynamics, rng = Dynamics(robot), np.random.default_rng(3)
-    fine = np.stack([each.pose for each in references(found, 2e-4)])
+    fine = KDTree([each.pose[:3] for each in references(found, 2e-4)])
     for time in [0.0, *rng.uniform(0, found.duration, 12), found.duration, found.duration + 1]:
         its = stop(found, time)
         assert its.feasible
         each = references(its, 1e-3)
         assert have_tensions(robot, dynamics, each).all()
-        for reference in each:
-            if its.ends <= found.duration:
-                assert np.linalg.norm(fine[:, :3] - reference.pose[:3], axis=1).min() <= 1e-3
+        if its.ends <= found.duration:
+            assert fine.query([reference.pose[:3] for reference in each])[0].max() <= 1e-3
         assert (its.tensions >= robot.t_min - 1e-9).all()
         assert (its.tensions <= robot.t_max + 1e-9).all()
         first, last = references(found, 1e-3, start=min(time, found.duration))[0], each[-1]
