@@ -1,7 +1,9 @@
-"""What both papers number, and which of these numbers the place of a claim names."""
+"""What both papers number, which of these numbers the place of a claim names, and where the errata have a claim."""
 
 import re
 from pathlib import Path
+
+from towline.studies.accounts.claim import Verdict
 
 PAPERS = Path(__file__).parent.parent.parent / "shared" / "papers"
 TEXTS = {"flying": PAPERS / "flying-cdpr.txt", "ctmrts": PAPERS / "ctmrts.txt"}
@@ -12,6 +14,15 @@ NUMBERED = {
 IN_THE_TEXT = {"Eq.": r"\\quad \((\d+)\)\$\$", "figure": r"^Fig\. (\d+)\.", "Table": r"^Table (\d+)"}
 STEPS = {"flying": r"^- (\d)\) ", "ctmrts": r"^(?:- )?\(([a-g])\) "}
 NAMED = {"Eq.": r"Eqs?\.", "figure": "figures?", "Table": "Table", "step": "steps?"}
+
+ERRATA = Path(__file__).parent.parent / "docs" / "errata"
+SECTIONS = {
+    Verdict.REPRODUCED: [],
+    Verdict.DIFFERS: ["What is printed, and what holds"],
+    Verdict.IMPOSSIBLE: ["Impossible"],
+    Verdict.NOT_DETERMINED: ["Not printed in the paper"],
+    Verdict.REPAIRED: ["What is possible instead"],
+}
 
 
 def numbers_of(place, kind):
@@ -27,3 +38,10 @@ def unnamed(paper, places):
         named = set().union(*(numbers_of(place, kind) for place in places))
         differences[kind] = named ^ {str(number) for number in numbers}
     return {kind: odd for kind, odd in differences.items() if odd}
+
+
+def misplaced(paper, verdicts):
+    """Claims that the page of errata does not have in the section of their verdict; if any, run `make errata`."""
+    sections = [part.partition("\n") for part in (ERRATA / f"{paper}.md").read_text().split("\n## ")]
+    places = {name: [title for title, _, text in sections if f"| {name} |" in text] for name in verdicts}
+    return {name: places[name] for name, verdict in verdicts.items() if places[name] != SECTIONS[verdict]}

@@ -24,12 +24,6 @@ from towline import Requirements, Robot, Task
 from towline.cli.main import app
 from towline.estimation.logs.mapping import LogMap
 from towline.models.parsing import parse_yaml
-from towline.studies.accounts.claim import Verdict
-from towline.studies.flying import flights, repair, shaken, vibration
-from towline.studies.flying import study as flying
-from towline.studies.towing import flights as towed
-from towline.studies.towing import modes, ranges
-from towline.studies.towing import study as towing
 
 ROOT = Path(__file__).parent.parent
 PAGES = {str(path.relative_to(ROOT)): path.read_text() for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]}
@@ -39,7 +33,6 @@ BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 CLAIMING = ("README.md", "docs/tutorial/infeasible.md", "docs/tutorial/calibrate.md")  # more than that they run
-SLOW = {part.chapter for part in (repair, vibration, shaken, flights, ranges, modes, towed)}  # seconds each
 COMPILER = shutil.which("cc")
 
 
@@ -172,24 +165,6 @@ def test_the_tutorial_calibrates(tmp_path, monkeypatch):
     names = run_page(CLAIMING[2], tmp_path, monkeypatch)
     assert names["before"] > 0.03
     assert names["after"] < 0.2 * names["before"]
-
-
-@pytest.mark.parametrize("study", [flying, towing], ids=lambda study: study.PAPER.name)
-def test_errata_are_current(study):
-    """Check that the page lists exactly the quick claims that are not reproduced; if not, run `make errata`."""
-    sections = PAGES[f"docs/errata/{study.PAPER.name}.md"].split("\n## ")
-    titles = {
-        Verdict.DIFFERS: "What is printed",
-        Verdict.IMPOSSIBLE: "Impossible",
-        Verdict.NOT_DETERMINED: "Not printed",
-    }
-    for claim in [claim for chapter in study.CHAPTERS.values() if chapter not in SLOW for claim in chapter().claims]:
-        where = [section for section in sections if f"| {claim.id} |" in section]
-        if claim.verdict is Verdict.REPRODUCED:
-            assert not where, claim.id
-        else:
-            (section,) = where
-            assert section.startswith(titles[claim.verdict]), claim.id
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ from towline.studies.flying import (
     wind,
 )
 
-from .numbered import unnamed
+from .numbered import misplaced, unnamed
 from .warm import towline
 
 CHEAP = [
@@ -315,6 +315,7 @@ def test_the_command_reproduces_the_paper(tmp_path):
     assert len(names) == len(set(names)) > 50
     assert not unnamed("flying", [claim["place"] for claim in printed["claims"]])
     by_name = {claim["id"]: claim for claim in printed["claims"]}
+    assert not misplaced("flying", {name: Verdict(claim["verdict"]) for name, claim in by_name.items()})
     assert by_name["circle"]["verdict"] == "impossible"
     places = {by_name[name]["place"] for name in ("VI.A-flown", "VI.B-flown", "circle-repair", "helix-repair")}
     assert places <= {"VI.A", "VI.B", "VI.A, figure 6", "VI.B, figure 8"}

@@ -26,7 +26,7 @@ from towline.studies.flying import radius as largest
 from towline.studies.towing import equations, loop, ranges, tensions
 
 from .legible import check_grey, check_size, check_texts, renderer_of
-from .numbered import IN_THE_TEXT, NUMBERED, STEPS, TEXTS, numbers_of, unnamed
+from .numbered import IN_THE_TEXT, NUMBERED, STEPS, TEXTS, misplaced, numbers_of, unnamed
 
 RING = np.radians(60 * np.arange(6))
 ANCHORS = np.column_stack([0.52 * np.cos(RING), 0.52 * np.sin(RING), np.full(6, -0.07)])
@@ -70,6 +70,10 @@ def test_a_place_names_numbers_one_by_one():
     assert numbers_of("Eqs. 4, 26 and 37, section V, step 7", "Eq.") == {"4", "26", "37"}
     assert numbers_of("Eqs. 34 to 36, figure 4", "Eq.") == {"34"}
     assert numbers_of("steps (a) and (b), Eq. 2", "step") == {"a", "b"}
+
+
+def test_the_errata_of_paper_c_are_current(chapters_of_c):
+    assert not misplaced("ctmrts", {name: claim.verdict for name, claim in claims_of(*chapters_of_c[:3]).items()})
 
 
 def test_each_number_of_paper_c_has_a_claim(towing):
