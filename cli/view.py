@@ -17,13 +17,14 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 def view(
     target: Annotated[
-        str,
+        str | None,
         typer.Argument(
-            metavar="TARGET",
-            help="A robot (name or YAML file), or a plan, simulation or workspace file (NetCDF).",
+            metavar="[TARGET]",
+            help="A robot (name or YAML file), or a plan, simulation or workspace file (NetCDF); default: the first "
+            "robot of the library, in a view that has a list of all.",
             autocompletion=robot_names,
         ),
-    ],
+    ] = None,
     other: Annotated[
         str | None, typer.Argument(metavar="[OTHER]", help="A second plan or simulation file, for comparison.")
     ] = None,
@@ -43,6 +44,7 @@ def view(
     """Show a robot, a plan, a simulation or a workspace in the browser, or compare two motions (extra viewer)."""
     import threading
 
+    from ..models import available
     from ..viewer import read, save_page, serve
 
     if html is not None:
@@ -50,6 +52,10 @@ def view(
             if differs:
                 raise InputError(f"{name} must be left out with --html: a page needs no server")
         check_ending("--html", html, ".html", ".htm")
+    if target is None:
+        if html is not None or robot is not None:
+            raise InputError(f"TARGET must be given with {'--robot' if html is None else '--html'}, got none")
+        target = available()[0]
     subject = read(target, robot, other)
     check_outputs({"--html": html})
     summary = {"kind": subject.kind, "robot": subject.robot.name} | ({} if other is None else {"other": other})

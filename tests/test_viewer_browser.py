@@ -130,6 +130,14 @@ def test_a_plan_plays_and_pauses(page, plan_file, tmp_path):
         saved = xr.load_dataset(plan_file).sel(time=stopped, method="nearest")
         np.testing.assert_allclose(tensions(page), saved["tensions"], atol=0.0051)
         page.screenshot(path=tmp_path / "plan.png")
+        for width, height, least in ((1600, 1000, 1000), (400, 800, 60)):  # on a phone in the panel
+            page.set_viewport_size({"width": width, "height": height})
+            bar = page.locator(".mantine-Slider-root").first.bounding_box()
+            assert bar["width"] > least
+            panel = page.locator(".towline-readout").bounding_box()
+            below = width > 1000
+            assert (bar["y"] > 0.9 * height) == below
+            assert (bar["x"] + bar["width"] < panel["x"]) == below
 
 
 def test_a_picture_is_saved(page, tmp_path):

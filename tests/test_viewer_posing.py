@@ -3,6 +3,7 @@
 import re
 import sys
 import time
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from towline.figures import style
 from towline.models import Dynamics, available, load
 from towline.solvers import capacity_margin
 from towline.statics.distribution import pose_problem, tensions
-from towline.viewer import read, serve
+from towline.viewer import Subject, read, serve
 from towline.viewer.geometry import Geometry
 from towline.viewer.posing import at_rest_with, home_at_rest, opening_pose
 from towline.viewer.sliders import sliders, whole_steps
@@ -441,3 +442,49 @@ def test_ends_of_a_slider_are_whole_steps_around_its_range(low, high):
     assert start - low > -1.0001 * step
     assert end - high < 1.0001 * step
     assert end / step == pytest.approx(round(end / step), abs=1e-3)
+
+
+def shown(url, cables, numbers):
+    """Wait until a new page has a pose of a robot with so many cables; return its panel."""
+    for _ in range(60):
+        opened = Wire(url)
+        try:
+            panel = str([found.get("content") for found in opened.panel.values()])
+            if panel.count("</tr>") == cables + 1 and np.allclose(pose(opened), numbers, atol=6e-4):
+                return panel
+        finally:
+            opened.close()
+        time.sleep(0.1)
+    pytest.fail("it is not shown")
+
+
+def test_a_list_switches_robots_and_a_link_keeps_robot_and_pose():
+    """Everything else that an address may have is ignored."""
+    planar, wanted = load("planar-4"), [0.5, 0.4, 2.7, 0.0, 0.0, 0.1]
+    with serve(read("cogiro"), port=0) as url:
+        opened = Wire(url)
+        assert set(opened.element(label="robot")[1]["options"]) == set(available())
+        opened.set("planar-4", label="robot")
+        opened.close()
+        panel = shown(url, 4, planar.home)
+        for t in tensions(planar, planar.home).tensions:
+            assert f"{t:.2f} N" in panel
+        address = re.search(r'href="(/[^"]*)"', panel)[1].replace("&amp;", "&")
+        assert address == "/?robot=planar-4&pose=" + ",".join(f"{x:.6g}" for x in planar.home)
+        assert urlopen(f"{url}/?robot=ipanema-2&pose={','.join(map(str, wanted))}").status == 200
+        shown(url, 8, wanted)
+        for query in ("pose=nan,0,0,0,0,0", "robot=ipanema-2&pose=nan,0,0,0,0,0", "robot=ipanema-2&pose=inf,0,0,0,0,0",
+                      "robot=ipanema-2&pose=1,2", "robot=../../x&pose=1", "robot=ipanema-2&pose=" + "1," * 2000,
+                      "robot=ipanema-2&pose=%00", "robot", "&=&;"):  # fmt: skip
+            assert urlopen(f"{url}/?{query}").status == 200
+        time.sleep(0.5)
+        shown(url, 8, wanted)
+        urlopen(f"{url}{address}")
+        shown(url, 4, planar.home)
+    with serve(Subject("mine", planar.model_copy(update={"name": "mine"})), port=0) as url:
+        opened = Wire(url)
+        assert opened.element(label="robot")[1]["value"] == "mine"
+        opened.close()
+        for name, cables in (("cogiro", 8), ("mine", 4)):  # the robot of a file stays in the list
+            urlopen(f"{url}/?robot={name}&pose=0,0,{1.5 if name == 'cogiro' else 0.8},0,0,0")
+            shown(url, cables, [0, 0, 1.5 if name == "cogiro" else 0.8, 0, 0, 0])

@@ -108,7 +108,14 @@ def test_the_worst_instant_is_marked_and_one_click_away(wire, folder):
         missing = saved["tensions"].isnull().any("cable").to_numpy()
         worst = float(saved["time"].to_numpy()[missing.argmax()])
     assert missing.any()
-    assert wire.element(label="time [s]")[1]["_marks"][0]["value"] == pytest.approx(worst)
+    mark = wire.element(label="time [s]")[1]["_marks"][0]
+    assert (mark["value"], mark["label"]) == (pytest.approx(worst), "worst")
+    bar = next(found["content"] for found in wire.panel.values() if "towline-timeline" in str(found.get("content")))
+    spans = [float(percent) for percent in re.findall(r",#D55E00 ([\d.]+)%", bar)]
+    with xr.open_dataset(folder / "hover.nc") as saved:
+        share = (worst - float(saved["time"][0])) / float(saved["time"][-1] - saved["time"][0])
+    assert spans[0] == pytest.approx(100 * share, abs=1.0)  # orange from there on
+    assert len(spans) % 2 == 0
     wire.set("last", label="go to")
     wire.set("worst", label="go to")
     while wire.read(0.3):

@@ -50,8 +50,10 @@ def refusal(headers: Headers, listening: str) -> str | None:
 
 
 @contextlib.contextmanager
-def guarded(listening: str) -> Iterator[list[bool]]:
+def guarded(listening: str, asked: Callable[[str], None] | None = None) -> Iterator[list[bool]]:
     """Make a viser server that starts in this block refuse the requests for which `refusal` has a reason.
+
+    `asked` is called with what follows the question mark in the address of a page that is opened.
 
     viser passes no check of its own to `websockets.serve`, so that function is replaced while the server starts. The
     list that this yields stays empty if the server started by other means, and so answers everyone.
@@ -66,7 +68,7 @@ def guarded(listening: str) -> Iterator[list[bool]]:
 
         def __init__(self, *args: Any, process_request: Callable[..., Any], **options: Any):
             started.append(True)
-            super().__init__(*args, process_request=_checked(process_request, listening), **options)
+            super().__init__(*args, process_request=_checked(process_request, listening, asked), **options)
 
     with _ONE_AT_A_TIME:
         websockets_server.serve = Guarded
@@ -76,7 +78,7 @@ def guarded(listening: str) -> Iterator[list[bool]]:
             websockets_server.serve = original
 
 
-def _checked(answer: Callable[..., Any], listening: str) -> Callable[..., Any]:
+def _checked(answer: Callable[..., Any], listening: str, asked: Callable[[str], None] | None) -> Callable[..., Any]:
     """Return viser's `process_request` with the check before it, and headers that keep its page out of others.
 
     The page gets the script of `frames` too.
@@ -86,6 +88,9 @@ def _checked(answer: Callable[..., Any], listening: str) -> Callable[..., Any]:
         reason = refusal(request.headers, listening)
         if reason is not None:
             return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")
+        parts = urlsplit(request.path)
+        if asked is not None and parts.path == "/" and parts.query and not request.headers.get_all("Upgrade"):
+            asked(parts.query)
         response = answer(connection, request)
         if response is not None:
             response.headers["Content-Security-Policy"] = "frame-ancestors 'self'"

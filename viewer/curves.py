@@ -26,6 +26,14 @@ class Curves(Displayed):
         """Return which instants have no tensions, or tensions beyond their limits, (k,)."""
         return ~(self.margins >= -1e-6 * max(float(np.nanmax(np.abs(self.tensions), initial=0.0)), 1.0))
 
+    @property
+    def infeasible_spans(self) -> list[tuple[float, float]]:
+        """Return the first and the last infeasible instant of each span, as shares of the duration."""
+        edges = np.diff(np.r_[False, self.infeasible, False].astype(int))
+        shares = (self.times - self.times[0]) / max(float(np.ptp(self.times)), np.finfo(float).tiny)
+        first, last = shares[edges[:-1] > 0], shares[edges[1:] < 0]
+        return list(zip(first.tolist(), last.tolist(), strict=True))
+
     def nearest(self, time: float) -> int:
         """Return the index of the instant nearest to `time` [s]."""
         return int(np.abs(self.times - time).argmin())

@@ -5,6 +5,7 @@ Names come from files, so every text that is not a number passes `html.escape`.
 
 import math
 from html import escape
+from urllib.parse import urlencode
 
 import numpy as np
 
@@ -32,6 +33,14 @@ NARROW = (
 )
 SHEET_SHARE = 0.45  # of the height, see NARROW
 BODY = "padding:4px 12px;font-size:13px;line-height:1.45;font-variant-numeric:tabular-nums"
+
+
+def link(robot: Robot, pose: np.ndarray, carriers: np.ndarray) -> str:
+    """Return HTML of a link that opens the view with these poses, (6,) and (c, 6)."""
+    moved = [] if np.array_equal(carriers, robot.carrier_home) else carriers.ravel()
+    numbers = ",".join(f"{value + 0.0:.6g}" for value in [*pose, *moved])
+    address = escape(f"/?{urlencode({'robot': robot.name, 'pose': numbers}, safe=',')}")
+    return f'<div style="{BODY}"><a class="towline-link" href="{address}">Link to this pose</a></div>'
 
 
 def readout(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str:

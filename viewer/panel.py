@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -41,14 +42,25 @@ LONGEST = 12.0  # [s] of the film: longer motions are shown faster
 
 
 class Panel:
-    """The controls of a subject on a viser server, until `close`."""
+    """The controls of a subject on a viser server, until `close`; for a robot with a list of `robots` to switch to."""
 
-    def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, stage: Stage):
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        subject: Subject,
+        geometry: Geometry,
+        stage: Stage,
+        robots: tuple[str, ...],
+        switch: Callable[[str], None],
+    ):
         self._subject, self._stage = subject, stage
         self._server, self._gui = server, cast("Any", server.gui)
         self._gui.configure_theme(control_width="medium", show_logo=False, show_share_button=False)
         self._gui.main_panel.dock_right()
         self._gui.set_panel_label(subject.title)
+        if subject.kind == "robot":
+            chosen = self._gui.add_dropdown("robot", robots, initial_value=subject.robot.name)
+            chosen.on_update(lambda event: None if event.client_id is None else switch(event.target.value))
         self._readout = self._gui.add_html("")
         frames = Frames(server)
         self._gui.add_html(labels.NARROW)
@@ -155,6 +167,17 @@ class Panel:
         file = io.BytesIO()
         imsave(file, np.clip(picture[..., :3] * opaque + 1.0 - opaque, 0.0, 1.0), format="png")
         client.send_file_download(name, file.getvalue(), save_immediately=True)
+
+    def pose(self, numbers: np.ndarray) -> None:
+        """Move a robot to the pose of its platform, (6,), and of its carriers, (6 c,), by default at home.
+
+        Other sizes and subjects are ignored.
+        """
+        home = self._subject.robot.carrier_home
+        if numbers.size == 6:
+            numbers = np.concatenate([numbers, home.ravel()])
+        if isinstance(self._controls, Posing) and numbers.size == home.size + 6:
+            self._controls.open(numbers[:6], numbers[6:].reshape(-1, 6))
 
     def close(self) -> None:
         """Stop playing and shading."""

@@ -18,6 +18,7 @@ from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
 from .feasible_ranges import Strips
 from .geometry import Geometry
+from .labels import link
 from .sliders import Slider, sliders
 from .snapshot import Snapshot, at_rest
 from .stage import move
@@ -93,6 +94,7 @@ class Posing:
         self._hang.on_update(lambda _: self._go(self._pose, self._carriers))
         nearest.on_click(lambda _: self._approach())
         home.on_click(lambda _: self._go(self._home, self._robot.carrier_home))
+        self._link = gui.add_html("")
 
         self._drag, self._names = drag, names
         drag.on_update(lambda _: self._show_handles())
@@ -190,6 +192,7 @@ class Posing:
                 refused = str(error)
             self._pose, self._carriers = pose.copy(), carriers.copy()
             with self._frames.instant():
+                self._link.content = link(self._robot, self._pose, self._carriers)
                 for slider, setting in zip(self._sliders, self._settings, strict=True):
                     if slider is not held or self._hang.value:
                         slider.value = self._value(setting)
@@ -204,6 +207,16 @@ class Posing:
                 self._shade([""] * len(self._tracks))
             else:
                 self._strips.want(pose, carriers)
+
+    def open(self, pose: np.ndarray, carriers: np.ndarray) -> None:
+        """Move to poses (6,) and (c, 6), as far as the sliders reach."""
+        wanted, places = self._pose.copy(), self._carriers.copy()
+        for setting in self._settings:
+            here, there = (
+                (wanted, pose) if setting.carrier is None else (places[setting.carrier], carriers[setting.carrier])
+            )
+            here[setting.coordinate] = min(max(float(there[setting.coordinate]), setting.low), setting.high)
+        self._go(wanted, places)
 
     def close(self) -> None:
         """Stop shading the sliders."""

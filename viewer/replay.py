@@ -24,6 +24,7 @@ from .snapshot import Snapshot, least_distance
 NEEDED = ("pose", "velocity", "acceleration", "carrier_pose", "tensions")
 MOST_FRAMES = 1500  # of a page
 MOST_MARKS = 20
+WORDS_APART = 0.1  # of the duration: marks with words
 LONGEST = 100  # letters of a text of the file
 
 
@@ -78,6 +79,7 @@ class Replay:
         self._cut = read("cut", (n, m)) > 0 if "cut" in dataset.variables else None
         self._events = _events(dataset) if self._flown else []
         self._starts = read("phase_start", (-1,)).tolist() if "phase_start" in dataset.variables else []
+        self._phases = [printable(str(name), LONGEST) for name in dataset["phase"].values] if self._starts else []
         self.obstacles = outlines_from(dataset, where)
         if n == 0 or not (np.diff(self.times) > 0).all():
             raise InputError(f"{where}: time must have increasing values, got {n} instants that do not increase")
@@ -104,9 +106,21 @@ class Replay:
         return int(np.where(np.isnan(self.margins), -np.inf, self.margins).argmin())
 
     @property
-    def marks(self) -> tuple[float, ...]:
-        """Return the times to mark on a time line [s]: the worst instant, the starts of phases, and events."""
-        return (float(self.times[self.worst]), *self._starts[:MOST_MARKS], *(at for at, _ in self._events[:MOST_MARKS]))
+    def marks(self) -> tuple[tuple[float, str], ...]:
+        """Return the times to mark on a time line [s], with words: the worst instant, starts of phases, and events.
+
+        A mark too near to one before it has no words.
+        """
+        marks = [(float(self.times[self.worst]), "worst")]
+        marks += list(zip(self._starts, self._phases, strict=True))[:MOST_MARKS]
+        marks += [(at, what.partition(": ")[2]) for at, what in self._events[:MOST_MARKS]]
+        shown: list[float] = []
+        for k, (at, _) in enumerate(marks):
+            if all(abs(at - other) > WORDS_APART * self.duration for other in shown):
+                shown.append(at)
+            else:
+                marks[k] = (at, "")
+        return tuple(marks)
 
     @property
     def path(self) -> np.ndarray:

@@ -6,7 +6,7 @@ import contextlib
 import io
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -21,8 +21,8 @@ from .access import guarded
 from .frames import Frames, with_script
 from .geometry import Geometry
 from .live_page import live_page
+from .live_view import Live
 from .page import aside, camera
-from .panel import Panel
 from .stage import Stage
 from .subject import Subject
 
@@ -58,13 +58,20 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     required("subject", subject, Subject)
     _check_address(host, port)
     # Quiet about connections that break off and messages that are none.
-    with quiet("websockets.server", "asyncio"), _started(host, port) as server:
-        geometry = Geometry(subject.robot)
-        stage = Stage(server, subject, geometry, captioned=False)
-        with contextlib.closing(Panel(server, subject, geometry, stage)):
-            server.on_client_connect(stage.mind)
-            # An address of IPv6 has colons of its own.
-            yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
+    links: list[Live] = []  # the view, once it is there
+
+    def follow(query: str) -> None:
+        for live in links:
+            live.follow(query)
+
+    with (
+        quiet("websockets.server", "asyncio"),
+        _started(host, port, follow) as server,
+        contextlib.closing(Live(server, subject)) as live,
+    ):
+        links.append(live)
+        # An address of IPv6 has colons of its own.
+        yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
 
 
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
@@ -131,8 +138,11 @@ def _check_address(host: str, port: int) -> None:
 
 
 @contextlib.contextmanager
-def _started(host: str, port: int) -> Iterator[viser.ViserServer]:
-    """Run a server until the block ends. Suppress what viser prints then, because --json prints JSON only."""
+def _started(host: str, port: int, asked: Callable[[str], None] | None = None) -> Iterator[viser.ViserServer]:
+    """Run a server until the block ends. Suppress what viser prints then, because --json prints JSON only.
+
+    `asked` is called with what follows the question mark in the address of a page that is opened.
+    """
     try:
         import viser
     except ImportError:
@@ -144,7 +154,7 @@ def _started(host: str, port: int) -> Iterator[viser.ViserServer]:
         def request_share_url(self, verbose: bool = True) -> str | None:
             return None
 
-    with contextlib.redirect_stdout(io.StringIO()), guarded(host) as guards:
+    with contextlib.redirect_stdout(io.StringIO()), guarded(host, asked) as guards:
         server = Unshared(host=host, port=port, verbose=False)
     try:
         if not guards:

@@ -61,7 +61,7 @@ class Stage:
     """
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
-        self._scene = server.scene
+        self._scene, self._left = server.scene, False
         self._robot = subject.robot
         extent = subject.replay.extent if subject.replay else geometry.extent
         if subject.other is not None:
@@ -177,6 +177,10 @@ class Stage:
         camera.fov = FIELD_OF_VIEW
         camera.near, camera.far = 1e-3 * self._size, 50 * self._size
 
+    def leave(self) -> None:
+        """Let cameras be, because the scene is that of another stage from now on."""
+        self._left = True
+
     def mind(self, client: viser.ClientHandle) -> None:
         """Fit the camera to portrait screens, now and whenever a screen is turned.
 
@@ -188,6 +192,8 @@ class Stage:
 
         def fit() -> None:
             nonlocal framed
+            if self._left:
+                return
             shape, looked_at = (float(camera.image_width), float(camera.image_height)), camera.look_at
             # An update may be older than the framing before it, so the places before count too.
             untouched = min(np.abs(looked_at - aim).max() for aim in (self.extent.centre, *aims)) < 1e-3 * self._size

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..figures import style
 from .charts import Charts
 from .curves import curves
 from .snapshot import Snapshot
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 RATE = 25.0  # [1/s] of playing
 TICK = 0.01  # [s] of the time line
+ORANGE = style.colour(1)
+NARROWEST = 0.004  # of the bar: a span that is seen
+PANEL = 20.5  # [rem], the width of viser's panel, with a margin
 SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x")
 
 
@@ -58,7 +62,9 @@ class TimeLine:
         with gui.add_folder("Time"):
             ticks = max(math.ceil((last - first) / TICK - 1e-6), 1)  # whole ones, so that the end is a round number
             end = first + round(ticks * TICK, 6)
-            about = "Dots: the worst instant, the starts of phases, and events."
+            about = "Dots: the worst instant, the starts of phases, and events. Orange: infeasible."
+            shown = curves(replay)
+            gui.add_html(_style(shown.infeasible_spans))
             self._now = gui.add_slider("time [s]", first, end, TICK, first, marks=replay.marks, hint=about)
             self._play = gui.add_button("Play", hint="K")
             groups = (("step", ("back", "next")), ("go to", ("first", "worst", "last")))
@@ -66,7 +72,7 @@ class TimeLine:
             self._loop = gui.add_checkbox("loop", True)
             self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1x")
             limits = np.concatenate([replay.robot.t_min, replay.robot.t_max])
-            self._charts = Charts(gui, curves(replay), limits, None if other is None else curves(other))
+            self._charts = Charts(gui, shown, limits, None if other is None else curves(other))
         self._now.on_update(self._dragged)
         self._play.on_click(lambda _: self._turn(not self._playing.is_set()))
         steps = {
@@ -137,3 +143,26 @@ class TimeLine:
             self._go(self._replay.index_at(onward), at=onward, playing=True)
             if onward == last and not self._loop.value:
                 self._turn(False)
+
+
+def _style(spans: list[tuple[float, float]]) -> str:
+    """Return HTML that moves the slider and the button after it to a bar below the scene, where there is room for one.
+
+    Infeasible spans, shares of the duration, are orange in the slider.
+    """
+    stops = ["transparent 0%"]
+    for first, last in spans:
+        low, high = 100 * min(first, 1 - NARROWEST), 100 * max(last, first + NARROWEST)
+        stops.append(f"transparent {low:.2f}%,{ORANGE} {low:.2f}%,{ORANGE} {high:.2f}%,transparent {high:.2f}%")
+    slider, play = (f"div:has(>.towline-timeline)+div{'+div' * k}" for k in range(2))
+    place = "position:fixed;bottom:0;z-index:3;background:#fffffff0;box-sizing:border-box;height:3.4em;padding:.6em"
+    return (
+        '<span class="towline-timeline"></span><style>'
+        f"{slider} .mantine-Slider-track::before{{background-image:linear-gradient(90deg,{','.join(stops)})}}"
+        f"{slider} .mantine-Slider-markLabel{{display:none}}"
+        f"@media (min-width:36.01em){{{slider}{{{place};left:6.5em;right:{PANEL}rem;padding-left:2.5em}}"
+        f"{play}{{{place};left:0;width:6.5em;margin:0!important}}"
+        f"{slider} .mantine-Slider-markLabel{{display:block;white-space:nowrap}}"
+        f"{slider} p{{display:none}}{slider} .mantine-Flex-root>div:has(>p){{width:0!important;padding:0!important}}}}"
+        "</style>"
+    )
