@@ -5,7 +5,7 @@ The planner works in stages and stops at the first that decides:
 1. ends and path (`infeasible_ends`): tasks that can be ruled out before planning;
 2. durations (`durations`) and timing (`time_law`), if the duration alone is free: feasible durations;
 3. a path past obstacles (`global_path`), where the usual guess exceeds a limit at rest: the next stages start from it;
-4. when a motion in a tube passes the points of its path, if the duration is a choice (`passing_times`);
+4. when a motion in a tube should be where on its path, if the duration is a choice (`reference`);
 5. easier programs to start the next from: linear distances from obstacles (`linear`); for teams more time and fewer
    steps (`homotopy`);
 6. the nonlinear program (`program`), audited; where the audit reports violations, tightened or on a finer mesh
@@ -37,8 +37,8 @@ from .proofs.durations import Durations, durations
 from .proofs.infeasible_ends import infeasible_ends
 from .result import Relaxed
 from .search.homotopy import from_easier
-from .search.passing_times import as_timed_by, passing_times
 from .search.phase_durations import shortest_phases
+from .search.reference import about_better_reference, with_its_reference
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion
 from .search.replanning import Replanner
@@ -177,7 +177,7 @@ class Planner(Displayed):
         check_progress(progress)
         with heeding():
             self.scenario, chosen = shortest_phases(self.scenario)
-            self.scenario = as_timed_by(start, self.scenario)
+            self.scenario = with_its_reference(start, self.scenario)
         self._search = search = Search(self.scenario, self._solvers, progress)
         search.stages += [] if chosen is None else [chosen]
         with heeding():
@@ -260,11 +260,9 @@ def _climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation]
     if timed is not None and not (own and timed.feasible):
         return timed
     planned = _again(search, *last) if start is None and last is not None else None
-    passing = passing_times(search) if start is last is None else None
-    planned = planned or _free_motion(search, start or passing)
-    if passing is not None and not planned.feasible:
-        search.take(scenario)
-        planned = _free_motion(search, None)
+    if planned is None and start is last is None:
+        planned = about_better_reference(search, _free_motion)
+    planned = planned or _free_motion(search, start)
     if timed is None or (planned.feasible and cost(planned) <= cost(timed)):
         return planned
     return replace(timed, build_s=search.build_s, solve_s=search.solve_s)

@@ -7,6 +7,7 @@ import pytest
 
 from towline import plan
 from towline.models import Dynamics, Robot, load
+from towline.ocp.nlp.held import held_spans
 from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.nlp.solver import Solver
@@ -166,3 +167,16 @@ def test_a_motion_that_meets_the_largest_cable_speed_at_an_end_is_not_faster_bes
     pose, times = found.audit.motion.pose, found.audit.times
     rates = np.diff([lengths(at) for at in pose], axis=0) / np.diff(times)[:, None]
     assert np.abs(rates).max() < fastest * (1 + 1e-5)
+
+
+def test_only_the_end_that_meets_a_limit_is_held():
+    """The other end rests, far below the largest speed: there the program is tightened as elsewhere."""
+    task = {
+        "path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1]},
+        "duration": 4.0,
+        "tube": {"position": "free"},
+        "limits": {"platform_speed": 0.3},
+        "initial": {"pose": [0, 0, 1], "velocity": [0, 0.3, 0]},
+    }
+    spans = held_spans(lay_out(load("cogiro"), read_task(task)), lambda _: SHRINK)
+    assert [its for limit, its in spans.items() if limit.name == "platform_speed"] == [((0.0, 0.0),)]

@@ -11,7 +11,7 @@ import numpy as np
 from ...models.part import COORDINATES
 from ..limits.distance import Distance
 from ..tasks.ends import at_rest_without_acceleration, carrier_ends, platform_ends
-from ..tasks.paths import Motion, WaypointPath
+from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, POSITION, START_BAND
 from ..tasks.task import FreeBase
 from .excess import Excess
@@ -192,17 +192,14 @@ def _end_step(audited: Instants, end: int) -> float:
 
 def _waypoints(audited: Instants) -> list[Excess]:
     """Check that the platform passes through the task's points where it has to."""
-    scenario, path = audited.scenario, audited.scenario.path
-    if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath):
-        return []
     if audited.deviation is None:
         return []  # on its path, whatever the time law; `lay_out` accepts no path that misses its points then
-    knots = np.clip(path.knots(scenario.duration), 0.0, scenario.duration)[1:-1]
-    missed = _off_path(audited, knots) - path.missed(scenario.duration)[1:-1]
+    times, offsets = audited.scenario.passes()
+    missed = _off_path(audited, times) - offsets
     missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
     off, turned = np.linalg.norm(missed[:, :3], axis=1), np.linalg.norm(missed[:, 3:], axis=1)
     exceeded = []
-    for k, time in enumerate(knots):
+    for k, time in enumerate(times):
         for value, unit in ((off[k], "m"), (turned[k], "rad")):
             exceeded += _missed("tube.waypoints", f"platform at point {k + 2}", time, value, PATH_TOLERANCE, unit)
     return exceeded

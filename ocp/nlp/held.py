@@ -15,7 +15,7 @@ from ...solvers import solve_batch
 from ..limits import Angle, Limit, Rate
 from ..tasks.deviation import Deviation
 from ..tasks.ends import between_fixed_values, fixed_values
-from ..tasks.paths import Motion, WaypointPath
+from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
 EASE = 0.1  # of the duration, after which all of a limit is tightened
@@ -48,8 +48,8 @@ def held_spans(scenario: Scenario, shrink_of: Callable[[Limit], float]) -> dict[
         with_tensions = bool(of_tensions[place].any())
         its = limit.over(_both_ends(scenario), its)
         slack = np.minimum(its - limit.low, limit.high - its).min(axis=1)
-        inside = (slack > 2 * shrink_of(limit) * limit.scale) & ~with_tensions & ~isinstance(limit, Angle)
-        spans[limit] = _held(scenario, needed, with_tensions, ~inside)
+        near = slack <= 2 * shrink_of(limit) * limit.scale
+        spans[limit] = _held(scenario, needed, with_tensions, near | with_tensions | isinstance(limit, Angle))
     return spans
 
 
@@ -116,7 +116,6 @@ def _held(scenario: Scenario, needed: Iterable[_Coordinate], chooses: bool, near
     if {column for column, _ in free} <= of_platform:
         lasts = scenario.duration
         spans += [(phase.start / lasts, phase.end / lasts) for phase in scenario.phases.all if phase.rests]
-        path = scenario.path
-        if scenario.task.tube.waypoints == "exact" and isinstance(path, WaypointPath) and not any(k for _, k in free):
-            spans += [(share, share) for share in (path.knots(lasts) / lasts).tolist()]
+        if not any(k for _, k in free):
+            spans += [(share, share) for share in (scenario.passes()[0] / lasts).tolist()]
     return tuple(spans)

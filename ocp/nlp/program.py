@@ -29,7 +29,7 @@ from ...base.display import Displayed
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values, platform_ends
-from ..tasks.paths import RestPath, WaypointPath
+from ..tasks.paths import RestPath
 from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
 from .derivatives import Block, Columns, Mapped, derivatives
@@ -298,15 +298,14 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> li
 
 def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> list[Block]:
     """Return rows that lead the platform through the waypoints, by the polynomial of the interval of each."""
-    path = scenario.path
+    times, missed = scenario.passes()
     platform = [i for i, owner in enumerate(scenario.owners()) if owner[0] is None]
-    if scenario.task.tube.waypoints != "exact" or not isinstance(path, WaypointPath) or not platform:
+    if not (len(times) and platform):
         return []
     blocks, lengths, size = [], grid.steps, scenario.scheme.size
     starts, given = grid.shares[::size], scenario.duration / len(lengths)
     coordinates = [coordinate for owner, coordinate in scenario.owners() if owner is None]
-    shares, missed = path.knots(scenario.duration) / scenario.duration, path.missed(scenario.duration)[:, coordinates]
-    for share, off in zip(shares[1:-1], missed[1:-1], strict=True):
+    for share, off in zip(times / scenario.duration, missed[:, coordinates], strict=True):
         k = min(int(np.searchsorted(starts, share, side="right")), len(lengths)) - 1
         its = [X[:, k * size + i] for i in range(size + 1)]
         position = points(scenario, layout, float(lengths[k]) * stretch(layout, its[0]), given, its).position

@@ -20,8 +20,9 @@ def motion_facts(plan: PlanData) -> list[Fact]:
         np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
     )
     kind = f"{len(plan.phases)} phases" if plan.phases else task.path.kind
-    timed = isinstance(plan.scenario.path, TimedPath) and plan.scenario.path is not task.path
-    law = ", with the fastest time law" if timed else ""
+    path, law = plan.scenario.path, ""
+    if isinstance(path, TimedPath) and path is not task.path:
+        law = ", with the fastest time law" if path.smoothing is None else ", in a tube about its fastest time law"
     return [
         ("duration", quantity(plan.scenario.duration, "s", digits=6)),
         ("path", f"{kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),

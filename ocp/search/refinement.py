@@ -1,5 +1,6 @@
 """Solve a program again as long as the audit of its solution reports violations: `refine`."""
 
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -31,44 +32,48 @@ def refine(search: Search, outcome: Outcome) -> str:
     Limits that are exceeded a little between the nodes are tightened by that on the same mesh, a few times. Else the
     mesh gets finer each time.
     """
-    scenario, steps = search.scenario, search.scenario.task.steps
+    scenario, mesh = search.scenario, Mesh(search.scenario.task.steps)
     audit = search.audit(outcome)
-    further: Shares = ()
-    little = LITTLE
-    distance = 0.0  # from the tension limits [N]
+    reserve, shrink = 0.0, 0.0
+    for attempt in range(1, REFINEMENTS + 2):
+        outcome, audit, mesh = _tightened_again(search, outcome, audit, mesh)
+        solved_once = outcome.success or mesh.further
+        if attempt > REFINEMENTS or audit.passed or not solved_once or search.seconds_left <= 0:
+            break
+        # Between finer nodes less can happen; a little distance from the limits takes care of what still does. It falls
+        # at least as the distance of the nodes does, and with it half of what was reduced before.
+        missed = float(audit.violation.max()) / scenario.robot.force_scale
+        reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
+        shrink = SHRINK * attempt if audit.excess else shrink
+        further: Shares = ()
+        if outcome.success:  # else not again what had no solution
+            halved = tuple((name, about, share / 2) for name, about, share in mesh.further)
+            further = _tightened(scenario, audit, halved)
+        mesh = Mesh(min(2 * mesh.steps, MOST_STEPS), reserve * scenario.robot.force_scale, shrink, further)
+        outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
+        audit = search.audit(outcome)
+    steps = mesh.steps
+    if outcome.success:
+        return f"the audit reports violations up to the finest mesh, {steps} steps"
+    return f"nonlinear program of {steps} steps: {ended(outcome.message)}"
+
+
+def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh) -> tuple[Outcome, Audit, Mesh]:
+    """Return a solution on the same mesh with limits that are tightened where the motion exceeds them a little."""
+    scenario, little = search.scenario, LITTLE
     for _ in range(TIGHTENINGS):
         beyond = _beyond(scenario, audit)
         if not (outcome.success and search.seconds_left > 0 and 0.0 < beyond <= little):
             break
-        further, little = _tightened(scenario, audit, further, TIGHTENED), beyond / 2
-        distance += SPARE * _missed(audit)
-        mesh = Mesh(steps, distance, further=further)
+        further, little = _tightened(scenario, audit, mesh.further, TIGHTENED), beyond / 2
+        mesh = replace(mesh, reserve=mesh.reserve + SPARE * _missed(audit), further=further)
         search.tighten(mesh)
         guess = None if search.has_solution(mesh) else outcome.deviation
         again = search.solve("nonlinear program", mesh, guess, clear=True)
         if not again.success:
             break
         outcome, audit = again, search.audit(again)
-    reserve, shrink = 0.0, 0.0
-    for attempt in range(1, REFINEMENTS + 1):
-        if audit.passed or not (outcome.success or further) or search.seconds_left <= 0:
-            break
-        # Between finer nodes less can happen; a little distance from the limits takes care of what still does. It falls
-        # at least as the distance of the nodes does, and with it half of what was reduced before.
-        steps = min(2 * steps, MOST_STEPS)
-        missed = float(audit.violation.max()) / scenario.robot.force_scale
-        reserve = min(reserve + RESERVE + missed, LARGEST_RESERVE)
-        shrink = SHRINK * attempt if audit.excess else shrink
-        if outcome.success:  # else not again what had no solution
-            further = _tightened(scenario, audit, tuple((name, about, share / 2) for name, about, share in further))
-        else:
-            further = ()
-        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
-        outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
-        audit = search.audit(outcome)
-    if outcome.success:
-        return f"the audit reports violations up to the finest mesh, {steps} steps"
-    return f"nonlinear program of {steps} steps: {ended(outcome.message)}"
+    return outcome, audit, mesh
 
 
 def _beyond(scenario: Scenario, audit: Audit) -> float:

@@ -22,7 +22,7 @@ from ..costs.terms import CarrierAcceleration, CarrierOffset, Jerk, Margin, Path
 from ..limits.limit import Hull, Limit
 from ..limits.limits import Limits
 from .deviation import Deviation
-from .paths import AnyPath, Motion, RestPath
+from .paths import AnyPath, Motion, RestPath, TimedPath, WaypointPath
 from .phases import LaidPhase, Phases
 from .scheme import SCHEMES, Scheme
 from .task import Task
@@ -240,6 +240,19 @@ class Scenario(Displayed):
         off = self.pose_on_path(motion, carriers) - self.path.at(times, self.duration).pose
         off[:, 3:] -= 2 * np.pi * np.round(off[:, 3:] / (2 * np.pi))
         return off
+
+    def passes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return when the platform has to pass inner points of its path [s], and their offsets from it.
+
+        They are (k,) and (k, 6) [m, rad]; none unless `tube.waypoints` is exact.
+        """
+        if self.task.tube.waypoints != "exact" or not isinstance(self.path, WaypointPath | TimedPath):
+            return np.zeros(0), np.zeros((0, 6))
+        _, times, poses = self.path.stations(self.duration)
+        times, poses = times[1:-1].clip(0.0, self.duration), poses[1:-1]
+        missed = poses - self.path.at(times, self.duration).pose
+        missed[:, 3:] -= 2 * np.pi * np.round(missed[:, 3:] / (2 * np.pi))
+        return times, missed
 
     def spread(self, body: int | None) -> np.ndarray:
         """Return the matrix (6, count) from free coordinates to the six of the platform (None) or of a carrier."""

@@ -15,6 +15,7 @@ from .line import LinePath
 from .motion import Motion
 from .rest import RestPath
 from .samples import SamplePath
+from .smoothed_law import SmoothedLaw
 from .stations import Stations
 from .time_law import TimeLaw
 from .waypoints import WaypointPath
@@ -41,6 +42,11 @@ class TimedPath(PathBase):
     dwell: tuple[NonNegative, ...] | None = Field(
         default=None, description="duration of the stop at each s [s]; zero where the speed is not; default: no stop"
     )
+    smoothing: Positive | None = Field(
+        default=None,
+        description="time over which the mean of the law is taken, so that the acceleration does not jump and is zero "
+        "at rest [s]; the motion then lasts as long as the task; default: not",
+    )
 
     @model_validator(mode="after")
     def _law_fits(self) -> Self:
@@ -65,8 +71,14 @@ class TimedPath(PathBase):
         return self
 
     @cached_property
-    def _law(self) -> TimeLaw:
-        return TimeLaw(np.array(self.s), np.array(self.speeds), np.array(self.dwell or np.zeros(len(self.s))))
+    def _law(self) -> TimeLaw | SmoothedLaw:
+        law = TimeLaw(np.array(self.s), np.array(self.speeds), np.array(self.dwell or np.zeros(len(self.s))))
+        return law if self.smoothing is None else SmoothedLaw(law, self.smoothing)
+
+    @property
+    def least(self) -> float:
+        """Return how long the motion lasts with the speeds given [s]."""
+        return self._law.duration
 
     @property
     def times(self) -> np.ndarray:
@@ -76,7 +88,7 @@ class TimedPath(PathBase):
     @property
     @override
     def natural_duration(self) -> float | None:
-        return self._law.duration
+        return self.least if self.smoothing is None else None
 
     def law(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return s, ds/dt [1/s] and d2s/dt2 [1/s^2] at `times` [s], (n,) each."""
@@ -94,9 +106,15 @@ class TimedPath(PathBase):
     def stations(self, duration: float) -> Stations:
         if not isinstance(self.along, WaypointPath):
             return Stations()
-        return self.along.stations(1.0)._replace(times=self.time_at(self.along.places))
+        slower = self._slower(duration)
+        return self.along.stations(1.0)._replace(times=slower * self.time_at(self.along.places))
 
     @override
     def at(self, times: np.ndarray, duration: float) -> Motion:
-        s, sd, sdd = self.law(times)
-        return self.along.by_fraction(s, self.until).timed(sd, sdd)
+        slower = self._slower(duration)
+        s, sd, sdd = self.law(np.asarray(times) / slower)
+        return self.along.by_fraction(s, self.until).timed(sd / slower, sdd / slower**2)
+
+    def _slower(self, duration: float) -> float:
+        """Return how many times as long as with the speeds given the motion lasts in a task of `duration` [s]."""
+        return 1.0 if self.smoothing is None else duration / self.least
