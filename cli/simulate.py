@@ -122,7 +122,8 @@ def simulate(
     figures: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for figures of error, tensions and controller status; with --runs: errors of all runs."
+            help="Folder for figures of error, tensions and controller status; with --runs: errors of all runs and "
+            "their envelopes over time."
         ),
     ] = None,
     form: FormatOption = "png",
@@ -282,6 +283,7 @@ def _often(
     """Simulate with many seeds, save, draw and print; return whether all runs passed."""
     from ..figures import flight as figure
     from ..figures import style
+    from ..figures.envelopes import envelopes
     from ..simulation.flights import report, save, summary
 
     figures, form = drawn
@@ -289,7 +291,8 @@ def _often(
         flights = run(execution=replace(where, progress=resumable(show, where.checkpoint, "flights")))
     add_to_message("")
     file = save(flights, target)
-    pictures = [] if figures is None else [style.save(figure.errors(flights), figures / f"errors.{form}")]
+    drawings = {} if figures is None else {"errors": figure.errors(flights), "envelopes": envelopes(flights)}
+    pictures = [style.save(drawing, figures / f"{name}.{form}") for name, drawing in drawings.items()]
     data = {**summary(flights), "file": file, "figures": pictures}
     print_result(as_json, data, lambda: report(flights).text(), (file, *pictures))
     return bool(flights["passed"].all())

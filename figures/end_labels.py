@@ -36,15 +36,18 @@ def together(values: np.ndarray, names: list[str], height: float) -> tuple[np.nd
     return values[:, [group[0] for group in groups]], texts
 
 
-def name_at_the_end(ax: Axes, values: np.ndarray, names: list[str]) -> None:
-    """Write the numbers of cables beside the ends of their curves, whose last values are (k,)."""
+def name_at_the_end(ax: Axes, values: np.ndarray, names: list[str], about: str = "cable ") -> None:
+    """Write the names of curves beside their ends, whose last values are (k,), by default numbers of cables.
+
+    The highest also has the text `about` before it.
+    """
     low, high = ax.get_ylim()
     places = (np.clip(values, low, high) - low) / (high - low)
     order = np.argsort(places)
     gap = min(GAP, HIGHEST / max(len(order) - 1, 1))
     for cable, place in zip(order, _spread(places[order], gap), strict=True):
         ax.annotate(
-            f"cable {names[cable]}" if cable == order[-1] else names[cable],
+            f"{about}{names[cable]}" if cable == order[-1] else names[cable],
             (1.0, places[cable]),
             xytext=(1.05, place),
             xycoords="axes fraction",

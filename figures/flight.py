@@ -101,7 +101,7 @@ def errors(flights: xr.Dataset) -> Figure:
     canvas = style.figure(height=2.5)
     largest, tolerance = np.sort(flights["error_max"].values), float(flights.attrs["tolerance_m"])
     passed = flights["passed"].values[np.argsort(flights["error_max"].values, kind="stable")]
-    scale, unit = _scale(largest[-1])
+    scale, unit = scale_of(largest[-1])
     ax = style.axes(canvas, "share of the runs [%]", f"largest error [{unit}]")
     share = 100 * (np.arange(len(largest)) + 0.5) / len(largest)
     ax.plot(share, largest / scale, color="#999999", linewidth=0.8)
@@ -111,7 +111,7 @@ def errors(flights: xr.Dataset) -> Figure:
         ax.set_yscale("log")
     else:
         ax.set_ylim(bottom=0.0)
-    _draw_tolerance(ax, tolerance, largest[-1], scale)
+    draw_tolerance(ax, tolerance, largest[-1], scale)
     ax.set_xlim(0, 100)
     style.legend_below(canvas, ax)
     return canvas
@@ -131,16 +131,16 @@ def _mark_events(panels: list[Axes], trajectory: xr.Dataset) -> None:
 def _draw_error(ax: Axes, trajectory: xr.Dataset) -> None:
     error = trajectory["tracking_error"].values
     largest = float(error.max(initial=0.0, where=np.isfinite(error)))
-    scale, unit = _scale(largest)
+    scale, unit = scale_of(largest)
     ax.plot(trajectory["time"].values, error / scale, **style.look(0))
     ax.set_ylabel(f"error [{unit}]")
     ax.set_ylim(bottom=0.0)
-    _draw_tolerance(ax, float(trajectory.attrs["tolerance_m"]), largest, scale)
+    draw_tolerance(ax, float(trajectory.attrs["tolerance_m"]), largest, scale)
 
 
-def _draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) -> None:
+def draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) -> None:
     """Draw the tolerance if it is near, else name it."""
-    own, unit = _scale(tolerance)
+    own, unit = scale_of(tolerance)
     text = f"tolerance {tolerance / own:g} {unit}"
     if tolerance < 2 * largest:
         style.limit_line(ax, tolerance / scale, text, place=0.01)
@@ -151,7 +151,7 @@ def _draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) ->
 
 def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
     offsets = _offsets(trajectory)
-    scale, unit = _scale(float(offsets.max()))
+    scale, unit = scale_of(float(offsets.max()))
     ax.set_ylabel(f"offset of\ncarriers [{unit}]")
     names = trajectory["carrier"].values[trajectory["carrier_moves"].values]
     _draw_named(ax, trajectory, names, offsets / scale)
@@ -200,7 +200,7 @@ def _end(time: np.ndarray) -> float:
     return float(time[-1] + (time[-1] - time[-2] if len(time) > 1 else 1e-3))
 
 
-def _scale(largest: float) -> tuple[float, str]:
+def scale_of(largest: float) -> tuple[float, str]:
     """Return the unit in which the largest of some lengths reads best, with its size [m]."""
     return next(((size, unit) for least, size, unit in SCALES if largest >= least), SCALES[-1][1:])
 

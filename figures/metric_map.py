@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CELLS = 32  # along each axis, at most
-IN_A_CELL = 4  # samples that a cell should have
+IN_A_CELL = 8  # samples that a cell should have: of half as many, some cells have none
 LAYERS = 3  # of a volume, along z
 LEVELS = 8
 SHARE = 2.0  # [%] of the values below the lowest level, and above the highest one
@@ -101,7 +101,9 @@ def _levels(values: np.ndarray) -> np.ndarray:
     from matplotlib.ticker import MaxNLocator
 
     low, high = np.percentile(values, (SHARE, 100 - SHARE)) if len(values) else (0.0, 1.0)
-    return np.array(MaxNLocator(LEVELS).tick_values(low, high if high > low else low + max(abs(low), 1.0) * 1e-6))
+    if style.one_value(low, high):
+        return low + 0.4 * style.ONE_VALUE * max(abs(low), style.TINY) * np.array([-1.0, 1.0])
+    return np.array(MaxNLocator(LEVELS).tick_values(low, high))
 
 
 def _ends(centres: np.ndarray) -> tuple[float, float]:

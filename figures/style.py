@@ -32,6 +32,7 @@ TEXT, NOTE = 8.0, 7.0  # sizes of letters [points]: labels of axes; numbers, leg
 BESIDE, LETTER = 36.0, 3.8  # points: labels and numbers beside axes; a letter of a title on average
 FORMATS = ("png", "pdf", "svg")
 DPI = 300
+ONE_VALUE, TINY = 1e-9, 1e-3  # values that differ by less, of the largest or of this, are the same
 
 
 def colour(index: int) -> str:
@@ -202,9 +203,18 @@ def legend_below(canvas: Figure, *panels: Axes, scale: float = 1.0) -> None:
         legend.remove()
 
 
+def one_value(low: float, high: float) -> bool:
+    """Return whether values between these are the same but for rounding."""
+    return high - low <= ONE_VALUE * max(abs(low), abs(high), TINY)
+
+
 def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes], label: str, **place: Any) -> Colorbar:
-    """Draw a colour bar beside panels, and return it."""
+    """Draw a colour bar beside panels, and return it; if all values are the same, it has one number."""
+    low, high = shades.norm.vmin, shades.norm.vmax  # a bar makes them different
     bar = canvas.colorbar(shades, ax=panels, **place)
+    if low is not None and high is not None and one_value(low, high):
+        middle = (low + high) / 2
+        bar.set_ticks([middle], labels=[f"{middle:.4g}"])
     bar.set_label(label, fontsize=NOTE)
     bar.ax.tick_params(labelsize=NOTE)
     return bar

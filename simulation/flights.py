@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import os
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,11 +24,12 @@ from ..plant import Plant
 from .data import TENSION_TOLERANCE
 from .experiment import Experiment
 from .flying import fly
-from .run_statistics import Extremes
+from .run_statistics import PARTS, Extremes
 
 if TYPE_CHECKING:
     import xarray as xr
 
+QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 DOUBT = 0.05  # probability that an interval does not have the true value
 ROUNDING = 1e-9  # of the duration
 FAILED = {"error": "position error", "tension": "tension", "slack": "slack", "diverged": "divergence"}
@@ -99,7 +101,21 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
             ("seed", "answer"), of["answered"], {"long_name": "number of control steps with each status"}
         ),
     }
-    coordinates = {"seed": Variable(("seed",), np.array(seeds)), "answer": Variable(("answer",), np.array(ANSWERS))}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of parts of the time that no run has reached
+        quantiles = np.nanquantile(of["over_time"].astype(float), QUANTILES, axis=0)
+    for k, (name, unit, about) in enumerate(
+        (("error", "m", "largest position error"), ("tension_min", "N", "smallest tension"),
+         ("tension_max", "N", "largest tension"))
+    ):  # fmt: skip
+        about = f"quantiles over the runs of the {about} in each part of the time"
+        variables[f"{name}_quantiles"] = over(("quantile", "time"), quantiles[..., k], unit, about)
+    coordinates = {
+        "seed": Variable(("seed",), np.array(seeds)),
+        "answer": Variable(("answer",), np.array(ANSWERS)),
+        "quantile": Variable(("quantile",), np.array(QUANTILES)),
+        "time": over(("time",), (np.arange(PARTS) + 0.5) / PARTS * periods * period, "s", "middle of the part"),
+    }
     attributes: dict[str, Any] = {"title": f"towline simulations of {robot.name}", "robot": to_yaml(robot)}
     attributes |= {"tolerance_m": tolerance, "duration_s": periods * period}
     if conditions.doubt:

@@ -10,13 +10,16 @@ from .record import Period
 
 # The statistics of a run: its number of periods, errors [m], tensions [N] of cables that are not cut, their excess over
 # t_max relative to the cable's range, the number of periods that begin with a slack cable whose t_min is above zero,
-# and the number of periods with each status.
+# the number of periods with each status, and of each part of the time the largest error [m], smallest tension and
+# largest tension [N]: nan in parts that it does not have.
+PARTS = 100  # of the time
 FIGURES = np.dtype(
     [
         ("lasted", "<i8"),
         *((name, "<f8") for name in ("error_rms", "error_max", "tension_min", "tension_max", "exceeded")),
         ("slack", "<i8"),
         ("answered", "<i8", (len(ANSWERS),)),
+        ("over_time", "<f4", (PARTS, 3)),
     ]
 )
 
@@ -33,6 +36,8 @@ class Extremes:
         self._rows = np.arange(flights)
         self._squares, self._largest = np.zeros(flights), np.zeros(flights)  # of the errors: sum, and largest
         self._slack, self._answers = np.zeros(flights, dtype=int), np.zeros((flights, len(ANSWERS)), dtype=int)
+        # Squared error, negative tension and tension, of which the largest count.
+        self._over_time = np.full((flights, PARTS, 3), np.nan, dtype="f4")
         self._least, self._most = np.full((flights, robot.m), np.inf), np.full((flights, robot.m), -np.inf)
 
     def take(self, period: Period) -> None:
@@ -53,6 +58,10 @@ class Extremes:
             whole, taut = whole & self._kept[rows], taut & self._kept[rows]
         self._least[rows] = np.minimum(self._least[rows], tensions, where=whole, out=self._least[rows])
         self._most[rows] = np.maximum(self._most[rows], tensions, where=whole, out=self._most[rows])
+        least = tensions.min(axis=1, where=whole, initial=np.inf)
+        most = tensions.max(axis=1, where=whole, initial=-np.inf)
+        part = period.number * PARTS // len(self._references)
+        self._over_time[rows, part] = np.fmax(self._over_time[rows, part], np.stack([square, -least, most], axis=1))
         if not tensions.min() > 0:
             self._slack[rows] += ((tensions <= 0) & taut).any(axis=1)
         answered = np.atleast_1d(command.answered)[rows]
@@ -69,5 +78,17 @@ class Extremes:
         result["error_max"] = np.sqrt(self._largest)
         for name, each in (("tension_min", self._least.min(axis=1)), ("tension_max", self._most.max(axis=1))):
             result[name] = np.where(np.isinf(each), 0.0, each)
+        # Of fewer periods than parts, some have none and keep the values before.
+        last = np.arange(PARTS) if len(self._references) >= PARTS else _filled(len(self._references))
+        over_time = self._over_time[:, last]
+        over_time[..., 0], over_time[..., 1] = np.sqrt(over_time[..., 0]), -over_time[..., 1]
+        result["over_time"] = np.where(np.isinf(over_time), np.nan, over_time)
         result["exceeded"] = np.maximum(((self._most - self._t_max) / self._range).max(axis=1), 0.0)
         return result
+
+
+def _filled(periods: int) -> np.ndarray:
+    """Return, for each part of the time, the last part that has one of so few periods, (PARTS,)."""
+    own = np.zeros(PARTS, dtype=int)
+    own[np.arange(periods) * PARTS // periods] = np.arange(periods) * PARTS // periods
+    return np.maximum.accumulate(own)

@@ -158,6 +158,7 @@ def _header(plant: Plant, controller: Controller, conditions: Experiment, seeds:
         "wind": wind,
         "seeds": f"{seeds.start} to {seeds.stop - 1}",
         **conditions.to_dict(),
+        "statistics": f"{FIGURES.itemsize} bytes a run",
         "towline": __version__,
         "numpy": np.__version__,
     }

@@ -13,6 +13,7 @@ from towline.figures import calibration, flight, limits, phase_plane, plan, robo
 from towline.figures.convergence import convergence
 from towline.figures.curve_in_space import curve_in_space
 from towline.figures.curves import Panel, curves
+from towline.figures.envelopes import envelopes
 from towline.figures.metric_map import metric_map
 from towline.figures.scene import Scene
 from towline.figures.views import views
@@ -138,6 +139,18 @@ def flown(cables: int = 6, wind: bool = True) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, {"tolerance_m": 0.05})
 
 
+def enveloped():
+    """Return quantiles of many flights, of which none reached the last second."""
+    time, shares = np.linspace(0.05, 4.95, 50), np.array([0.0, 0.05, 0.5, 0.95, 1.0])
+    wave = np.where(time < 4, 1 + np.sin(time), np.nan)
+    spread = {"error": (0.01, 0.01), "tension_min": (2.0, 1.0), "tension_max": (20.0, 30.0)}
+    quantiles = {
+        f"{name}_quantiles": (("quantile", "time"), low * wave + width * shares[:, None])
+        for name, (low, width) in spread.items()
+    }
+    return xr.Dataset(quantiles, {"time": time, "quantile": shares}, {"tolerance_m": 0.05, "duration_s": 5.0})
+
+
 def flights() -> xr.Dataset:
     """Return errors of many flights, some of which failed."""
     errors = np.geomspace(0.004, 0.06, 40)
@@ -254,6 +267,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "flight-tensions": lambda: flight.tensions(flown()),
     "flight-tensions-8": lambda: flight.tensions(flown(cables=8, wind=False)),
     "errors": lambda: flight.errors(flights()),
+    "envelopes": lambda: envelopes(enveloped()),
     "residuals": lambda: residuals(8, np.arange(400) / 100),
     "residuals-3": lambda: residuals(3),
     "anchors-3": lambda: corrected(3),

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 
@@ -11,6 +12,7 @@ from towline import InputError
 from towline.figures import limits, style, sweep
 from towline.figures.curves import Panel, curves
 from towline.figures.end_labels import together
+from towline.figures.metric_map import metric_map
 
 from .figure_cases import FIGURES
 from .legible import COLUMN_MM, LEAST_STEP, check_grey, check_size, check_texts, lightness, renderer_of
@@ -178,3 +180,25 @@ def test_units_are_typeset():
     assert style.typeset("acceleration [m/s^2, rad/s^2], jerk [m/s^3]") == "acceleration [m/s², rad/s²], jerk [m/s³]"
     names = [text.get_text() for text in FIGURES["limits"]().legends[0].get_texts()]
     assert any(name.startswith("carrier acceleration (at most 1.2 m/s²): ") for name in names)
+
+
+@pytest.mark.parametrize("value", [0.0, 5.0, -3.0, 1e-7])
+def test_a_map_of_one_value_says_only_that(value):
+    """Also where rounding makes the values differ a little, and in a sweep."""
+    rng = np.random.default_rng(0)
+    position = np.c_[rng.uniform(-1, 1, (2000, 2)), np.zeros(2000)]
+    margin = ("sample", value * (1 + 1e-13 * rng.random(2000)), {"units": "N"})
+    centres = np.linspace(-0.9, 0.9, 10)
+    result = xr.Dataset(
+        {"position": (("sample", "axis"), position), "margin": margin}, {"x": centres, "y": centres, "z": [0.0]}
+    )
+    values = np.full((3, 2), value)
+    axes = [sweep.Axis("a", [1.0, 2.0, 3.0]), sweep.Axis("b", [1.0, 2.0])]
+    for figure in (
+        metric_map(result, ["margin"]),
+        sweep.sweep(axes, np.full((3, 2), "feasible"), {"margin [N]": values}),
+    ):
+        figure.canvas.draw()
+        bar = figure.axes[-1]
+        texts = [text.get_text() for text in (*bar.get_xticklabels(), *bar.get_yticklabels()) if text.get_text()]
+        assert [float(text.replace("\N{MINUS SIGN}", "-")) for text in texts] == [value]

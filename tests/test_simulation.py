@@ -102,6 +102,13 @@ def test_the_same_seed_is_the_same_file_and_another_one_is_not(tmp_path, crane):
 def test_a_flight_of_many_is_the_flight_alone():
     task = {"wind": (4, 2, 0.5), "gusts": 1.0, "noise": NOISE, "duration": 1.0, "tolerance": 0.02}
     many = simulate("wang-flying", load("wang-flying").home, runs=3, seed=7, **task)
+    singles = [simulate("wang-flying", load("wang-flying").home, seed=seed, **task).trajectory for seed in (7, 8, 9)]
+    parts = np.arange(singles[0].sizes["time"]) * 100 // singles[0].sizes["time"]
+    for name, of, by in (("error", "tracking_error", np.max), ("tension_min", "tensions", np.min),
+                         ("tension_max", "tensions", np.max)):  # fmt: skip
+        last = [np.array([by(one[of].values[parts == part]) for part in sorted(set(parts))]) for one in singles]
+        found = many[f"{name}_quantiles"].values[:, sorted(set(parts))]
+        np.testing.assert_allclose(found, np.quantile(last, many["quantile"].values, axis=0), rtol=1e-6)
     alone = simulate("wang-flying", load("wang-flying").home, seed=9, **task)
     assert many["error_max"].values[2] == alone.error.max()
     assert many["tension_max"].values[2] == alone.record.tensions.max()
