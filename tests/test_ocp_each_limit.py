@@ -84,8 +84,9 @@ def from_box(points, low, high):
 
 
 def from_line(points, start, end):
-    share = np.clip((points - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
-    return np.linalg.norm(points - start - share[..., None] * (end - start), axis=-1)
+    line = end - start
+    share = np.clip(((points - start) * line).sum(axis=-1) / (line**2).sum(axis=-1), 0, 1)
+    return np.linalg.norm(points - start - share[..., None] * line, axis=-1)
 
 
 def cables_apart(found):
@@ -96,8 +97,7 @@ def cables_apart(found):
     for i, j in combinations(range(robot.m), 2):
         a, b = robot.cables[i], robot.cables[j]
         if a.attachment != b.attachment and (a.carrier, a.anchor) != (b.carrier, b.anchor):
-            apart = np.linalg.norm(points[:, i, :, None] - points[:, j, None], axis=-1)
-            nearest.append(apart.min(axis=(1, 2)))
+            nearest.append(from_line(points[:, i], attachments[:, j, None], anchors[:, j, None]).min(axis=1))
     return np.array(nearest)
 
 
