@@ -73,7 +73,9 @@ def random_shape(rng, size, kind, at=(0.0, 0.0, 0.0)):
 
 
 def placed(pose, points):
-    return Rotation.from_euler("xyz", pose[3:]).apply(points) + pose[:3]
+    """Return points (k, 3) of a frame at poses (..., 6) in {G}, (..., k, 3)."""
+    R = Rotation.from_euler("xyz", np.atleast_2d(pose)[:, 3:]).as_matrix().reshape(*np.shape(pose)[:-1], 3, 3)
+    return points @ R.swapaxes(-1, -2) + pose[..., None, :3]
 
 
 def between_hulls(first, second):
@@ -102,11 +104,11 @@ class Scene:
         self.path = {"kind": "line", "start": ends[0].tolist(), "end": ends[1].tolist()}
         self.duration = rng.uniform(0.1, 0.2) if fast else rng.uniform(1.0, 3.0)
         middle = Planner(with_body(self.body), self.task([])).scenario.path
-        self.at = lambda time: middle.at(np.array([time]), self.duration).pose[0]
+        self.at = lambda times: middle.at(np.atleast_1d(times), self.duration).pose.reshape(*np.shape(times), 6)
         about = self.at(self.duration * rng.uniform(0.2, 0.8))
         beside = rng.normal(size=3)
         beside *= size * rng.uniform(0.2, 1.2) / np.linalg.norm(beside)
-        centre = placed(about, self.corners.mean(axis=0)) + beside
+        centre = placed(about, self.corners).mean(axis=0) + beside
         self.place, self.others, its = random_shape(rng, rng.uniform(0.3, 1.0) * size, KINDS[(seed // 4) % 4], centre)
         self.radius += its
 
@@ -114,14 +116,13 @@ class Scene:
         limits = {"keep_out": [BARE | place for place in places]}
         return {"path": self.path, "duration": self.duration, "limits": limits}
 
-    def distance(self, time, shift=(0.0, 0.0, 0.0)):
-        pose = self.at(time)
-        return between_hulls(placed(pose, self.corners), self.others + np.array(shift))
+    def distance(self, time):
+        return between_hulls(placed(self.at(time), self.corners), self.others)
 
     def nearest(self, samples):
         """Return when the bodies are nearest, and their distance there, negative if they overlap at all."""
         times = np.linspace(0.0, self.duration, samples)
-        values = np.array([self.distance(time)[0] for time in times])
+        values = np.array([between_hulls(each, self.others)[0] for each in placed(self.at(times), self.corners)])
         best = (times[values.argmin()], values.min())
         for k in np.argsort(values)[:3]:
             ends = times[max(k - 1, 0)], times[min(k + 1, samples - 1)]
@@ -173,12 +174,13 @@ def test_the_tip_of_a_long_body_passes_between_instants():
     robot = with_body(body)
     pose = Planner(robot, task).scenario.path.at(np.array([100.5 / 200 * 0.15]), 0.15).pose
     for beyond, seen in ((0.0, True), (0.014, True), (0.016, False)):
-        tip = placed(pose[0], np.array([5 + beyond, 0, 0])).tolist()
+        tip = placed(pose[0], np.array([[5 + beyond, 0, 0]]))[0].tolist()
         ball = {"kind": "sphere", "centre": tip, "radius": 0.005, **BARE}
         audited = audit(Planner(robot, task | {"limits": {"keep_out": [ball]}}).scenario, None)
         # At no instant do they meet: the tip is 23 mm from the ball's centre at the nearest ones.
         poses = audited.motion.pose
-        apart = [between_hulls(placed(pose, np.array([[0, 0, 0], [5, 0, 0]])), np.array([tip]))[0] for pose in poses]
+        lines = placed(poses, np.array([[0, 0, 0], [5, 0, 0]]))
+        apart = [between_hulls(line, np.array([tip]))[0] for line in lines]
         assert min(apart) > 0.02
         assert any(excess.about == "platform's body outside place" for excess in audited.excess) == seen
 
@@ -205,7 +207,7 @@ def nearest(planned, corners, radius, others):
     """Return the least distance of a body and a place along a plan [m], by least squares."""
     times = np.linspace(0.0, planned.scenario.duration, 1500)
     poses = planned.scenario.motion(times, planned.deviation)[0].pose
-    return min(between_hulls(placed(pose, corners), others)[0] for pose in poses) - radius
+    return min(between_hulls(each, others)[0] for each in placed(poses, corners)) - radius
 
 
 def test_a_post_between_the_attachments_is_seen_and_avoided():
@@ -269,7 +271,7 @@ def test_a_body_of_a_load_counts_while_it_is_carried(x, feasible, tube):
     times = np.linspace(0.0, 5.0, 500)  # while it is carried
     poses = freely.scenario.motion(times, freely.deviation)[0].pose
     ends = np.array([pillar["start"], pillar["end"]])
-    assert min(between_hulls(placed(pose, corners), ends)[0] for pose in poses) - 0.2 >= -1e-6
+    assert min(between_hulls(each, ends)[0] for each in placed(poses, corners)) - 0.2 >= -1e-6
 
 
 @pytest.mark.parametrize("with_radius", [0.0, 0.05])
@@ -280,7 +282,7 @@ def test_floor_and_room_bound_the_lowest_and_outermost_places(with_radius):
     task = {"path": {"kind": "line", "start": ends[0], "end": ends[1]}, "duration": 3}
     scenario = Planner(with_body(body), task).scenario
     poses = scenario.motion(np.linspace(0, 3, 3001), None)[0].pose
-    corners = np.array([placed(pose, np.array(points)) for pose in poses])
+    corners = placed(poses, np.array(points))
     low, high = corners.min(axis=(0, 1)) - with_radius, corners.max(axis=(0, 1)) + with_radius
     for slack, exceeded in ((1e-5, False), (-1e-5, True)):
         room = {"min": (low - slack).tolist(), "max": (high + slack).tolist()}
@@ -291,7 +293,7 @@ def test_floor_and_room_bound_the_lowest_and_outermost_places(with_radius):
             assert "platform's body is 10 um beyond the floor at t = 3.000 s" in found
             assert any(text.startswith("platform's body is 10 um beyond the largest x of the room") for text in found)
     # Without a body its centre of mass and its attachments count.
-    lowest = min(placed(pose, scenario.robot.attachments)[:, 2].min() for pose in poses)
+    lowest = placed(poses, scenario.robot.attachments)[..., 2].min()
     data = load("cogiro").model_dump()
     for slack, count in ((1e-5, 0), (-1e-5, 1)):
         robot = Robot.model_validate(data | {"floor": lowest - slack})

@@ -462,16 +462,14 @@ def test_the_weakest_winches_are_those_of_a_bisection(name, margin):
     kept = np.flatnonzero(robot.dof_mask)
     w = Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))[kept]
     scale = np.repeat([1.0, 1.0 / robot.length], 3)[kept]
+    matrices = Dynamics(robot).wrench_matrix(poses)[:, kept] * scale[:, None]
 
     def least(t_max):
-        problems = (
-            TensionProblem(A[kept] * scale[:, None], w * scale, robot.t_min, np.full(robot.m, t_max))
-            for A in Dynamics(robot).wrench_matrix(poses)
-        )
+        problems = (TensionProblem(A, w * scale, robot.t_min, np.full(robot.m, t_max)) for A in matrices)
         return min(capacity_margin(problem).value for problem in problems)
 
     low, high = robot.t_min.max(), 20_000.0
-    for _ in range(50):
+    while high - low > 1e-7:
         middle = (low + high) / 2
         low, high = (low, middle) if least(middle) >= margin else (middle, high)
     (t_max,) = set(found.robot.t_max)

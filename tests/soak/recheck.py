@@ -127,8 +127,8 @@ class _Motion:
 
     def anchors(self, times: np.ndarray) -> np.ndarray:
         """Return the anchors in {G}, (n, m, 3)."""
-        pose = next(self.carriers(times))[:, self.robot.carrier_of_cable]
-        return pose[..., :3] + np.einsum("nmij,mj->nmi", rotation(pose[..., 3:]), self.robot.anchors)
+        pose, owner = next(self.carriers(times)), self.robot.carrier_of_cable
+        return pose[:, owner, :3] + np.einsum("nmij,mj->nmi", rotation(pose[..., 3:])[:, owner], self.robot.anchors)
 
     def cables(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return both ends of all cables."""
