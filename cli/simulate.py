@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -219,9 +219,11 @@ def simulate(
         outputs["--figures"] = figures and figures / f"{figure}.{form}"
         check_outputs(outputs, {"the plan": plan, "--noise": noise, "--mismatch": mismatch})
         kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop, FaultTolerant)
-        pilot = dict(zip(CONTROLLERS, kinds, strict=True))[controller](loaded)
-        air = None if wind is None else numbers("--wind", wind, 3)
         sensors = None if noise is None else read_yaml(noise, Noise)
+        kind = dict(zip(CONTROLLERS, kinds, strict=True))[controller]
+        known: dict[str, Any] = {} if kind in (LengthControl, OpenLoop) else {"sensors": sensors}
+        pilot = kind(loaded, **known)
+        air = None if wind is None else numbers("--wind", wind, 3)
         differs = None if mismatch is None else read_yaml(mismatch, Mismatch)
         conditions = Conditions(
             air, gusts, sensors, events=event or (), duration=duration, tolerance=tolerance, mismatch=differs

@@ -1,7 +1,7 @@
 """`ComputedTorque`: desired acceleration, the wrench required for it, and the tensions that produce this wrench."""
 
 import os
-from math import ceil
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,19 +9,21 @@ from typing_extensions import override
 
 from ..base.errors import InputError
 from ..base.inputs import number, required, shown
-from ..core import control_move_on, control_step, control_take, control_thrusts
+from ..core import control_step, control_take, control_thrusts
 from ..models.files import as_robot
 from ..models.record import record_of
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
 from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
+from .bandwidths import HELD, SWINGING, bandwidths_for
 from .boxes import boxes, stay_inside
 from .command import HOLD, NOTHING, NOWHERE, PLANNED, SOFT, Command
-from .command_delay import Pending
 from .controllability import uncontrolled
 from .controller import Controller
-from .lag import RotorLead
+from .lag import WINCHES_KEEP, Lead, rotor_lead
+from .late_states import LateStates
+from .noise import Noise
 from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
 from .reference import Reference
@@ -30,8 +32,6 @@ from .state import State
 from .tension_loop import TensionLoop
 
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
-SHORTEST_LAG = 0.005  # [s]
-OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; of the time since a state was measured
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
 
@@ -56,13 +56,14 @@ class ComputedTorque(Controller):
         A `Robot`, the name of one in the library, or the path of a robot file.
     bandwidth
         Bandwidth w of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = w^2. Default:
-        10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers.
+        10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers; see `sensors`.
     damping
         Damping ratio z: Kd = 2 z w.
     integral
         Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
     observer
         Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no estimates.
+        Default: 10; see `sensors`.
     rate
         Largest rate of change of tensions [N/s], a number or one for each cable (default: no limit).
     reach
@@ -71,9 +72,9 @@ class ComputedTorque(Controller):
     carrier_bandwidth, carrier_acceleration
         Bandwidth of this motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
-        Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`. If carriers turn so
-        late that the attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the inverse of
-        this lag.
+        Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`. Default of `attitude`:
+        40, or the inverse of the known lag of rotors and sensors. If carriers turn so late that the attitude loop would
+        be unstable (core/control/turning.c), it is lowered to the inverse of this lag.
     patience
         Time for which the sensor of a cable may report no tension, although one is commanded, until the cable is
         treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again once
@@ -82,16 +83,17 @@ class ComputedTorque(Controller):
         Bandwidth of a loop on measured tensions [rad/s], for winches that do not deliver the commanded tensions: the
         command is corrected until the sensors report the desired tensions, inside the limits of tensions and rates.
         With 0 only the observer compensates, in a third of a second; with 20 it takes a tenth of a second.
-    tension_lag
-        Time constant with which winches follow a command [s], at least 5 ms: the loop compares measurements with the
-        desired tensions of that time.
-    rotor_lag
-        Known time constant with which actuators of flying carriers follow commands [s], of which 15 ms are left.
+    tension_lag, rotor_lag
+        Known time constants with which winches and actuators of flying carriers follow commands [s]. Commands lead by
+        them, within limits and rates, until 5 ms of the first and 15 ms of the second are left.
+    sensors
+        Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The bandwidths that are
+        not given are then the largest that they permit (control/bandwidths.py), at most twice the defaults above.
 
     Raises
     ------
     InputError
-        If an argument has a wrong value.
+        If an argument has a wrong value, or the robot would be lost with these sensors.
     """
 
     batches = True
@@ -102,38 +104,50 @@ class ComputedTorque(Controller):
         bandwidth: Any = None,
         damping: Any = 1.0,
         integral: Any = 0.0,
-        observer: float = 10.0,
+        observer: float | None = None,
         rate: Any = None,
         reach: tuple[float, float] | None = None,
         carrier_bandwidth: float = 6.0,
         carrier_acceleration: float = 5.0,
         place: float = 5.0,
-        attitude: float = 40.0,
+        attitude: float | None = None,
         patience: float = 0.05,
         tension_loop: float = 0.0,
         tension_lag: float = 0.005,
         rotor_lag: float = 0.0,
+        sensors: Noise | Mapping[str, Any] | None = None,
     ):
         self.robot, self._alone = as_robot(robot), OneAtATime()
         few = self._few = self.robot.m < len(self.robot.platform.dof)
         self._scale = self.robot.wrench_scale
         self._limits = limits_of(self.robot, rate)
-        if bandwidth is None:
-            bandwidth = 1.5 if few else 10.0
-        gains = bandwidth, damping, integral, observer, carrier_bandwidth, carrier_acceleration, place, patience
+        rotors, usual = number("rotor_lag", rotor_lag, 0.0, 0.1), SWINGING if few else HELD
+        loops = bandwidths_for(self.robot, usual, sensors, rotors, bandwidth, observer, attitude)
+        gains = (
+            loops.bandwidth,
+            damping,
+            integral,
+            loops.observer,
+            carrier_bandwidth,
+            carrier_acceleration,
+            place,
+            patience,
+        )
         self._settings = settings_of(self.robot, self._limits, *gains)
         far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
-        self._settings["attitude"] = self._attitude = number("attitude", attitude, 0.1, 1e3)
-        loop = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1e3)
-        self._loop = TensionLoop(loop[0], max(loop[1], SHORTEST_LAG), *self._limits) if loop[0] else None
+        self._settings["attitude"] = self._attitude = loops.attitude
+        loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
+        has_lead = lag > WINCHES_KEEP and self.robot.fixed_lengths is None
+        self._ahead = Lead(lag, WINCHES_KEEP, *self._limits) if has_lead else None
+        self._loop = TensionLoop(loop, 0.0 if has_lead else WINCHES_KEEP, *self._limits) if loop else None
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None
         self._robot = record_of(self.robot)
         self._flies = bool(self._settings["by_wrench"].any())
         self._moves_carriers = self._flies or bool(far.any())
-        self._lead = RotorLead(self.robot, lag) if (lag := number("rotor_lag", rotor_lag, 0.0, 0.1)) else None
-        self._is_plain = not self._moves_carriers and self._loop is None
+        self._lead = rotor_lead(self.robot, rotors) if rotors else None
+        self._is_plain = not self._moves_carriers and self._loop is None and self._ahead is None
         self._negligible = NEGLIGIBLE * self.robot.force_scale
         self._begin(1)
 
@@ -174,9 +188,7 @@ class ComputedTorque(Controller):
         """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
-        self._first: float | None = None  # time of the first step
-        self._seen, self._commanded = 0.0, Pending(2 * OLDEST)
-        self._commanded.reset(rows * m)
+        self._seen, self._sent_lately = 0.0, LateStates(self._robot, rows * m)
         self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
         self._last = bytes(8 * rows * m)  # tensions that were commanded last
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
@@ -191,10 +203,9 @@ class ComputedTorque(Controller):
         memory = self._cables, self._platform, self._of_carriers
         self._inputs = self._robot, self._measured, self._cables, self._wanted, orders, problems.t_ref
         self._arrays = self._measured, self._wanted, orders, *memory, problems.memory
-        if self._loop is not None:
-            self._loop.reset()
-        if self._lead is not None:
-            self._lead.reset()
+        for part in (self._loop, self._ahead, self._lead):
+            if part is not None:
+                part.reset()
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
         self._paused = False  # whether the integral of a row does
         self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
@@ -262,6 +273,9 @@ class ComputedTorque(Controller):
         seen = time if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
         own = self._robot, self._settings
+        if self._ahead is not None:
+            self._ahead.pass_time(dt, self._cables["last"])
+            self._last = self._cables["last"].tobytes()
         if time - seen <= ROUNDING and since == dt:
             fixed = dt, since, self._problems.length, solves
             try:
@@ -269,50 +283,19 @@ class ComputedTorque(Controller):
             except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
                 state, reference = self._as_floats(state, reference)
                 done = control_step(*fixed, state, reference, *own, None, *self._arrays)
-            self._remember(time, dt)
+            self._sent_lately.remember(self._last, dt)
         else:
             state, reference = self._take(state, reference)
-            self._remember(time, dt)
-            late = self._move_on(time - seen, since, dt)
+            cables, age = self._cables, time - seen
+            otherwise = cables["known"] - cables["then"]
+            self._sent_lately.remember(self._last, dt)
+            self._sent_lately.commanded(cables, age, since, dt, self._senses)
+            memory = otherwise, self._platform["disturbance"], self._accelerations
+            late = self._sent_lately.move_on(age, self._measured, *memory)
             done = control_step(dt, since, self._problems.length, solves, None, None, *own, late, *self._arrays)
         self._has_cut, self._optimal = done[0] > 0, done[1]
-        self._first = time if self._time is None else self._first
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
-
-    def _remember(self, time: float, dt: float) -> None:
-        """Add the command that has acted since the last step to those that states may be too old to show."""
-        last = self._last
-        if dt > 0 and self._time == self._first:  # whose command is taken for that of the time before
-            self._commanded.add(last)
-            self._commanded.wait(OLDEST)
-        self._commanded.add(last)
-        self._commanded.wait(dt)
-
-    def _move_on(self, age: float, since: float, dt: float) -> np.ndarray | None:
-        """Predict the current state from one that is `age` old [s]; return the measured state if it is late.
-
-        The observers use the measured state. With a predicted state they would correct their own prediction and be
-        unstable for delays beyond the inverse of their bandwidth.
-        """
-        cables, measured = self._cables, self._measured
-        otherwise = cables["known"] - cables["then"]
-        if dt > 0:
-            window = since if since > 0 else dt
-            cables["then"] = self._commanded.means(age + window, 1, window).reshape(cables.shape)
-        if not self._senses:
-            cables["measured"] = cables["then"]
-        if age <= ROUNDING:
-            return None
-        late = measured.copy()
-        if age > OLDEST:
-            measured[:] = np.nan
-        else:
-            parts = ceil(age / PART)
-            tensions = self._commanded.means(age, parts, age / parts).reshape(parts, *otherwise.shape) + otherwise
-            given = self._platform["disturbance"].copy(), np.maximum(tensions, 0.0), np.frombuffer(self._accelerations)
-            control_move_on(age / parts, self._robot, *given, measured)
-        return late
 
     def _command(
         self,
@@ -362,6 +345,8 @@ class ComputedTorque(Controller):
 
     def _sent(self, wanted: np.ndarray) -> np.ndarray:
         """Return the commands to the winches that produce the desired tensions, (N, m) [N]."""
+        if self._ahead is not None:
+            wanted = self._ahead.sent(wanted, self._elapsed)
         if self._loop is None:
             return wanted
         reports = self._cables["measured"] if self._senses else None
@@ -398,3 +383,13 @@ class ComputedTorque(Controller):
             target = np.where(np.isfinite(reference), reference, last)
             problems.tensions[row] = np.clip(target, *problems.bounds[:, row])
         return answered
+
+
+def agree(controller: ComputedTorque, sender: ComputedTorque) -> None:
+    """Let a controller take over the command that another one of the same robot has sent, as if it were its own."""
+    controller._cables["last"], controller._actuation[:] = sender._cables["last"], sender._actuation
+    controller._last, controller._accelerations = sender._last, sender._accelerations
+    controller._platform["attitude"] = sender._platform["attitude"]
+    controller._of_carriers["ordered"] = sender._of_carriers["ordered"]
+    if sender._lead is not None and controller._lead is not None:
+        controller._lead.agree(sender._lead)

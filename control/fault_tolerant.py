@@ -132,8 +132,7 @@ class FaultTolerant(Controller):
         if self._rest is None:
             command = self._team.step(time, state, reference)
             state, reference = self._as_floats(state, reference)
-            sender = self._team if self._team.handed_over is None else self._team._beside
-            unexplained = sender.disturbance_of_carriers[0] @ self._down
+            unexplained = self._team.disturbance_of_carriers[0] @ self._down
             if self.lost is not None or not (unexplained > NOTICED * self._weights).any():
                 return command
             self._lose(time, int(np.argmax(unexplained / self._weights)), state, reference)

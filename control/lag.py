@@ -1,4 +1,4 @@
-"""First-order lags: `Lag`, how drives follow commands, and `RotorLead`, commands that make up for a known one."""
+"""First-order lags: `Lag`, how drives follow commands, and `Lead`, commands that make up for a known one."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..models.robot import Robot
 
 SHORTEST = 1e-9  # [s], which divides
-LEFT = 0.015  # [s]: what a lead leaves of a lag
+WINCHES_KEEP, ROTORS_KEEP = 0.005, 0.015  # [s]: what leads leave of their lags
 
 
 class Lag:
@@ -31,44 +31,56 @@ class Lag:
         return command + missing * self._lag / dt * (1 - left)
 
 
-class RotorLead:
-    """Send actuators of flying carriers more than they should give, so that they follow a known lag earlier.
+class Lead:
+    """Send drives more than they should give, so that they follow a known lag earlier.
 
         u = y + (lag / left) (wanted - y)
 
-    with y, what the actuators give by now if their lag is as known.
+    with y, what the drives give by now if their lag is as known.
 
     Parameters
     ----------
-    robot
-        The robot.
     lag
-        Time constant of the actuators [s].
+        Time constant of the drives [s].
+    left
+        What is left of it [s]; a shorter lag stays as it is.
+    low, high
+        Limits of commands, which broadcast with them.
+    rate
+        Largest rate of change of commands, likewise.
     """
 
-    def __init__(self, robot: Robot, lag: float):
-        self._ratio, most = max(lag / LEFT, 1.0), max(len(carrier.actuators) for carrier in robot.carriers)
-        self._lag, self._limits = lag, np.zeros((2, len(robot.carriers), most))  # (2, c, a)
-        for index, carrier in enumerate(robot.carriers):
-            for number, each in enumerate(carrier.actuators):
-                self._limits[:, index, number] = each.low, each.high
+    def __init__(self, lag: float, left: float, low: np.ndarray, high: np.ndarray, rate: Any = np.inf):
+        self._ratio, self._lag, self._limits, self._rate = max(lag / left, 1.0), lag, (low, high), rate
         self.reset()
 
     def reset(self) -> None:
         """Forget all earlier steps."""
         self._given, self._sent = Lag(self._lag), np.zeros(0)
 
-    def pass_time(self, dt: float, actuation: np.ndarray) -> None:
-        """Write what the actuators gave on average since the last step, `dt` [s] ago, to `actuation`, (N, c, a)."""
+    def pass_time(self, dt: float, given: np.ndarray) -> None:
+        """Write what the drives gave on average since the last step, `dt` [s] ago, to `given`, (N, ...)."""
         if dt > 0 and self._given.value is not None:
-            actuation[:] = self._given.follow(self._sent, dt)
+            given[:] = self._given.follow(self._sent, dt)
 
-    def sent(self, wanted: np.ndarray) -> np.ndarray:
-        """Return the commands, (N, c, a), from what actuators should give."""
-        given = self._given.value = wanted.copy() if self._given.value is None else self._given.value
-        self._sent = np.clip(given + self._ratio * (wanted - given), *self._limits)
+    def sent(self, wanted: np.ndarray, dt: float = 0.0) -> np.ndarray:
+        """Return the commands, (N, ...), from what drives should give; `dt` [s] is the time since the last ones."""
+        if self._given.value is None:
+            self._given.value = self._sent = wanted.copy()
+        given, room = self._given.value, self._rate * dt if dt > 0 else np.inf
+        sent = np.clip(given + self._ratio * (wanted - given), self._sent - room, self._sent + room)
+        self._sent = np.clip(sent, *self._limits)
         return self._sent.copy()
 
-    def agree(self, other: "RotorLead") -> None:
+    def agree(self, other: "Lead") -> None:
         """Take over what another one has sent."""
         self._given.value, self._sent = other._given.value, other._sent
+
+
+def rotor_lead(robot: Robot, lag: float) -> Lead:
+    """Return the lead of the actuators of flying carriers, (N, c, a), for a known lag [s]."""
+    limits = np.zeros((2, len(robot.carriers), max(len(carrier.actuators) for carrier in robot.carriers)))
+    for index, carrier in enumerate(robot.carriers):
+        for number, each in enumerate(carrier.actuators):
+            limits[:, index, number] = each.low, each.high
+    return Lead(lag, ROTORS_KEEP, *limits)

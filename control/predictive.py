@@ -1,7 +1,7 @@
 """`Predictive`: model predictive control with limits of tensions and carriers."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 from warnings import warn
@@ -19,17 +19,19 @@ from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
 from .as_floats import as_floats
+from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for
 from .carrier_references import Flown, Freed, Moved, Tethered
 from .command import HOLD, OTHERWISE, SHIFTED, Command
-from .computed_torque import SOMETHING, ComputedTorque
+from .computed_torque import ComputedTorque, agree
 from .keep_out import Surroundings
+from .noise import Noise
 from .preview import Preview, turns
 from .reference import Reference
-from .settings import positive, reach_of, set_reach
+from .settings import reach_of, set_reach
 from .stability import grows
 from .state import State
 from .watch import LATE, UNSTABLE, HandOver, Watch
-from .weights import PATIENT, STILL, TEAM, TOWING, tensions_of, terminal, weights
+from .weights import ripple, terminal, weights
 
 TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
@@ -87,8 +89,8 @@ class Predictive(ComputedTorque):
         enforce tube and bodies wherever the tensions allow. The reference may pass through a body.
     observer
         Bandwidth of the estimates of disturbances [rad/s], 0: none. Default: 60, but 20 if carriers correct errors.
-    rate, place, attitude, patience, tension_loop, tension_lag, rotor_lag
-        See `ComputedTorque`.
+    rate, place, attitude, patience, tension_loop, tension_lag, rotor_lag, sensors
+        See `ComputedTorque`; defaults are not exceeded.
 
     Attributes
     ----------
@@ -117,11 +119,12 @@ class Predictive(ComputedTorque):
         keep_out: Sequence[Shape | dict[str, Any]] = (),
         observer: float | None = None,
         place: float = 5.0,
-        attitude: float = 40.0,
+        attitude: float | None = None,
         patience: float = 0.05,
         tension_loop: float = 0.0,
         tension_lag: float = 0.005,
         rotor_lag: float = 0.0,
+        sensors: Noise | Mapping[str, Any] | None = None,
     ):
         the_robot = as_robot(robot)
         correct = the_robot.fixed_lengths is not None or the_robot.m < len(the_robot.platform.dof)
@@ -135,19 +138,20 @@ class Predictive(ComputedTorque):
         far = far - reacts
         correcting = TOWING if the_robot.fixed_lengths is None else TEAM
         usual = correcting if correct else PATIENT if far.any() else STILL
-        self._bandwidth = positive("bandwidth", usual.bandwidth if bandwidth is None else bandwidth, 6)
+        rotors = number("rotor_lag", rotor_lag, 0.0, 0.1)
+        own = bandwidths_for(the_robot, usual, sensors, rotors, bandwidth, observer, attitude)
+        self._bandwidth = own.bandwidth
         carrier_bandwidth = usual.carrier_bandwidth if carrier_bandwidth is None else carrier_bandwidth
         returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
         count = whole_number("stages", stages, 1, 200)
         self._steps = np.full(count, number("stage", usual.stage if stage is None else stage, 1e-4, 10.0))
         self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
-        observer = usual.observer if observer is None else observer
-        loops: dict[str, Any] = {"rate": rate, "place": place, "attitude": attitude, "patience": patience}
+        loops: dict[str, Any] = {"rate": rate, "place": place, "attitude": own.attitude, "patience": patience}
         loops["rotor_lag"] = rotor_lag
-        self._beside = ComputedTorque(the_robot, reach=given, **loops)
+        self._beside = ComputedTorque(the_robot, reach=given, sensors=sensors, **loops)
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag}
-        super().__init__(the_robot, observer=observer, reach=reach, **loops)
+        super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
         set_reach(self._settings, reacts)
         self._followed = np.flatnonzero(flies & ~far.any(axis=1))
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
@@ -163,7 +167,8 @@ class Predictive(ComputedTorque):
         self._horizon = self._program(reaches, returning)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
         usual = self.robot.force_scale / self.robot.platform.mass
-        self._watch = Watch(scale, usual, None if correct else self._ripple())
+        rates = 2 * self._bandwidth + float(self._settings["observer"])
+        self._watch = Watch(scale, usual, None if correct else ripple(self.robot, self._limits, rates))
         self._from_the_start: HandOver | None = None
         self.reset()
         if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
@@ -210,16 +215,6 @@ class Predictive(ComputedTorque):
         control_stages(self._robot, self._moved.freed, self._moved.tethers, *about, A, B, c)
         return A[0], B[0]
 
-    def _ripple(self) -> np.ndarray | None:
-        """Return the tensions that unit rates require, relative to their distance from limits at home, (m, 6) [s/m]."""
-        low, high, _ = self._limits
-        best = tensions_at(self.robot, self.robot.home, method="largest-margin")
-        if best.tensions is None:
-            return None
-        room = np.minimum(best.tensions - low, high - best.tensions)
-        asked = tensions_of(self.robot) * (2 * self._bandwidth + float(self._settings["observer"]))
-        return asked / np.maximum(room, SOMETHING * high)[:, None]
-
     @override
     def _forget(self) -> None:
         super()._forget()
@@ -260,12 +255,14 @@ class Predictive(ComputedTorque):
         reference = as_floats(reference, self.robot, None)
         if self.handed_over is None:
             self._compare(time, dt, reference)
+        if self._ahead is not None:
+            agree(self._beside, self)  # what the winches have made of the last command
         self._beside._turning = None if self.handed_over is None else self._turning  # of the orders that are sent
         beside = self._beside.step(time, state, reference)
         unexplained = np.array(self._watch.unexplained)
         if self.handed_over is not None:
             answered = np.array(OTHERWISE if beside.answered != HOLD else HOLD, dtype=np.int8)
-            self._agree(self._beside, self)
+            agree(self, self._beside)
             tensions = self._sent(beside.tensions[None])[0]
             return beside._replace(tensions=tensions, answered=answered, unexplained=unexplained)
         tensions, proof = self._predict(time, dt, reference), self._nowhere
@@ -277,7 +274,7 @@ class Predictive(ComputedTorque):
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         command = self._command(reference, tensions, answered, proof, alone=True)
-        self._agree(self, self._beside)
+        agree(self._beside, self)
         if self._turning is not None and (lag := self._turning["lag"][0]):
             self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._attitude:.0f}")
         return command._replace(unexplained=unexplained)
@@ -298,15 +295,11 @@ class Predictive(ComputedTorque):
                 memory, (offset, rate) = self._beside._of_carriers[0], offsets
                 memory["offset"], memory["offset_rate"] = offset - dt * rate, rate  # this step adds the rest
 
-    @staticmethod
-    def _agree(sender: ComputedTorque, other: ComputedTorque) -> None:
-        """Tell another controller of the same robot the command that was sent, as if it were its own."""
-        other._cables["last"], other._actuation[:] = sender._cables["last"], sender._actuation
-        other._last, other._accelerations = sender._last, sender._accelerations
-        other._platform["attitude"] = sender._platform["attitude"]
-        other._of_carriers["ordered"] = sender._of_carriers["ordered"]
-        if sender._lead is not None and other._lead is not None:
-            other._lead.agree(sender._lead)
+    @property
+    @override
+    def disturbance_of_carriers(self) -> np.ndarray:
+        """Return the estimated disturbance force on each flying carrier, (1, c, 3) [N]."""
+        return (super() if self.handed_over is None else self._beside).disturbance_of_carriers
 
     @property
     @override

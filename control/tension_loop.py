@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from .lag import SHORTEST
+
 
 class TensionLoop:
     """Add the integral of the tension error to the desired tensions, for winches that deliver others.
@@ -15,7 +17,7 @@ class TensionLoop:
     bandwidth
         k [rad/s].
     lag
-        Time constant with which winches follow their commands [s].
+        Time constant with which winches follow their commands [s]; 0 if `before` is what they gave.
     lowest, highest, fastest
         Limits of commands, (m,) [N], and of their rates [N/s].
     """
@@ -49,7 +51,7 @@ class TensionLoop:
         if self._sent is None:
             self._late = self._sent = wanted.copy()
             self._more = np.zeros_like(wanted)
-        self._late = self._late + (1.0 - np.exp(-dt / self._lag)) * (before - self._late)
+        self._late = self._late + (1.0 - np.exp(-dt / max(self._lag, SHORTEST))) * (before - self._late)
         if measured is not None:
             lacking = np.where(np.isfinite(measured), self._late - measured, 0.0)
             self._more = self._more + min(self._bandwidth * dt, 1.0) * lacking

@@ -1,4 +1,4 @@
-"""Costs of a predictive controller: `Weights`, from bandwidths, and `terminal`, the cost after the last stage."""
+"""Costs of a predictive controller: `Weights`, from bandwidths, `terminal`, after the last stage; and `ripple`."""
 
 from typing import NamedTuple
 
@@ -6,23 +6,11 @@ import numpy as np
 
 from ..models.dynamics import dynamics_of
 from ..models.robot import Robot
-
-
-class Usual(NamedTuple):
-    """The defaults for one type of robot: bandwidths [rad/s], and the duration of a stage [s]."""
-
-    bandwidth: float
-    carrier_bandwidth: float
-    observer: float
-    stage: float
-
-
-# Carriers that correct errors, with cables of fixed length or with winches; those that may leave their reference, and
-# are slower than tensions; and those that stay.
-TEAM, TOWING = Usual(8.0, 6.0, 20.0, 0.025), Usual(6.0, 6.0, 20.0, 0.025)
-PATIENT, STILL = Usual(40.0, 2.0, 60.0, 0.03), Usual(40.0, 2.0, 60.0, 0.015)
+from ..statics.distribution import tensions
+from .settings import Limits
 
 SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much as a carrier at the end of its reach
+ROOM = 1e-3  # of its upper limit: what a tension is taken to be from limits
 SINGULAR = 1e-3  # of the largest singular value: directions with less are not controlled by tensions
 ROUNDS = 2000  # of the Riccati recursion
 SETTLED = 1e-9  # relative change at which it ends
@@ -74,10 +62,18 @@ def weights(
     return Weights(duration * states, duration * np.concatenate([np.ones(robot.m), far / carrier_bandwidth**4]))
 
 
-def tensions_of(robot: Robot) -> np.ndarray:
-    """Return the smallest tensions for unit accelerations of the pose at rest at home, (m, 6) [N]."""
+def ripple(robot: Robot, limits: Limits, bandwidth: np.ndarray) -> np.ndarray | None:
+    """Return the tensions that unit rates require, relative to their distance from limits at home, (m, 6) [s/m].
+
+    They accelerate the pose by `bandwidth`, (6,) [rad/s], times the rates. None if the robot cannot rest at home.
+    """
+    best = tensions(robot, robot.home, method="largest-margin").tensions
+    if best is None:
+        return None
     A, M = _at_home(robot)
-    return np.linalg.pinv(A, SINGULAR) @ (M * robot.dof_mask)
+    asked = np.linalg.pinv(A, SINGULAR) @ (M * robot.dof_mask) * bandwidth
+    room = np.minimum(best - limits.low, limits.high - best)
+    return asked / np.maximum(room, ROOM * limits.high)[:, None]
 
 
 def _at_home(robot: Robot) -> tuple[np.ndarray, np.ndarray]:

@@ -4,12 +4,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.execution import Execution
 from ..base.former_names import moved_name
+from ..control.noise import Noise
 from .conditions import Conditions
 from .events import Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
 from .log_replay import Replay, replay
 from .mismatch import Mismatch
 from .own_run import simulation_of
-from .sensors import Noise
 from .simulate import simulate
 from .simulation import Simulation
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..base.display import Displayed
 from ..base.inputs import finite_array, number, one_of, whole_number
+from ..control.noise import Noise
 from ..models.parsing import validate
 from ..plant.plant import DRIVES
 from .mismatch import Mismatch
-from .sensors import Noise
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import numpy as np
 
 from ..base.display import record
 from ..control import Reference
+from ..control.noise import Noise
 from .events import Cut, Event
 from .mismatch import Mismatch
-from .sensors import Noise
 
 Wind = Callable[[np.ndarray, int], np.ndarray]  # the wind at times (K,) [s] for a seed, (K, 3) [m/s]
 

@@ -7,6 +7,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.inputs import number, required, shown
 from ..control import Reference
+from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
 from ..core import sense
@@ -15,7 +16,6 @@ from ..plant.plant import History
 from .events import Cut
 from .experiment import Experiment
 from .record import Record
-from .sensors import Noise
 from .simulation import Simulation
 
 UNCONTROLLED = -1  # the status of steps without a controller

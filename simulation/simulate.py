@@ -16,6 +16,7 @@ from ..base.errors import InputError
 from ..base.execution import Execution, ExecutionOptions
 from ..base.inputs import required, shown, whole_number, with_fields
 from ..control import ComputedTorque, Controller, Reference
+from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
 from ..estimation.logs.opening import is_recording
@@ -35,7 +36,6 @@ from .log_replay import replay
 from .mismatch import Mismatch
 from .record import Record
 from .runs import fly_many
-from .sensors import Noise
 from .simulation import Simulation
 from .winds import read_wind
 
@@ -121,8 +121,8 @@ def simulate(
         a recording (CSV, MCAP, a bag, NetCDF without a plan), which `replay` repeats: then all other arguments are left
         out, and the result is a `Replay`.
     controller
-        Controller (default: `ComputedTorque(robot)`). A single run calls its `reset` and uses the object itself. Many
-        runs use copies, unless it accepts batches.
+        Controller (default: `ComputedTorque(robot, sensors=noise)`). A single run calls its `reset` and uses the object
+        itself. Many runs use copies, unless it accepts batches.
     wind, noise, events, duration
         As in `Conditions`.
     seed
@@ -175,7 +175,8 @@ def simulate(
     the_robot = as_robot(robot)
     if controller is not None and not isinstance(controller, Controller):
         raise InputError(f"controller must be a Controller, got {shown(controller)}")
-    pilot = ComputedTorque(the_robot) if controller is None else controller
+    known = None if meets.noise == Noise() else required("noise", meets.noise, Noise)
+    pilot = ComputedTorque(the_robot, sensors=known) if controller is None else controller
     meets = replace(meets, drive=meets.drive or pilot.drive or default_drive(the_robot))
     plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance

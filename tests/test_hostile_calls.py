@@ -375,6 +375,7 @@ VALID: dict[str, Callable[[], Any]] = {
     "tension_loop": lambda: 20.0,
     "tension_lag": lambda: 0.02,
     "rotor_lag": lambda: 0.02,
+    "sensors": lambda: {"velocity": 1e-3},
     "rate": lambda: None,
     "reach": lambda: (0.1, 0.1),
     "carrier_bandwidth": lambda: 5.0,

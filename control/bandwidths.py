@@ -1,0 +1,151 @@
+"""`bandwidths_for`: the default bandwidths of controllers, and what delays, lags and noise of sensors permit.
+
+A loop of bandwidth w with an observer of bandwidth K, whose state is T late without being predicted, and whose measured
+positions and velocities have the noise s_x and s_v, keeps
+
+    (w + K) T <= 1        w^2 s_x + (2 w + K) s_v <= 0.05 g        h (lag + T') <= 1
+
+with the bandwidth h of the attitude loops of flying carriers, whose drives lag. Two standard deviations of the tensions
+that noise of velocities requires are inside the limits at home. At about twice these bounds robots were lost in
+simulations with an independent plant.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.inputs import number
+from ..base.text import quantity
+from ..models.parsing import validate
+from ..models.robot import Robot
+from .lag import ROTORS_KEEP, WINCHES_KEEP
+from .noise import Noise
+from .settings import limits_of, positive
+from .watch import OFTEN
+from .weights import ripple
+
+NOISE = 0.05  # of gravity: acceleration by noise of the measured state
+LOST, UNSTABLE = 2.0, 1.5  # times the bounds: robots are lost
+LEAST = 0.1  # of the usual bandwidths: with less a robot does not follow
+READINGS = 1e3  # [1/s], without a rate
+GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
+ATTITUDE = 40.0  # [rad/s]
+
+
+class Usual(NamedTuple):
+    """The defaults for one type of robot: bandwidths [rad/s], and the duration of a stage [s]."""
+
+    bandwidth: float
+    observer: float
+    carrier_bandwidth: float
+    stage: float
+    most: float = 1.0  # times bandwidth and observer, if the sensors permit it
+
+
+# Of `ComputedTorque`: with fewer cables than degrees of freedom, whose loads swing, and with others.
+SWINGING, HELD = Usual(1.5, 10.0, 6.0, np.inf), Usual(10.0, 10.0, 6.0, np.inf, 2.0)
+# Of `Predictive`: carriers that correct errors, with cables of fixed length or with winches; those that may leave their
+# reference, and are slower than tensions; and those that stay.
+TEAM, TOWING = Usual(8.0, 20.0, 6.0, 0.025), Usual(6.0, 20.0, 6.0, 0.025)
+PATIENT, STILL = Usual(40.0, 60.0, 2.0, 0.03), Usual(40.0, 60.0, 2.0, 0.015)
+
+
+class Bandwidths(NamedTuple):
+    """Bandwidths [rad/s]: of the error, (6,), of the observers, and of the attitude loops of flying carriers."""
+
+    bandwidth: np.ndarray
+    observer: float
+    attitude: float
+
+
+def bandwidths_for(
+    robot: Robot,
+    usual: Usual,
+    sensors: Noise | Mapping[str, Any] | None,
+    rotor_lag: float,
+    bandwidth: Any = None,
+    observer: float | None = None,
+    attitude: float | None = None,
+) -> Bandwidths:
+    """Return the given bandwidths, and for those that are None the largest ones that the sensors permit.
+
+    Without `sensors` they are the usual ones.
+
+    Raises
+    ------
+    InputError
+        If an argument has a wrong value, or the robot would be lost with given bandwidths, or with a tenth of the usual
+        ones.
+    """
+    w = None if bandwidth is None else positive("bandwidth", bandwidth, 6)
+    K = None if observer is None else number("observer", observer, 0.0, 1e3)
+    h = None if attitude is None else number("attitude", attitude, 0.1, 1e3)
+    errors = None if sensors is None else _errors_of(_noise_of(sensors), robot)
+    flies = any(carrier.actuators for carrier in robot.carriers)
+    turning = (min(rotor_lag, ROTORS_KEEP) + (0.0 if errors is None else errors.age)) if flies else 0.0
+    if h is not None and h * turning > UNSTABLE:
+        raise InputError(
+            f"attitude must be at most {UNSTABLE / turning:.3g} rad/s if carriers turn {quantity(turning, 's')} late, "
+            f"got {h:g} rad/s"
+        )
+    h = h or (min(ATTITUDE, 1.0 / turning) if turning else ATTITUDE)
+    if errors is None:
+        return Bandwidths(np.full(6, usual.bandwidth) if w is None else w, usual.observer if K is None else K, h)
+    part, reason = errors.permit(usual.bandwidth, usual.observer)
+    if w is None and K is None and part < LEAST:
+        raise InputError(
+            f"sensors must permit {LEAST:g} of the bandwidths {usual.bandwidth:g} and {usual.observer:g} rad/s, got "
+            f"{reason}, which permits {part:.2g}"
+        )
+    part = min(part, usual.most)
+    given = np.full(6, part * usual.bandwidth) if w is None else w, part * usual.observer if K is None else K
+    part, reason = errors.permit(float(given[0].max()), given[1])
+    if LOST * part < 1.0:
+        raise InputError(
+            f"bandwidth and observer must be at most {LOST * part:.2g} of the given ones for {reason}, got "
+            f"{given[0].max():g} and {given[1]:g} rad/s"
+        )
+    return Bandwidths(*given, h)
+
+
+def _noise_of(sensors: Any) -> Noise:
+    return sensors if isinstance(sensors, Noise) else validate(sensors, Noise, "sensors")
+
+
+class _Errors(NamedTuple):
+    """Errors of sensors: ages [s], and standard deviations of positions [m] and velocities [m/s]."""
+
+    age: float  # of all states
+    late: float  # what of the age and of lags is not predicted
+    position: float
+    velocity: float
+    ripple: float  # two standard deviations of tensions by velocities, of their distance from limits [s]
+
+    def permit(self, bandwidth: float, observer: float) -> tuple[float, str]:
+        """Return by which factor both bandwidths may be multiplied, and what does not permit more."""
+        by_age = 1.0 / max((bandwidth + observer) * self.late, TINY)
+        a, b = bandwidth**2 * self.position, (2 * bandwidth + observer) * self.velocity
+        by_noise = 2 * NOISE * GRAVITY / max(b + np.sqrt(b * b + 4 * a * NOISE * GRAVITY), TINY)
+        by_noise = min(by_noise, 1.0 / max((2 * bandwidth + observer) * self.ripple, TINY))
+        if by_age < by_noise:
+            return by_age, f"a state that is {quantity(self.late, 's')} late"
+        return by_noise, f"noise of {quantity(self.position, 'm')} and {quantity(self.velocity, 'm/s')}"
+
+
+def _errors_of(noise: Noise, robot: Robot) -> _Errors:
+    """Return the errors of sensors; angles count by the robot's length."""
+    step, size = 1.0 / (noise.rate or READINGS), np.array([1.0, robot.length])
+    age = noise.delay + (step / 2 if noise.rate else 0.0)
+    late = 0.0 if noise.stamped else age
+    steps = np.array([noise.resolution, noise.attitude_resolution]) / np.sqrt(12)
+    position = np.hypot(np.array([noise.position, noise.attitude]), steps)
+    velocity = np.array([noise.velocity, noise.attitude_rate])
+    if noise.differenced:
+        late, velocity = late + step / 2, np.hypot(velocity, np.sqrt(2) * position / step)
+    late += WINCHES_KEEP if robot.fixed_lengths is None else 0.0
+    strict = robot.fixed_lengths is None and robot.m >= len(robot.platform.dof)
+    of_tensions = ripple(robot, limits_of(robot, None), np.repeat(velocity, 3)) if strict and velocity.any() else None
+    most = 0.0 if of_tensions is None else OFTEN * float(np.linalg.norm(of_tensions, axis=1).max())
+    return _Errors(age, late, float((size * position).max()), float((size * velocity).max()), most)

@@ -1,0 +1,81 @@
+"""`LateStates`: current states from older ones and the commands that were sent since."""
+
+from math import ceil
+
+import numpy as np
+
+from ..core import control_move_on
+from .as_floats import ROUNDING
+from .command_delay import Pending
+
+OLDEST, PART = 0.25, 2e-3  # [s]: an older state is none; of the time since a state was measured
+
+
+class LateStates:
+    """Predict the current states of N robots from their measured states and the commands that were sent since.
+
+    Observers use the measured states. With predicted ones they would correct their own prediction and be unstable for
+    delays beyond the inverse of their bandwidth.
+
+    Parameters
+    ----------
+    robot
+        Record of the robot.
+    count
+        Number of tensions of all robots, N m.
+    """
+
+    def __init__(self, robot: np.ndarray, count: int):
+        self._robot, self._commanded, self._begun = robot, Pending(2 * OLDEST), False
+        self._commanded.reset(count)
+
+    def remember(self, tensions: bytes, dt: float) -> None:
+        """Remember the tensions (N, m) of the last step, `dt` [s] ago."""
+        if dt > 0 and not self._begun:  # the first ones are taken for those of the time before
+            self._commanded.add(tensions)
+            self._commanded.wait(OLDEST)
+            self._begun = True
+        self._commanded.add(tensions)
+        self._commanded.wait(dt)
+
+    def commanded(self, cables: np.ndarray, age: float, since: float, dt: float, senses: bool) -> None:
+        """Write what was commanded when states were measured, `age` [s] ago, to records of cables (N, m).
+
+        `since` [s] is the time between the measurements of this step and of the last one, `dt` [s] that between the
+        steps. Sensors report the tensions of one period, while observers need their mean since the last measurement.
+        """
+        if dt > 0:
+            window = since if since > 0 else dt
+            cables["then"] = self._commanded.means(age + window, 1, window).reshape(cables.shape)
+            if window > dt:
+                cables["measured"] += cables["then"] - self._commanded.means(age + dt, 1, dt).reshape(cables.shape)
+        if not senses:
+            cables["measured"] = cables["then"]
+
+    def move_on(
+        self, age: float, motions: np.ndarray, otherwise: np.ndarray, disturbance: np.ndarray, accelerations: bytes
+    ) -> np.ndarray | None:
+        """Predict motions, (N, 1 + c, 12), over their `age` [s]; return them as measured if they are late.
+
+        Parameters
+        ----------
+        age, motions
+            Motions that are too old become nan.
+        otherwise
+            Differences of tensions from their commands, (N, m) [N].
+        disturbance
+            Estimated, (N, 6) [N, N m].
+        accelerations
+            Of carriers as commanded, (N, c, 6).
+        """
+        if age <= ROUNDING:
+            return None
+        late = motions.copy()
+        if age > OLDEST:
+            motions[:] = np.nan
+        else:
+            parts = ceil(age / PART)
+            tensions = self._commanded.means(age, parts, age / parts).reshape(parts, *otherwise.shape) + otherwise
+            given = disturbance.copy(), np.maximum(tensions, 0.0), np.frombuffer(accelerations)
+            control_move_on(age / parts, self._robot, *given, motions)
+        return late

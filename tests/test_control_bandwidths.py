@@ -1,0 +1,123 @@
+"""Default bandwidths by what sensors permit: against a loop of plain NumPy with delay and noise."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from towline import InputError, load, plan, simulate
+from towline.control import ComputedTorque, FaultTolerant, Predictive
+from towline.control.bandwidths import HELD, SWINGING, TEAM, bandwidths_for
+from towline.simulation import Noise
+
+from .warm import towline as run
+
+G = 9.81
+
+
+def grows(w, K, late, steps=6000, dt=1e-3):
+    """Return whether x'' = u + d diverges with u = -w^2 x - 2 w v - d_estimated of a state that is `late` [s]."""
+    n = max(1, round(late / dt))
+    states, x, v, explained, estimate = [(1.0, 0.0)] * n, 1.0, 0.0, 0.0, 0.0
+    largest = np.zeros(steps)
+    for k in range(steps):
+        late_x, late_v = states[0]
+        u = -(w**2) * late_x - 2 * w * late_v - estimate
+        explained += dt * (u + estimate)
+        v += dt * u
+        x += dt * v
+        states = [*states[1:], (x, v)]
+        estimate = K * (late_v - explained)
+        largest[k] = abs(x)
+    return bool(largest[-steps // 4 :].max() > largest[: steps // 4].max())
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.05, 0.1])
+def test_a_loop_with_the_permitted_bandwidths_is_stable_and_one_that_is_refused_is_not(delay):
+    robot = load("multi-quadrotor-3")  # without winches: nothing but the delay is late
+    w, K, _ = bandwidths_for(robot, TEAM, {"delay": delay}, 0.0)
+    assert w[0] / K == pytest.approx(TEAM.bandwidth / TEAM.observer)
+    assert not grows(w[0], K, delay)
+    assert grows(3 * w[0], 3 * K, delay)
+    with pytest.raises(InputError, match=r"bandwidth and observer must be at most .* of the given ones"):
+        bandwidths_for(robot, TEAM, {"delay": delay}, 0.0, 3 / (28 * delay) * 8, 3 / (28 * delay) * 20)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(1e-5, 1e-2), st.floats(1e-4, 0.3))
+def test_noise_accelerates_by_a_twentieth_of_gravity_at_most(position, velocity):
+    robot = load("multi-quadrotor-4")
+    sensors = {"position": position, "velocity": velocity}
+    if 0.01 * TEAM.bandwidth**2 * position + 0.1 * (2 * TEAM.bandwidth + TEAM.observer) * velocity > 0.05 * G:
+        with pytest.raises(InputError, match="noise of"):
+            bandwidths_for(robot, TEAM, sensors, 0.0)
+        return
+    w, K, _ = bandwidths_for(robot, TEAM, sensors, 0.0)
+    by_noise = w[0] ** 2 * position + (2 * w[0] + K) * velocity
+    assert by_noise <= 0.05 * G * (1 + 1e-9)
+    assert w[0] == TEAM.bandwidth or by_noise == pytest.approx(0.05 * G)
+
+
+def test_bandwidths_without_sensors_are_the_usual_ones_and_good_sensors_permit_more():
+    robot, few = load("cogiro"), load("wang-ctmrts-4")
+    for sensors, factor in ((None, 1.0), ({}, 2.0), (Noise(position=1e-5, velocity=1e-5), 2.0)):
+        w, K, attitude = bandwidths_for(robot, HELD, sensors, 0.0)
+        np.testing.assert_allclose(w, factor * HELD.bandwidth)
+        assert (K, attitude) == (factor * HELD.observer, 40.0)
+        np.testing.assert_allclose(bandwidths_for(few, SWINGING, sensors, 0.0)[0], SWINGING.bandwidth)
+
+
+def test_attitude_loops_are_as_fast_as_rotors_and_sensors_permit():
+    robot = load("multi-quadrotor-3")
+    assert bandwidths_for(robot, TEAM, None, 0.01).attitude == 40.0
+    assert bandwidths_for(robot, TEAM, {"delay": 0.02}, 0.02).attitude == pytest.approx(1 / 0.035)
+    assert bandwidths_for(robot, TEAM, {"delay": 0.02, "stamped": True}, 0.0).attitude == 40.0
+    with pytest.raises(InputError, match=r"attitude must be at most 30 rad/s if carriers turn 0.05 s late, got 40"):
+        ComputedTorque(robot, attitude=40.0, sensors={"delay": 0.035}, rotor_lag=0.06)
+
+
+@pytest.mark.parametrize("make", [ComputedTorque, Predictive, FaultTolerant])
+@pytest.mark.parametrize(
+    ("sensors", "message"),
+    [
+        ({"delay": 1.0}, "sensors must permit 0.1 of the bandwidths .* rad/s, got a state that is 1 s late"),
+        ({"velocity": 100.0}, "sensors must permit 0.1 of .* got noise of 0 m and 100 m/s"),
+        ({"delay": -1}, "sensors: delay must be"),
+        ({"dealy": 1}, "dealy"),
+        (7, "sensors"),
+        ("late", "sensors"),
+        ({"delay": float("nan")}, "delay"),
+    ],
+)
+def test_sensors_with_which_a_robot_would_be_lost_are_refused_in_one_line(make, sensors, message):
+    with pytest.raises(InputError, match=message) as error:
+        make("multi-quadrotor-4", sensors=sensors)
+    assert "\n" not in str(error.value)
+
+
+def test_differences_of_coarse_poses_leave_room_for_tensions():
+    """With default gains this noise needs more than the tensions have, which `Predictive` notices and gives up for."""
+    robot, coarse = load("wang-flying"), {"resolution": 2e-4, "attitude_resolution": 4e-4, "differenced": True}
+    coarse["rate"] = 100
+    conditions = {"duration": 0.3, "noise": coarse, "wind": (3, 2, 0.5), "gusts": 1.0}
+    usual, told = (Predictive(robot, sensors=sensors) for sensors in (None, coarse))
+    assert simulate(robot, robot.home, usual, **conditions).handed_over is not None
+    calm = simulate(robot, robot.home, told, **conditions)
+    assert calm.handed_over is None
+    assert calm.error.max() < 5e-3
+
+
+def test_the_command_line_gives_its_controllers_the_sensors(tmp_path):
+    path = {"kind": "line", "start": [-1, 0, 1.5], "end": [0.5, 0, 1.5]}
+    plan("cogiro", {"path": path, "duration": 2.0}).save(tmp_path / "line.nc")
+    noise = {"rate": 50, "delay": 0.03, "stamped": True}
+    (tmp_path / "late.yaml").write_text(json.dumps(noise))
+    printed = json.loads(run("simulate", "cogiro", "line.nc", "--noise", "late.yaml", "--json", cwd=tmp_path).stdout)
+    own = simulate("cogiro", tmp_path / "line.nc", ComputedTorque("cogiro", 20.0, observer=20.0), noise=noise)
+    assert printed["error_rms"] == own.to_dict()["error_rms"]
+    (tmp_path / "late.yaml").write_text("{delay: 2}")
+    refused = run("simulate", "cogiro", "line.nc", "--noise", "late.yaml", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "sensors must permit 0.1 of the bandwidths" in refused.stderr
