@@ -25,6 +25,9 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     the result is the stop with the smallest missing wrench, with its certificate. The time to compute it depends on
     how long the robot takes to stop, not on the plan.
 
+    Carriers that fly, each with one cable of fixed length, leave their path: each is where the force of its cable,
+    which changes as little as possible, points to (`statics.team_stops`).
+
     Parameters
     ----------
     plan
@@ -41,7 +44,8 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     Raises
     ------
     InputError
-        If an argument has a wrong type or value, or the robot has flying carriers, whose thrust no facet bounds.
+        If an argument has a wrong type or value, or the robot has flying carriers, but not each with one cable of fixed
+        length.
     """
     robot, trajectory = planned(plan)
     return stop_along(robot, trajectory, number("time", time, 0.0, 1e9))

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ..base.display import Displayed, Fact
-from ..base.errors import InputError
 from ..base.netcdf import Contents
 from ..base.text import quantity
 from ..models.dynamics import dynamics_of
@@ -28,6 +27,7 @@ from ..models.trajectory import Motion, Trajectory, moved_on
 from ..solvers import Certificate, certify, solve_batch
 from ..solvers.available_wrench import facets
 from .distribution import wrench_problem
+from .team_stops import TeamStop, team_stop_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -70,6 +70,8 @@ class Stop(Displayed):
         Length of the path of the platform until it rests [m].
     certificate
         Certificate of the instant with the largest shortfall; None if tensions inside their limits always exist.
+    limit
+        Of a team of flying carriers: the limit that the stop breaks most, its value and time; empty if it breaks none.
     """
 
     robot: Robot
@@ -81,6 +83,7 @@ class Stop(Displayed):
     tensions: np.ndarray
     distance: float
     certificate: Certificate | None
+    limit: str = ""
 
     @property
     def duration(self) -> float:
@@ -89,8 +92,8 @@ class Stop(Displayed):
 
     @property
     def feasible(self) -> bool:
-        """Return whether tensions inside their limits exist from the beginning to the end."""
-        return self.certificate is None
+        """Return whether tensions and carriers stay inside their limits from the beginning to the end."""
+        return self.certificate is None and not self.limit
 
     def to_dict(self) -> dict[str, Any]:
         """Return "begins", "ends" and "duration" [s], "distance" [m] and "feasible", for JSON."""
@@ -111,22 +114,20 @@ class Stop(Displayed):
     def _facts(self) -> list[Fact]:
         tensions = f"{quantity(self.tensions.min(), 'N')} to {quantity(self.tensions.max(), 'N')}"
         facts = [("begins", quantity(self.begins, "s")), ("path", quantity(self.distance, "m")), ("tensions", tensions)]
-        return facts if self.certificate is None else [*facts, ("limits", self.certificate.describe())]
+        broken = self.limit or (self.certificate and self.certificate.describe())
+        return [*facts, ("limits", broken)] if broken else facts
 
 
 def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
     """Stop as `control.stop` does, on a trajectory with a duration.
 
-    Raises `InputError` if the robot has flying carriers.
+    Raises `InputError` if the robot has flying carriers, but not each with one cable of fixed length.
     """
-    for carrier in robot.carriers:
-        if carrier.efforts:
-            raise InputError(
-                "a stop must be of a robot with carriers of kind ground, prescribed or mobile, got "
-                f"{robot.name!r} with {carrier.name!r} of kind {carrier.kind}"
-            )
     end = trajectory.duration or 0.0
-    trajectory, begins = _continued(trajectory, end), min(time, end)
+    begins = min(time, end)
+    if any(carrier.efforts for carrier in robot.carriers):
+        return _of_team(robot, team_stop_along(robot, _continued(trajectory, end), begins))
+    trajectory = _continued(trajectory, end)
     best: tuple[tuple[int, float], Stop] | None = None
     for reserve, goes_on in ATTEMPTS:
         law = _refined(_braking(_Limits(robot, trajectory, begins, reserve, goes_on)))
@@ -138,6 +139,13 @@ def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
         best = (rank, found) if best is None or rank < best[0] else best
     assert best is not None
     return best[1]
+
+
+def _of_team(robot: Robot, found: TeamStop) -> Stop:
+    times, tau, platform, carriers, tensions, _, limit = found
+    distance = float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum())
+    motions = times, platform, carriers, tensions
+    return Stop(robot, float(tau[0]), float(tau[-1]), *motions, distance, certificate=None, limit=limit)
 
 
 def longest_stop_along(robot: Robot, trajectory: Trajectory, period: float) -> Stop:
