@@ -106,6 +106,9 @@ def calibrate(
     if fix:
         measurements, texts = corrected(loaded, measurements)
         read.notes.extend(f"corrected: {text}" for text in texts)
+    if not as_json:
+        for note in read.notes:
+            typer.echo(f"  {note}")
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     text = result.report()  # before anything is written
     written = {} if result.refused else {"file": result.save(target)}
@@ -113,9 +116,6 @@ def calibrate(
         written["report"] = result.save_report(report)
     pictures = [] if figures is None else result.plot(figures, form)
     data = {**result.to_dict(), "notes": read.notes, "file": None, **written, "figures": pictures}
-    if not as_json:
-        for note in read.notes:
-            typer.echo(f"  {note}")
     print_result(as_json, data, lambda: text, [*written.values(), *pictures])
     if result.refused:
         hint = "; --fix corrects it" if result.doubt and result.mistake and result.mistake.corrected else ""

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.text import quantity
 from ...models import points
 from ...models.robot import Robot
-from .mapping import Field, Fields, LogMap, carrier_fields
+from .mapping import Field, Fields, LogMap, carrier_fields, command_fields
 from .recording import Recording, Samples
 from .smoothing import FEWEST, Parabolas, within
 from .streams import Reader, at_times
+
+LEAST_THRUST, MOST_THRUST = 0.6, 3.0  # times the weight, of thrusts in newtons
 
 
 def filled(times: np.ndarray | None, samples: Samples, field: Field) -> np.ndarray:
@@ -24,6 +27,22 @@ def filled(times: np.ndarray | None, samples: Samples, field: Field) -> np.ndarr
     if good.all() or times is None:
         return values
     return np.column_stack([np.interp(times, times[good], column[good]) for column in values.T])
+
+
+def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarray:
+    """Return thrusts (N, c) [N], nan of carriers that they could not hold up, or that fly without any load."""
+    result, gravity = thrusts.copy(), float(np.linalg.norm(robot.gravity))
+    for index, carrier in enumerate(robot.carriers):
+        if not carrier.actuators or not np.isfinite(thrusts[:, index]).any():
+            continue
+        usual, own = float(np.nanmedian(thrusts[:, index])), carrier.mass * gravity
+        if not LEAST_THRUST * own < usual < MOST_THRUST * (own + robot.weight):
+            result[:, index] = np.nan
+            notes.append(
+                f"thrusts of {carrier.name} are not used: they are {quantity(usual, 'N', 3)} (median) for a weight of "
+                f"{quantity(own, 'N', 3)}; a map may state their unit, as in 'thrusts: thrust_* [20 N]'"
+            )
+    return result
 
 
 def tensions_by_thrust(
@@ -48,11 +67,17 @@ def tensions_by_thrust(
 
 
 def carriers_at(
-    robot: Robot, recordings: Sequence[Recording], given: LogMap | None, times: np.ndarray | None, count: int
+    robot: Robot,
+    recordings: Sequence[Recording],
+    given: LogMap | None,
+    times: np.ndarray | None,
+    count: int,
+    notes: list[str],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return poses (N, c, 6) [m, rad] and thrusts (N, c) [N] of the carriers at N = `count` times; nan: not recorded.
 
-    Carriers that cannot move are at home. Without times, there are as many samples as in the recording.
+    Carriers that cannot move are at home. Without times, there are as many samples as in the recording. Thrusts are
+    those that the map names, those with the names of carriers, or those with numbers; what is implausible is noted.
     """
     poses = np.tile(robot.carrier_home, (count, 1, 1))
     thrusts = np.full(poses.shape[:2], np.nan)
@@ -73,7 +98,27 @@ def carriers_at(
         if found.thrusts:
             values = filled(times, reader.stream(found.thrusts), found.thrusts[0])
             thrusts[:, index] = values[:, 0]
-    return poses, thrusts
+    flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators]
+    if flying and ((given and given.thrusts) or not np.isfinite(thrusts).any()):
+        names = [carrier.name for carrier in robot.carriers]
+        found = command_fields(recordings, given, robot.m, names)
+        if found.thrusts and len(found.thrusts) != len(flying):
+            wanted = f"{len(flying)} fields, one for each carrier that flies"
+            raise InputError(f"thrusts must be {wanted}, got {len(found.thrusts)}")
+        if found.thrusts:
+            values = filled(times, reader.stream(found.thrusts), found.thrusts[0])
+            thrusts[:, index] = values[:, 0]
+    flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators]
+    if flying and ((given and given.thrusts) or not np.isfinite(thrusts).any()):
+        names = [carrier.name for carrier in robot.carriers]
+        found = command_fields(recordings, given, robot.m, names)
+        if found.thrusts and len(found.thrusts) != len(flying):
+            raise InputError(
+                f"thrusts must be {len(flying)} fields, one for each carrier that flies, got {len(found.thrusts)}"
+            )
+        if found.thrusts:
+            thrusts[:, flying] = filled(times, Reader(found).stream(found.thrusts), found.thrusts[0])
+    return poses, _plausible(robot, thrusts, notes)
 
 
 def _angles(times: np.ndarray | None, reader: Reader, found: Fields) -> np.ndarray:

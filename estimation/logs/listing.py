@@ -11,7 +11,7 @@ from ...base.errors import InputError
 from ...base.text import quantity
 from ...figures.report import Part, Report, Section, Table
 from ...models.robot import Robot
-from .mapping import Fields, LogMap, carrier_fields, fields_of, free_axes
+from .mapping import Fields, LogMap, carrier_fields, command_fields, fields_of, free_axes
 from .names import UNITS, epoch_unit
 from .recording import GAP, Recording, Topic, plain
 
@@ -31,7 +31,9 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
         found, problem = fields_of(recordings, given, robot and robot.m, moving, free_axes(robot)), None
         for name in moving:
             of = carrier_fields(recordings, given, name)
-            carriers[name] = [f"{one.full} [{one.unit}]" for one in (*of.position, *of.orientation, *of.thrusts)]
+            carriers[name] = [one.label for one in (*of.position, *of.orientation, *of.thrusts, *of.directions)]
+        if given and given.thrusts and robot is not None:
+            carriers["thrusts"] = [one.label for one in command_fields(recordings, given, robot.m).thrusts]
     except InputError as error:
         found, problem = Fields(), f"{error}{', or give the robot (--robot)' if robot is None else ''}"
     return {
@@ -44,7 +46,7 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
             }
             for one in recordings
         ],
-        "fields": {name: [f"{one.full} [{one.unit}]" for one in getattr(found, name)] for name in ROLES} | carriers,
+        "fields": {name: [one.label for one in getattr(found, name)] for name in ROLES} | carriers,
         "uses": _uses(found, robot is not None and robot.fixed_lengths is not None),
         "problem": problem,
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -26,17 +27,23 @@ MOST_LISTED = 12
 
 
 class Field(NamedTuple):
-    """A field of a recording, and its unit."""
+    """A field of a recording, and its unit, of which `factor` are 1."""
 
     recording: Recording
     topic: Topic
     name: str
     unit: str
+    factor: float = 1.0
 
     @property
     def full(self) -> str:
         """Return the name with that of its topic, as a message names it."""
         return plain(self.topic.full(self.name))
+
+    @property
+    def label(self) -> str:
+        """Return the name and the unit, as in a map."""
+        return f"{self.full} [{'' if self.factor == 1 else f'{self.factor:g} '}{self.unit}]"
 
 
 class Fields(NamedTuple):
@@ -54,7 +61,10 @@ class Fields(NamedTuple):
 
 
 class LogMap(Part):
-    """Names of the fields of a log, each with a unit in brackets if it is not SI: `/winches/position[*] [mm]`."""
+    """Names of the fields of a log, each with a unit in brackets if it is not SI: `/winches/position[*] [mm]`.
+
+    The unit may have a factor: `/winches/angle[*] [0.05 m]` of a drum with a radius of 50 mm, whose angles are in rad.
+    """
 
     lengths: str | list[str] = Key([], description="readings of the lengths, one name or one for each cable")
     tensions: str | list[str] = Key([], description="tensions, as `lengths`")
@@ -254,8 +264,13 @@ def _in_units(one: Field, kind: str, stated: bool) -> Field:
     """Return a field with its unit, SI where none is stated; raise InputError for another one, or if others are."""
     if not one.unit and not stated:  # of times by their size, when they are read
         return one if kind == "time" else one._replace(unit=next(iter(UNITS[kind])))
-    if one.unit not in UNITS[kind]:
-        raise InputError(f"the unit of {one.full} must be one of {', '.join(UNITS[kind])}, got {one.unit!r}")
+    number, _, unit = one.unit.rpartition(" ")
+    with suppress(ValueError):  # such as 20 N
+        one = one._replace(unit=unit, factor=float(number)) if number else one
+    if one.unit not in UNITS[kind] or not 0 < abs(one.factor) < np.inf:
+        units = ", ".join(UNITS[kind])
+        known = f"one of {units}, or a number of these in a map, such as [0.05 {next(iter(UNITS[kind]))}]"
+        raise InputError(f"the unit of {one.full} must be {known}, got {one.unit!r}")
     return one
 
 

@@ -127,7 +127,7 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     if not moving:
         return read
     times = None if measured.times is None else measured.times + read.begin
-    poses, thrusts = carriers_at(robot, read.recordings, given, times, len(measured))
+    poses, thrusts = carriers_at(robot, read.recordings, given, times, len(measured), read.notes)
     there = np.asarray(np.isfinite(poses[..., :3]).any(axis=(0, 2)))
     lost = ", ".join(robot.carriers[i].name for i in moving if not there[i])
     if lost:

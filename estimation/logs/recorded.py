@@ -92,6 +92,8 @@ def read_recorded(
     known = as_robot(robot)
     try:
         read = read_log(log, None, poses, known, fields, carriers=False)
+        if read.fields.directions and not read.fields.position:  # from which poses follow
+            read = read_log(log, None, poses, known, fields)
     except InputError as error:
         raise (InputError(f"log: {error}") if isinstance(log, list | tuple) else error) from None
     given = None if fields is None else read_map(fields)
@@ -130,11 +132,7 @@ def read_recorded(
         if lengths is not None and not any(carrier.moves for carrier in known.carriers):
             wrong = mistake(known, measured)
             doubt = f"the log probably has an input error: {wrong.text}" if wrong and wrong.severe else None
-        carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times))
-        flying = [i for i, carrier in enumerate(known.carriers) if carrier.actuators]
-        if found.thrusts and not np.isfinite(thrusts).any():
-            given_thrusts = at(found.thrusts, len(flying))
-            thrusts[:, flying] = np.nan if given_thrusts is None else given_thrusts
+        carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
         return Recorded(
             robot=known,
             times=times,
@@ -161,9 +159,12 @@ def _poses(robot: Robot, read: Log, notes: list[str]) -> tuple[np.ndarray, np.nd
     known = np.asarray(np.isfinite(poses).any(axis=0))
     poses[:, ~moves] = np.where(np.isfinite(poses[:, moves][:, :1]), robot.home[~moves], np.nan)
     if not known[moves].all():
-        if any(carrier.moves for carrier in robot.carriers) or not read.fields.lengths:
+        seen = measured.directions is not None
+        if not seen and (any(carrier.moves for carrier in robot.carriers) or not read.fields.lengths):
             raise InputError("must have poses of the platform, position and orientation, got others")
         computed = poses_from_log(robot, measured).estimate.pose
         poses[:, ~known] = computed[:, ~known]
-        notes.append("coordinates of the pose that were not measured are computed from the lengths")
+        means = "lengths and directions of the cables" if seen else "lengths"
+        notes.append(f"coordinates of the pose that were not measured are computed from the {means}")
+        known |= seen
     return poses, known & moves

@@ -32,7 +32,7 @@ class Reader:
         parts: list[Samples] = []
         for one in fields:
             whole, names = self._topic(one), self._of[id(one.topic)]
-            factor = next(units[one.unit] for units in UNITS.values() if one.unit in units)
+            factor = one.factor * next(units[one.unit] for units in UNITS.values() if one.unit in units)
             column = factor * whole.values[:, names.index(one.name)]
             parts.append(Samples(whole.times, column[:, None]))
         if all(one.topic is fields[0].topic for one in fields):
@@ -52,7 +52,8 @@ class Reader:
             clock = self._times.get(key)
             if clock is not None and one.topic.times is None:
                 column = values[:, self._of[key].index(clock.name)]
-                times = column * UNITS["time"][clock.unit or epoch_unit(float(np.nanmax(np.abs(column), initial=0.0)))]
+                unit = clock.unit or epoch_unit(float(np.nanmax(np.abs(column), initial=0.0)))
+                times = clock.factor * UNITS["time"][unit] * column
                 again = np.diff(times, prepend=np.nan) == 0
                 if 0 < again.mean() <= MOST_REPEATED:
                     self.notes.append(f"left out, with the time of the sample before: {quantity(int(again.sum()))}")
