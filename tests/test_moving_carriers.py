@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError, load
 from towline.estimation.calibration import Measurements, calibrate
-from towline.estimation.logs import read_measurements
+from towline.estimation.calibration.solving import usual
+from towline.estimation.logs import read_log, read_measurements
 
 from .warm import towline as run
 
@@ -109,11 +110,61 @@ def test_poses_of_carriers_are_saved_and_checked(recording, tmp_path):
     again = read_measurements(log.save(tmp_path / "log.nc"), robot=NAME)
     np.testing.assert_allclose(again.carrier_poses, log.carrier_poses, atol=1e-12)
     np.testing.assert_array_equal(log.only(slice(0, 5)).carrier_poses, log.carrier_poses[:5])
-    with pytest.raises(InputError, match="free must not have clock where carriers move"):
-        calibrate(NAME, log, "clock")
     with pytest.raises(InputError, match=r"carrier_poses must have the shape \(2, c, 6\), got \(2, 6\)"):
         Measurements(np.ones((2, 3)), carrier_poses=np.zeros((2, 6)))
     with pytest.raises(InputError, match=r"carrier_poses must have the shape \(N, 3, 6\) of the carriers"):
         calibrate(NAME, Measurements(np.ones((2, 3)), carrier_poses=np.zeros((2, 1, 6))), "offsets")
     with pytest.raises(InputError, match="carrier_poses must be finite"):
         Measurements(np.ones((2, 3)), carrier_poses=np.full((2, 3, 6), np.nan))
+
+
+def two_clocks(folder, offset):
+    """A platform under six winches of a quadrotor, both in motion: readings, and poses of both by another clock.
+
+    Two files, or one if the offset is small: as if there were one clock.
+    """
+    robot, draw = load("wang-flying-quadrotor"), np.random.default_rng(4)
+    moved, offsets = draw.normal(0, 0.01, (6, 3)), draw.normal(0, 0.03, 6)
+    waves = draw.uniform(0.3, 1.2, (2, 12)), draw.uniform(0, 6, (2, 12))
+    size = np.array([0.06, 0.05, 0.04, 0.12, 0.1, 0.15, 0.8, 0.6, 0.3, 0.1, 0.1, 0.5])
+
+    def at(t):
+        values = size * (np.sin(2 * np.pi * np.outer(t, waves[0][0]) + waves[1][0]))
+        drone = robot.carrier_home[0] + values[:, 6:]
+        R = Rotation.from_euler("xyz", drone[:, 3:])
+        own = robot.home - robot.carrier_home[0] + values[:, :6]  # of the platform, seen from the drone
+        place = drone[:, :3] + R.apply(own[:, :3])
+        return drone, place, R, R * Rotation.from_euler("xyz", own[:, 3:])
+
+    t = np.arange(0, 20, 0.02)
+    drone, place, R, turn = at(t)
+    anchors = drone[:, None, :3] + np.einsum("nij,mj->nmi", R.as_matrix(), robot.anchors + moved)
+    ends = place[:, None] + np.einsum("nij,mj->nmi", turn.as_matrix(), robot.attachments)
+    readings = np.linalg.norm(ends - anchors, axis=2) - offsets + draw.normal(0, 5e-4, (len(t), 6))
+    winches = {"t [s]": t, **{f"l{i} [m]": readings[:, i] for i in range(6)}}
+    s = np.arange(0.4, 19, 0.01) if offset > 1 else t - offset
+    drone, place, R, turn = at(s)
+    columns = {"t [s]": s + offset} if offset > 1 else winches
+    bodies = {"platform_": (place, turn), f"{robot.carriers[0].name}_": (drone[:, :3], R)}
+    for name, (position, rotation) in bodies.items():
+        columns |= {f"{name}{axis} [m]": position[:, k] for k, axis in enumerate("xyz")}
+        columns |= {f"{name}q{axis} [1]": rotation.as_quat()[:, k] for k, axis in enumerate("xyzw")}
+    write(folder / "winches.csv", winches)
+    write(folder / "mocap.csv", columns)
+    return robot, robot.anchors + moved, offsets
+
+
+@pytest.mark.parametrize("offset", [0.025, 7200.3])
+def test_clocks_of_moving_carriers(offset, tmp_path):
+    """Of one file by the fit alone, of two by cable speeds before."""
+    robot, anchors, offsets = two_clocks(tmp_path, offset)
+    log = read_log(tmp_path / "winches.csv", None, tmp_path / "mocap.csv" if offset > 1 else None, robot)
+    assert usual(robot, log.measurements) == ("anchors", "offsets", "clock")
+    result = calibrate(robot, log.measurements)
+    before = log.clock.offset if log.clock else 0.0
+    assert before + result.clock == pytest.approx(offset, abs=1e-3)
+    assert result.noise < 7e-4
+    for i in range(6):
+        one = result.parameters[4 * i : 4 * i + 4]
+        truth = [*anchors[i], offsets[i]]
+        assert all(abs(part.value - true) < 4.5 * part.sigma + 2e-4 for part, true in zip(one, truth, strict=True))

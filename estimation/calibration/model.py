@@ -32,6 +32,7 @@ from ...models.robot import Robot
 from ..logs.measurements import Measurements, carriers_of, measured_poses
 from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
+from .carrier_motion import CarrierMotion
 from .geometry import runs
 from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, prior_sigmas
 from .sightings import sightings
@@ -144,6 +145,8 @@ class Model(Displayed):
         Clock offset of the platform's accelerations, near that of its poses [s].
     interpolates
         True if poses between measured ones are known, as with a track.
+    carriers
+        Measured poses of the carriers over time; default: those of the measurements, without a clock offset.
     """
 
     parameters: Parameters
@@ -160,6 +163,7 @@ class Model(Displayed):
     felt: FeltTensions | None = None
     ahead: float = 0.0
     interpolates: bool = False
+    carriers: CarrierMotion | None = None
 
     @property
     def robot(self) -> Robot:
@@ -216,6 +220,7 @@ class Model(Displayed):
             unbalanced=None if self.unbalanced is None else self.unbalanced[rows],
             forces=self._forces.only(rows),
             felt=None if self.felt is None else self.felt.only(rows),
+            carriers=None if self.carriers is None else self.carriers.at_samples(rows),
         )
 
     @cached_property
@@ -291,7 +296,10 @@ class Model(Displayed):
         base_position, base_rotation, velocity, rate = self._base(state.x[parameters.clock])
         position, rotation = base_position + state.shift, state.turn @ base_rotation
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
-        run = runs(robot, table, position, rotation, carriers_of(robot, self.measurements))
+        moving = self.carriers and self.carriers.at(state.x[parameters.clock])
+        at = carriers_of(robot, self.measurements) if moving is None else moving.poses
+        run = runs(robot, table, position, rotation, at)
+        carried = moving and moving.of_cables(robot, position + arms)
         slip, y = self.slips(state.x), self.measurements.lengths.T
         stretch, tensions, by_errors = self._stretch(state)
         scale0 = parameters.table(parameters.first)[:, 7:8]
@@ -315,7 +323,7 @@ class Model(Displayed):
         weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
         in_balance = np.zeros((len(position), 6)) if forces is None else forces.residuals * weighs[:, None]
         by_prior = (state.x - parameters.first) / self.prior_sigmas
-        seen = sightings(parameters, state.x, (position, rotation), run, self.measurements, derive)
+        seen = sightings(parameters, state.x, (position, rotation), run, at, self.measurements, carried, derive)
         seen_residuals = np.zeros((len(position), 0)) if seen is None else seen.residuals * inside[:, None]
         residuals = Residuals(readings, poses, by_prior, in_balance, seen_residuals)
         if not derive:
@@ -340,7 +348,9 @@ class Model(Displayed):
             others[..., 0] = np.einsum("mni,ni->mn", by_pose, twist)
             for one in (forces, seen):
                 if one is not None and one.by_parameters is not None and one.by_pose is not None:
-                    one.by_parameters[..., parameters.clock] = (one.by_pose @ twist[..., None])[..., 0]
+                    one.by_parameters[..., parameters.clock] += (one.by_pose @ twist[..., None])[..., 0]
+            if carried is not None:
+                others[..., 0] -= np.einsum("mni,mni->mn", along, carried[0])
         for column, (cable, first) in enumerate(parameters.slips, start=OF_ROBOT):
             others[cable, first:, column] = -gain[cable, first:]
         forces, seen = self._kept(forces, weighs), self._kept(seen, inside)

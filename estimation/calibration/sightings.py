@@ -10,7 +10,7 @@ import numpy as np
 from ...core import columns_by_geometry
 from ...models import points
 from ...models.record import record_of
-from ..logs.measurements import Measurements, carriers_of
+from ..logs.measurements import Measurements
 from .balance import Balanced
 from .geometry import Runs
 from .motion import cross
@@ -24,12 +24,15 @@ def sightings(
     x: np.ndarray,
     placed: tuple[np.ndarray, np.ndarray],
     run: Runs,
+    carriers: np.ndarray,
     measurements: Measurements,
+    carried: tuple[np.ndarray, np.ndarray] | None = None,
     derive: bool = True,
 ) -> Balanced | None:
     """Return residuals (N, 3 m) with positions (N, 3) and rotations (N, 3, 3) of the platform; None without directions.
 
-    `run` is the geometry of the cables there. What was not measured has zeros.
+    `run` is the geometry of the cables there, `carriers` are poses, and `carried` is `Carriers.of_cables` if these move
+    with the clock offset. What was not measured has zeros.
     """
     robot, d = of.robot, measurements.directions
     if d is None:
@@ -52,7 +55,7 @@ def sightings(
     cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
     poses = np.concatenate([position, points.angles(rotation)], axis=1)
     S = np.empty((count, m, 6, 7))
-    columns_by_geometry(record, poses, np.ascontiguousarray(carriers_of(robot, measurements)), S)
+    columns_by_geometry(record, poses, np.ascontiguousarray(carriers), S)
     by_geometry = -W @ S[:, :, :3]  # (N, m, 3, 7)
     by_shift = by_geometry[..., 3:6] @ np.swapaxes(rotation, 1, 2)[:, None]
     arms = np.einsum("nij,mj->nmi", rotation, table[:, 3:6])
@@ -62,6 +65,10 @@ def sightings(
         own = i * (of.clock // m)
         by_parameters[:, i, :, own : own + 6] = by_geometry[:, i, :, :6]
         by_parameters[:, i, :, own + 8] = by_geometry[:, i, :, 6]
+    if carried is not None:
+        velocity, rate = (np.swapaxes(part, 0, 1)[..., None] for part in carried)
+        turning = np.cross(rate[..., 0], u)[..., None]
+        by_parameters[..., of.clock] = (W @ turning - by_shift @ velocity)[..., 0]
     by_pose = np.concatenate([by_shift, by_turn], axis=3).reshape(count, 3 * m, 6)
     return Balanced(residuals, by_parameters.reshape(count, 3 * m, of.count), by_pose)
 

@@ -11,6 +11,7 @@ from ..logs.cable_directions import placed
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .balance import Balance
+from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
 from .model import Model, State
@@ -46,8 +47,7 @@ def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
     """Return the default free parameters, with the clock offset if a motion was measured."""
     groups = ("anchors", "offsets", "clock")
     still = float(measurements.lengths.std(axis=0).max()) < WINDING * measurements.sigma.lengths
-    moves = measurements.carrier_poses is not None or still
-    known = measurements.times is not None and not moves and is_enough(robot, measurements, ("clock",))
+    known = measurements.times is not None and not still and is_enough(robot, measurements, ("clock",))
     return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
 
 
@@ -178,7 +178,8 @@ def model_of(
         position, rotation, _ = measured_poses(robot, measurements)
         assert measurements.times is not None
         track = PoseTrack(measurements.times, position, rotation, tracked(robot, measurements))
-        model = replace(model, track=track)
+        carriers = None if measurements.carrier_poses is None else CarrierMotion(robot, measurements)
+        model = replace(model, track=track, carriers=carriers)
     elif np.isinf(model.pose_sigmas[:, :3]).any():
         if start is None:
             table = parameters.table(parameters.first)
@@ -199,8 +200,6 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     parameters = Parameters(robot, groups)
     if "clock" in groups:
         known = tracked(robot, measurements)
-        if measurements.carrier_poses is not None:
-            raise InputError("free must not have clock where carriers move, whose clock is that of the lengths, got it")
         if measurements.times is None:
             raise InputError("measurements.times must be given to estimate a clock offset, got none")
         if known.sum() < 4:

@@ -12,22 +12,21 @@ from scipy.spatial.transform import Rotation
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...models import points
-from ...models.dynamics import Dynamics
 from ...models.files import as_robot
 from ...models.robot import Robot
-from .alignment import Clock, align
+from .alignment import Clock
 from .cable_directions import in_world, vectors
 from .carrier_poses import carriers_at, tensions_by_thrust
+from .clocks import clock_of_poses
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, read_map
 from .measurements import Measurements
 from .opening import recordings
 from .pose_track import PoseTrack
 from .recording import Recording, Samples
-from .streams import Reader, at_times, check_rising, interpolated
+from .streams import Reader, at_times, interpolated
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 COUNTED = 1e8  # [s]: times beyond count from 1970, and are read from the first one
-MOST_ALIGNED = 200_000  # poses
 AHRS = np.radians(0.5)  # sigma of orientations that no motion capture measured
 
 
@@ -46,6 +45,8 @@ class Log(NamedTuple):
         Reading of the lengths' clock at time 0 of the measurements [s].
     recordings
         The files.
+    clock
+        Clock of the poses, if it is another one than that of the lengths.
     """
 
     measurements: Measurements
@@ -53,6 +54,7 @@ class Log(NamedTuple):
     notes: list[str]
     begin: float = 0.0
     recordings: Sequence[Recording] = ()
+    clock: Clock | None = None
 
 
 def read_measurements(
@@ -112,7 +114,7 @@ def read_log(
     try:
         found = _fields([*first, *others] if given else first, others, given, known)
         everything = [*first, *others]
-        read = measurements_of(found, everything, sigma, known)._replace(recordings=everything)
+        read = measurements_of(found, everything, sigma, known, given)._replace(recordings=everything)
         if not carriers:
             return read
         return _with_directions(read if known is None else _with_carriers(read, known, given), known, given)
@@ -127,7 +129,10 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     if not moving:
         return read
     times = None if measured.times is None else measured.times + read.begin
-    poses, thrusts = carriers_at(robot, read.recordings, given, times, len(measured), read.notes)
+    seen = times  # by the clock of the poses
+    if times is not None and read.clock is not None:
+        seen = read.clock.offset + read.clock.rate * times
+    poses, thrusts = carriers_at(robot, read.recordings, given, seen, len(measured), read.notes)
     there = np.asarray(np.isfinite(poses[..., :3]).any(axis=(0, 2)))
     lost = ", ".join(robot.carriers[i].name for i in moving if not there[i])
     if lost:
@@ -198,7 +203,11 @@ def _fields(
 
 
 def measurements_of(
-    found: Fields, from_: Sequence[Recording], sigma: float | Mapping[str, float] | None, robot: Robot | None
+    found: Fields,
+    from_: Sequence[Recording],
+    sigma: float | Mapping[str, float] | None,
+    robot: Robot | None,
+    given: LogMap | None = None,
 ) -> Log:
     """Return the measurements of some fields, at the times of whichever of lengths and poses has fewer samples."""
     notes = [note for one in from_ for note in one.notes]
@@ -219,14 +228,15 @@ def measurements_of(
         orientation = at_times(position.times, orientation, found.orientation[0])
     pose = position or orientation
     source = (found.position or found.orientation or (main,))[0]
-    together = source.topic is main.topic
+    together, clock = source.topic is main.topic, None
     if pose is not None and not together:
         if times is None or pose.times is None:
             raise InputError("lengths and poses of several files or topics must have times, got none")
         quaternions = None if orientation is None else _quaternions(orientation.values)
         places = np.full((len(pose.values), 3), np.nan) if position is None else position.values
+        clock = clock_of_poses(lengths, Samples(pose.times, places), quaternions, source, main, robot, given, from_)
         lengths, tensions, places, quaternions = _merged(
-            lengths, tensions, Samples(pose.times, places), quaternions, source, main, robot, notes
+            lengths, tensions, Samples(pose.times, places), quaternions, main, clock, notes
         )
         position = None if position is None else Samples(lengths.times, places)
         orientation = None if quaternions is None else Samples(lengths.times, quaternions)
@@ -245,7 +255,8 @@ def measurements_of(
         notes.append(f"orientations without positions are taken to be good to {quantity(np.degrees(AHRS), 'deg', 2)}")
         known = sigmas.get("sigma", {})
         sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
-    return Log(Measurements(lengths.values, **arguments, **sigmas), found, [*notes, *read.notes], begin)
+    measured = Measurements(lengths.values, **arguments, **sigmas)
+    return Log(measured, found, [*notes, *read.notes], begin, clock=clock)
 
 
 def _whole(robot: Robot | None, samples: Samples, first: int) -> Samples:
@@ -271,27 +282,15 @@ def _merged(
     tensions: Samples | None,
     position: Samples,
     quaternions: np.ndarray | None,
-    source: Field,
     first: Field,
-    robot: Robot | None,
+    clock: Clock | None,
     notes: list[str],
 ) -> tuple[Samples, Samples | None, np.ndarray, np.ndarray | None]:
     """Return lengths, tensions, positions (N, 3) and quaternions (N, 4) at the same times."""
     times, pose_times = lengths.times, position.times
     assert times is not None
     assert pose_times is not None
-    for one in (times, pose_times):
-        check_rising(one)
-    shared = min(times[-1], pose_times[-1]) - max(times[0], pose_times[0])
-    if source.recording is not first.recording or shared < 0.5 * min(np.ptp(times), np.ptp(pose_times)):
-        if robot is not None and any(carrier.moves for carrier in robot.carriers):
-            raise InputError(
-                f"lengths and poses must have one clock, because the carriers of {robot.name} move and cable speeds "
-                f"cannot align two, got two"
-            )
-        if robot is None:
-            raise InputError("robot must be given to align the clocks of lengths and poses, got None")
-        clock = _aligned(lengths, position, quaternions, robot)
+    if clock is not None:
         pose_times = (pose_times - clock.offset) / clock.rate
         notes.append(f"{clock} (by cable speeds, whose correlation is {clock.likeness:.2f})")
     known = np.isfinite(position.values).all(axis=1) | np.isnan(position.values).all()
@@ -325,29 +324,6 @@ def _merged(
     forces = None if forces is None else Samples(at[kept], forces[kept])
     turned = None if quaternions is None else quaternions[kept]
     return Samples(at[kept], moved[kept]), forces, places[kept], turned
-
-
-def _aligned(lengths: Samples, position: Samples, quaternions: np.ndarray | None, robot: Robot) -> Clock:
-    known = np.isfinite(position.values).all(axis=1)
-    if quaternions is not None:
-        known &= np.isfinite(quaternions).all(axis=1)
-    rows = np.flatnonzero(known)
-    if len(rows) < 4 or lengths.times is None or position.times is None:
-        raise InputError("poses with positions must be measured to align the clocks, got none")
-    rows = rows[:: max(1, len(rows) // MOST_ALIGNED)]
-    if lengths.values.shape[1] != robot.m:
-        raise InputError(f"lengths must have a column for each of the {robot.m} cables, got {lengths.values.shape[1]}")
-    poses = np.tile(robot.home, (len(rows), 1))
-    poses[:, :3] = position.values[rows]
-    effects = [poses[:, :3]]
-    if quaternions is not None:
-        rotation = Rotation.from_quat(quaternions[rows])
-        poses[:, 3:] = points.angles(rotation.as_matrix())
-        effects.append((rotation * rotation[0].inv()).as_rotvec())
-    effects = np.hstack(effects)
-    effects = effects[:, np.ptp(effects, axis=0) > 1e-6]
-    along = np.asarray(Dynamics(robot).cable_lengths(poses))
-    return align(lengths.times, lengths.values, position.times[rows], along, effects)
 
 
 def _quaternions(values: np.ndarray) -> np.ndarray:
