@@ -23,7 +23,7 @@ from ...base.text import quantity
 from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, check_measurements, measured_poses, tracked
+from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
 from .frames import displaced_frames, fitted_frames
 from .geometry import runs
 from .interpretations import FACTORS, Interpretation, interpretations
@@ -64,7 +64,10 @@ class Mistake(NamedTuple):
 
 
 class _Log(NamedTuple):
-    """Samples with measured poses: the parameters' table, positions, rotations, angles as logged, and readings."""
+    """Samples with measured poses: the parameters' table, positions, rotations, angles as logged, and readings.
+
+    `carriers` are the poses of moving ones, (N, c, 6), which are read in the same way, or None.
+    """
 
     robot: Robot
     table: np.ndarray
@@ -73,11 +76,17 @@ class _Log(NamedTuple):
     angles: np.ndarray
     y: np.ndarray
     sigma: float
+    carriers: np.ndarray | None = None
 
-    def at(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions and rotations as another way means them."""
+    def at(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Return positions, rotations and poses of carriers as another way means them."""
         turned = self.rotation if way.turned is None else way.turned(self.rotation, self.angles)
-        return way.placed(self.position), turned
+        carriers = None if self.carriers is None else self.carriers.copy()
+        for one in () if carriers is None else np.swapaxes(carriers, 0, 1):
+            one[:, :3] = way.placed(one[:, :3])
+            if way.turned is not None:
+                one[:, 3:] = points.angles(way.turned(points.rotations(one[:, 3:]), one[:, 3:]))
+        return way.placed(self.position), turned, carriers
 
 
 class _Way(NamedTuple):
@@ -106,40 +115,42 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     table = parameters.table(parameters.first)
     position, rotation, known = measured_poses(robot, given)
     rows = np.flatnonzero(tracked(robot, given))
-    turning = bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())  # else it is taken to be as at home
+    carriers = given.carrier_poses
+    framed = carriers is None and bool((known.any(axis=0) | (robot.dof_mask == 0))[3:].all())
     if len(rows) > MOST_SAMPLES:
         rows = rows[np.linspace(0, len(rows) - 1, MOST_SAMPLES).astype(int)]
     readings = given.lengths * table[:, 7]
-    if len(rows) < 4 or given.carrier_poses is not None:  # moving carriers would have to be in each comparison
+    if len(rows) < 4:
         return _too_large(robot, given, readings)
     angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
     sigma = given.sigma.lengths
-    log = _Log(robot, table, position[rows], rotation[rows], angles[rows], readings[rows], sigma)
+    seen = None if carriers is None else carriers[rows]
+    log = _Log(robot, table, position[rows], rotation[rows], angles[rows], readings[rows], sigma, seen)
     order = np.arange(robot.m)
     lengths, y = _parts(log, Interpretation(""))
     e = (lengths - y[order, order])[:, : len(rows)]
     noise = sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
     if max(map(_root_mean_square, e)) <= sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / len(rows))):
-        return _displaced(log, given, noise) if turning else None
+        return _displaced(log, given, noise) if framed else None
     ways, as_given = _explanations(log, e, noise)
     best = min((way for way in ways if way.text), key=lambda way: way[:2])
     change = float(np.median(np.abs(log.y - np.median(log.y, axis=0))))
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
-    if far and turning and len(rows) >= FEWEST[1]:
+    if far and framed and len(rows) >= FEWEST[1]:
         frames = fitted_frames(robot, table, log.position, log.rotation, log.y)
         moved = frames.of(position, rotation)
         lengths, y = _parts(log._replace(position=moved[0][rows], rotation=moved[1][rows]), Interpretation(""))
         size = _rms(_medians(lengths - y[order, order], len(rows)))
         if VERY_CLEARLY * size < min(as_given, best.size) and size < EXPLAINED * change:
-            return Mistake(_better(str(frames), as_given, size), _corrected(given, *moved, order, 1.0))
+            return Mistake(_better(str(frames), as_given, size), _corrected(given, *moved, None, order, 1.0))
     if named:
-        whole = log._replace(position=position, rotation=rotation, angles=angles)
+        whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
         corrected = (
             None if best.several else _corrected(given, *whole.at(best.way), best.columns, best.signs * best.way.factor)
         )
         return Mistake(_better(best.text, as_given, best.size), corrected)
-    return None if far or not turning else _displaced(log, given, noise)
+    return None if far or not framed else _displaced(log, given, noise)
 
 
 def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
@@ -168,13 +179,19 @@ def _better(text: str, before: float, after: float) -> str:
 
 
 def _corrected(
-    given: Measurements, position: np.ndarray, rotation: np.ndarray, columns: np.ndarray, factors: np.ndarray | float
+    given: Measurements,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    carriers: np.ndarray | None,
+    columns: np.ndarray,
+    factors: np.ndarray | float,
 ) -> Measurements:
     poses = given.poses
     if poses is not None:
         poses = np.where(np.isfinite(poses), np.hstack([position, points.angles(rotation)]), np.nan)
     tensions = None if given.tensions is None else given.tensions[:, columns]
-    return Measurements(given.lengths[:, columns] * factors, poses, None, tensions, given.times, given.sigma._asdict())
+    lengths = given.lengths[:, columns] * factors
+    return changed(given, lengths=lengths, poses=poses, tensions=tensions, carrier_poses=carriers)
 
 
 def _displaced(log: _Log, given: Measurements, noise: float) -> Mistake | None:
@@ -187,7 +204,7 @@ def _displaced(log: _Log, given: Measurements, noise: float) -> Mistake | None:
         return None
     frames, before = found
     position, rotation, _ = measured_poses(log.robot, given)
-    corrected = _corrected(given, *frames.of(position, rotation), np.arange(log.robot.m), 1.0)
+    corrected = _corrected(given, *frames.of(position, rotation), None, np.arange(log.robot.m), 1.0)
     return Mistake(_better(str(frames), before, frames.size), corrected, severe=False)
 
 
@@ -282,7 +299,7 @@ def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mista
         f"{robot.name} is about {quantity(length, 'm', digits=3)} long"
     )
     position, rotation, _ = measured_poses(robot, given)
-    return Mistake(text, _corrected(given, position, rotation, np.arange(robot.m), 1e-3))
+    return Mistake(text, _corrected(given, position, rotation, given.carrier_poses, np.arange(robot.m), 1e-3))
 
 
 def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
@@ -294,7 +311,7 @@ def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
     run = runs(log.robot, log.table, *log.at(way))
     explained = [np.ones((*run.lengths.shape, 1))]
     if len(log.y) >= FEWEST[0]:
-        explained.append(run.directions)
+        explained.append(run.by_geometry[..., :3])
     if len(log.y) >= FEWEST[1]:
         explained.append(run.by_geometry[..., 3:6])
     D = np.concatenate(explained, axis=2)  # (m, N, c)

@@ -35,7 +35,7 @@ def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarra
     for index, carrier in enumerate(robot.carriers):
         if not carrier.actuators or not np.isfinite(thrusts[:, index]).any():
             continue
-        usual, own = float(np.nanmedian(thrusts[:, index])), carrier.mass * gravity
+        usual, own = float(np.nanmedian(thrusts[:, index])), getattr(carrier, "mass", 0.0) * gravity
         if not LEAST_THRUST * own < usual < MOST_THRUST * (own + robot.weight):
             result[:, index] = np.nan
             notes.append(
@@ -105,17 +105,6 @@ def carriers_at(
         if found.thrusts and len(found.thrusts) != len(flying):
             wanted = f"{len(flying)} fields, one for each carrier that flies"
             raise InputError(f"thrusts must be {wanted}, got {len(found.thrusts)}")
-        if found.thrusts:
-            values = filled(times, reader.stream(found.thrusts), found.thrusts[0])
-            thrusts[:, index] = values[:, 0]
-    flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators]
-    if flying and ((given and given.thrusts) or not np.isfinite(thrusts).any()):
-        names = [carrier.name for carrier in robot.carriers]
-        found = command_fields(recordings, given, robot.m, names)
-        if found.thrusts and len(found.thrusts) != len(flying):
-            raise InputError(
-                f"thrusts must be {len(flying)} fields, one for each carrier that flies, got {len(found.thrusts)}"
-            )
         if found.thrusts:
             thrusts[:, flying] = filled(times, Reader(found).stream(found.thrusts), found.thrusts[0])
     return poses, _plausible(robot, thrusts, notes)

@@ -137,7 +137,7 @@ class Measurements(Displayed):
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
         try:
-            return self._with(**{name: None if array is None else array[rows] for name, array in arrays.items()})
+            return changed(self, **{name: None if array is None else array[rows] for name, array in arrays.items()})
         except (IndexError, TypeError, ValueError):
             accepted = f"indices below {len(self)} that rise, flags ({len(self)},) or a slice"
             raise InputError(f"rows must be {accepted}, got {shown(rows)}") from None
@@ -150,7 +150,7 @@ class Measurements(Displayed):
         InputError
             If they have a wrong value.
         """
-        return self._with(sigma=sigma)
+        return changed(self, sigma=sigma)
 
     def with_lengths(self, lengths: ArrayLike) -> Measurements:
         """Return the measurements with other lengths (N, m) [m].
@@ -160,7 +160,7 @@ class Measurements(Displayed):
         InputError
             If they have a wrong shape or value.
         """
-        return self._with(lengths=lengths)
+        return changed(self, lengths=lengths)
 
     def with_carriers(self, carrier_poses: ArrayLike, tensions: ArrayLike | None = None) -> Measurements:
         """Return the measurements with other poses of carriers (N, c, 6) [m, rad], and tensions (N, m) [N] if given.
@@ -170,7 +170,7 @@ class Measurements(Displayed):
         InputError
             If they have a wrong shape or value.
         """
-        return self._with(carrier_poses=carrier_poses, tensions=self.tensions if tensions is None else tensions)
+        return changed(self, carrier_poses=carrier_poses, tensions=self.tensions if tensions is None else tensions)
 
     def with_directions(self, directions: ArrayLike | None) -> Measurements:
         """Return the measurements with other directions of cables in {G}, (N, m, 3), as for the class, or without any.
@@ -180,15 +180,11 @@ class Measurements(Displayed):
         InputError
             If they have a wrong shape or value.
         """
-        return self._with(directions=directions)
+        return changed(self, directions=directions)
 
     def without_poses(self) -> Measurements:
         """Return the measurements without poses of the platform."""
-        return self._with(poses=None)
-
-    def _with(self, **new: Any) -> Measurements:
-        given: dict[str, Any] = {name: getattr(self, name) for name in ARRAYS}
-        return Measurements(**{**given, "sigma": self.sigma._asdict(), **new})
+        return changed(self, poses=None)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save as NetCDF atomically, and return the path; `read_measurements` reads the file.
@@ -228,6 +224,12 @@ class Measurements(Displayed):
             coordinates["time"] = Variable(("time",), self.times, {"units": "s"})
         attributes = {f"sigma_{name}": value for name, value in self.sigma._asdict().items()}
         return save_netcdf(Contents(variables, coordinates, attributes), file_path("path", path))
+
+
+def changed(measurements: Measurements, **new: Any) -> Measurements:
+    """Return measurements with other arguments; raise InputError as the class does."""
+    given: dict[str, Any] = {name: getattr(measurements, name) for name in ARRAYS}
+    return Measurements(**{**given, "sigma": measurements.sigma._asdict(), **new})
 
 
 def check_measurements(robot: Robot, measurements: object) -> Measurements:
