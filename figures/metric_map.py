@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import style
+from .workspace import outer_edges
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,13 +41,13 @@ def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray |
     position = result["position"].values
     layers, headings = [np.ones(len(position), dtype=bool)], [""]
     if len(thick) == 3:
-        ends = np.linspace(*_ends(result["z"].values), LAYERS + 1)
+        ends = np.linspace(*outer_edges(result["z"].values), LAYERS + 1)
         between = list(pairwise(ends))
         layers = [(position[:, 2] >= low) & (position[:, 2] <= high) for low, high in between]
         headings = [f"z = {low:.3g} to\n{high:.3g} m" for low, high in between]
     marks = np.empty((0, 3)) if anchors is None else anchors
     axes = thick[:2]
-    box = np.array([_ends(result["xyz"[k]].values) for k in axes])
+    box = np.array([outer_edges(result["xyz"[k]].values) for k in axes])
     extent = np.ptp(np.vstack([box.T, marks[:, axes]]), axis=0)
     columns, rows = len(layers), len(metrics)
     tall = (style.COLUMN - 0.8) / columns * extent[-1] / extent[0]  # of panels at equal scales [inches]
@@ -104,9 +105,3 @@ def _levels(values: np.ndarray) -> np.ndarray:
     if style.one_value(low, high):
         return low + 0.4 * style.ONE_VALUE * max(abs(low), style.TINY) * np.array([-1.0, 1.0])
     return np.array(MaxNLocator(LEVELS).tick_values(low, high))
-
-
-def _ends(centres: np.ndarray) -> tuple[float, float]:
-    """Return the outer edges of equal cells, from their centres."""
-    half = 0.5 * float(centres[1] - centres[0])
-    return float(centres[0]) - half, float(centres[-1]) + half

@@ -96,7 +96,7 @@ def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> Figure:
         share = _share(result, tuple(name for name in ("x", "y", "z") if name != along))
         style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(result[along], share, color=style.colour(0))
         return canvas
-    ends = np.array(np.meshgrid(*(_ends(result[name].values) for name in "xyz"))).reshape(3, -1).T
+    ends = np.array(np.meshgrid(*(outer_edges(result[name].values) for name in "xyz"))).reshape(3, -1).T
     canvas, panels = views_of(ends if anchors is None else np.vstack([ends, anchors]), views, 0.8)
     canvas.suptitle(title, fontsize=style.TEXT)
     for ax, view in zip(panels, views, strict=True):
@@ -137,10 +137,10 @@ def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) ->
         ax.plot(*marks.T, "^", color="#000000", markersize=4, label="anchors")
 
 
-def _ends(centres: np.ndarray) -> list[float]:
+def outer_edges(centres: np.ndarray) -> tuple[float, float]:
     """Return the outer edges of equal cells, from their centres."""
     half = 0.5 * float(centres[1] - centres[0]) if len(centres) > 1 else 0.0
-    return [float(centres[0]) - half, float(centres[-1]) + half]
+    return float(centres[0]) - half, float(centres[-1]) + half
 
 
 def _share(result: xr.Dataset, over: tuple[str, ...]) -> xr.DataArray:
