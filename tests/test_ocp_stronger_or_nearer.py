@@ -76,3 +76,46 @@ def test_a_load_that_is_too_heavy_has_the_heaviest_that_is_not():
     assert not plan(Robot.model_validate(data), found.scenario.task).feasible
     assert 91 < mass.possible < 3000
     assert robot.t_max.max() < strength.possible < 3000 / mass.possible * 1.2 * robot.t_max.max()
+
+
+def test_a_wind_is_weakened_until_a_plan_is_feasible():
+    task = {"path": {"kind": "line", "start": [0, 0, -1.2], "end": [0.3, 0, -1.2]}, "duration": 3, "wind": [25, 0, 0]}
+    found = plan("wang-flying", task)
+    offer = next(each for each in found.relaxations if each.name == "wind")
+    assert 1 < offer.possible < 25
+    assert f"{offer.possible:.4g} m/s instead of 25 m/s (audited)" in found.report()
+    assert plan("wang-flying", task | {"wind": [offer.possible, 0, 0]}).feasible
+    assert not plan("wang-flying", task | {"wind": [1.1 * offer.possible, 0, 0]}).feasible
+
+
+def test_a_rotation_ends_at_a_smaller_angle():
+    path = {"kind": "line", "start": [0, 0, 2.5, 0, 0, 0], "end": [0, 0, 2.5, 1.4, 0, 0]}
+    found = plan("ipanema-2", {"path": path, "duration": 4})
+    offer = next(each for each in found.relaxations if each.name == "part of the rotation")
+    share = offer.possible / 100
+    degrees = np.rad2deg(1.4 * share)
+    assert f"% of it, to roll, pitch, yaw ({degrees:.2f}"[:-2] in found.report()
+    for factor, possible in ((0.999, True), (1.01, False)):
+        end = [0, 0, 2.5, 1.4 * share * factor, 0, 0]
+        assert plan("ipanema-2", {"path": path | {"end": end}, "duration": 4}).feasible == possible
+
+
+def test_no_change_is_offered_that_a_task_cannot_have():
+    """The rate of tensions would fall to its limit in more than the longest duration of a task."""
+    path = {"kind": "line", "start": [-2, -1, 2.0], "end": [2, 1, 2.5]}
+    found = plan("cogiro", {"path": path, "duration": 1.2, "limits": {"tension_rate": 100}})
+    assert found.status == "infeasible"
+    assert all(each.plan.feasible for each in found.relaxations)
+
+
+def test_without_a_feasible_change_the_report_says_what_may_help():
+    wall = {"kind": "box", "name": "wall", "min": [-0.1, -5, 0], "max": [0.1, 5, 6]}
+    line = {"kind": "line", "start": [-1, 0, 2.5], "end": [1, 0, 2.5]}
+    blocked = plan("ipanema-2", {"path": line, "duration": 4, "limits": {"keep_out": [wall]}})
+    assert not blocked.relaxations
+    assert "`tube: {position: 0.5}` permits the planner to leave the path" in blocked.report()
+    away = {"kind": "line", "start": [1.1, 0.9, 0.2], "end": [4, 4, 2]}
+    above = plan("wang-ctmrts", {"path": away, "duration": 6})
+    assert not above.relaxations
+    assert "no cable pulls along force (0.00, 0.00, 1.00)" in above.report()  # above all anchors
+    assert "a nearer path" in above.report()

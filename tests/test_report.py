@@ -191,12 +191,13 @@ def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path)
         file = found.save_report(tmp_path / "new" / "report.html")
         text = file.read_text()
         page = Page(text)
-        # A table's row is one heading or one text here. The spans are below the first section, other tables below all
-        # of them; audit, computation and stages are folded at the end.
+        # A table's row is one heading or one text here. The spans are below the reasons and what to try, other tables
+        # below all sections; audit, computation and stages are folded at the end.
         first, *others = sections(found)
+        try_it = [others.pop(0)] if others[0].title == "What you can try" else []
         ends = [section for section in others if section.title in ("Audit", "Computation")]
         others = [section for section in others if section not in ends]
-        order = [first, spans_table(found), *others, cables_table(found), *ends, stages_table(found)]
+        order = [first, *try_it, spans_table(found), *others, cables_table(found), *ends, stages_table(found)]
         told = []
         for part in filter(None, order):
             if hasattr(part, "facts"):

@@ -12,11 +12,14 @@ from ...models.parsing import to_yaml
 from ...solvers import Certificate
 from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
+from ..tasks.task_limits import OF_BODY
+from ..warnings.outside_frame import LEAVES
 from .motion_facts import motion_facts, wind
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
 RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding
 SAME_LENGTH = 1e-9  # [m]
+TRY = "What you can try"
 LEVEL = 1e-3  # [rad]: of a smaller attitude nothing is said
 
 
@@ -38,7 +41,7 @@ def sections(plan: PlanData) -> list[Section]:
     bottlenecks = [] if plan.law is None else [("", each.describe()) for each in plan.law.bottlenecks]
     every = [
         Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
-        Section("What you can try", [_relaxation(plan, relaxed) for relaxed in plan.relaxations]),
+        Section(TRY, [_relaxation(plan, relaxed) for relaxed in plan.relaxations] or _ideas(plan)),
         Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
         Section("Active limits along the path (s = 0 at its start, 1 at its end)", bottlenecks),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
@@ -128,14 +131,15 @@ def stages_table(plan: PlanData) -> Table | None:
 
 
 def report(plan: PlanData, drawings: Callable[[], Iterable[Drawing]] = tuple) -> Report:
-    """Return the report of a plan; the spans without tensions follow the first section, which states why."""
-    robot, task, (first, *others), spans = plan.scenario.robot, plan.scenario.task, sections(plan), spans_table(plan)
+    """Return the report of a plan; the spans without tensions follow the sections why, and what to try."""
+    robot, task, every, spans = plan.scenario.robot, plan.scenario.task, sections(plan), spans_table(plan)
+    first = 1 + any(section.title == TRY for section in every)
     tables = [table for table in (cables_table(plan), phases_table(plan), stages_table(plan)) if table is not None]
     return Report(
         about=f"{robot.name}, {task.name}",
         status=plan.status.value,
         summary=decisive(plan),
-        parts=[first, *([] if spans is None else [spans]), *others, *tables],
+        parts=[*every[:first], *([] if spans is None else [spans]), *every[first:], *tables],
         drawings=drawings,
         folded=("Audit", "Computation", "Stages"),
         files=[
@@ -228,7 +232,8 @@ def _cause(plan: PlanData, certificate: Certificate) -> str:
         for way, cables, bound in (("below", certificate.at_min, low), ("above", certificate.at_max, high))
         if cables.size
     ]
-    return f"at {_pose_then(plan, time)}, {', or '.join(ways)}" if ways else ""
+    nothing = f"no cable pulls along {certificate.text(_up(plan)).along.partition('; ')[0]}"
+    return f"at {_pose_then(plan, time)}, {', or '.join(ways) or nothing}"
 
 
 def _pose_then(plan: PlanData, time: float | None) -> str:
@@ -238,6 +243,21 @@ def _pose_then(plan: PlanData, time: float | None) -> str:
     place = f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(pose[:3], 6))}) m"
     turned = ", ".join(f"{np.rad2deg(value) + 0.0:.3g}" for value in np.round(pose[3:], 6))
     return place if np.abs(pose[3:]).max() < LEVEL else f"{place}, roll, pitch, yaw ({turned}) degrees"
+
+
+def _ideas(plan: PlanData) -> list[Fact]:
+    """Return what may help a plan for which no feasible change was found; nothing of it is computed."""
+    if plan.feasible:
+        return []
+    scenario, ideas = plan.scenario, list[Fact]()
+    inside = {excess.limit for excess in plan.audit.excess} & {"keep_out", "cable_clearance", *OF_BODY}
+    if inside and not scenario.platform_free:
+        ideas.append(("another path", "`tube: {position: 0.5}` permits the planner to leave the path by 0.5 m"))
+    if outside := [sentence for sentence in plan.warnings if sentence.startswith(LEAVES)]:
+        ideas.append(("a nearer path", f"inside the frame: {outside[0].partition(':')[2].partition(';')[0].strip()}"))
+    tried = "shorter line, weaker wind, lighter platform or stronger cables"
+    found = [("no single change", f"is known that makes it feasible: no duration, limit, {tried}")]
+    return ideas or (found if plan.certificate is not None else [])
 
 
 def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:

@@ -15,7 +15,7 @@ from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.paths import LinePath
-from ..tasks.scenario import Scenario
+from ..tasks.scenario import AUDIT_RATE, MOST_SAMPLES, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.wind_set import WindBox
 from .relaxations import LONGER, near_motion, rounded, slower
@@ -58,10 +58,10 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     if min(factors, default=2.0) <= 1.0 or (others and not scenario.stretches):
         return []
     found = list[Relaxed]()
-    for make in (_nearer_end, _lighter_platform, _stronger_cables):
+    seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
+    for make in (_nearer_end, _less_wind, _lighter_platform, _stronger_cables):
         its = make(search, scenario)
-        if not its and others:
-            seconds = rounded(LONGER * max(factors) * scenario.duration, up=True)
+        if not its and others and seconds * AUDIT_RATE <= MOST_SAMPLES:
             longer = lay_out(scenario.robot, task.model_copy(update={"duration": seconds}))
             with_it = f", with a duration of {quantity(seconds, 's')}"
             its = [replace(each, detail=each.detail + with_it) for each in make(search, longer)]
@@ -75,16 +75,34 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
     if not isinstance(path, LinePath):
         return []
     start, way = np.array(path.start), np.array(path.end) - np.array(path.start)
-    whole = float(np.linalg.norm(way[:3]))
+    whole, turns = float(np.linalg.norm(way[:3])), not way[:3].any()
 
     def to(share: float) -> Variation:
         end = start + share * way
         nearer = path.model_copy(update={"end": tuple(end.tolist())})
-        place = ", ".join(f"{value:.4g}" for value in end[:3])
+        place = ", ".join(f"{value:.4g}" for value in (np.rad2deg(end[3:]) if turns else end[:3]))
         varied = lay_out(scenario.robot, scenario.task.model_copy(update={"path": nearer}))
+        if turns:
+            return varied, 100 * share, f"of it, to roll, pitch, yaw ({place}) degrees"
         return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place})"
 
-    return _largest(search, to, "length of the line", "m")
+    return (
+        _largest(search, to, "part of the rotation", "%") if turns else _largest(search, to, "length of the line", "m")
+    )
+
+
+def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the strongest wind from the same direction that is feasible."""
+    wind = scenario.task.wind
+    if wind is None or isinstance(wind, WindBox) or not any(wind):
+        return []
+    speed = float(np.linalg.norm(wind))
+
+    def with_wind(share: float) -> Variation:
+        task = scenario.task.model_copy(update={"wind": tuple(share * component for component in wind)})
+        return lay_out(scenario.robot, task), share * speed, f"instead of {quantity(speed, 'm/s')}"
+
+    return _largest(search, with_wind, "wind", "m/s")
 
 
 def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:

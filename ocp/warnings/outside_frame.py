@@ -12,6 +12,7 @@ LEAST = 1e-3  # [m], and of the size of the frame, whichever is less: nearer tha
 FLAT = 0.1  # of the largest span of the anchors: an axis along which they span less has no sides
 AXES = "xyz"
 LEFT = 1e-6  # [m]
+LEAVES = "the platform leaves the frame of the robot"
 
 
 class Side(NamedTuple):
@@ -46,7 +47,7 @@ def outside_frame(seen: Instants) -> list[str]:
             part = "its centre of mass" if point == 0 else f"attachment {point}"
             where = quantity_row(np.round(seen.platform[row, point], 4) + 0.0)
             sentences.append(
-                f"the platform leaves the frame of the robot: {part} is {quantity(beyond[row, point], 'm', 3)} "
+                f"{LEAVES}: {part} is {quantity(beyond[row, point], 'm', 3)} "
                 f"{side.name} at t = {seen.times[row]:.3f} s, at ({where}) m; "
                 "limits.platform_box bounds where it goes"
             )
