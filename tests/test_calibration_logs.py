@@ -115,7 +115,7 @@ def spoiled(what):
     elif what == "a gap":
         header[3] = "l9 [m]"
     elif what == "nan":
-        rows[5, 4] = np.nan
+        rows[:, 4] = np.nan
     elif what == "times":
         rows[20, 0] = rows[18, 0]
     elif what == "no lengths":
@@ -146,7 +146,7 @@ FAULTS = {
     "unknown column": "must have columns l0 to l6 without a gap, got no l2",
     "twice": "must have each column once, got l1 twice",
     "a gap": "must have columns l0 to l7 without a gap, got no l2",
-    "nan": "l3 must be a finite number at sample 5, got nan",
+    "nan": "l3 must be a finite number at sample 0, got nan",
     "times": "times must increase from sample to sample, got 9.5 s and then 9 s at sample 20",
     "no lengths": "must have columns l0, l1, ... of lengths, got x, y, z, roll, pitch, yaw",
     "part of a position": "must have all columns x, y, z or none of them, got x, y",

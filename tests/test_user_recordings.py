@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from towline import load, read_measurements
+from towline.estimation.calibration import calibrate
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
 
@@ -101,3 +102,24 @@ def test_positions_alone_have_input_errors_too(tmp_path):
     found = mistake(load(robot), read_measurements(tmp_path / "swapped.csv", robot=robot))
     assert "l0 and l1 look exchanged" in found.text
     assert found.severe
+
+
+def test_missing_readings_and_a_table_of_two_sensors(tmp_path):
+    """Readings that failed are left out; lengths and poses in different lines are interpolated."""
+    robot, _ = user.planar(tmp_path, 12)
+    head, *lines = (tmp_path / "planar.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines]
+    rows[17][2] = ""
+    rows[40][1:5] = ["nan"] * 4
+    (tmp_path / "gaps.csv").write_text("\n".join([head, *(",".join(row) for row in rows)]))
+    said = called("calibrate", robot, "gaps.csv", "--free", "offsets,scales,clock", cwd=tmp_path)
+    assert "left out, without all lengths or tensions: 2" in said
+    joined = []
+    for row in rows:
+        joined += [[*row[:5], "", ""], [f"{float(row[0]) + 0.004:.6g}", "", "", "", "", *row[5:]]]
+    (tmp_path / "joined.csv").write_text("\n".join([head, *(",".join(row) for row in joined)]))
+    read = read_measurements(tmp_path / "joined.csv", robot=robot)
+    assert len(read) > 0.95 * len(rows)
+    result = calibrate(load(robot), read, ["anchors", "offsets", "scales", "clock"])
+    assert result.clock == pytest.approx(-0.034 + 0.004, abs=2e-3)
+    assert result.noise < 4e-4

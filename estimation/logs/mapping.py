@@ -268,9 +268,8 @@ def _in_units(one: Field, kind: str, stated: bool) -> Field:
     with suppress(ValueError):  # such as 20 N
         one = one._replace(unit=unit, factor=float(number)) if number else one
     if one.unit not in UNITS[kind] or not 0 < abs(one.factor) < np.inf:
-        units = ", ".join(UNITS[kind])
-        known = f"one of {units}, or a number of these in a map, such as [0.05 {next(iter(UNITS[kind]))}]"
-        raise InputError(f"the unit of {one.full} must be {known}, got {one.unit!r}")
+        hint = f" (or a multiple, such as [0.05 {next(iter(UNITS[kind]))}])" if one.unit else ""
+        raise InputError(f"the unit of {one.full} must be one of {', '.join(UNITS[kind])}, got {one.unit!r}{hint}")
     return one
 
 

@@ -26,6 +26,7 @@ from .recording import Recording, Samples
 from .streams import Reader, at_times, interpolated
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
+MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
 COUNTED = 1e8  # [s]: times beyond count from 1970, and are read from the first one
 AHRS = np.radians(0.5)  # sigma of orientations that no motion capture measured
 
@@ -229,6 +230,10 @@ def measurements_of(
     pose = position or orientation
     source = (found.position or found.orientation or (main,))[0]
     together, clock = source.topic is main.topic, None
+    if together and pose is not None and times is not None and found.lengths:
+        complete, known = (np.isfinite(one.values).all(axis=1) for one in (lengths, pose))
+        if (complete & known).sum() < 0.5 * min(complete.sum(), known.sum()):  # a table of two sensors
+            together, lengths = False, Samples(times[complete], lengths.values[complete])
     if pose is not None and not together:
         if times is None or pose.times is None:
             raise InputError("lengths and poses of several files or topics must have times, got none")
@@ -241,21 +246,24 @@ def measurements_of(
         position = None if position is None else Samples(lengths.times, places)
         orientation = None if quaternions is None else Samples(lengths.times, quaternions)
     elif tensions is not None:
+        good = np.isfinite(tensions.values).all(axis=1)
+        if tensions.times is not None:
+            tensions = Samples(tensions.times[good], tensions.values[good])
         tensions = at_times(lengths.times, tensions, found.tensions[0])
-    _check_finite(lengths.values, found.lengths)
-    arguments: dict[str, Any] = {"times": None if lengths.times is None else lengths.times - begin}
+    kept = _kept(lengths.values, found.lengths)
     if tensions is not None:
-        _check_finite(tensions.values, found.tensions)
-        arguments["tensions"] = tensions.values
-    if position is not None:
-        arguments["poses"] = position.values
-    if orientation is not None:
-        arguments["orientations"] = orientation.values
+        kept &= _kept(tensions.values, found.tensions)
+    if not kept.all():
+        notes.append(f"left out, without all lengths or tensions: {quantity(int((~kept).sum()))}")
+    arguments: dict[str, Any] = {"times": None if lengths.times is None else (lengths.times - begin)[kept]}
+    for name, one in (("tensions", tensions), ("poses", position), ("orientations", orientation)):
+        if one is not None:
+            arguments[name] = one.values[kept]
     if position is None and orientation is not None and "rotation" not in (sigmas.get("sigma") or {}):
         notes.append(f"orientations without positions are taken to be good to {quantity(np.degrees(AHRS), 'deg', 2)}")
         known = sigmas.get("sigma", {})
         sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
-    measured = Measurements(lengths.values, **arguments, **sigmas)
+    measured = Measurements(lengths.values[kept], **arguments, **sigmas)
     return Log(measured, found, [*notes, *read.notes], begin, clock=clock)
 
 
@@ -336,8 +344,11 @@ def _quaternions(values: np.ndarray) -> np.ndarray:
     return np.where(np.abs(size - 1) < 0.1, result / np.where(size > 0, size, 1.0), np.nan)
 
 
-def _check_finite(values: np.ndarray, fields: Sequence[Field]) -> None:
-    wrong = np.argwhere(~np.isfinite(values))
-    if wrong.size:
-        row, column = (int(i) for i in wrong[0])
+def _kept(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:
+    """Return the samples that are complete, (N,) of bool; raise InputError if too many have gaps."""
+    finite = np.isfinite(values)
+    kept = finite.all(axis=1)
+    if not kept.any() or (finite.any(axis=1) & ~kept).mean() > MOST_PARTIAL:
+        row, column = (int(i) for i in np.argwhere(~finite)[0])
         raise InputError(f"{fields[column].full} must be a finite number at sample {row}, got {values[row, column]:g}")
+    return np.asarray(kept)
