@@ -37,12 +37,12 @@ from .proofs.durations import Durations, durations
 from .proofs.infeasible_ends import infeasible_ends
 from .result import Relaxed
 from .search.homotopy import from_easier
-from .search.phase_durations import shortest_phases
 from .search.reference import about_better_reference, with_its_reference
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion
 from .search.replanning import Replanner
 from .search.search import Search
+from .search.shortest_durations import Chosen, shortest_durations
 from .search.start import deviation_from
 from .search.stops_within import stopping_within
 from .search.stronger_or_nearer import near_chosen_motion, stronger_or_nearer
@@ -149,6 +149,7 @@ class Planner(Displayed):
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
         self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan
+        self._chosen: Chosen | None = None  # how ranges of durations became numbers
         self._flown: Plan | Replanner | None = None  # what `replan` continues from
 
     @property
@@ -176,13 +177,15 @@ class Planner(Displayed):
         """
         check_progress(progress)
         with heeding():
-            self.scenario, chosen = shortest_phases(self.scenario)
+            self.scenario, chosen = shortest_durations(self.scenario)
+            self._chosen = chosen or self._chosen
             self.scenario = with_its_reference(start, self.scenario)
         self._search = search = Search(self.scenario, self._solvers, progress)
-        search.stages += [] if chosen is None else [chosen]
+        search.stages += [chosen.stage] if chosen else []
         with heeding():
             guess = None if start is None else deviation_from(self.scenario, start)
             plan = replace(_climb(search, guess, self._last), stages=tuple(search.stages))
+            plan = plan if self._chosen is None else self._chosen.judged(plan)
             self.scenario = search.scenario
             if plan.feasible and plan.deviation is not None and search.mesh is not None:
                 self._last = search.mesh, plan.deviation
@@ -253,16 +256,15 @@ def _climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation]
     scenario = search.scenario
     if scenario.is_fixed:
         return _fixed_motion(search)
-    proven = _blocked(search)
-    if proven is not None:
+    if (proven := _blocked(search)) is not None:
         return proven
     timed, own = _time_law(search) if scenario.count == 0 else (None, True)
     if timed is not None and not (own and timed.feasible):
         return timed
-    planned = _again(search, *last) if start is None and last is not None else None
-    if planned is None and start is last is None:
+    if start is last is None:
         planned = about_better_reference(search, _free_motion)
-    planned = planned or _free_motion(search, start)
+    else:
+        planned = (_again(search, *last) if start is None and last else None) or _free_motion(search, start)
     if timed is None or (planned.feasible and cost(planned) <= cost(timed)):
         return planned
     return replace(timed, build_s=search.build_s, solve_s=search.solve_s)

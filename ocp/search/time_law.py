@@ -28,7 +28,8 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
     if scenario.wind_box is not None:
         return None, "not computed: in moving air the drag is not proportional to the square of the speed"
     path = task.path
-    if not (path.stretches and isinstance(path, LinePath | WaypointPath)) or getattr(path, "timing", "") == "uniform":
+    own = path.natural_duration is not None or getattr(path, "timing", "") == "uniform"
+    if own or not isinstance(path, LinePath | WaypointPath):
         return None, f"not computed: the path of kind {task.path.kind} has a time law of its own"
     hard = {name: getattr(task.limits, name) for name in KNOWN_LIMITS if name not in task.limits.soft}
     alone = {"limits": TaskLimits(**hard), "margin": scenario.hard_margin, "tube": Tube()}

@@ -289,13 +289,15 @@ class Task(Part):
     def seconds(self) -> float:
         """Return the duration of the motion [s]; for a range its geometric mean, from which the planner starts.
 
+        A path that dwells takes longer than it does.
+
         Raises
         ------
         InputError
             If neither the task nor its path gives it.
         """
         if isinstance(self.duration, PositiveRange):
-            return float(np.sqrt(self.duration.min * self.duration.max))
+            return float(np.sqrt(max(self.duration.min, self.path.resting) * self.duration.max))
         seconds = self.duration if self.duration is not None else self.path.natural_duration
         if seconds is None:
             raise InputError(f"task {self.name!r}: duration must be a number > 0 [s] or a range, got nothing")

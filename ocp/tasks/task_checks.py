@@ -17,7 +17,7 @@ from .initial import Final, Initial, check_ends
 from .limit_list import bodies
 from .paths import WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, Scenario
-from .task import Task
+from .task import FreeBase, Task
 from .task_limits import OF_CARRIERS
 from .wind_set import WindBox
 
@@ -153,17 +153,21 @@ def _check_times(task: Task, where: str) -> None:
         )
     paths = {"path": task.path, **getattr(task.base, "paths", {}), **getattr(task.base, "around", {})}
     for name, path in paths.items():
-        if task.seconds <= path.resting:
+        if longest <= path.resting:
             raise InputError(
-                f"{where}: duration must be more than the {path.resting:g} s for which {name} dwells, got "
-                f"{task.seconds:g} s"
+                f"{where}: duration must be more than the {path.resting:g} s for which {name} dwells, got {longest:g} s"
             )
     if isinstance(task.duration, PositiveRange):
         for name, path in paths.items():
-            if not path.stretches:
+            if path.natural_duration is not None or (path.resting and path is not task.path):
                 raise InputError(
                     f"{where}: duration must be a number [s], got a range, while {name} of kind {path.kind} has "
-                    "times of its own; paths of kind rest, line, and waypoints without times and dwell take a range"
+                    "times of its own; paths of kind rest, line, and waypoints without times take a range"
+                )
+            if path.resting and (task.tube.radius or task.tube.turn or isinstance(task.base, FreeBase)):
+                raise InputError(
+                    f"{where}: duration must be a number [s] where path has a dwell and tube or base leave the motion "
+                    "free, got a range"
                 )
     for name, path in paths.items():
         end = path.natural_duration if path.kind in ENDING else None

@@ -1,8 +1,9 @@
-"""Durations of phases as ranges: each the shortest that is feasible, found in the whole motion."""
+"""Durations of phases and of paths that dwell as ranges: each the shortest that is feasible."""
 
+import numpy as np
 import pytest
 
-from towline import InputError, load, plan, read_task
+from towline import InputError, load, plan, read_task, time_along
 from towline.ocp import Planner
 
 HIGH, LOW, FAR = [-2, -1, 1.6], [-2, -1, 1], [2, 1, 1.6]
@@ -83,3 +84,50 @@ def test_planning_again_takes_the_durations_of_the_first_plan():
     first, second = planner.plan(), planner.plan()
     assert first.duration == second.duration
     assert "durations of phases" not in [stage.name for stage in second.stages]
+
+
+STILL = {"kind": "waypoints", "points": [[-1, 0, 1], [1, 1, 1.5], [1, -1, 1], [-1, 0, 1]], "dwell": [0, 0.5, 0.3, 0]}
+RANGE = {"min": 0.5, "max": 20}
+
+
+def test_a_path_that_dwells_has_the_fastest_time_law_and_rests_as_long_as_its_dwells():
+    found = plan("cogiro", {"path": STILL, "duration": RANGE})
+    assert found.feasible
+    assert found.duration == pytest.approx(time_along("cogiro", {"path": STILL}).duration)
+    times, motion = found.audit.times, found.audit.motion
+    for point, dwell in zip(STILL["points"][1:3], STILL["dwell"][1:3], strict=True):
+        there = np.linalg.norm(motion.pose[:, :3] - point, axis=1) < 1e-9
+        assert np.ptp(times[there]) >= dwell - 2e-3
+        assert np.abs(motion.velocity[there]).max() < 1e-3
+
+
+def test_a_limit_that_time_laws_do_not_know_takes_the_shortest_duration_of_the_own_law():
+    most = 50.0  # [m/s^3]
+    task = {"path": STILL, "limits": {"cable_jerk": most}}
+    found = plan("cogiro", task | {"duration": RANGE})
+    assert found.feasible
+    step = 1e-3
+    times = np.arange(0.0, found.duration, step)
+    lengths = found.scenario.dynamics.cable_lengths(found.scenario.motion(times, None)[0].pose)
+    jerk = np.abs(np.diff(lengths, 3, axis=0)).max() / step**3
+    assert 0.95 * most < jerk < 1.01 * most
+    assert not plan("cogiro", task | {"duration": 0.99 * found.duration}).feasible
+
+
+def test_what_no_known_law_of_a_path_that_dwells_keeps_is_not_called_infeasible():
+    planner = Planner("cogiro", {"path": STILL, "duration": RANGE, "limits": {"tension_rate": 1.0}})
+    assert [planner.plan().status.value for _ in range(2)] == ["not-found"] * 2
+    assert plan("cogiro", {"path": STILL, "duration": {"min": 1, "max": 1.5}}).status.value == "infeasible"
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"tube": {"position": 0.1}}, "duration must be a number .s. where path has a dwell"),
+        ({"duration": {"min": 0.1, "max": 0.8}}, "more than the 0.8 s for which path dwells, got 0.8 s"),
+    ],
+)
+def test_a_range_for_a_dwell_that_cannot_be_is_one_line(change, expected):
+    with pytest.raises(InputError, match=expected) as refused:
+        plan("cogiro", {"path": STILL, "duration": RANGE} | change)
+    assert "\n" not in str(refused.value)

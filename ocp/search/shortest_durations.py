@@ -1,24 +1,76 @@
-"""Choose durations of phases from their ranges, each the shortest that is feasible: `shortest_phases`."""
+"""Choose durations of phases, and of paths that dwell, from their ranges: `shortest_durations`.
+
+Each is the shortest that is feasible.
+"""
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
 
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...models.ranges import PositiveRange
 from ..audits.audit import audit
+from ..plan import Plan
 from ..result import PlannerStep
 from ..tasks.lay_out import lay_out
 from ..tasks.lay_out_phases import LEAST_INSTANTS
 from ..tasks.paths import SequencePath
 from ..tasks.scenario import AUDIT_RATE, Scenario
+from ..tasks.status import MotionStatus
 from ..tasks.task import Task
+from .time_law import BOUND, fastest
 
 LEAST = LEAST_INSTANTS / AUDIT_RATE  # [s], that a phase may last
 CLOSE = 1e-3  # relative: from the shortest duration that is feasible
 
 
-def shortest_phases(scenario: Scenario) -> tuple[Scenario, PlannerStep | None]:
+class Chosen(NamedTuple):
+    """How durations were chosen."""
+
+    stage: PlannerStep
+    proven: bool = True  # whether no motion is feasible if the one with these durations is not
+
+    def judged(self, plan: Plan) -> Plan:
+        """Return a plan with these durations, not-found instead of infeasible if they prove nothing."""
+        if self.proven or plan.status is not MotionStatus.INFEASIBLE:
+            return plan
+        reason = "neither the fastest time law nor the path's own is feasible"
+        return replace(plan, status=MotionStatus.NOT_FOUND, reason=reason)
+
+
+def shortest_durations(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
+    """Return the scenario with numbers for the ranges of its phases, or for that of a path that dwells.
+
+    Also return how they were chosen; None for any other scenario, which is returned as it is.
+
+    Raises `InputError` if a phase has a range although tube or base leave the motion free.
+    """
+    span = scenario.duration_range
+    if span is not None and scenario.path.resting and not scenario.count:
+        return _with_dwell(scenario, span)
+    return _shortest_phases(scenario)
+
+
+def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chosen]:
+    """Return the scenario with the fastest time law, or else with the path's own law in the least time."""
+    start, task = time.perf_counter(), scenario.task
+    law, message = fastest(scenario)
+    chosen = None
+    if law is not None and law.law is not None and law.feasible and span.min <= law.duration <= span.max:
+        timed = lay_out(scenario.robot, task.model_copy(update={"path": law.law.path, "duration": None}))
+        chosen = timed if audit(timed, None).passed else None
+    if chosen is None:
+        least = PositiveRange(min=max(span.min, scenario.path.resting * (1 + CLOSE)), max=span.max)
+        seconds = _shortest(least, lambda seconds: audit(scenario.held(seconds), None).passed)
+        chosen, message = scenario.held(seconds), f"{quantity(seconds, 's')} with the task's time law"
+    too_slow = law is not None and law.feasible and BOUND * law.duration > span.max
+    proven = too_slow or (law is not None and law.law is not None and law.law.certificate is not None)
+    return chosen, Chosen(PlannerStep("duration with its dwells", message, time.perf_counter() - start), proven)
+
+
+def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
     """Return the scenario with a number for each duration of a phase, and the stage that chose them.
 
     A phase is audited alone, at durations that double, and then halve the range in which the shortest lies. What its
@@ -53,7 +105,7 @@ def shortest_phases(scenario: Scenario) -> tuple[Scenario, PlannerStep | None]:
         phases[index] = phases[index].model_copy(update={"duration": seconds})
     chosen = lay_out(scenario.robot, task.model_copy(update={"phases": tuple(phases)}))
     message = ", ".join(filter(None, [message, f"{quantity(chosen.duration, 's')} in all"]))
-    return chosen, PlannerStep("durations of phases", message, time.perf_counter() - start)
+    return chosen, Chosen(PlannerStep("durations of phases", message, time.perf_counter() - start))
 
 
 def _shortest(of: PositiveRange, feasible: Callable[[float], bool]) -> float:
