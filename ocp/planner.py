@@ -149,7 +149,7 @@ class Planner(Displayed):
         self._solvers: dict[Mesh, Solver] = {}
         self._search: Search | None = None  # that has not ended
         self._last: tuple[Mesh, Deviation] | None = None  # of the last feasible plan
-        self._chosen: Chosen | None = None  # how ranges of durations became numbers
+        self._chosen: Chosen | None = None  # the stage that made ranges of durations numbers
         self._flown: Plan | Replanner | None = None  # what `replan` continues from
 
     @property

@@ -32,6 +32,11 @@ class Costs(Displayed):
         """Return the jerk that adds one; infinite if it costs nothing."""
         return min((cost.amount for cost in self.all if isinstance(cost, Jerk)), default=np.inf)
 
+    @property
+    def has_rates(self) -> bool:
+        """Return whether rates cost, besides the jerk."""
+        return any(isinstance(cost, RateCost) and not isinstance(cost, Jerk) for cost in self.all)
+
     @cached_property
     def function(self) -> ca.Function:
         """Return the function of what costs at an instant, (1, 1), and of the values whose rates cost, in amounts.

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import chain, pairwise
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -29,6 +29,9 @@ from .rows import (
 )
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
+
+
+_Whole: TypeAlias = Callable[[], list[list[ca.SX]]]  # the motions in {G} at all points, (18, 1) each
 
 
 class Points(NamedTuple):
@@ -66,10 +69,17 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     h = step * stretch(layout, x)
     own = points(scenario, layout, h, given, columns)
     constraints = [_chain_rows(layout, h, given, columns, x_end, own), *_inner_rows(scenario, layout, h, columns, own)]
-    moving = [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
-    whole = [
-        [ca.vertcat(*body) for body in (in_world(scenario, bodies[0], bodies[1:]), *bodies[1:])] for bodies in moving
-    ]
+
+    # Many tasks need neither of these, which take a tenth of the time of building.
+    @cache
+    def moving() -> list[list[list[ca.SX]]]:
+        return [motions(scenario, layout, *pair) for pair in zip(columns, referred, strict=True)]
+
+    @cache
+    def whole() -> list[list[ca.SX]]:
+        all_bodies = [(in_world(scenario, bodies[0], bodies[1:]), *bodies[1:]) for bodies in moving()]
+        return [[ca.vertcat(*body) for body in bodies] for bodies in all_bodies]
+
     # The mean square of the jerk, and what rates cost.
     jerks = [point / scenario.costs.jerk for point in bernstein.derivative(h, own.acceleration)]
     cost = bernstein.mean_square(jerks, ca.dot)
@@ -86,7 +96,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
             position = bernstein.joined(h, own.position, first[layout.v], last[layout.q], last[layout.v])
             own_points = Points(position, own.speed, own.acceleration)
             return Points(*([of_body @ point for point in part] for part in own_points))
-        motion = [point[1 + carrier] for point in moving]
+        motion = [point[1 + carrier] for point in moving()]
         jerk = [of_body @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
         return _total(scenario, h, motion, [of_body @ column[layout.a] for column in columns], jerk)
 
@@ -145,14 +155,16 @@ def _inner_rows(
 
 
 def _rate_cost(
-    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: list[list[ca.SX]], take_up: ca.SX
+    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: _Whole, take_up: ca.SX
 ) -> ca.SX | float:
     """Return what rates from point to point cost.
 
     On the ground those of tensions cost by default, so that the load is taken up over the whole phase.
     """
     objective, robot = scenario.task.objective, scenario.robot
-    changing = [costs_at(scenario, layout, *at)[1] for at in zip(columns, whole, strict=True)]
+    changing = [ca.SX(0, 1)] * len(columns)
+    if scenario.costs.has_rates:
+        changing = [costs_at(scenario, layout, *at)[1] for at in zip(columns, whole(), strict=True)]
     if scenario.phases.rest and objective.tension_rate is None:
         gentle = TAKE_UP * take_up * robot.force_scale / (objective.tension or robot.force_scale)
         changing = [ca.vertcat(its, gentle * x[layout.tensions]) for its, x in zip(changing, columns, strict=True)]
@@ -169,14 +181,14 @@ def _pieces(scenario: Scenario, at_points: list[ca.SX]) -> list[tuple[float, ca.
 
 
 def _rate_rows(
-    scenario: Scenario, mesh: Mesh, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: list[list[ca.SX]]
+    scenario: Scenario, mesh: Mesh, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: _Whole
 ) -> Iterator[Constraints]:
     """Yield values and rows of the limits of how fast something changes, from point to point."""
     limits = scenario.limits
     if not any(isinstance(limit, Rate) for limit in limits):
         return
     at_points = []
-    for column, bodies in zip(columns, whole, strict=True):
+    for column, bodies in zip(columns, whole(), strict=True):
         tensions = scenario.robot.force_scale * column[layout.tensions]
         at_points.append(limits.function(*bodies, tensions, spread(scenario, None) @ column[layout.q]))
     for limit, place in zip(limits, limits.places, strict=True):
@@ -187,13 +199,13 @@ def _rate_rows(
 
 
 def _way_rows(
-    scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], whole: list[list[ca.SX]]
+    scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], whole: _Whole
 ) -> Iterator[tuple[int, Constraints]]:
     """Yield index and constraints of the distances from thin regions on the straight way from point to point."""
     held = mesh.held(scenario)
     for limit, on_the_way in swept(scenario, mesh).items():
         slack = layout.slack(columns[0], limit)
-        pieces = [bounded(limit, on_the_way(*first, *second), mesh, slack, held) for first, second in pairwise(whole)]
+        pieces = [bounded(limit, on_the_way(*first, *second), mesh, slack, held) for first, second in pairwise(whole())]
         values, rows = ([*chain(*parts)] for parts in zip(*pieces, strict=True))
         yield scenario.limits.all.index(limit), (values, rows)
 

@@ -28,6 +28,8 @@ def leaving_rows(scenario: Scenario, layout: Layout, references: np.ndarray, col
 
     `references` are the motions at all points, (18 (1 + c), points).
     """
+    if all(limit.is_convex or limit.is_equation for limit in scenario.limits):
+        return []  # they hold between the nodes anyway
     blocks, size, last = [], scenario.scheme.size, references.shape[1] - 1
     for end, node, forwards in ((0, 0, 1.0), (-1, last, -1.0)):
         fixed = [value.column for value in fixed_values(scenario) if (value.end, value.order) == (end, 2)]
@@ -52,7 +54,7 @@ def leaving_rows(scenario: Scenario, layout: Layout, references: np.ndarray, col
 def _slopes_outwards(scenario: Scenario, end: int) -> Iterator[tuple[str, ca.Function]]:
     """Yield the names of the limits of speed that are on a bound at an end, and how fast they leave it.
 
-    Functions are of the motions of platform and carriers, (18, 1) each. Convex limits hold between the nodes anyway.
+    Functions are of the motions of platform and carriers, (18, 1) each.
     """
     limits, share = scenario.limits, 0.0 if end == 0 else 1.0
     held = held_spans(scenario, lambda _: ON_IT)

@@ -27,7 +27,7 @@ CLOSE = 1e-3  # relative: from the shortest duration that is feasible
 
 
 class Chosen(NamedTuple):
-    """How durations were chosen."""
+    """The stage that chose durations, and what it proves."""
 
     stage: PlannerStep
     proven: bool = True  # whether no motion is feasible if the one with these durations is not
@@ -43,7 +43,7 @@ class Chosen(NamedTuple):
 def shortest_durations(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
     """Return the scenario with numbers for the ranges of its phases, or for that of a path that dwells.
 
-    Also return how they were chosen; None for any other scenario, which is returned as it is.
+    Also return the stage that chose them; None for any other scenario, which is returned as it is.
 
     Raises `InputError` if a phase has a range although tube or base leave the motion free.
     """
