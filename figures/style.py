@@ -116,29 +116,26 @@ def panels_below(
     return every
 
 
-def axes_in_space(canvas: Figure, text: float = TEXT) -> Any:
-    """Return axes of a 3-D picture, with coordinates and units as labels of size `text` [points], and few ticks."""
+def axes_in_space(canvas: Figure) -> Any:
+    """Return axes of a 3-D picture, with coordinates and units as labels, and few ticks."""
     from mpl_toolkits.mplot3d import Axes3D  # its import registers the projection
 
     ax: Any = canvas.add_subplot(projection=Axes3D.name)
     for axis in "xyz":
-        getattr(ax, f"set_{axis}label")(f"{axis} [m]", fontsize=text, labelpad=(0.9 if axis == "z" else 0.4) * text)
+        getattr(ax, f"set_{axis}label")(f"{axis} [m]", fontsize=TEXT, labelpad=(0.9 if axis == "z" else 0.4) * TEXT)
         getattr(ax, f"{axis}axis").set_major_locator(few_ticks())
-    ax.tick_params(labelsize=text - TEXT + NOTE, pad=0.0)
-    ax.tick_params(axis="z", pad=0.5 * text)  # its numbers run across it
+    ax.tick_params(labelsize=NOTE, pad=0.0)
+    ax.tick_params(axis="z", pad=0.5 * TEXT)  # its numbers run across it
     return ax
 
 
-def equal_scales(ax: Any, points: np.ndarray, zoom: float = 0.85) -> None:
-    """Set the same scale on all three axes, so that a circle looks like a circle.
-
-    `zoom` below 1 leaves a margin for labels, which the layout does not count.
-    """
+def equal_scales(ax: Any, points: np.ndarray) -> None:
+    """Set the same scale on all three axes, so that a circle looks like a circle."""
     low, high = points.min(axis=0), points.max(axis=0)
     half = max(0.54 * float((high - low).max()), 1e-3)  # some air, so that ticks do not meet at the corners
     for axis, centre in zip("xyz", (low + high) / 2, strict=True):
         getattr(ax, f"set_{axis}lim")(centre - half, centre + half)
-    ax.set_box_aspect((1, 1, 1), zoom=zoom)
+    ax.set_box_aspect((1, 1, 1), zoom=0.85)  # a margin for labels, which the layout does not count
 
 
 def few_ticks(most: int = 4) -> MaxNLocator:

@@ -14,6 +14,7 @@ MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear progra
 _PER_METRE = 40.0  # force scales that a metre costs by which a bound is missed
 _LARGEST = 1e7  # of the objective [N]
 _FOUND = 1e-5  # of the margin, or of 1 N: a smaller improvement ends the search
+_PROGRAMS = 60  # from one start, at most
 
 
 class Multipliers(NamedTuple):
@@ -70,9 +71,7 @@ class _Program:
         return np.clip(y + self.solution.x[: y.size] * self.scale, variables.low, variables.high)
 
 
-def maximise(
-    evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1, most: int = 60
-) -> None:
+def maximise(evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1) -> None:
     """Move the variables to a local maximum of a goal, in place: an interrupt keeps what is reached.
 
     Parameters
@@ -87,8 +86,6 @@ def maximise(
         Time of `time.perf_counter` at which it ends early [s].
     delta
         Longest step of the first program, of the range of each variable.
-    most
-        Number of linear programs.
     """
     price = _PER_METRE * evaluation.variables.robot.force_scale
 
@@ -98,7 +95,7 @@ def maximise(
         return goal.value(float(every.min()), z, frequency) - price * evaluation.missing(z), every
 
     value, every = merit(y)
-    for _ in range(most):
+    for _ in range(_PROGRAMS):
         if delta < 1e-6 or time.perf_counter() > until or not np.isfinite(value):
             break
         program = _Program(evaluation, goal, y, delta, every)

@@ -95,9 +95,9 @@ def decisive_winds_at(box: WindBox, robot: Robot, pose: np.ndarray, velocity: np
     return [value.full().T for value in values]
 
 
-def inner_winds(box: WindBox, count: int, first: int = 0) -> np.ndarray:
+def inner_winds(box: WindBox, count: int) -> np.ndarray:
     """Return winds that fill the box evenly, (count, 3) [m/s]; every fourth lies on a face."""
-    index = np.arange(first + 1, first + count + 1)
+    index = np.arange(1, count + 1)
     share = (0.5 + index[:, None] * _STEPS) % 1.0
     faces = np.flatnonzero(index % 4 == 0)
     axis = (index[faces] // 4) % 3

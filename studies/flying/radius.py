@@ -27,9 +27,9 @@ DEPTHS = np.linspace(0.4, 4.0, 10)  # of the circle under the quadrotor [m]
 BEYOND = (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8)  # radii [m] at which all pairings are tried, besides the printed one
 
 
-def largest_radius(dynamics: Dynamics, floor: float = 0.0, below: float = BELOW, most: float = 2.0) -> float:
-    """Return the largest radius [m], up to `most`, at which tensions of at least `floor` [N] exist all the time."""
-    return _bisected(lambda radius: feasible(dynamics, radius, floor, below), 0.0, most)
+def largest_radius(dynamics: Dynamics, floor: float = 0.0, below: float = BELOW) -> float:
+    """Return the largest radius [m], up to 2 m, at which tensions of at least `floor` [N] exist all the time."""
+    return _bisected(lambda radius: feasible(dynamics, radius, floor, below), 0.0, 2.0)
 
 
 def feasible(dynamics: Dynamics, radius: float, floor: float, below: float = BELOW) -> bool:
@@ -39,10 +39,10 @@ def feasible(dynamics: Dynamics, radius: float, floor: float, below: float = BEL
     return bool(solve_batch(A, w, np.full(robot.m, floor), robot.t_max).feasible.all())
 
 
-def largest_radius_of_any(low: float, high: float = BEYOND[0]) -> float:
-    """Return the largest radius [m] from `low` to `high` at which some pairing holds the platform all the time."""
+def largest_radius_of_any(low: float) -> float:
+    """Return the largest radius [m], from `low` to 0.25 m, at which some pairing holds the platform all the time."""
     pairs = hold(low)
-    return _bisected(lambda radius: len(hold(radius, pairs)) > 0, low, high)
+    return _bisected(lambda radius: len(hold(radius, pairs)) > 0, low, BEYOND[0])
 
 
 def _bisected(holds: Callable[[float], bool], low: float, high: float) -> float:
