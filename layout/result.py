@@ -7,11 +7,16 @@ import numpy as np
 
 from ..base.display import Displayed, Fact
 from ..base.text import quantity, quantity_range, quantity_row
+from ..figures.drawing import Drawing
 from ..figures.report import Part, Report, Reported, Section, Table
+from ..figures.robot import draw
 from ..models import Robot
+from ..models.dynamics import dynamics_of
 from ..models.parsing import to_yaml
 from ..ocp.plan import Plan
-from ..solvers import Certificate
+from ..solvers import Certificate, solve
+from ..statics.distribution import wrench_problem
+from ..statics.scene import scene_at
 from .impossibility import Impossibility
 from .judgement import Judgement
 from .reasons import Binding, Reasons
@@ -91,7 +96,7 @@ class Design(Reported, Displayed):
 
     def _summary(self) -> str:
         if self.impossibility is not None:
-            return self.impossibility.describe(self._up())
+            return "no layout inside the boxes meets the requirements"
         text = f"capacity margin {quantity(self.margin, 'N')} (before {quantity(self.margin_before, 'N')})"
         if self.requirements.minimise is not None:
             mean, before = (quantity(robot.t_max.mean(), "N") for robot in (self.robot, self.before))
@@ -129,9 +134,8 @@ class Design(Reported, Displayed):
         about = f"{self.before.name}, {self.requirements.name}"
         parts: list[Part] = []
         if self.impossibility is not None:
-            proof = self.impossibility.certificate.describe(self._up()).replace("\n", " ")
-            parts.append(f"proof for one pose and wrench: {proof}")
-            return Report(about, self.status, self._summary(), parts)
+            parts += self._why_not(self.impossibility)
+            return Report(about, self.status, self._summary(), parts, drawings=self._drawings)
         pairing = self.requirements.free[0].pairing
         searched = quantity(self.starts) + (" pairings" if pairing else f" start{'s' * (self.starts != 1)}")
         searched += f", {quantity(self.poses)} pair{'s' * (self.poses != 1)} of pose and wrench"
@@ -146,19 +150,58 @@ class Design(Reported, Displayed):
             wanted += room_of(self.before, self.requirements).describe()
             wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
             facts.append(("wanted", f"{' and a '.join(wanted)}; this does not prove that no layout has it"))
-        parts.append(Section("", facts))
-        if self.reasons is not None:
-            parts += self._why(self.reasons)
-        return Report(about, self.status, self._summary(), parts, files=[("The robot's file", to_yaml(self.robot))])
+        why = [] if self.reasons is None else self._why(self.reasons)
+        files = [("The robot's file", to_yaml(self.robot))]
+        parts += [Section("", [*facts, *self._state()]), *why]
+        return Report(about, self.status, self._summary(), parts, files=files, drawings=self._drawings)
 
-    def _why(self, found: Reasons) -> list[Part]:
+    def _why_not(self, proof: Impossibility) -> list[Part]:
+        certificate = proof.certificate
+        text = certificate.text(self._up())
+        facts = [
+            ("pose", f"({quantity_row(proof.pose)}) [m, rad]"),
+            ("wrench", f"({quantity_row(proof.wrench)}) [N, N m]"),
+            ("direction", text.along),
+            ("needed", text.needed),
+            ("available", f"{text.available}, in the best layout inside the boxes"),
+            ("short by", text.short_by),
+        ]
+        if certificate.at_max.size:
+            cables = ", ".join(str(cable + 1) for cable in certificate.at_max)
+            idea = ("stronger cables", f"a higher t_max of cables {cables}, a smaller wrench, or larger boxes")
+        else:
+            idea = ("another pose", "or boxes of anchors farther along the direction; stronger cables do not help")
+        return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
+
+    def _drawings(self) -> list[Drawing]:
+        """Return pictures of the robots at the pose that limits the margin most, or at the impossible pose."""
+        one = self.impossibility or next(iter(self.reasons.binding if self.reasons else ()), None)
+        if one is None:
+            return []
+        robots = {"after": self.robot} if not self.impossibility else {}
+        where = "at the pose that limits the margin most" if robots else "at the impossible pose"
+        robots["before"] = self.before
+        drawings = []
+        for name, robot in robots.items():
+            problem = wrench_problem(robot, dynamics_of(robot).wrench_matrix(one.pose), one.wrench)
+            shown = scene_at(robot, one.pose, solve(problem).tensions, f"{self.before.name}, {name}")
+            drawings.append(Drawing(f"The robot {name} the design, {where}", draw(shown)))
+        return drawings
+
+    def _state(self) -> list[Fact]:
+        """Return in a sentence whether the layout can be improved."""
+        found = self.reasons
+        if found is None:
+            return []
         state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
         bounds = f"{found.at_bounds} free numbers are at a bound of their box"
         if self.requirements.free[0].pairing:
             state, bounds = "the best of all pairings at the poses of the grid", "all points are given"
-        facts = [("layout", f"{state}; {bounds}")]
+        return [("layout", f"{state}; {bounds}")]
+
+    def _why(self, found: Reasons) -> list[Part]:
         gain = "mean t_max -" if self.requirements.minimise else f"{self.requirements.maximise.replace('_', ' ')} +"
-        facts += [
+        gains = [
             (one.change, f"{gain}{quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
             for one in found.advice
         ]
@@ -166,7 +209,8 @@ class Design(Reported, Displayed):
         columns = ("share", "pose [m, rad]", "wrench [N, N m]", "least reserve along", "limits")
         more = len(found.binding) - len(rows)
         table = Table("What binds", columns, rows, (0,))
-        return [Section("", facts), table, *([f"and {more} more"] if more > 0 else [])]
+        changes = Table("What a change would gain", ("change", "gain"), gains)
+        return [changes, table, *([f"and {more} more"] if more > 0 else [])]
 
     def _binding_row(self, one: Binding) -> list[str]:
         limits = [

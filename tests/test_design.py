@@ -90,7 +90,7 @@ def test_a_published_layout_is_improved_and_judged_from_its_file(found, tmp_path
     assert found.clearance >= 0.04
 
 
-def test_the_report_names_what_binds(found):
+def test_the_report_names_what_binds(found, tmp_path):
     report, data = found.report(), found.to_dict()
     assert report.startswith("ipanema-2, design: FEASIBLE, capacity margin")
     assert "local optimum" in report
@@ -98,6 +98,9 @@ def test_the_report_names_what_binds(found):
     assert sum(one["weight"] for one in data["binding"]) == pytest.approx(1.0, abs=1e-6)
     assert json.loads(json.dumps(data))["margin"] == found.margin
     assert len(repr(found).splitlines()) <= 5
+    page = found.save_report(tmp_path / "report.html").read_text()
+    assert page.count("<img") + page.count("<svg") == 2  # the robot after and before
+    assert "What a change would gain" in page
     robot = load("ipanema-2")
     for one in found.reasons.binding[:5]:  # the reserve along its direction is the margin
         A = Dynamics(found.robot).wrench_matrix(one.pose)
@@ -217,6 +220,9 @@ def test_the_impossible_is_refused_with_a_certificate_that_no_layout_breaks(name
         assert result.status == "infeasible", number
         assert result.robot == robot
         assert "no layout inside the boxes" in result.report()
+        stronger = "stronger cables do not help" not in result.report()
+        assert stronger == bool(result.certificate.at_max.size)
+        assert "What you can try" in result.report()
         proof = result.impossibility
         variables = variables_of(robot, read_requirements(requirements))
         assert proof.verify(variables)
