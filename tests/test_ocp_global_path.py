@@ -220,7 +220,7 @@ def test_formations_that_are_free_at_the_ends_start_clear():
 @pytest.mark.parametrize("ends", ["exact", "periodic"])
 def test_formations_that_are_given_at_the_ends_stay(ends):
     space = Space(past_a_pillar(ends=ends))
-    np.testing.assert_array_equal(with_clear_ends(space, AtRest(space.scenario, space.size), 0.05, 0).ends, space.ends)
+    np.testing.assert_array_equal(with_clear_ends(space, AtRest(space.scenario, space.size), 0.05).ends, space.ends)
 
 
 def test_formations_keep_the_balance_of_a_load():

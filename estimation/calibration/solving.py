@@ -163,14 +163,8 @@ def _stretched(model: Model, state: State, length: float) -> Model:
     return model if same else replace(model, felt=felt)
 
 
-def model_of(
-    robot: Robot,
-    measurements: Measurements,
-    groups: tuple[str, ...],
-    prior: dict[str, float],
-    start: np.ndarray | None = None,
-) -> Model:
-    """Return the model of checked arguments; `start` are initial poses (N, 6), default: level ones."""
+def model_of(robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]) -> Model:
+    """Return the model of checked arguments, which starts with level poses where none are measured."""
     parameters = Parameters(robot, groups)
     weights = np.ones((robot.m, len(measurements)))
     model = Model(parameters, measurements, prior, weights, forces=Balance(robot, measurements))
@@ -181,12 +175,10 @@ def model_of(
         carriers = None if measurements.carrier_poses is None else CarrierMotion(robot, measurements)
         model = replace(model, track=track, carriers=carriers)
     elif np.isinf(model.pose_sigmas[:, :3]).any():
-        if start is None:
-            table = parameters.table(parameters.first)
-            lengths = table[:, 6] + table[:, 7] * measurements.lengths
-            start = level_poses(robot, lengths, "offsets" in groups, measurements.carrier_poses)
-            start = placed(robot, measurements, start)
-        model = replace(model, start=start)
+        table = parameters.table(parameters.first)
+        lengths = table[:, 6] + table[:, 7] * measurements.lengths
+        start = level_poses(robot, lengths, "offsets" in groups, measurements.carrier_poses)
+        model = replace(model, start=placed(robot, measurements, start))
     return model
 
 

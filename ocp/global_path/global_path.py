@@ -86,21 +86,21 @@ class GlobalPath(Displayed):
         return float(np.clip(max([scenario.duration, *by_speed, *by_rate]), span.min, span.max))
 
 
-def find_global_path(scenario: Scenario, seconds: float = np.inf, seed: int = 0) -> tuple[GlobalPath | None, str]:
+def find_global_path(scenario: Scenario, seconds: float = np.inf) -> tuple[GlobalPath | None, str]:
     """Return a path, or None, and a message: its length, or why there is none.
 
-    The same scenario and seed have the same path, unless the time of `seconds` ends first.
+    The same scenario has the same path, unless the time of `seconds` ends first.
     """
     space, deadline = Space(scenario), time.perf_counter() + seconds
     rest = AtRest(scenario, space.size)
-    space = with_clear_ends(space, rest, min(RESERVES[0] * space.size, MOST_RESERVE), seed)
+    space = with_clear_ends(space, rest, min(RESERVES[0] * space.size, MOST_RESERVE))
     kept = rest(*space.poses(space.ends))
     for end, slack, worst in zip(("start", "end"), kept.slack, kept.worst, strict=True):
         if slack < -STILL:
             return None, f"no path, since the {end} exceeds {limit_name(scenario, int(worst))} too"
     budgets = MOST_OF_TEAM if space.shaped else MOST
     for part, most in zip(RESERVES, budgets, strict=True):
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         clear = ClearSpace(space, rest, min(part * space.size, MOST_RESERVE), most, deadline)
         found = _connected(clear, rng)
         if found is not None and not space.shaped:
