@@ -224,12 +224,17 @@ def test_wrong_directions_are_one_line(recorded, robot, tmp_path):
         ("payload_x", "position", "x"),
         ("ee_z", "position", "z"),
         ("imu.q_x", "quaternion", "x"),
+        ("tension_cable_1", "tensions", "1"),
+        ("cable_length(4)", "lengths", "4"),
+        ("dir_cable1_x", "directions", "1 x"),
+        ("speed_winch_1", None, None),
+        ("winch_2_velocity", None, None),
         ("qx", "quaternion", "x"),
     ],
 )
 def test_usual_names(name, role, which):
     found = names.role(name)
-    assert (found.role, found.which) == (role, which)
+    assert (found and found.role, found and found.which) == (role, which)
 
 
 def test_calibration_without_positions_of_the_load(recorded, robot, tmp_path):

@@ -123,3 +123,28 @@ def test_missing_readings_and_a_table_of_two_sensors(tmp_path):
     result = calibrate(load(robot), read, ["anchors", "offsets", "scales", "clock"])
     assert result.clock == pytest.approx(-0.034 + 0.004, abs=2e-3)
     assert result.noise < 4e-4
+
+
+def test_headers_of_motion_capture_and_units_below_names(tmp_path):
+    """The export of a motion capture system: bodies, markers and axes in lines above each other."""
+    text = (
+        "Format Version,1.23,Take Name,Take 1,Capture Frame Rate,100\n\n"
+        ",,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Marker,Marker,Marker\n"
+        ',,platform,platform,platform,platform,platform,platform,platform,"platform:1","platform:1","platform:1"\n'
+        ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Position,Position,Position\n"
+        "Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X,Y,Z\n"
+    )
+    rows = [[k, 0.01 * k, 0, 0, 0.6, 0.8, 1 + 0.1 * k, 2, 3, 9, 9, 9] for k in range(200)]
+    (tmp_path / "take.csv").write_text(text + "\n".join(",".join(map(str, row)) for row in rows) + "\n")
+    said = called("log", "take.csv", cwd=tmp_path, code=1)  # it has no lengths
+    assert "Rigid Body/platform/Position/X [m]" in said
+    assert "Rigid Body/platform/Rotation/W [1]" in said
+    assert "100 Hz" in said
+    (tmp_path / "units.csv").write_text("time;l1;l2\ns;mm;mm\n0;1500;1600\n0.1;1510;1590\n")
+    log = read_measurements(tmp_path / "units.csv")
+    np.testing.assert_allclose(log.lengths, [[1.5, 1.6], [1.51, 1.59]])
+    np.testing.assert_allclose(log.times, [0, 0.1])
+    (tmp_path / "bad.csv").write_text(text + "0,0.0,0,0,0.6,0.8,1,2,3,9,9,9\n1,0.01,much,0,0.6,0.8,1,2,3,9,9,9\n")
+    wrong = towline("log", "bad.csv", cwd=tmp_path)
+    assert wrong.returncode == 2
+    assert "line 8, column Rigid Body/platform/Rotation/X must be a number, got 'much'" in wrong.stderr

@@ -239,6 +239,11 @@ def _usual(
         complete = [one for one in complete if measured_name(one[0].full) is None] or complete
     if len(complete) > 1 and what == "position":  # messages of poses rather than transforms and scenes
         complete = [one for one in complete if "Pose" in one[0].topic.kind] or complete
+    if len(complete) > 1 and what == "position":  # of a body that has an orientation, rather than of its markers
+        with suppress(InputError):
+            turned = _usual(everything, "orientation", None, (), prefix, free)
+            stem = re.split(r"(?i)orientation|rotation|quat", turned[0].full)[0] if turned else ""
+            complete = [one for one in complete if stem and one[0].full.startswith(stem)] or complete
     if len(complete) > 1 and position:
         complete = [one for one in complete if one[0].topic is position[0].topic] or complete
     if len(complete) > 1 and what == "orientation" and {len(one) for one in complete} == {3, 4} and len(complete) == 2:

@@ -21,23 +21,28 @@ UNITS = {
     "azimuths": ANGLES,
 }
 _BEFORE = r"(?:.*[./_ ])?"
-_AFTER = r"(?:[./_ ](?:length|position|pos|data|value))*"
+_AFTER = r"(?:[./_ ](?:length|len|position|pos|data|value))*"
+_NUMBER = r"[_ ]?[\[(]?(\d+)[\])]?"
 _OF = r"(?:(?:cable|rope|wire|winch)[_ ]?)?"
-_BODY = r"(?:payload|load|platform|end[_ ]?effector|ee|mp|mocap|vicon|optitrack|body|object|pose)"
-_DIRECTION = r"(?:dir(?:ection)?s?|unit[_ ]?vec(?:tor)?s?)"
+_BODY = r"(?:payload|load|platform|end[_ ]?effector|ee|mp|mocap|vicon|optitrack|body|object|pose"
+_BODY += r"|state(?:_?estimate)?)"
+_DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?)"
+_CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
+_NO_LENGTH = re.compile(r"tension|force|effort|speed|veloc|vel_|accel|current|torque|thrust|temp|status|error")
 _VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
 # The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
 PATTERNS = {
     "lengths": (
-        rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|encoders?|enc)[_ ]?\[?(\d+)\]?{_AFTER}",
+        rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|encoders?|enc){_NUMBER}{_AFTER}",
         rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)\[(\d+)\]",
         r".*/position\[[^\]]*?(\d+)\]",
         r".*/joints\[[^\]]*?(\d+)\]\.position",
     ),
     "tensions": (
-        rf"{_BEFORE}{_OF}(?:tensions?|forces?|load[_ ]?cells?|f|t)[_ ]?\[?(\d+)\]?(?:[./_ ](?:data|value))*",
+        rf"{_BEFORE}{_OF}(?:tensions?|forces?|load[_ ]?cells?|f|t){_NUMBER}(?:[./_ ](?:data|value))*",
         rf"{_BEFORE}{_OF}(?:tensions?|forces?)[./_ ](?:data|values?|effort)\[(\d+)\]",
         r".*(?:cable|rope|wire|winch)[_ ]?(\d+)[./_ ](?:tension|force)(?:[./_ ](?:data|value))*",
+        rf"{_BEFORE}(?:tensions?|forces?)[./_ ](?:cable|rope|wire|winch)[_ ]?(\d+)",
     ),
     "position": (
         rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])",
@@ -50,14 +55,18 @@ PATTERNS = {
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
     "directions": (
         rf"{_BEFORE}{_OF}(?:{_DIRECTION}|q)[_ ./]?\[?(\d+)\]?{_VECTOR}",
-        rf".*(?:cable|rope|wire|tether)s?[_ ./]?\[?(?:cable )?(\d+)\]?[_ ./](?:{_DIRECTION}|q){_VECTOR}",
+        rf"{_BEFORE}{_CABLE}[_ ./](?:{_DIRECTION}|q){_VECTOR}",
+        rf"{_BEFORE}{_DIRECTION}[_ ]{_CABLE}{_VECTOR}",
         rf"{_BEFORE}(?:(?:cable|rope|wire|tether)[_ ]?)?{_DIRECTION}(\b){_VECTOR}",  # of the only cable of a carrier
     ),
     "azimuths": (
         r".*(?:cable|rope|wire|tether|winch)[_ ]?(\d+)[./_ ](azimuth|elevation|swivel)",
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
-    "time": (rf"%?(t|times?|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds|elapsed(?:[_ ]time)?)",),
+    "time": (
+        rf"%?(t|(?:ros[_ ]?)?times?|time \(seconds\)|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds)",
+        r"(elapsed(?:[_ ]time)?)",
+    ),
 }
 # What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
 _COMMAND = re.compile(
@@ -85,7 +94,11 @@ def role(name: str) -> Role | None:
     for text, unit in ((low, ""), *([(found[1], _EXACT[found[2]])] if (found := _SUFFIX.fullmatch(low)) else [])):
         for which, patterns in PATTERNS.items():
             for pattern in patterns:
-                match = re.fullmatch(pattern, text)
+                match = (
+                    None
+                    if which == "lengths" and _NO_LENGTH.search(text.rpartition("/")[2])
+                    else re.fullmatch(pattern, text)
+                )
                 if match and (not unit or unit in UNITS[which]):
                     group = text
                     for first, last in reversed(match.regs[1:]):

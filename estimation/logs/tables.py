@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,11 @@ from ...base.errors import InputError
 from ...base.inputs import printable
 from ...base.netcdf import check_units
 from .measurements import Sigma
-from .names import FORCES, role
+from .names import FORCES, UNITS, role
 from .recording import Recording, Samples, Topic
 
+MOST_ABOVE, LONGEST_HEADER = 20, 100_000  # lines above the numbers, and their characters
+KNOWN_UNITS = {"", *(unit for units in UNITS.values() for unit in units)}
 MOST_FIELDS = 40_000_000  # of a CSV file
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -41,10 +44,44 @@ def from_csv(content: bytes, where: str) -> Recording:
         units[name] = unit
         return 1.0
 
-    columns, lines = read_columns(text, note, gaps=True, most=MOST_FIELDS)
+    columns, lines = read_columns(one_header(text), note, gaps=True, most=MOST_FIELDS)
     if not lines:
         raise InputError("must have a line for each sample below its header, got none")
     return Recording(where, "CSV", {"": _table(columns, units)})
+
+
+def one_header(text: str) -> str:
+    """Return CSV with one line of names: motion capture systems write several, and others one of units below names."""
+    lines = text[:LONGEST_HEADER].splitlines()[: MOST_ABOVE + 1]
+    mark = max(",;\t", key="".join(lines).count)
+    table = [[cell.strip().strip('"') for cell in line.split(mark)] for line in lines]
+    first = next((k for k, row in enumerate(table) if _is_data(row)), 0)
+    rows = [
+        row
+        for row, line in zip(table[:first], lines, strict=False)
+        if len(row) == len(table[first]) and line[:1] != "#"
+    ]
+    if not rows or (len(rows) == 1 and all(not line.strip() or line[:1] == "#" for line in lines[: first - 1])):
+        return text
+    units = [cell.strip("[]()") for cell in rows[-1]]
+    stated = len(rows) > 1 and all(unit in KNOWN_UNITS for unit in units)
+    names = ["/".join(dict.fromkeys(filter(None, column))) for column in zip(*rows[: len(rows) - stated], strict=True)]
+    titles = [f"{name} [{unit}]" if stated and unit else name for name, unit in zip(names, units, strict=True)]
+    below = text.split("\n", first)[-1] if "\n" in text else ""
+    return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines
+
+
+def _is_data(row: Sequence[str]) -> bool:
+    """Return whether at least half of the fields that are not empty are numbers, the first one among them."""
+    numbers = sum(map(_is_number, row))
+    return _is_number(row[0]) and 2 * numbers >= sum(map(bool, row))
+
+
+def _is_number(cell: str) -> bool:
+    with suppress(ValueError):
+        float(cell)
+        return True
+    return False
 
 
 def from_netcdf(content: bytes, where: str) -> Recording:
