@@ -46,11 +46,13 @@ def _limits(audited: Instants) -> list[Excess]:
     limits, exceeded = audited.scenario.limits, []
     # A limit of tensions is not checked where there are none; any other value that is nan exceeds its limit.
     there = np.where(np.isfinite(audited.tensions).all(axis=1, keepdims=True), 0.0, np.nan)
-    for limit, values in zip(limits, audited.values, strict=True):
+    for limit, values, place in zip(limits, audited.values, limits.places, strict=True):
         if isinstance(limit, Distance):
             continue  # `clearances` bounds them over all time
         beyond = np.maximum(limit.low - values, values - limit.high)
-        unchecked = np.isnan(limit.over(audited.times, there)) if limit.name in limits.of_tensions else False
+        unchecked: np.ndarray | bool = False
+        if limit.name in limits.of_tensions:
+            unchecked = np.isnan(limit.over(audited.times, np.repeat(there, place.stop - place.start, axis=1)))
         beyond = np.where(np.isnan(beyond), np.where(unchecked, -np.inf, np.inf), beyond)
         if beyond.max() <= limit.tolerance:
             continue

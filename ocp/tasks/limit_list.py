@@ -31,6 +31,7 @@ from ..limits.carriers import (
 )
 from ..limits.limit import Limit
 from ..limits.limits import Limits
+from ..limits.natural_frequency import NaturalFrequency
 from ..limits.places import CablesOutside, CarriersOutside, PlatformOutside
 from ..limits.platform import (
     PlatformAcceleration,
@@ -72,6 +73,8 @@ def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
         yield CableLength(robot, given.cable_length.min, given.cable_length.max)
     if given.cable_clearance is not None and (clearance := CableClearance(robot, given.cable_clearance)).labels:
         yield clearance
+    if given.natural_frequency is not None:
+        yield NaturalFrequency(robot, given.natural_frequency)
     if "margin" in given.soft:
         yield Margin(robot, task.margin)
     if given.tension_rate is not None:

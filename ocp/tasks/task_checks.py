@@ -231,6 +231,16 @@ def _check_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:
                 raise InputError(
                     f"{where}: limits.soft must not name {name!r}, a limit of {owner}: {robot.name!r} has none"
                 )
+    if task.limits.natural_frequency is not None:
+        if task.phases is not None:
+            raise InputError(f"{where}: limits.natural_frequency must be left out with phases, whose loads change it")
+        for index, cable in enumerate(robot.cables):
+            for key, value in (("stiffness", cable.stiffness), ("t_min", cable.t_min)):
+                if not value:
+                    raise InputError(
+                        f"{where}: limits.natural_frequency needs cables with a stiffness and a t_min above 0 N, got "
+                        f"{'none' if value is None else '0'} for cables[{index}].{key} of robot {robot.name!r}"
+                    )
     for place in task.limits.keep_out:
         if place.frame == "platform" and place.cables is not None:
             _check_attachments(robot, place, place.cables, f"{where}: limits.keep_out {place.name!r}", "cables")

@@ -125,6 +125,11 @@ class TaskLimits(Part):
         default=None, description="mechanical power of every winch, tension times rate of the length [W]"
     )
     cable_length: Range | None = Field(default=None, description="range of every cable's length [m]")
+    natural_frequency: Positive | None = Field(
+        default=None,
+        description="lowest natural frequency of the platform on elastic cables, with the planned tensions and fixed "
+        "unstrained lengths; always hard [Hz]",
+    )
     tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
     platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
     zone_speed: tuple[SpeedZone, ...] = Field(
@@ -178,7 +183,7 @@ class TaskLimits(Part):
 
     @model_validator(mode="after")
     def _soft_ones_exist(self) -> Self:
-        apart = ("soft", "keep_out", "own", *OF_CARRIERS)
+        apart = ("soft", "keep_out", "own", "natural_frequency", *OF_CARRIERS)
         of_task = [name for name in type(self).model_fields if name not in apart]
         given = [name for name in of_task if getattr(self, name) not in (None, ())]
         frames = {place.frame for place in self.keep_out}
