@@ -126,7 +126,7 @@ def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
     """Return whether some matrix of A (n, 6, m) has fewer than `dof` independent columns, and the inverses (n, m, 6).
 
     Nothing else in an audit takes as long as a decomposition of each matrix. Those that are far from losing a row by
-    their condition in the Frobenius norm, which is never less than that of the singular values, need none: the inverse
+    their condition in the Frobenius norm, which is never less than that of the singular values, need none. The inverse
     by A A^T has lost the square of the condition, and one step of Newton's method (Schulz 1933) brings that back.
     """
     if A.shape[1] == dof <= A.shape[2]:
