@@ -11,6 +11,7 @@ from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.model import Model
 from towline.estimation.calibration.parameters import Parameters
+from towline.estimation.calibration.solving import model_of
 from towline.estimation.logs import names
 from towline.estimation.pose.from_log import poses_from_log
 
@@ -185,6 +186,31 @@ def test_gradients_are_slopes_of_the_cost(name, flat):
         slope = (seen(np.zeros_like(state.x), dq) - seen(np.zeros_like(state.x), -dq)) / 2e-6
         kept = np.ones_like(e, dtype=bool) if not flat else e == 0
         np.testing.assert_allclose(by_pose[..., i][kept], slope[kept], atol=2e-4)
+
+
+def test_a_clock_offset_moves_carriers_too():
+    """Derivatives by the clock of lengths and directions against differences, with carriers that turn."""
+    robot, draw = load("flycrane"), np.random.default_rng(5)
+    t = np.arange(0, 2, 0.02)
+    waves = np.sin(np.multiply.outer(t, draw.uniform(1, 3, (len(robot.carriers) + 1, 6))))
+    poses, carriers = robot.home + 0.1 * waves[:, 0], robot.carrier_home + 0.1 * waves[:, 1:]
+    lengths = Dynamics(robot).cable_lengths(poses, carriers)
+    u = -np.swapaxes(Dynamics(robot).wrench_matrix(poses, carriers)[:, :3], 1, 2)
+    sigma = {"lengths": 0.01, "directions": 0.03}
+    given = Measurements(lengths, poses, times=t, sigma=sigma, carrier_poses=carriers, directions=u)
+    model = model_of(robot, given, ("offsets", "clock"), {})
+    clock, states = model.parameters.clock, []
+    for offset in (0.01, 0.01 + 1e-5, 0.01 - 1e-5):
+        states.append(model.begin())
+        states[-1].x[clock] = offset
+    _, derivatives = model.linearised(states[0])
+    more, less = (model.residuals(state) for state in states[1:])
+    inside = slice(3, -3)
+    slope = (more.readings - less.readings) / 2e-5
+    np.testing.assert_allclose(derivatives.others[:, inside, 0], slope[:, inside], atol=1e-2 * np.abs(slope).max())
+    slope = (more.directions - less.directions) / 2e-5
+    found = derivatives.blocks[-1][1][..., clock]
+    np.testing.assert_allclose(found[inside], slope[inside], atol=1e-2 * np.abs(slope).max())
 
 
 def test_wrong_directions_are_one_line(recorded, robot, tmp_path):

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from towline import load, read_measurements
 from towline.estimation.calibration import calibrate
@@ -148,3 +149,39 @@ def test_headers_of_motion_capture_and_units_below_names(tmp_path):
     wrong = towline("log", "bad.csv", cwd=tmp_path)
     assert wrong.returncode == 2
     assert "line 8, column Rigid Body/platform/Rotation/X must be a number, got 'much'" in wrong.stderr
+
+
+@pytest.mark.parametrize("what", ["sound", "north", "mount", "w first"])
+def test_frames_of_an_ahrs(what, tmp_path):
+    """Its world looks north, it is mounted on its side, or its quaternions begin with w."""
+    robot, offsets = user.hanging_robot(tmp_path), np.array([0.02, 0.006, -0.02, -0.01])
+    places = user.statics(tmp_path, offsets)
+    head, *lines = (tmp_path / "statics.csv").read_text().splitlines()
+    rows = np.array([line.split(",") for line in lines], dtype=float)
+    turn = Rotation.from_euler("xyz", rows[:, 4:7], degrees=True)
+    if what == "north":
+        turn = Rotation.from_euler("z", 70, degrees=True) * turn
+    elif what == "mount":
+        turn = turn * Rotation.from_euler("y", 90, degrees=True)
+    quaternions = turn.as_quat()[:, [3, 0, 1, 2]] if what == "w first" else turn.as_quat()
+    header = [*head.split(",")[:4], "qx", "qy", "qz", "qw", *head.split(",")[7:]]
+    user.write(tmp_path / "ahrs.csv", header, np.hstack([rows[:, :4], quaternions, rows[:, 7:]]))
+    said = called("pose", robot, "--log", "ahrs.csv", cwd=tmp_path)
+    expected = {
+        "sound": "",
+        "north": "the world of the orientations looks turned by 70",
+        "mount": "the sensor of the orientations looks turned by ",
+        "w first": "(w, x, y, z) read as (x, y, z, w)",
+    }
+    assert ("corrected" in said) == (what != "sound")
+    assert expected[what] in said
+    poses = np.loadtxt(tmp_path / "ahrs-poses.csv", delimiter=",", skiprows=1)
+    assert np.sqrt(((poses[:, :3] - places) ** 2).sum(axis=1).mean()) < 0.06  # the offsets are not known here
+    if what != "north":
+        return
+    done = towline("calibrate", robot, "ahrs.csv", "--free", "offsets", "--json", cwd=tmp_path)
+    assert done.returncode == 1
+    fixed, _ = found(called("calibrate", robot, "ahrs.csv", "--free", "offsets", "--fix", "--json", cwd=tmp_path))
+    for i in range(4):
+        value, sigma = fixed[f"cables[{i}].offset"]
+        assert abs(value - offsets[i]) < 4 * sigma + 5e-3

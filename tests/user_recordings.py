@@ -94,7 +94,7 @@ def hanging_robot(folder):
     return robot_file(folder / "hanging.yaml", FRAME, PLATFORM, [0, 0, 1.2, 0, 0, 0], com=COM)
 
 
-def four_cables(folder, seconds=14):
+def four_cables(folder, seconds=9):
     """Winches: mm, semicolons, ns since 1970, a line twice. Motion capture: 41 ms ahead, w first, gaps. The truth."""
     draw = np.random.default_rng(0)
     coarse = np.arange(0, seconds + 0.01, 0.1)

@@ -24,6 +24,7 @@ from ...models import points
 from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
+from .attitudes import misread_attitudes
 from .frames import displaced_frames, fitted_frames
 from .geometry import runs
 from .interpretations import FACTORS, Interpretation, interpretations
@@ -121,7 +122,8 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
         rows = rows[np.linspace(0, len(rows) - 1, MOST_SAMPLES).astype(int)]
     readings = given.lengths * table[:, 7]
     if len(rows) < 4:
-        return _too_large(robot, given, readings)
+        attitudes = misread_attitudes(robot, given)
+        return Mistake(*attitudes) if attitudes else _too_large(robot, given, readings)
     angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
     sigma = given.sigma.lengths
     seen = None if carriers is None else carriers[rows]

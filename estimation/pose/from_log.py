@@ -26,6 +26,7 @@ from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
 
 MOST_TRACKED = 2000  # samples that are followed one by one; all others begin between them
+BLOCK = 5000  # samples whose poses are fitted together
 MOST_NAMED = 12
 CERTAIN = 4.0  # standard deviations by which residuals must exceed the stated ones
 VISIBLE = 1e-3  # of the cables' length, of a swing that is named
@@ -56,6 +57,8 @@ class LogPoses(Displayed):
         Number of the others in a sample.
     excess
         Factor by which the others exceed their standard deviations.
+    misread
+        What was wrong with measured orientations, and is corrected, or None.
     """
 
     estimate: PoseEstimate
@@ -63,6 +66,7 @@ class LogPoses(Displayed):
     squares: np.ndarray | None = None
     more: int = 0
     excess: float = 1.0
+    misread: str | None = None
 
     @property
     def cost(self) -> np.ndarray:
@@ -113,6 +117,8 @@ class LogPoses(Displayed):
 
     def lines(self) -> Iterator[str]:
         """Yield the wrong samples, one line for each run of them, and how far the platform may swing."""
+        if self.misread:
+            yield f"corrected: {self.misread}"
         if self.excess > 1.0:
             yield f"residuals are {quantity(self.excess, digits=3)} times as large as stated, and so are the sigmas"
         if len(self.wrong) == 1 and not self.fits.any():
@@ -190,7 +196,8 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
         If an argument has a wrong value, or a length is not above zero.
     """
     given, deviations = check_measurements(robot, measurements), checked_sigma(sigma, robot.m)
-    alone = given.poses is not None and not np.isfinite(given.poses[:, :3]).any()  # orientations, as of an AHRS
+    few = robot.m < robot.dof_mask.sum()  # more cables need no orientations
+    alone = few and given.poses is not None and not np.isfinite(given.poses[:, :3]).any()  # as of an AHRS
     if given.directions is not None or alone:
         return _by_more(robot, given, deviations, begin, alone)
     lengths = lengths_of(robot, given.lengths, given.tensions)
@@ -214,33 +221,53 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
 
 def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float, oriented: bool) -> LogPoses:
     """Return poses by lengths, directions of cables and, if `oriented`, measured orientations; by least squares."""
-    from ..calibration.normal_equations import pose_covariances
+    from ..calibration.attitudes import misread_attitudes
+    from ..calibration.balance import needs_balance
     from ..calibration.sightings import sighted
+
+    measured = given.with_sigma(given.sigma._asdict() | {"lengths": float(sigma.min())})
+    misread = misread_attitudes(robot, measured) if oriented else None
+    measured = (misread.corrected if misread else measured) if oriented else measured.without_poses()
+    weights = sigma.min() / sigma
+    blocks = [_block(robot, measured.only(slice(k, k + BLOCK)), weights) for k in range(0, len(given), BLOCK)]
+    poses, left, squares, covariances, converged = (np.concatenate(part) for part in zip(*blocks, strict=True))
+    balanced = needs_balance(robot, measured)
+    freedoms = int(robot.dof_mask.sum())
+    of_forces = freedoms if measured.tensions is not None else max(freedoms - robot.m, 0)
+    more = int(np.median(sighted(measured))) + 3 * oriented + balanced * of_forces
+    redundancy, excess = robot.m - freedoms + more, 1.0
+    if redundancy > 0:
+        ratio = float(np.sqrt(np.median(squares) / largest_cost(redundancy, 0.5)))
+        excess = ratio if ratio > 1 + CERTAIN / np.sqrt(2 * redundancy * len(given)) else 1.0
+    estimate = PoseEstimate(
+        robot=robot,
+        pose=poses,
+        residuals=left,
+        converged=converged,
+        sigma=sigma,
+        carrier_pose=given.carrier_poses,
+        by_gravity=np.full(len(given), balanced and robot.m < freedoms),
+        known_covariance=excess**2 * covariances,
+    )
+    times = None if given.times is None else given.times + begin
+    return LogPoses(estimate, times, squares / excess**2, more, excess, misread and misread.text)
+
+
+def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return poses (k, 6), residuals of lengths (k, m) [m], sums of squares, covariances and success of samples."""
+    from ..calibration.normal_equations import pose_covariances
     from ..calibration.solving import length_of, model_of
     from ..calibration.solving import lengths_of as lengths_left
     from ..calibration.starts import fit_from
 
-    measured = given.with_sigma(given.sigma._asdict() | {"lengths": float(sigma.min())})
-    model = model_of(robot, measured if oriented else measured.without_poses(), (), {})
-    model = replace(model, weights=np.repeat(sigma.min() / sigma[:, None], len(given), axis=1))
+    model = model_of(robot, measured, (), {})
+    model = replace(model, weights=np.repeat(weights[:, None], len(measured), axis=1))
     found = fit_from(model, model.begin(), length_of(robot))[0]
-    residuals = model.residuals(found.state)
-    more = int(np.median(sighted(measured))) + 3 * oriented + (model.balanced.freedoms if model.balanced else 0)
-    redundancy = robot.m - int(robot.dof_mask.sum()) + more
-    excess = 1.0
-    if redundancy > 0:
-        ratio = float(np.sqrt(np.median(residuals.of_samples) / largest_cost(redundancy, 0.5)))
-        excess = ratio if ratio > 1 + CERTAIN / np.sqrt(2 * redundancy * len(given)) else 1.0
     position, rotation = model.poses(found.state)
-    estimate = PoseEstimate(
-        robot=robot,
-        pose=np.hstack([position, points.angles(rotation)]),
-        residuals=lengths_left(replace(model, weights=np.ones_like(model.weights)), found.state),
-        converged=np.full(len(given), found.converged),
-        sigma=sigma,
-        carrier_pose=given.carrier_poses,
-        by_gravity=np.full(len(given), model.balanced is not None and robot.m < robot.dof_mask.sum()),
-        known_covariance=excess**2 * pose_covariances(model, found.state),
+    return (
+        np.hstack([position, points.angles(rotation)]),
+        lengths_left(model, found.state),
+        model.residuals(found.state).of_samples,
+        pose_covariances(model, found.state),
+        np.full(len(measured), found.converged),
     )
-    times = None if given.times is None else given.times + begin
-    return LogPoses(estimate, times, residuals.of_samples / excess**2, more, excess)
