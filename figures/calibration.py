@@ -17,7 +17,9 @@ WITHIN_95 = 2.795  # standard deviations: the root of the 95 % quantile of chi-s
 MOST_SAMPLES = 2000  # of a cable in a panel: more are not visible, and files grow
 
 
-def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = None) -> Figure:
+def residuals(
+    before: np.ndarray, after: np.ndarray, times: np.ndarray | None = None, wrong: np.ndarray | None = None
+) -> Figure:
     """Draw the residuals of each cable's length with the parameters of the file, and with the calibrated ones.
 
     Parameters
@@ -26,12 +28,22 @@ def residuals(before: np.ndarray, after: np.ndarray, times: np.ndarray | None = 
         (N, m) [m].
     times
         Times of the samples, (N,) [s]; default: their numbers.
+    wrong
+        Readings that the fit leaves out, (N, m); default: none. They are crosses, at the edge if they are beyond it.
     """
     canvas = style.figure(height=3.4)
     along = "sample" if times is None else "time [s]"
     top, bottom = style.panels_below(canvas, along, ("residual, file [mm]", "calibrated [mm]"))
+    out = np.zeros(before.shape, dtype=bool) if wrong is None else wrong
     for ax, values in ((top, before), (bottom, after)):
-        _of_cables(ax, values, times)
+        _of_cables(ax, np.where(out, np.nan, values), times)
+        low, high = ax.get_ylim()
+        rows, cables = np.nonzero(out & np.isfinite(values))
+        if rows.size:
+            at = rows if times is None else times[rows]
+            look = {"color": style.colour(1), "markersize": 4.0, "clip_on": False, "label": "left out"}
+            ax.plot(at, np.clip(1e3 * values[rows, cables], low, high), "x", **look)
+            ax.set_ylim(low, high)
     style.legend_below(canvas, top, scale=2.0)
     return canvas
 

@@ -72,3 +72,20 @@ def test_a_calibration_draws_its_own_numbers(tmp_path):
     assert all((tmp_path / "new" / f"{name}.png").stat().st_size > 5000 for name in drawn)
     blind = calibrate("cogiro", Measurements(built.readings), free=("anchors",))
     assert "anchors" not in blind.figures()  # they are open: they have no ellipsoids
+
+
+def test_wrong_readings_are_marked_at_the_edge_and_do_not_count():
+    """The root mean square and the range are those of the other readings."""
+    rng = np.random.default_rng(2)
+    before, after = rng.normal(size=(2, 100, 3)) * [[[0.02]], [[0.001]]]
+    wrong = np.zeros((100, 3), dtype=bool)
+    wrong[17, 1] = True
+    before[17, 1] = after[17, 1] = 0.3
+    figure = residuals(before, after, wrong=wrong)
+    for ax, values in zip(figure.axes, (before, after), strict=True):
+        rms = 1e3 * np.sqrt(np.mean(values[~wrong] ** 2))
+        assert any(f"{rms:.3g} mm" in text.get_text() for text in ax.texts) or f"{rms:.3g} mm" in ax.get_title("left")
+        high = ax.get_ylim()[1]
+        assert high < 1.5e3 * np.abs(values[~wrong]).max()
+        (cross,) = (line for line in ax.lines if line.get_label() == "left out")
+        assert cross.get_xydata().tolist() == [[17.0, high]]

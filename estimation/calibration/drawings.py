@@ -24,7 +24,10 @@ def drawings(result: CalibrationData) -> dict[str, Figure]:
     Ellipsoids are drawn if all anchors are observable.
     """
     times = result.measurements.times
-    drawn = {"residuals": pictures.residuals(result.residuals_before, result.residuals, times)}
+    wrong = np.zeros(result.residuals.shape, dtype=bool)
+    for one in result.outliers:
+        wrong[one.sample, one.cable] = True
+    drawn = {"residuals": pictures.residuals(result.residuals_before, result.residuals, times, wrong)}
     robot, file = result.robot, result.file
     names = [parameter.name for parameter in result.parameters]
     known = set(result.identifiable)
