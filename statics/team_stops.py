@@ -56,8 +56,8 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     alone = sorted(robot.carrier_of_cable) == list(range(len(robot.carriers)))
     if not all(flying) or not alone or robot.fixed_lengths is None:
         raise InputError(
-            "a stop must be of a team whose carriers fly with one cable of fixed length each, or of a robot with carriers "
-            f"of kind ground, prescribed or mobile, got {robot.name!r}"
+            "a stop must be of a team whose carriers fly with one cable of fixed length each, or of a robot with "
+            f"carriers of kind ground, prescribed or mobile, got {robot.name!r}"
         )
 
     end = trajectory.duration or 0.0

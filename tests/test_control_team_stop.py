@@ -83,6 +83,6 @@ def test_an_event_stops_a_team_from_the_command_line(made, tmp_path):
 def test_what_is_no_such_team_is_refused_in_one_line():
     found = plan("flycrane", {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.5, 0, 0]}, "duration": 4.0,
                               "base": {"kind": "free"}})  # fmt: skip
-    with pytest.raises(InputError, match="with one cable of fixed length each, .* got 'flycrane'") as error:
+    with pytest.raises(InputError, match=r"with one cable of fixed length each, .* got 'flycrane'") as error:
         stop(found, 1.0)
     assert "\n" not in str(error.value)
