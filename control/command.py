@@ -6,8 +6,8 @@ import numpy as np
 
 from ..base.display import record
 
-ANSWERS = ("as planned", "shifted plan", "soft wrench", "hold", "not as modelled")
-PLANNED, SHIFTED, SOFT, HOLD, OTHERWISE = range(5)
+ANSWERS = ("as planned", "shifted plan", "soft wrench", "hold", "not as modelled", "off the reference")
+PLANNED, SHIFTED, SOFT, HOLD, OTHERWISE, OFF = range(6)
 NOWHERE, NOTHING = np.full(6, np.nan), np.array(np.nan)
 NOWHERE.flags.writeable = NOTHING.flags.writeable = False
 
@@ -24,7 +24,8 @@ class Command(NamedTuple):
     answered
         (...), status of the step, an index of `ANSWERS`: tensions give the required wrench ("as planned"); an earlier
         solution is used ("shifted plan"); tensions with the closest wrench ("soft wrench"); the last command is held
-        ("hold"); or computed torque, because the robot does not move as predicted ("not as modelled").
+        ("hold"); computed torque, because the robot does not move as predicted ("not as modelled"); or tensions as
+        planned, but the platform is more than a tenth of the cables' length or 0.5 rad off ("off the reference").
     direction, shortfall
         If no tensions inside the limits and rates give the required wrench: the direction of the missing wrench,
         (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying carrier has too

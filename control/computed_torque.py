@@ -21,6 +21,7 @@ from .boxes import boxes, stay_inside
 from .command import HOLD, NOTHING, NOWHERE, PLANNED, SOFT, Command
 from .controllability import uncontrolled
 from .controller import Controller
+from .deviation import Deviation
 from .lag import WINCHES_KEEP, Lead, rotor_lead
 from .late_states import LateStates
 from .noise import Noise
@@ -119,8 +120,7 @@ class ComputedTorque(Controller):
     ):
         self.robot, self._alone = as_robot(robot), OneAtATime()
         few = self._few = self.robot.m < len(self.robot.platform.dof)
-        self._scale = self.robot.wrench_scale
-        self._limits = limits_of(self.robot, rate)
+        self._scale, self._limits = self.robot.wrench_scale, limits_of(self.robot, rate)
         rotors, usual = number("rotor_lag", rotor_lag, 0.0, 0.1), SWINGING if few else HELD
         loops = bandwidths_for(self.robot, usual, sensors, rotors, bandwidth, observer, attitude)
         gains = (
@@ -148,7 +148,7 @@ class ComputedTorque(Controller):
         self._moves_carriers = self._flies or bool(far.any())
         self._lead = rotor_lead(self.robot, rotors) if rotors else None
         self._is_plain = not self._moves_carriers and self._loop is None and self._ahead is None
-        self._negligible = NEGLIGIBLE * self.robot.force_scale
+        self._negligible, self._deviation = NEGLIGIBLE * self.robot.force_scale, Deviation(self.robot)
         self._begin(1)
 
     @override
@@ -206,6 +206,7 @@ class ComputedTorque(Controller):
         for part in (self._loop, self._ahead, self._lead):
             if part is not None:
                 part.reset()
+        self._poses = self._measured[0, 0, :6], self._wanted[0, :6]
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
         self._paused = False  # whether the integral of a row does
         self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
@@ -231,7 +232,8 @@ class ComputedTorque(Controller):
             if self._paused:
                 self._platform["integrates"] = 1
             self._paused = False
-            if self._is_plain and self._is_one and not self._has_cut:  # the rest, at a fifth of the time
+            simple = self._is_plain and self._is_one and not self._has_cut
+            if simple and not self._deviation.is_far(*self._poses):  # the rest, at a fifth of the time
                 tensions = problems.tensions[0].copy()
                 self._last = tensions.tobytes()
                 ordered: Any = reference.carrier_acceleration  # any array that the core can read
@@ -328,7 +330,10 @@ class ComputedTorque(Controller):
             actuation = self._actuation.copy() if self._lead is None else self._lead.sent(self._actuation)
             if lacking > self._negligible:
                 answered, proof = self._with_thrust_lacking(answered, proof)
-        tensions = self._sent(tensions)
+        tensions, answered = (
+            self._sent(tensions),
+            self._deviation.status(answered, self._measured[:, 0, :6], self._wanted[:, :6]),
+        )
         if alone:
             own = None if actuation is None else actuation[0]
             return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)

@@ -13,8 +13,9 @@ from ..models.files import as_robot
 from ..models.robot import Robot
 from ..models.trajectory import moved_on
 from .as_floats import as_floats, is_time, measured_at, rows_of
-from .command import HOLD, PLANNED, Command
+from .command import HOLD, OFF, PLANNED, Command
 from .controller import Controller
+from .deviation import Deviation
 from .open_loop import planned_command
 from .reference import Reference
 from .state import State
@@ -88,7 +89,7 @@ class LengthControl(Controller):
         self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
         self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
         self._most = number("most", SHARE * self.robot.length if most is None else most, 0.0, 1e3)
-        self._dynamics = dynamics_of(self.robot)
+        self._dynamics, self._deviation = dynamics_of(self.robot), Deviation(self.robot)
         self.reset()
 
     @override
@@ -129,8 +130,9 @@ class LengthControl(Controller):
         lengths = self._dynamics.cable_lengths(pose, carriers) / (1.0 + tensions / self._EA) + corrected
         self._time, self._tensions = float(time), reference.tensions
         command = planned_command(self.robot, reference, rows)
+        status = np.where(self._deviation.are_far(state.pose, moved_on(reference[:3], -age)[0]), OFF, PLANNED)
         return command._replace(
-            answered=np.where(held, HOLD, PLANNED).astype(np.int8),
+            answered=np.where(held, HOLD, status).astype(np.int8),
             lengths=np.broadcast_to(lengths, command.tensions.shape),
         )
 

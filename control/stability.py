@@ -10,6 +10,7 @@ from .reference import Reference
 from .state import State
 
 PERIOD = 2e-3  # [s] between steps
+SLOWEST = 1e-3  # [rad/s]
 LEAST, SLOW, MOST = 400, 4.0, 1500  # steps, time constants of the errors, and steps again
 FAR = 0.3  # of the robot's length: errors that have grown
 MORE = 1.2  # of the velocities in the second third of the steps are in the last: a motion nobody damps has as many
@@ -29,7 +30,7 @@ def grows(controller: Controller, robot: Robot, tensions: np.ndarray, bandwidth:
     scale = np.repeat([1.0, robot.length], 3) * robot.dof_mask
     push = PUSH * robot.force_scale * scale * np.random.default_rng(0).normal(size=6)
     state = plant.start(tensions=tensions)
-    steps = int(np.clip(SLOW / bandwidth / PERIOD, LEAST, MOST))
+    steps = int(np.clip(SLOW / max(bandwidth, SLOWEST) / PERIOD, LEAST, MOST))
     sizes, pulls = np.zeros(steps), tensions
     controller.reset()
     for k in range(steps):

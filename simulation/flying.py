@@ -143,7 +143,7 @@ def fly(
             lived = alive if k else np.ones(flights, dtype=bool)
             try:
                 take(Period(k, lived, motions, lengths, pulls, command))
-            except IndexError:
+            except (IndexError, TypeError, ValueError):
                 check_command(command, robot, flights, time)
                 raise
         if not going:
@@ -220,6 +220,15 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
         if values.dtype.kind not in "fiub" or not np.isfinite(values).all():
             raise InputError(f"controller must return finite {name}, got others at t = {time:g} s")
     answered = np.asarray(command.answered)
+    if answered.dtype.kind == "f":
+        raise InputError(f"controller must return an integer as answered, got {answered.flat[0]!s} at t = {time:g} s")
+    for name, core in (("direction", (6,)), ("shortfall", ()), ("unexplained", ())):  # nan where there is none
+        values = np.asarray(getattr(command, name))
+        if values.dtype.kind not in "fiub" or values.shape not in ((*lead, *core), core):
+            raise InputError(
+                f"controller must return {name} of shape {(*lead, *core)}, got {shown(getattr(command, name))} "
+                f"at t = {time:g} s"
+            )
     if not ((answered >= 0) & (answered < len(ANSWERS))).all():
         raise InputError(
             f"controller must return answered from 0 to {len(ANSWERS) - 1}, got {answered.max()} at t = {time:g} s"

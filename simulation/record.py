@@ -41,7 +41,7 @@ class Record(Displayed):
         self.motions[k], self.lengths[k], self.tensions[k] = period.motions[0], period.lengths[0, 0], period.tensions[0]
         self.commanded[k], self.answered[k], self.orders[k] = command.tensions, command.answered, command.carrier_pose
         if command.answered:
-            if not 0 < command.answered < len(ANSWERS):
+            if not 0 < command.answered < len(ANSWERS) or command.answered != int(command.answered):
                 raise IndexError(command.answered)
             self.direction[k], self.shortfall[k] = command.direction, command.shortfall
         if command.released is not None:

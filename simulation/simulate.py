@@ -243,11 +243,18 @@ def _in_turn(robot: Robot, first: Trajectory, events: Sequence[Event]) -> list[t
 def _references(robot: Robot, parts: Sequence[tuple[float, Trajectory]], times: np.ndarray) -> list[Reference]:
     """Return the reference at each of the times (n,) [s]."""
     which = np.maximum(np.searchsorted([begins for begins, _ in parts], times) - 1, 0)
-    return [
+    result = [
         reference
         for number, (begins, part) in enumerate(parts)
         for reference in references_at(robot, part, times[which == number] - begins)
     ]
+    for reference in result:
+        for part in reference:
+            if part is not None:
+                part.flags.writeable = (
+                    False  # a controller that changes them would change what errors are measured from
+                )
+    return result
 
 
 def _one(plant: Plant, controller: Controller, experiment: Experiment, seed: int, tolerance: float) -> Simulation:

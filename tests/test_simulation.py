@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from towline import load, plan
 from towline.base.errors import InputError
-from towline.control import Command, ComputedTorque, Controller, State
+from towline.control import ANSWERS, Command, ComputedTorque, Controller, State
 from towline.control.trajectory import read_trajectory
 from towline.core._core import sense, winch_lengths
 from towline.models import Dynamics, Robot
@@ -373,7 +373,10 @@ class Wrong(Controller):
         (tuple, "must return a Command"),
         ({"tensions": np.zeros(3)}, "tensions of shape"),
         ({"tensions": np.full(8, np.nan)}, "finite tensions"),
-        ({"answered": 5}, "answered from 0 to 4, got 5"),
+        ({"answered": len(ANSWERS)}, "answered from 0 to 5, got 6"),
+        ({"answered": 1.5}, "an integer as answered, got 1.5"),
+        ({"answered": 2, "shortfall": "much"}, r"shortfall of shape .*, got 'much'"),
+        ({"unexplained": np.ones(3)}, "unexplained of shape"),
         ({"carrier_pose": np.zeros(6)}, "carrier_pose of shape"),
     ],
 )
@@ -382,6 +385,16 @@ def test_what_a_controller_may_return_is_checked(change, message, runs, since):
         simulate("cogiro", load("cogiro").home, Wrong(change, since), duration=0.01, runs=runs)
     assert "\n" not in str(error.value)
     assert str(error.value).endswith(f"at t = {since:g} s")
+
+
+def test_a_controller_cannot_change_what_errors_are_measured_from():
+    class Moving(ComputedTorque):
+        def step(self, time, state, reference):
+            reference.pose[0] += 1.0
+            return super().step(time, state, reference)
+
+    with pytest.raises(ValueError, match="read-only"):
+        simulate("cogiro", load("cogiro").home, Moving("cogiro"), duration=0.01)
 
 
 @pytest.mark.parametrize("runs", [None, 2])
