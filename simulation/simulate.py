@@ -121,8 +121,8 @@ def simulate(
         a recording (CSV, MCAP, a bag, NetCDF without a plan), which `replay` repeats: then all other arguments are left
         out, and the result is a `Replay`.
     controller
-        Controller (default: `ComputedTorque(robot, sensors=noise)`). A single run calls its `reset` and uses the object
-        itself. Many runs use copies, unless it accepts batches.
+        Controller (default: `ComputedTorque(robot)`). A single run calls its `reset` and uses the object itself. Many
+        runs use copies, unless it accepts batches.
     wind, noise, events, duration
         As in `Conditions`.
     seed
@@ -175,8 +175,7 @@ def simulate(
     the_robot = as_robot(robot)
     if controller is not None and not isinstance(controller, Controller):
         raise InputError(f"controller must be a Controller, got {shown(controller)}")
-    known = None if meets.noise == Noise() else required("noise", meets.noise, Noise)
-    pilot = ComputedTorque(the_robot, sensors=known) if controller is None else controller
+    pilot = ComputedTorque(the_robot) if controller is None else controller
     meets = replace(meets, drive=meets.drive or pilot.drive or default_drive(the_robot))
     plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
