@@ -217,6 +217,25 @@ def test_formations_that_are_free_at_the_ends_start_clear():
     np.testing.assert_allclose(platform[[0, -1], 3:5], 0.0, atol=1e-12)  # it may turn about the vertical alone
 
 
+def test_a_platform_turns_at_its_ends_where_its_attitude_is_free():
+    """A ball below an attachment of a level platform: a little roll or pitch lifts that, position and yaw do not."""
+    robot = load("ipanema-1")
+    start, end = (robot.home + np.r_[x, np.zeros(5)] for x in (-0.3, 0.3))
+    corner = start[:3] + robot.attachments[robot.attachments[:, 2].argmin()]
+    ball = {"kind": "sphere", "centre": (corner - [0, 0, 0.115]).tolist(), "radius": 0.1, "cables": None}
+    task = {
+        "path": {"kind": "line", "start": start.tolist(), "end": end.tolist()},
+        "duration": 3.0,
+        "tube": {"position": "free", "attitude": 0.3},
+        "limits": {"keep_out": [ball | {"platform": 0.02}]},
+    }
+    path, message = find_global_path(lay_out(robot, Task.model_validate(task)))
+    assert path is not None, message
+    platform, _ = path.space.poses(path.at(np.array([0.0, 1.0])))
+    np.testing.assert_allclose(platform[:, :3], [start[:3], end[:3]], atol=1e-12)
+    assert np.abs(platform[0, 3:5]).max() > 1e-3
+
+
 @pytest.mark.parametrize("ends", ["exact", "periodic"])
 def test_formations_that_are_given_at_the_ends_stay(ends):
     space = Space(past_a_pillar(ends=ends))

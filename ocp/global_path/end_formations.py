@@ -1,6 +1,7 @@
-"""`with_clear_ends`: formations at start and end that keep all limits, where the task leaves them free.
+"""`with_clear_ends`: formations and attitudes at start and end that keep all limits, where the task leaves them free.
 
-A formation that starts at home may stand in the way of an obstacle, although its task lets it start with any other.
+A formation that starts at home may stand in the way of an obstacle, although its task lets it start with any other. So
+may a platform with the attitude of its path.
 """
 
 from dataclasses import replace
@@ -8,19 +9,20 @@ from dataclasses import replace
 import numpy as np
 
 from ..tasks.ends import carrier_ends, fixed_values
+from ..tasks.scenario import ATTITUDE
 from .at_rest import AtRest
 from .clear_space import FORMATIONS, grown
 from .space import Space
 
 YAW = 5
-MOST_YAW = 0.4  # [rad], that the platform starts or ends turned
+MOST_TURN = 0.4  # [rad], by which the platform starts or ends turned
 SPARE = 2.0  # times the reserve, which is kept if there is space
 AWAY = 0.02  # metres of slack that a metre away from the usual formation is worth
 
 
 def with_clear_ends(space: Space, rest: AtRest, reserve: float) -> Space:
     """Return the space with ends near the usual ones that keep all limits by the reserve [m], if they are found."""
-    if not space.shaped or carrier_ends(space.scenario.task) == "periodic":
+    if carrier_ends(space.scenario.task) == "periodic":
         return space
     rng, ends = np.random.default_rng(0), space.ends.copy()
     for k, slack in enumerate(rest(*space.poses(ends)).slack):
@@ -38,10 +40,12 @@ def _free(space: Space, end: int) -> np.ndarray | None:
     if any(owners[column][0] is not None for column in fixed):
         return None
     free = np.zeros(space.count)
-    free[len(platform) :] = np.inf
-    if YAW in platform and platform.index(YAW) not in fixed:
-        free[platform.index(YAW)] = min(scenario.task.tube.turn, MOST_YAW)
-    return free
+    free[len(platform) :] = np.inf if space.shaped else 0.0
+    turning = (YAW,) if space.shaped else ATTITUDE  # a formation carries its load level
+    for column, coordinate in enumerate(platform):
+        if coordinate in turning and column not in fixed:
+            free[column] = min(scenario.task.tube.turn, MOST_TURN)
+    return free if free.any() else None
 
 
 def _clear_end(
@@ -60,5 +64,6 @@ def _clear_end(
     formation = np.isinf(free)
     first = np.repeat(end[None], FORMATIONS, axis=0)
     first[1:] += rng.uniform(-1.0, 1.0, first[1:].shape) * np.where(formation, 0.0, free)
-    first[1:, formation] = [space.sample_shape(rng) for _ in range(FORMATIONS - 1)]
+    if formation.any():
+        first[1:, formation] = [space.sample_shape(rng) for _ in range(FORMATIONS - 1)]
     return inside(grown(space, first, score, np.minimum(free, 1.0), rng)[0])

@@ -25,6 +25,7 @@ from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 
 NEAR = 0.08  # of a motion's extent: where a place is, of which a program has rows the first time
+FEW = 8  # regions
 ROUNDS = 4  # of rows that are added where a solution exceeds what the program leaves out; then it has all
 PASSES = 3
 MOST_AGAIN = 60  # iterations from a solution that is near: more do not lead to one
@@ -115,7 +116,9 @@ class Search:
             if self.seconds_left <= 0:
                 stage.message = f"{ENDS[TIME_LIMIT]} before it began"
                 return self._unsolved(mesh, guess)
-            outcome = self._run(mesh, guess, coarser, NEAR if coarser or clear else 2 * NEAR)
+            # Of few regions rows that are not needed cost less than another round.
+            crowded = len(self.scenario.task.limits.keep_out) > FEW
+            outcome = self._run(mesh, guess, coarser, NEAR if coarser or (clear and crowded) else 2 * NEAR)
             for added in range(ROUNDS + 1):
                 program = self._solvers[mesh].program
                 if not outcome.success or self.seconds_left <= 0 or program.suffices(outcome.deviation):
