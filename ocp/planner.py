@@ -393,8 +393,7 @@ def _again(search: Search, mesh: Mesh, motion: Deviation) -> Plan | None:
 
 
 def _closest(search: Search, reason: str) -> Plan:
-    """Return the best plan, with relaxations if it is not feasible."""
+    """Return the best plan or a direct motion that is feasible, or else the best plan with its relaxations."""
     plan = search.best(reason)
-    if plan.feasible:
-        return plan
-    return replace(plan, offers=partial(near_chosen_motion, search, plan.scenario, plan.deviation, plan.audit))
+    offers = partial(near_chosen_motion, search, plan.scenario, plan.deviation, plan.audit)
+    return plan if plan.feasible else search.audit_direct() or replace(plan, offers=offers)

@@ -1,6 +1,7 @@
 """The planner's ladder: what each stage claims, against closed forms and brute force; and where the planner starts."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan, time_along
 from towline.ocp.audits.violation import cost
+from towline.ocp.nlp.solver import Solver
 from towline.ocp.proofs.durations import durations
 from towline.ocp.search.start import deviation_from
 from towline.ocp.search.time_law import fastest
@@ -263,3 +265,36 @@ def test_every_rung_is_told_with_its_time():
         assert stage.seconds >= 0
         assert stage.message in found.report()
     assert [stage["name"] for stage in found.to_dict()["stages"]] == names(found)
+
+
+@pytest.fixture
+def unsolved(monkeypatch):
+    """No program is solved: each run ends a metre beside its best motion."""
+    solve = Solver.solve
+
+    def failing(self, *arguments, **named):
+        outcome = solve(self, *arguments, **named)
+        away = replace(outcome.deviation, q=outcome.deviation.q + 1.0)
+        return replace(outcome, deviation=away, success=False)
+
+    monkeypatch.setattr(Solver, "solve", failing)
+
+
+@pytest.mark.usefixtures("unsolved")
+@pytest.mark.parametrize("duration", [2.0, {"min": 0.01, "max": 2.0}])
+def test_a_direct_motion_that_is_feasible_is_the_plan_if_no_program_is_solved(duration):
+    """Of a range the longest duration is tried, too: 2 m in 0.14 s are too fast."""
+    line = {"kind": "line", "start": [-1, 0, 1], "end": [1, 0, 1]}
+    found = plan("cogiro", {"path": line, "duration": duration, "tube": {"position": 0.05}, "steps": 20})
+    assert found.feasible
+    assert found.duration == 2.0
+    assert found.tracking_error_max < 1e-9
+    assert "direct motion" in found.stages[-1].name
+
+
+@pytest.mark.usefixtures("unsolved")
+def test_a_direct_motion_that_is_not_feasible_is_no_plan():
+    line = {"kind": "line", "start": [-1, 0, 1], "end": [1, 0, 1]}
+    limits = {"keep_out": [{"kind": "sphere", "centre": [0, 0, 1.3], "radius": 0.1, "cables": None}]}
+    found = plan("cogiro", {"path": line, "duration": 2.0, "tube": {"position": 0.1}, "limits": limits, "steps": 20})
+    assert found.status is MotionStatus.NOT_FOUND

@@ -250,6 +250,17 @@ class Search:
         self._audited.append((relative_violation(scenario, audited), outcome, audited))
         return audited
 
+    def audit_direct(self) -> Plan | None:
+        """Audit the motions from which programs start, and return the first plan of one that passes, or None."""
+        scenario, span = self.scenario, self.scenario.duration_range
+        for seconds in (scenario.duration, *([] if span is None else [span.max])):
+            lasting = scenario.lasting(seconds)
+            guess = usual_guess(lasting, Grid.of(lasting, scenario.task.steps).shares * seconds)
+            audited = self.audit_motion(lasting, guess, f"audit of the direct motion in {quantity(seconds, 's')}")
+            if audited.passed:
+                return Plan(lasting, MotionStatus.FEASIBLE, guess, audited, self.build_s, self.solve_s)
+        return None
+
     def best_of_interrupted(self) -> Plan | None:
         """Return the best plan of a search that was interrupted, audited now if it has to be; None if there is none."""
         if self._interrupted is not None:
