@@ -26,7 +26,7 @@ VISIBLE = np.radians(8.0)  # offsets of the readings turn a platform less
 
 
 class Misread(NamedTuple):
-    """What is wrong, in one line, and the measurements with it corrected."""
+    """An error of the measured orientations, in one line, and the measurements without it."""
 
     text: str
     corrected: Measurements
