@@ -93,7 +93,8 @@ def pymoo(task: Task) -> np.ndarray:
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
             out["F"] = -task.score(x)
 
-    algorithm = GA(pop_size=POPULATION, sampling=task.draws())
+    first: Any = task.draws()  # pymoo's type is that of one of its own samplings
+    algorithm = GA(pop_size=POPULATION, sampling=first)
     left = max(task.until - time.perf_counter(), 1e-3)
     found = minimize(Layout(), algorithm, ("time", left), seed=int(task.rng.integers(2**31)))
     return task.layout(np.asarray(found.X))
