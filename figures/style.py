@@ -207,7 +207,8 @@ def one_value(low: float, high: float) -> bool:
 
 def colour_bar(canvas: Figure, shades: ScalarMappable, panels: Axes | list[Axes], label: str, **place: Any) -> Colorbar:
     """Draw a colour bar beside panels, and return it; if all values are the same, it has one number."""
-    low, high = shades.norm.vmin, shades.norm.vmax  # a bar makes them different
+    limits: tuple[Any, Any] = shades.get_clim()  # a bar makes them different
+    low, high = limits
     bar = canvas.colorbar(shades, ax=panels, **place)
     if low is not None and high is not None and one_value(low, high):
         middle = (low + high) / 2
