@@ -50,7 +50,9 @@ def design(
         ),
     ] = False,
 ) -> None:
-    """Find anchors, attachments and tension limits with the largest capacity margin, and report what limits it.
+    """Find the best anchors, attachments and tension limits, and report what limits them.
+
+    The best have the largest capacity margin, or else the weakest winches or the highest natural frequency.
 
     The exit code is 1 if no layout that meets the requirements was found, or if none exists, which is then proven.
     Ctrl-C ends the search with the best layout so far.
