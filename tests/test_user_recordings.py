@@ -91,7 +91,6 @@ def test_a_planar_robot_with_a_drum_scale_and_positions_alone(tmp_path):
         for k, axis in ((0, "x"), (2, "z")):
             value, sigma = values[f"cables[{i}].anchor.{axis}"]
             assert abs(value - anchors[i, k]) < 4 * sigma + 1e-3
-    called("pose", "planar-calibrated.yaml", "--log", "planar.csv", cwd=tmp_path)
     wrong = called("pose", robot, "--log", "planar.csv", cwd=tmp_path, code=1)
     assert "no pose fits the lengths of any sample" in wrong
 
@@ -179,8 +178,7 @@ def test_frames_of_an_ahrs(what, tmp_path):
     assert np.sqrt(((poses[:, :3] - places) ** 2).sum(axis=1).mean()) < 0.06  # the offsets are not known here
     if what != "north":
         return
-    done = towline("calibrate", robot, "ahrs.csv", "--free", "offsets", "--json", cwd=tmp_path)
-    assert done.returncode == 1
+    assert mistake(load(robot), read_measurements(tmp_path / "ahrs.csv", robot=robot)).severe
     fixed, _ = found(called("calibrate", robot, "ahrs.csv", "--free", "offsets", "--fix", "--json", cwd=tmp_path))
     for i in range(4):
         value, sigma = fixed[f"cables[{i}].offset"]

@@ -163,7 +163,7 @@ def planar(folder, seconds=24):
         x, z = 1.45 + 0.9 * np.sin(1.1 * s) + 0.1 * np.sin(2.7 * s), 1.1 + 0.65 * np.sin(1.37 * s + 0.4)
         return np.column_stack([x, 0 * s, z])
 
-    t = np.arange(0, seconds, 0.03)
+    t = np.arange(0, seconds, 0.05)
     true = anchors + draw.normal(0, 0.01, anchors.shape) * [1, 0, 1]
     level = np.tile(np.eye(3), (len(t), 1, 1))
     readings = (lengths_at(true, attachments, at(t), level) - draw.normal(0, 0.02, 4)) / 1.02
