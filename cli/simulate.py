@@ -293,8 +293,10 @@ def _often(
         flights = run(execution=replace(where, progress=resumable(show, where.checkpoint, "flights")))
     add_to_message("")
     file = save(flights, target)
-    drawings = {} if figures is None else {"errors": figure.errors(flights), "envelopes": envelopes(flights)}
-    pictures = [style.save(drawing, figures / f"{name}.{form}") for name, drawing in drawings.items()]
+    pictures = []
+    if figures is not None:
+        drawings = {"errors": figure.errors(flights), "envelopes": envelopes(flights)}
+        pictures = [style.save(drawing, figures / f"{name}.{form}") for name, drawing in drawings.items()]
     data = {**summary(flights), "file": file, "figures": pictures}
     print_result(as_json, data, lambda: report(flights).text(), (file, *pictures))
     return bool(flights["passed"].all())

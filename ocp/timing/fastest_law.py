@@ -152,7 +152,10 @@ class FastestLaw(Displayed):
         Raises `InputError` if `path` is not a path.
         """
         required("path", path, PathBase)
-        law = {"s": tuple(self.s.tolist()), "speeds": tuple((self.sd if self.exists else self._shown()).tolist())}
+        law: dict[str, Any] = {
+            "s": tuple(self.s.tolist()),
+            "speeds": tuple((self.sd if self.exists else self._shown()).tolist()),
+        }
         dwell = self.parametrised.dwell
         if any(dwell.values()):
             law["dwell"] = tuple(dwell.get(s, 0.0) for s in law["s"])
