@@ -132,11 +132,15 @@ def test_a_plan_plays_and_pauses(page, plan_file, tmp_path):
         page.screenshot(path=tmp_path / "plan.png")
         for width, height, least in ((1600, 1000, 1000), (400, 800, 60)):  # on a phone in the panel
             page.set_viewport_size({"width": width, "height": height})
+            below = width > 1000
+            page.wait_for_function(  # a page is laid out some time after it has its size
+                "([low, below]) => "
+                "(document.querySelector('.mantine-Slider-root').getBoundingClientRect().y > low) === below",
+                arg=[0.9 * height, below],
+            )
             bar = page.locator(".mantine-Slider-root").first.bounding_box()
             assert bar["width"] > least
             panel = page.locator(".towline-readout").bounding_box()
-            below = width > 1000
-            assert (bar["y"] > 0.9 * height) == below
             assert (bar["x"] + bar["width"] < panel["x"]) == below
 
 
