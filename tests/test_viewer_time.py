@@ -186,6 +186,15 @@ def test_curves_have_the_worst_of_every_part(folder):
     assert len(curves(replay, points=10_000).times) == len(replay.times)
 
 
+def test_a_margin_that_is_rounding_is_drawn_as_none(folder):
+    replay = read(str(folder / "line.nc")).replay
+    lowest = replay.margins.min()
+    vars(replay)["margins"] = replay.margins - lowest + 1e-12
+    assert (replay.margins > 0).all()
+    assert curves(replay).margins.min() == 0
+    assert curves(replay).margins.max() > 0
+
+
 def test_curves_at_other_times_end_where_the_motion_ends():
     two = Curves(np.array([0.0, 2.0]), np.array([[1.0, 5.0], [3.0, 7.0]]), np.array([0.0, 1.0]))
     other = two.on(np.array([-1.0, 1.0, 2.0, 3.0]))

@@ -10,6 +10,7 @@ import numpy as np
 from ..base.display import Displayed
 from .replay import Replay
 
+ROUNDING = 1e-9  # of the largest tension: a margin that is zero
 POINTS = 240  # of a curve, about one for each pixel of the panel
 
 
@@ -51,4 +52,6 @@ def curves(replay: Replay, points: int = POINTS) -> Curves:
     edges = np.unique(np.linspace(0, len(margins), points + 1).round().astype(int))
     worst = [low + severity[low:high].argmin() for low, high in pairwise(edges)]
     shown = np.unique([0, *worst, len(margins) - 1])
-    return Curves(replay.times[shown], replay.tensions[shown], margins[shown])
+    rounding = ROUNDING * float(np.nanmax(np.abs(replay.tensions), initial=0.0))
+    drawn = np.where(np.abs(margins[shown]) < rounding, 0.0, margins[shown])
+    return Curves(replay.times[shown], replay.tensions[shown], drawn)
