@@ -14,7 +14,7 @@ from towline.layout.variables import variables_of
 from towline.models.points import rotations
 from towline.solvers import capacity_margin
 
-from .stiff_robots import elastic, inertia
+from .stiff_robots import elastic, frequencies
 
 BOX = {"min": [-1.5, -1.0, 2.0], "max": [1.5, 1.0, 3.0]}
 BODY = {"kind": "box", "min": [-0.5, -0.1, 0.3], "max": [0.5, 0.1, 0.7]}
@@ -131,27 +131,7 @@ def test_slopes_of_the_room_are_those_of_differences():
 
 
 def lowest_frequency(robot, pose):
-    """Return the lowest frequency by differences of the forces of cables whose unstrained lengths are held."""
-    pulls, M = tensions(robot, pose).tensions, inertia(robot, pose)
-    EA = np.array([cable.stiffness for cable in robot.cables])
-    arms = (robot.attachments - robot.platform.com) @ rotations(pose[None, 3:])[0].T
-    com = pose[:3] + rotations(pose[None, 3:])[0] @ robot.platform.com
-
-    def strained(delta):
-        turn = np.array([[0, -delta[5], delta[4]], [delta[5], 0, -delta[3]], [-delta[4], delta[3], 0]])
-        r = arms + arms @ turn.T
-        return r, robot.anchors - com - delta[:3] - r
-
-    unstrained = np.linalg.norm(strained(np.zeros(6))[1], axis=1) / (1 + pulls / EA)
-
-    def wrench(delta):
-        r, along = strained(delta)
-        lengths = np.linalg.norm(along, axis=1)
-        forces = (EA * (lengths / unstrained - 1) / lengths)[:, None] * along
-        return np.r_[forces.sum(axis=0), np.cross(r, forces).sum(axis=0)]
-
-    K = -np.array([wrench(1e-6 * e) - wrench(-1e-6 * e) for e in np.eye(6)]).T / 2e-6
-    return np.sqrt(np.linalg.eigvals(np.linalg.solve(M, (K + K.T) / 2)).real.min()) / (2 * np.pi)
+    return frequencies(robot, pose, tensions(robot, pose).tensions)[0]
 
 
 @pytest.fixture(scope="module")

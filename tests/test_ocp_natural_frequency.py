@@ -4,37 +4,11 @@ import numpy as np
 import pytest
 
 from towline import InputError, load, plan
-from towline.models.points import rotations
 from towline.statics.stiffness import stiffest
 
-from .stiff_robots import elastic, inertia
+from .stiff_robots import elastic, frequencies
 
 LINE = {"path": {"kind": "line", "start": [-1, -0.5, 2.2], "end": [1, 0.5, 2.8]}, "duration": 3, "steps": 20}
-
-
-def frequencies(robot, pose, pulls):
-    """Return the natural frequencies with these tensions, ascending [Hz]."""
-    EA = np.array([cable.stiffness for cable in robot.cables])
-    R = rotations(pose[None, 3:])[0]
-    arms, com = (robot.attachments - robot.platform.com) @ R.T, pose[:3] + R @ robot.platform.com
-
-    def strained(delta):
-        turn = np.array([[0, -delta[5], delta[4]], [delta[5], 0, -delta[3]], [-delta[4], delta[3], 0]])
-        r = arms + arms @ turn.T
-        return r, robot.anchors - com - delta[:3] - r
-
-    unstrained = np.linalg.norm(strained(np.zeros(6))[1], axis=1) / (1 + pulls / EA)
-
-    def wrench(delta):
-        r, along = strained(delta)
-        lengths = np.linalg.norm(along, axis=1)
-        forces = (EA * (lengths / unstrained - 1) / lengths)[:, None] * along
-        return np.r_[forces.sum(axis=0), np.cross(r, forces).sum(axis=0)]
-
-    K = -np.array([wrench(1e-6 * e) - wrench(-1e-6 * e) for e in np.eye(6)]).T / 2e-6
-    moves = np.flatnonzero(robot.dof_mask)
-    K, M = (part[np.ix_(moves, moves)] for part in ((K + K.T) / 2, inertia(robot, pose)))
-    return np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(M, K)).real)) / (2 * np.pi)
 
 
 def lowest(found, every=100):
