@@ -43,7 +43,7 @@ class Lead:
     lag
         Time constant of the drives [s].
     left
-        What is left of it [s]; a shorter lag stays as it is.
+        Remaining time constant [s]; a shorter lag is not changed.
     low, high
         Limits of commands, which broadcast with them.
     rate

@@ -64,9 +64,9 @@ class LateStates:
         otherwise
             Differences of tensions from their commands, (N, m) [N].
         disturbance
-            Estimated, (N, 6) [N, N m].
+            Estimated wrench of the disturbance, (N, 6) [N, N m].
         accelerations
-            Of carriers as commanded, (N, c, 6).
+            Commanded accelerations of the carriers, (N, c, 6).
         """
         if age <= ROUNDING:
             return None

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN = 0.2  # of a limit: what uses less is only named
-MOST = 10.0  # of a limit: larger values are drawn alike
+MOST = 10.0  # of a limit: larger values are drawn as this
 
 
 class Limited(NamedTuple):

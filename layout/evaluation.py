@@ -190,7 +190,7 @@ class Evaluation:
     def spaces(self, y: np.ndarray) -> np.ndarray:
         """Return by how much the bounds of the room are kept at each pose, (N, k) [m]; negative where they are not.
 
-        A frequency counts as a share of its bound.
+        Frequencies are relative to their bound.
         """
         room, found = self.room, [np.zeros((len(self._poses), 0))]
         if room.clearance > 0.0:

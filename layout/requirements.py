@@ -129,7 +129,7 @@ class Requirement(Part):
     def sampled(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Return random poses of the box with its attitudes, (count, 6); of a list all poses.
 
-        Of each coordinate a third is at a bound, since the worst poses often are on faces, edges and corners.
+        A third of the values of each coordinate are at its bounds, where the worst poses often are.
         """
         if self.box is None:
             return np.array(self.poses)

@@ -81,14 +81,20 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
 
 
 def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
-    """Return what is left of a plan that ends at rest."""
+    """Return the rest of a plan that ends at rest; of its limits, those of tensions are checked."""
     left = max((trajectory.duration or 0.0) - begins, SHORTEST)
     times = np.linspace(0.0, left, max(int(left / APART), 10))
     platform, carriers = trajectory.at(begins + times)
     dynamics = dynamics_of(robot)
     A, w = dynamics.wrench_matrix(platform[0], carriers[0]), dynamics.required_wrench(*platform, wind=trajectory.wind)
     tensions = (np.linalg.pinv(A) @ w[..., None])[..., 0]
-    return TeamStop(times, begins + times, platform, carriers, tensions, 0.0, "")
+    beyond = np.maximum(robot.t_min - tensions, tensions - robot.t_max) / (robot.t_max - robot.t_min)
+    k, i = np.unravel_index(np.argmax(beyond), beyond.shape)
+    if not beyond[k, i] > ACCEPTED:
+        return TeamStop(times, begins + times, platform, carriers, tensions, 0.0, "")
+    bound = robot.t_min[i] if tensions[k, i] < robot.t_min[i] else robot.t_max[i]
+    limit = f"tension {i + 1}: {quantity(tensions[k, i])} of {bound:g} at {quantity(times[k], 's')}"
+    return TeamStop(times, begins + times, platform, carriers, tensions, float(beyond[k, i]), limit)
 
 
 def _least(square: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -5,8 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from towline import Dynamics, InputError, load, plan, simulate
+from towline import Dynamics, InputError, Robot, load, plan, simulate
 from towline.control import Predictive, longest_stop, references, stop
+from towline.control.planned_references import planned
+from towline.statics.team_stops import team_stop_along
 
 from .warm import towline as run
 
@@ -70,6 +72,19 @@ def test_a_team_goes_on_to_its_end_where_no_stop_is_shorter(made):
     assert its.duration <= 0.2
     assert its.ends <= found.duration + 0.01
     assert longest_stop(found, 0.5).duration >= stop(found, 1.0).duration
+
+
+def test_the_rest_of_a_plan_for_stronger_cables_is_no_feasible_stop(made):
+    robot, found = made
+    begins = found.duration - 0.15
+    highest = stop(found, begins).tensions.max()
+    cables = [{**cable.model_dump(), "t_max": 0.9 * highest} for cable in robot.cables]
+    weak = Robot.model_validate({**robot.model_dump(), "cables": cables})
+    its = team_stop_along(weak, planned(found)[1], begins)
+    cable = int(its.tensions.max(axis=0).argmax())
+    share = (its.tensions.max() - weak.t_max[cable]) / (weak.t_max[cable] - weak.t_min[cable])
+    assert its.excess == pytest.approx(share, rel=1e-6)
+    assert its.limit.startswith(f"tension {cable + 1}: ")
 
 
 def test_an_event_stops_a_team_from_the_command_line(made, tmp_path):

@@ -57,14 +57,14 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         outer, inner = (expected * seen.inv()).mean(), (seen.inv() * expected).mean()
         for left, right, frame in ((none, none, ""), (outer, none, "world"), (none, inner, "sensor")):
             size = float(np.median((left * seen * right * expected.inv()).magnitude()))
-            complex_ = (k > 0) + bool(frame)
+            corrections = (k > 0) + bool(frame)
             about = (left * right).as_rotvec()
             angle = float(np.linalg.norm(about))
             axis = quantity_row(np.round(about / max(angle, 1e-12), 2), digits=2)
             size_of = quantity(np.degrees(angle), "deg", 3)
             turned = f"the {frame} of the orientations looks turned by {size_of} about ({axis})"
             text = " and ".join(part for part in (way.text, turned if frame else "") if part)
-            tried.append((size * CLEARLY**complex_, size, text, left, right, k))
+            tried.append((size * CLEARLY**corrections, size, text, left, right, k))
     best = min(tried, key=lambda one: one[0])
     if not best[2] or tried[0][1] < VISIBLE:
         return None

@@ -85,7 +85,7 @@ class Measurements(Displayed):
     poses
         (N, 6) [m, rad], nan where not measured, or None.
     tensions, times, carrier_poses, directions
-        As given, or None; directions have unit length, seen from above if that was measured.
+        The given arrays, or None; directions have unit length, horizontal if azimuths were measured.
     sigma
         `Sigma`: of lengths, positions, rotations, tensions and directions.
 

@@ -79,7 +79,7 @@ _EXACT = {unit.lower(): unit for units in UNITS.values() for unit in units}
 class Role(NamedTuple):
     """Role of a field, which of its fields it is, the name with "#" in place of that, and a unit in the name.
 
-    Of a direction, it is the cable's number, empty if there is none, and the axis: "1 x".
+    For a direction, the field is the number of the cable, empty if there is none, and the axis: "1 x".
     """
 
     role: str

@@ -58,7 +58,7 @@ class LogPoses(Displayed):
     excess
         Factor by which the others exceed their standard deviations.
     misread
-        What was wrong with measured orientations, and is corrected, or None.
+        Description of an error of the measured orientations, which is corrected; or None.
     """
 
     estimate: PoseEstimate
