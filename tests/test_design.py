@@ -329,6 +329,7 @@ def test_from_random_layouts_and_for_equal_and_mirrored_points():
     np.testing.assert_array_equal(mirrored.robot.attachments, robot.attachments)
 
 
+BALL = {"kind": "sphere", "centre": [3.2, -2.7, 4.2], "radius": 0.2}
 HOSTILE = [
     ({"free": []}, "free"),
     ({"require": []}, "require"),
@@ -362,6 +363,20 @@ HOSTILE = [
     ({"time_limit": 0}, "time_limit"),
     ({"seed": 1.5}, "seed"),
     ({"sed": 1}, "did you mean 'seed'"),
+    ({"maximise": "natural_frequency"}, r"cables\[0\].stiffness must be given for natural_frequency"),
+    ({"natural_frequency": 3}, "stiffness must be given"),
+    ({"natural_frequency": 0}, "natural_frequency"),
+    ({"natural_frequency": float("nan")}, "natural_frequency"),
+    ({"cable_platform_clearance": 0.1}, "without platform.body"),
+    ({"cable_floor_clearance": 0.1}, "without a floor"),
+    ({"cable_floor_clearance": -1}, "cable_floor_clearance"),
+    ({"keep_out": [{"kind": "sphere", "centre": [0, 0, 0]}]}, "radius"),
+    ({"keep_out": [{**BALL, "platform": 0.2}]}, r"keep_out\[0\].platform must be left out"),
+    ({"keep_out": [{**BALL, "carriers": None}]}, r"keep_out\[0\].carriers must be left out"),
+    ({"keep_out": 3}, "keep_out"),
+    ({"maximise": "natural_frequency", "minimise": "t_max",
+      "free": [{"part": "t_max", "range": {"min": 100, "max": 900}}]}, "maximise must be left out with minimise"),
+    ({"maximise": "natural_frequency", "free": [{"part": "attachment", "pairing": True}]}, "margin with a pairing"),
 ]  # fmt: skip
 
 

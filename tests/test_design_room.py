@@ -202,32 +202,6 @@ def test_the_stiffest_pretension_is_that_of_a_scan():
     assert found.judgement.frequency == pytest.approx(best, rel=1e-3)
 
 
-HOSTILE = [
-    ({"maximise": "natural_frequency"}, r"cables\[0\].stiffness must be given for natural_frequency"),
-    ({"natural_frequency": 3}, "stiffness must be given"),
-    ({"natural_frequency": 0}, "natural_frequency"),
-    ({"natural_frequency": float("nan")}, "natural_frequency"),
-    ({"cable_platform_clearance": 0.1}, "without platform.body"),
-    ({"cable_floor_clearance": 0.1}, "without a floor"),
-    ({"cable_floor_clearance": -1}, "cable_floor_clearance"),
-    ({"keep_out": [{"kind": "sphere", "centre": [0, 0, 0]}]}, "radius"),
-    ({"keep_out": [{**LAMP, "platform": 0.2}]}, r"keep_out\[0\].platform must be left out"),
-    ({"keep_out": [{**LAMP, "carriers": None}]}, r"keep_out\[0\].carriers must be left out"),
-    ({"keep_out": 3}, "keep_out"),
-    ({"maximise": "natural_frequency", "minimise": "t_max",
-      "free": [{"part": "t_max", "range": {"min": 100, "max": 900}}]}, "maximise must be left out with minimise"),
-    ({"maximise": "natural_frequency", "free": [{"part": "attachment", "pairing": True}]}, "margin with a pairing"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("change", "names"), HOSTILE)
-def test_wrong_requirements_are_refused_in_one_line(change, names):
-    robot = load("ipanema-2")
-    with pytest.raises(InputError, match=names) as error:
-        design(robot, requirements=wanted(robot) | change)
-    assert len(str(error.value).splitlines()) == 1
-
-
 def test_slack_cables_have_no_frequency():
     robot = elastic("ipanema-2", 1e4, t_min=1.0)
     slack = [{"part": "t_min", "cables": [3], "range": {"min": 0, "max": 5}}]
