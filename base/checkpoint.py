@@ -37,16 +37,11 @@ class Kind(NamedTuple):
 
 
 class Checkpoint:
-    """The numbered results in an open checkpoint.
-
-    Attributes
-    ----------
-    stored
-        How many there are.
-    """
+    """The numbered results in an open checkpoint."""
 
     def __init__(self, path: Path, kind: Kind, database: sqlite3.Connection):
         self._path, self._kind, self._database = path, kind, database
+        # how many there are
         self.stored: int = database.execute("SELECT count(*) FROM record WHERE number >= 0").fetchone()[0]
         self._safe_at = time.monotonic()
 
@@ -88,19 +83,13 @@ def checkpoint_path(checkpoint: object, resume: object, progress: object) -> Pat
 def open_checkpoint(path: Path, kind: Kind, header: dict[str, Any], resume: bool) -> Iterator[Checkpoint]:
     """Open a checkpoint for a run that `header` describes.
 
-    Parameters
-    ----------
-    path
-        The file.
-    kind
-        What it holds.
-    header
-        Everything that the results depend on, by names for messages; ready for JSON.
-    resume
-        False: create a new file. True: continue the file, or create it if there is none or an empty one.
+    - `path`: the file.
+    - `kind`: what it holds.
+    - `header`: everything that the results depend on, by names for messages; ready for JSON.
+    - `resume`: False: create a new file. True: continue the file, or create it if there is none or an empty one.
 
-    Raises `InputError` if the file cannot be written; if it exists and `resume` is False; if it is no checkpoint,
-    of another run, damaged, or in use. The file is not changed then.
+    Raises `InputError` if the file cannot be written; if it exists and `resume` is False; if it is no checkpoint, of
+    another run, damaged, or in use. The file is not changed then.
     """
     target = check_writable(path)
     try:

@@ -35,12 +35,8 @@ FIXED = 2**12  # [bytes] by which a chunk that does not compress may grow
 class _Account:
     """Count the memory that the contents of a file will take, up to what is accepted.
 
-    Attributes
-    ----------
-    size
-        Of the file [bytes].
-    accepted
-        The most memory for its contents [bytes].
+    - `size`: of the file [bytes].
+    - `accepted`: the most memory for its contents [bytes].
     """
 
     def __init__(self, size: int, always: int = ALWAYS_ACCEPTED):
@@ -82,19 +78,13 @@ def check_hdf5(
 ) -> dict[str, h5py.Dataset]:
     """Return the datasets at the top of an open file that are wanted, none of whose data has been read, by their names.
 
-    Parameters
-    ----------
-    file
-        The open file.
-    size
-        Its size [bytes].
-    wanted
-        Whether a dataset is read; the others are not looked at. Default: all.
-    always
-        Memory that the contents may take, however small the file is [bytes].
+    - `file`: the open file.
+    - `size`: its size [bytes].
+    - `wanted`: whether a dataset is read; the others are not looked at. Default: all.
+    - `always`: memory that the contents may take, however small the file is [bytes].
 
-    Raises `InputError` if part of it is in another file, if it declares or expands to much more than its size, or
-    is compressed in another way than gzip.
+    Raises `InputError` if part of it is in another file, if it declares or expands to much more than its size, or is
+    compressed in another way than gzip.
     """
     import h5py
 

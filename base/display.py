@@ -134,12 +134,8 @@ def tensions_over_time(times: np.ndarray, tensions: np.ndarray, t_min: np.ndarra
 def picture(curves: Iterable[Curve], x: str = "", y: str = "", equal: bool = False) -> str:
     """Return curves as an SVG picture without fonts, files or identifiers of its own; empty if there are no numbers.
 
-    Parameters
-    ----------
-    x, y
-        Labels of the axes; without, none is drawn.
-    equal
-        Whether both axes have the same scale.
+    - `x`, `y`: labels of the axes; without, none is drawn.
+    - `equal`: whether both axes have the same scale.
     """
     drawn = [(np.asarray(a, dtype=float), np.asarray(b, dtype=float), colour) for a, b, colour in curves]
     points = np.concatenate([np.empty((2, 0)), *(np.stack([a, b]) for a, b, _ in drawn)], axis=1)

@@ -148,12 +148,8 @@ def check_workers(workers: object, scheduler: object) -> None:
 def start_workers(workers: int, scheduler: str | None) -> Iterator[Workers]:
     """Start workers, which end with the block.
 
-    Parameters
-    ----------
-    workers
-        Processes of this machine; 1: this process.
-    scheduler
-        Address of a Dask scheduler, which has workers of its own; default: this machine.
+    - `workers`: processes of this machine; 1: this process.
+    - `scheduler`: address of a Dask scheduler, which has workers of its own; default: this machine.
 
     Raises `InputError` if there is no such scheduler.
     """

@@ -21,14 +21,10 @@ OTHERS = {"m^2": ("mm^2", 1e6), "m^3": ("cm^3", 1e6)}  # what a small value is w
 def quantity(value: Number, unit: str = "", digits: int = DIGITS) -> str:
     """Write a number with its unit: `quantity(10337.2, "N")` is "10 340 N", `quantity(5.2e-7, "N")` is "0.52 uN".
 
-    Parameters
-    ----------
-    value
-        A number of type int is exact, any other is rounded; None and nan become "-".
-    unit
-        Written after the number, with another prefix if the number is very small or very large (default: no unit).
-    digits
-        Largest number of significant digits of a rounded number; trailing zeros are left out.
+    - `value`: a number of type int is exact, any other is rounded; None and nan become "-".
+    - `unit`: written after the number, with another prefix if the number is very small or very large (default: no
+      unit).
+    - `digits`: largest number of significant digits of a rounded number; trailing zeros are left out.
     """
     if value is None or math.isnan(value):
         return NO_VALUE

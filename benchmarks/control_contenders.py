@@ -150,14 +150,7 @@ def _daqp(alone: bool) -> Callable[[Program], Solver]:
 class Sparse:
     """Matrices of programs of one size, for z = (u_0, x_1, u_1, ..., x_N); behind x_0 if that is a variable.
 
-    Attributes
-    ----------
-    controls, states :
-        Indices of controls and states in z, (N, m) and (N, n).
-    H :
-        Hessian of the cost, with ones for x_0, whose bounds determine it.
-    mask :
-        Entries of the rows of `dynamics` that are not zero, (N n, size) of bool.
+    `controls`, `states`: indices of controls and states in z, (N, m) and (N, n).
     """
 
     def __init__(self, first: Program, fixed_start: bool):
@@ -166,9 +159,10 @@ class Sparse:
         stages = np.arange(N)[:, None] * (m + n) + self.offset
         self.controls, self.states = stages + np.arange(m), stages + m + np.arange(n)
         blocks = [block for k in range(N) for block in (first.R[k], first.Q[k + 1])]
+        # Hessian of the cost, with ones for x_0, whose bounds determine it
         self.H = sp.block_diag([np.eye(self.offset), *blocks]).toarray()
         full = first._replace(A=np.ones_like(first.A), B=np.ones_like(first.B))
-        self.mask = self.dynamics(full) != 0
+        self.mask = self.dynamics(full) != 0  # entries of the rows of `dynamics` that are not zero, (N n, size) of bool
 
     def dynamics(self, program: Program) -> Array:
         """Return the rows B u + A x - x of the next stage, (N n, size)."""

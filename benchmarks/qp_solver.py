@@ -68,20 +68,14 @@ def solve_problem(
 ) -> qpsolvers.Solution:
     """Solve a QP with diagonal cost, equations and limits; the signature is that of qpsolvers' back ends.
 
-    Parameters
-    ----------
-    problem :
-        The QP; sparse matrices are made dense.
-    initvals, verbose :
-        Not used.
-    eps_abs :
-        Residuals and duality gap that are good enough. It matters only where the equations are nearly dependent: then
-        those that equal 0 = 0 within the tolerance are left out, if the result meets the original QP to `eps_abs`.
-    method :
-        One of `towline.solvers.methods()` that ends at the optimum.
+    - `problem`: the QP; sparse matrices are made dense.
+    - `initvals`, `verbose`: not used.
+    - `eps_abs`: residuals and duality gap that are good enough. It matters only where the equations are nearly
+      dependent: then those that equal 0 = 0 within the tolerance are left out, if the result meets the original QP to
+      `eps_abs`.
+    - `method`: one of `towline.solvers.methods()` that ends at the optimum.
 
-    Raises `InputError` if the QP has inequality rows, a cost matrix that is not diagonal and positive, or no
-    equations.
+    Raises `InputError` if the QP has inequality rows, a cost matrix that is not diagonal and positive, or no equations.
     """
     import qpsolvers
 

@@ -11,12 +11,8 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path 
 
     Call it after reading robot and task, and before any long computation.
 
-    Parameters
-    ----------
-    outputs
-        Files by the names of their options; None for an option that is not used.
-    inputs
-        Files by their meaning; files that have been read so far may be omitted.
+    - `outputs`: files by the names of their options; None for an option that is not used.
+    - `inputs`: files by their meaning; files that have been read so far may be omitted.
 
     Raises `InputError` if one cannot be written, or is one of the other files.
     """

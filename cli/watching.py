@@ -41,19 +41,11 @@ def progress_bar(what: str, quiet: bool) -> Iterator[Callable[..., None]]:
 
 
 class Watch:
-    """A display of a solver's progress.
-
-    Attributes
-    ----------
-    rows
-        All rows received: (iteration, objective, infeasibility).
-    attempt
-        Number of the solver's runs: another one begins where the iteration number falls back.
-    """
+    """A display of a solver's progress."""
 
     def __init__(self, shown: Progress | None, what: str):
-        self.rows: list[tuple[int, float, float]] = []
-        self.attempt = 1
+        self.rows: list[tuple[int, float, float]] = []  # all rows received: (iteration, objective, infeasibility)
+        self.attempt = 1  # number of the solver's runs: another one begins where the iteration number falls back
         self._shown = shown
         self._line: TaskID | None = None if shown is None else shown.add_task(what, detail="preparing", total=None)
 

@@ -49,17 +49,10 @@ def rows_of(state: State) -> int | None:
 def as_floats(given: Given, robot: Robot, rows: int | None) -> Given:
     """Return a state or a reference with NumPy arrays of float64; nan stays, for a sensor without a value.
 
-    Parameters
-    ----------
-    robot
-        Robot of the state or reference.
-    rows
-        Leading dimension that arrays may have, or None if they have none.
+    - `robot`: robot of the state or reference.
+    - `rows`: leading dimension that arrays may have, or None if they have none.
 
-    Raises
-    ------
-    InputError
-        Naming the array that does not fit.
+    Raises `InputError` naming the array that does not fit.
     """
     kind, shape = type(given).__name__.lower(), {"tensions": (robot.m,), "carrier": (len(robot.carriers), 6)}
     arrays: dict[str, Any] = {}

@@ -73,11 +73,8 @@ def bandwidths_for(
 
     Without `sensors` they are the usual ones.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value, or the robot would be lost with given bandwidths, or with a tenth of the usual
-        ones.
+    Raises `InputError` if an argument has a wrong value, or the robot would be lost with given bandwidths, or with a
+    tenth of the usual ones.
     """
     w = None if bandwidth is None else positive("bandwidth", bandwidth, 6)
     K = None if observer is None else number("observer", observer, 0.0, 1e3)

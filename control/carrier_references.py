@@ -36,12 +36,8 @@ class Moved(ABC):
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the coordinates and their rates, (2, f), `dt` [s] after the last step.
 
-        Parameters
-        ----------
-        measured
-            (1 + c, 12), poses and velocities.
-        reference
-            (3, f), the result of `along` for the reference.
+        - `measured`: (1 + c, 12), poses and velocities.
+        - `reference`: (3, f), the result of `along` for the reference.
         """
 
     def under_way(self) -> np.ndarray:

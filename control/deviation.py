@@ -12,10 +12,7 @@ TURNED = 0.5  # [rad], each of roll, pitch and yaw
 class Deviation:
     """Compare measured poses of platforms with their references.
 
-    Parameters
-    ----------
-    robot
-        The robot.
+    `robot`: the robot.
     """
 
     def __init__(self, robot: Robot):

@@ -29,11 +29,6 @@ class Surroundings:
     One row keeps the frame inside the tube. One row for each body keeps the closest of the platform's points (frame and
     attachments) outside. Each uses a plane that touches the tube or the body at the point closest to the guess.
 
-    Attributes
-    ----------
-    rows
-        Number of rows in each stage.
-
     Raises `InputError` if an argument has a wrong value.
     """
 
@@ -44,7 +39,7 @@ class Surroundings:
         self._bodies = validate({"keep_out": list(keep_out)}, _Bodies, "Predictive").keep_out
         self._points = np.vstack([np.zeros(3), robot.attachments])
         self._scale = max(robot.length, 1e-3)
-        self.rows = len(self._bodies) + (self._tube is not None)
+        self.rows = len(self._bodies) + (self._tube is not None)  # number of rows in each stage
 
     def write(self, horizon: Any, states: np.ndarray, wanted: np.ndarray, penalty: float) -> None:
         """Write the rows about guessed states, with the cost per metre of violation [1/m]; both states (N + 1, n)."""

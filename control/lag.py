@@ -13,10 +13,7 @@ WINCHES_KEEP, ROTORS_KEEP = 0.005, 0.015  # [s]: what leads leave of their lags
 class Lag:
     """Let drives follow commands with time constants: lag dy/dt = u - y.
 
-    Parameters
-    ----------
-    lag
-        Time constants [s], which broadcast with commands.
+    `lag`: time constants [s], which broadcast with commands.
     """
 
     def __init__(self, lag: Any):
@@ -38,16 +35,10 @@ class Lead:
 
     with y, what the drives give by now if their lag is as known.
 
-    Parameters
-    ----------
-    lag
-        Time constant of the drives [s].
-    left
-        Remaining time constant [s]; a shorter lag is not changed.
-    low, high
-        Limits of commands, which broadcast with them.
-    rate
-        Largest rate of change of commands, likewise.
+    - `lag`: time constant of the drives [s].
+    - `left`: remaining time constant [s]; a shorter lag is not changed.
+    - `low`, `high`: limits of commands, which broadcast with them.
+    - `rate`: largest rate of change of commands, likewise.
     """
 
     def __init__(self, lag: float, left: float, low: np.ndarray, high: np.ndarray, rate: Any = np.inf):

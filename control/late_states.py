@@ -17,12 +17,8 @@ class LateStates:
     Observers use the measured states. With predicted ones they would correct their own prediction and be unstable for
     delays beyond the inverse of their bandwidth.
 
-    Parameters
-    ----------
-    robot
-        Record of the robot.
-    count
-        Number of tensions of all robots, N m.
+    - `robot`: record of the robot.
+    - `count`: number of tensions of all robots, N m.
     """
 
     def __init__(self, robot: np.ndarray, count: int):
@@ -57,16 +53,10 @@ class LateStates:
     ) -> np.ndarray | None:
         """Predict motions, (N, 1 + c, 12), over their `age` [s]; return them as measured if they are late.
 
-        Parameters
-        ----------
-        age, motions
-            Motions that are too old become nan.
-        otherwise
-            Differences of tensions from their commands, (N, m) [N].
-        disturbance
-            Estimated wrench of the disturbance, (N, 6) [N, N m].
-        accelerations
-            Commanded accelerations of the carriers, (N, c, 6).
+        - `age`, `motions`: motions that are too old become nan.
+        - `otherwise`: differences of tensions from their commands, (N, m) [N].
+        - `disturbance`: estimated wrench of the disturbance, (N, 6) [N, N m].
+        - `accelerations`: commanded accelerations of the carriers, (N, c, 6).
         """
         if age <= ROUNDING:
             return None

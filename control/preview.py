@@ -18,16 +18,10 @@ CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was a
 class Preview:
     """Future references, at the beginning of each stage and at the end of the last.
 
-    Parameters
-    ----------
-    robot
-        The robot.
-    steps
-        Durations of the stages, (N,) [s].
-    moved
-        Coordinates of carriers that a solution moves.
-    tensions
-        Tensions for a reference without tensions, (m,) [N].
+    - `robot`: the robot.
+    - `steps`: durations of the stages, (N,) [s].
+    - `moved`: coordinates of carriers that a solution moves.
+    - `tensions`: tensions for a reference without tensions, (m,) [N].
     """
 
     def __init__(self, robot: Robot, steps: np.ndarray, moved: Moved, tensions: np.ndarray):

@@ -12,14 +12,9 @@ class TensionLoop:
 
     with t delayed like the winches. A command stays inside limits and rates, at which the integral stops.
 
-    Parameters
-    ----------
-    bandwidth
-        k [rad/s].
-    lag
-        Time constant with which winches follow their commands [s]; 0 if `before` is what they gave.
-    lowest, highest, fastest
-        Limits of commands, (m,) [N], and of their rates [N/s].
+    - `bandwidth`: k [rad/s].
+    - `lag`: time constant with which winches follow their commands [s]; 0 if `before` is what they gave.
+    - `lowest`, `highest`, `fastest`: limits of commands, (m,) [N], and of their rates [N/s].
     """
 
     def __init__(self, bandwidth: float, lag: float, lowest: np.ndarray, highest: np.ndarray, fastest: np.ndarray):
@@ -36,17 +31,11 @@ class TensionLoop:
     ) -> np.ndarray:
         """Return the tensions to send, (N, m) [N].
 
-        Parameters
-        ----------
-        dt
-            Time since the last step [s].
-        wanted
-            Desired tensions from now on, (N, m) [N].
-        before, measured
-            Desired tensions at the time of the measurement, (N, m) [N], and the measured ones; nan and None change
-            nothing.
-        cut
-            Cables that are treated as cut, (N, m): their commands are the desired tensions.
+        - `dt`: time since the last step [s].
+        - `wanted`: desired tensions from now on, (N, m) [N].
+        - `before`, `measured`: desired tensions at the time of the measurement, (N, m) [N], and the measured ones; nan
+          and None change nothing.
+        - `cut`: cables that are treated as cut, (N, m): their commands are the desired tensions.
         """
         if self._sent is None:
             self._late = self._sent = wanted.copy()

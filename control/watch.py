@@ -33,18 +33,13 @@ class Watch:
     acceleration. New plans and jumps of the reference do not contribute, because they act through the commands. Steps
     that are further apart than the window are not compared.
 
-    Parameters
-    ----------
-    scale
-        Factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for locked
-        coordinates.
-    usual
-        Acceleration of the platform by the robot's force scale [m/s^2]: `BOUND` times this is permitted, and a step
-        without a solution is treated as an unexplained acceleration of this size.
-    ripple
-        Tensions commanded for unit rates of the pose, relative to the distance of tensions from their limits,
-        (m, 6) [s/m, s/rad]. The limits clip the effect of rate noise, more on one side than on the other, so `OFTEN`
-        standard deviations beyond the limits are a reason to hand over. Default: noise is ignored.
+    - `scale`: factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for
+      locked coordinates.
+    - `usual`: acceleration of the platform by the robot's force scale [m/s^2]: `BOUND` times this is permitted, and a
+      step without a solution is treated as an unexplained acceleration of this size.
+    - `ripple`: tensions commanded for unit rates of the pose, relative to the distance of tensions from their limits,
+      (m, 6) [s/m, s/rad]. The limits clip the effect of rate noise, more on one side than on the other, so `OFTEN`
+      standard deviations beyond the limits are a reason to hand over. Default: noise is ignored.
     """
 
     def __init__(self, scale: np.ndarray, usual: float, ripple: np.ndarray | None = None):

@@ -32,21 +32,13 @@ def weights(
     A double integrator ddx = a with the cost w^4 x^2 + 2 w^2 dx^2 + a^2 decays with the double pole -w. The smallest
     tensions for an acceleration a cost a' M (A A')^-1 M a, whose diagonal at home replaces a^2.
 
-    Parameters
-    ----------
-    robot
-        The robot.
-    bandwidth
-        Bandwidth w of each coordinate of the pose, (6,) [rad/s].
-    reach
-        Intended deviation of each freed coordinate of a carrier, (f,) [m, rad].
-    carrier_bandwidth
-        Bandwidth with which these return [rad/s].
-    duration
-        Duration of a stage [s].
-    moved
-        Accelerations of the pose at home per unit of the freed coordinates, (6, f). They contribute to the least effort
-        if tensions do not control all degrees of freedom.
+    - `robot`: the robot.
+    - `bandwidth`: bandwidth w of each coordinate of the pose, (6,) [rad/s].
+    - `reach`: intended deviation of each freed coordinate of a carrier, (f,) [m, rad].
+    - `carrier_bandwidth`: bandwidth with which these return [rad/s].
+    - `duration`: duration of a stage [s].
+    - `moved`: accelerations of the pose at home per unit of the freed coordinates, (6, f). They contribute to the least
+      effort if tensions do not control all degrees of freedom.
     """
     A, M = _at_home(robot)
     far = (SHARE * robot.force_scale / reach) ** 2

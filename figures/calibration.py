@@ -22,14 +22,10 @@ def residuals(
 ) -> Figure:
     """Draw the residuals of each cable's length with the parameters of the file, and with the calibrated ones.
 
-    Parameters
-    ----------
-    before, after
-        (N, m) [m].
-    times
-        Times of the samples, (N,) [s]; default: their numbers.
-    wrong
-        Readings that the fit leaves out, (N, m); default: none. They are crosses, at the edge if they are beyond it.
+    - `before`, `after`: (N, m) [m].
+    - `times`: times of the samples, (N,) [s]; default: their numbers.
+    - `wrong`: readings that the fit leaves out, (N, m); default: none. They are crosses, at the edge if they are beyond
+      it.
     """
     canvas = style.figure(height=3.4)
     along = "sample" if times is None else "time [s]"
@@ -51,16 +47,10 @@ def residuals(
 def consistency(residuals: np.ndarray, cost: np.ndarray, largest: float, times: np.ndarray | None = None) -> Figure:
     """Draw how well poses fit their lengths: the residual of each cable, and their sums of squares with a limit.
 
-    Parameters
-    ----------
-    residuals
-        Residuals of the lengths, (N, m) [m].
-    cost
-        Sum of squares in standard deviations, (N,).
-    largest
-        Limit that sound samples rarely exceed, or nan.
-    times
-        Times of the samples, (N,) [s]; default: their numbers.
+    - `residuals`: residuals of the lengths, (N, m) [m].
+    - `cost`: sum of squares in standard deviations, (N,).
+    - `largest`: limit that sound samples rarely exceed, or nan.
+    - `times`: times of the samples, (N,) [s]; default: their numbers.
     """
     canvas = style.figure(height=3.4)
     along = "sample" if times is None else "time [s]"
@@ -145,10 +135,8 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> Fig
 def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
     """Draw the standard deviations of the parameters by cable, one series for each kind of parameter.
 
-    Parameters
-    ----------
-    sigmas
-        (m,) [m] by kind, such as "anchor x"; inf where the measurements leave a parameter open, nan where it is fixed.
+    `sigmas`: (m,) [m] by kind, such as "anchor x"; inf where the measurements leave a parameter open, nan where it is
+    fixed.
     """
     from matplotlib.ticker import LogLocator, NullFormatter
 

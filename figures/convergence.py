@@ -28,11 +28,8 @@ def runs(iterates: Sequence[Iterate]) -> list[np.ndarray]:
 def convergence(iterates: Sequence[Iterate]) -> Figure:
     """Draw infeasibility and objective over the iterations, numbered through all runs, with a colour for each run.
 
-    Parameters
-    ----------
-    iterates
-        Rows of (iteration, objective, infeasibility) in order. Another run begins where the iteration number falls to
-        0: a finer mesh, tighter limits, or a program with slacks.
+    `iterates`: rows of (iteration, objective, infeasibility) in order. Another run begins where the iteration number
+    falls to 0: a finer mesh, tighter limits, or a program with slacks.
     """
     canvas = style.figure(height=3.3)
     labels = ("infeasibility [-]", "objective [-]")

@@ -30,12 +30,8 @@ def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray |
     A region without extent along one axis has one panel, a volume three: the lower, middle and upper third of its
     heights. Along a line, the samples themselves are drawn.
 
-    Parameters
-    ----------
-    result
-        From `workspace.sample`, with the variables `metrics` and `position`.
-    anchors
-        Anchors to mark, (m, 3) in {G} [m] (default: none).
+    - `result`: from `workspace.sample`, with the variables `metrics` and `position`.
+    - `anchors`: anchors to mark, (m, 3) in {G} [m] (default: none).
     """
     thick = [k for k, name in enumerate("xyz") if result.sizes[name] > 1]
     position = result["position"].values

@@ -23,21 +23,15 @@ FLOOR = "#e2e2e2"
 class Perspective:
     """The projection of points onto a picture.
 
-    Attributes
-    ----------
-    low, high, size
-        Corners and diagonal of the box around what is shown, in {G} [m].
-    flat
-        True if it is in a vertical plane.
-    floor, cell
-        Height of the floor, and edge of its cells [m].
+    - `low`, `high`, `size`: corners and diagonal of the box around what is shown, in {G} [m].
+    - `floor`, `cell`: height of the floor, and edge of its cells [m].
     """
 
     def __init__(self, points: np.ndarray, standing: bool = False):
         """Show points (k, 3) [m]; a robot `standing` on posts has its floor at z = 0 if that is below and near."""
         self.low, self.high = points.min(axis=0), points.max(axis=0)
         self.size = max(float(np.linalg.norm(self.high - self.low)), 1e-6)
-        self.flat = bool(self.high[1] - self.low[1] < FLAT * self.size)
+        self.flat = bool(self.high[1] - self.low[1] < FLAT * self.size)  # True if it is in a vertical plane
         lowest = float(self.low[2])
         self.floor = lowest - BELOW * self.size
         if standing and lowest < self.size:

@@ -16,12 +16,9 @@ if TYPE_CHECKING:
 def phase_plane(s: np.ndarray, sd: np.ndarray, active: Sequence[tuple[float, float, str]]) -> Figure:
     """Draw ds/dt over s, (n,) each.
 
-    Parameters
-    ----------
-    s, sd
-        Fraction of the path, increasing from 0 to 1, and its rate [1/s], whose square is linear between grid points.
-    active
-        Stretches of the path with their active limit: start, end and name.
+    - `s`, `sd`: fraction of the path, increasing from 0 to 1, and its rate [1/s], whose square is linear between grid
+      points.
+    - `active`: stretches of the path with their active limit: start, end and name.
     """
     canvas = style.figure(height=2.2 + 0.17 * len({name for *_, name in active}))
     ax = style.axes(canvas, "fraction s of the path [-]", "ds/dt [1/s]")

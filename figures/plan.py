@@ -53,10 +53,7 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
 
     Where no tensions exist, thin lines show the tensions that the motion would need without limits, pushing included.
 
-    Parameters
-    ----------
-    trajectories
-        Datasets of plans, by the titles of their panels.
+    `trajectories`: datasets of plans, by the titles of their panels.
     """
     phases = any("phase" in trajectory.coords for trajectory in trajectories.values())
     missing = any(not np.isfinite(trajectory["tensions"].values).all() for trajectory in trajectories.values())

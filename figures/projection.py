@@ -38,10 +38,7 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
 
     The view from above is above the view along y, and the view along x is beside it, so that coordinates line up.
 
-    Parameters
-    ----------
-    below
-        Height for a legend [inches].
+    `below`: height for a legend [inches].
     """
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.ones(3))
     extent = (1 + 2 * AIR) * (high - low)

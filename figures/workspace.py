@@ -24,12 +24,8 @@ MOST_POINTS = 20_000  # of a series in a panel: more are not visible, and files 
 def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) -> Figure:
     """Draw points of {G} from above and from two sides, at equal scales.
 
-    Parameters
-    ----------
-    points
-        (n, 3) [m] by label, drawn in their order.
-    marks
-        Points to mark, such as anchors, (k, 3) [m].
+    - `points`: (n, 3) [m] by label, drawn in their order.
+    - `marks`: points to mark, such as anchors, (k, 3) [m].
     """
     canvas, panels = views_of(np.vstack([*points.values(), *([] if marks is None else [marks])]), VIEWS)
     for ax, view in zip(panels, VIEWS, strict=True):
@@ -42,12 +38,8 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
 def cross_sections(points: np.ndarray, heights: list[float], thickness: float) -> Figure:
     """Draw the points of {G} that lie within `thickness` / 2 of each of some heights, from above, at one scale.
 
-    Parameters
-    ----------
-    points
-        (n, 3) [m].
-    heights, thickness
-        [m].
+    - `points`: (n, 3) [m].
+    - `heights`, `thickness`: [m].
     """
     columns = min(len(heights), 2)
     rows = -(-len(heights) // columns)
@@ -78,12 +70,8 @@ def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> Figure:
     Darker areas are those where a larger share of the samples along the line of sight was accepted. Axes along which
     the region has no extent are left out.
 
-    Parameters
-    ----------
-    result
-        From `workspace.sample`, with the counts `tried` and `reached` (x, y, z) of its cells.
-    anchors
-        Anchors to mark, (m, 3) in {G} [m] (default: none).
+    - `result`: from `workspace.sample`, with the counts `tried` and `reached` (x, y, z) of its cells.
+    - `anchors`: anchors to mark, (m, 3) in {G} [m] (default: none).
     """
     thick = [name for name in ("x", "y", "z") if result.sizes[name] > 1]
     views = [view for view in VIEWS if "xyz"[view.across] in thick and "xyz"[view.up] in thick]

@@ -25,16 +25,10 @@ def anneal(
 ) -> np.ndarray:
     """Return the variables of a good layout for the rows of an evaluation, (p,).
 
-    Parameters
-    ----------
-    evaluation
-        An evaluation of few poses, because it is repeated thousands of times.
-    goal
-        The objective.
-    until
-        Time of `time.perf_counter` at which it ends [s]: where an evaluation takes long, with fewer moves.
-    near
-        Initial layout, annealed at a lower temperature; default: random ones.
+    - `evaluation`: an evaluation of few poses, because it is repeated thousands of times.
+    - `goal`: the objective.
+    - `until`: time of `time.perf_counter` at which it ends [s]: where an evaluation takes long, with fewer moves.
+    - `near`: initial layout, annealed at a lower temperature; default: random ones.
     """
     variables = evaluation.variables
     low, high, points = variables.low, variables.high, variables.points

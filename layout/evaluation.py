@@ -82,14 +82,9 @@ class Slopes:
 class Evaluation:
     """Evaluate layouts at the rows of requirements.
 
-    Parameters
-    ----------
-    variables
-        Those of the design.
-    rows
-        Poses and wrenches.
-    room
-        Bounds of distances and lengths (default: none).
+    - `variables`: those of the design.
+    - `rows`: poses and wrenches.
+    - `room`: bounds of distances and lengths (default: none).
     """
 
     def __init__(self, variables: Variables, rows: Rows, room: Room = NO_BOUNDS):

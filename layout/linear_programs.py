@@ -74,18 +74,11 @@ class _Program:
 def maximise(evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1) -> None:
     """Move the variables to a local maximum of a goal, in place: an interrupt keeps what is reached.
 
-    Parameters
-    ----------
-    evaluation
-        Of all rows that count.
-    goal
-        The objective.
-    y
-        Where to start, (p,); it is moved.
-    until
-        Time of `time.perf_counter` at which it ends early [s].
-    delta
-        Longest step of the first program, of the range of each variable.
+    - `evaluation`: of all rows that count.
+    - `goal`: the objective.
+    - `y`: where to start, (p,); it is moved.
+    - `until`: time of `time.perf_counter` at which it ends early [s].
+    - `delta`: longest step of the first program, of the range of each variable.
     """
     price = _PER_METRE * evaluation.variables.robot.force_scale
 

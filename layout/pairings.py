@@ -33,14 +33,9 @@ def best_pairing(
     The least margin over a few rows bounds the one over all. So pairings are computed at all rows in the order of this
     bound, until it is no larger than the best.
 
-    Parameters
-    ----------
-    robot, rows
-        The robot with its points, and the rows that count.
-    cables
-        Cables that exchange their attachments, at most `MOST_PAIRED`.
-    requirements
-        Their room is kept. If no pairing has it, the robot's own is returned.
+    - `robot`, `rows`: the robot with its points, and the rows that count.
+    - `cables`: cables that exchange their attachments, at most `MOST_PAIRED`.
+    - `requirements`: their room is kept. If no pairing has it, the robot's own is returned.
     """
     room = room_of(robot, requirements)
     own, kept = np.arange(robot.m), np.flatnonzero(robot.dof_mask)

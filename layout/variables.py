@@ -62,10 +62,7 @@ def parts(layout: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def variables_of(robot: Robot, requirements: Requirements) -> Variables:
     """Return the variables of the free numbers of a robot.
 
-    Raises
-    ------
-    InputError
-        If the requirements do not fit the robot.
+    Raises `InputError` if the requirements do not fit the robot.
     """
     _check(robot, requirements)
     fixed, column_of = _layout_of(robot), {}

@@ -61,38 +61,22 @@ NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 
 @dataclass(frozen=True)
 class CasprImport(Displayed):
-    """A robot, and what else the folder contains.
+    """A robot, and what else the folder contains."""
 
-    Attributes
-    ----------
-    robot
-        The robot; its source names the folder and repeats the notes.
-    cable_set
-        Id of the set of cables that was read.
-    cable_sets
-        Ids of all sets in the file.
-    notes
-        Sentences on what was left out or assumed.
-    """
-
-    robot: Robot
-    cable_set: str
-    cable_sets: tuple[str, ...]
-    notes: list[str]
+    robot: Robot  # the robot; its source names the folder and repeats the notes
+    cable_set: str  # id of the set of cables that was read
+    cable_sets: tuple[str, ...]  # ids of all sets in the file
+    notes: list[str]  # sentences on what was left out or assumed
 
 
 def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> CasprImport:
     """Read a folder with one *_bodies.xml and one *_cables.xml as CASPR has them.
 
-    Parameters
-    ----------
-    folder
-        The folder of one robot.
-    cable_set
-        Id of the set of cables; default: the file's default_cable_set.
+    - `folder`: the folder of one robot.
+    - `cable_set`: id of the set of cables; default: the file's default_cable_set.
 
-    Raises `InputError` if a file is missing or wrong, or towline cannot express the robot: one line that names the
-    file and the element.
+    Raises `InputError` if a file is missing or wrong, or towline cannot express the robot: one line that names the file
+    and the element.
     """
     place = Path(folder)
     notes = Counter[str]()

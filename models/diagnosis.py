@@ -16,32 +16,17 @@ LEVEL_POSES = 50
 
 @dataclass(frozen=True)
 class Diagnosis(Displayed):
-    """The diagnosis of a robot at its home pose.
+    """The diagnosis of a robot at its home pose."""
 
-    Attributes
-    ----------
-    rank
-        Rank of the wrench matrix at home.
-    rank_level, rank_tilted
-        Largest rank among seeded random poses about home, unrotated and rotated.
-    singular_values
-        Singular values of the balanced rows of the wrench matrix at home, moments divided by `Robot.length`,
-        descending.
-    lengths
-        Cable lengths at home [m].
-    reason
-        Reason for a rank below the platform's degrees of freedom, otherwise empty.
-    warnings
-        Sentences about numbers that are valid but implausible.
-    """
-
-    rank: int
+    rank: int  # rank of the wrench matrix at home
+    # largest rank among seeded random poses about home, unrotated and rotated
     rank_level: int
     rank_tilted: int
+    # singular values of the balanced rows of the wrench matrix at home, moments divided by `Robot.length`, descending
     singular_values: np.ndarray  # (min(6, m),)
-    lengths: np.ndarray  # (m,)
-    reason: str
-    warnings: list[str]
+    lengths: np.ndarray  # cable lengths at home, (m,) [m]
+    reason: str  # reason for a rank below the platform's degrees of freedom, otherwise empty
+    warnings: list[str]  # sentences about numbers that are valid but implausible
 
 
 def diagnose(robot: Robot | str | os.PathLike[str]) -> Diagnosis:

@@ -24,12 +24,8 @@ _RESULTS = 5
 class Mechanics:
     """Compute a robot's mechanics at one pose or at many: arguments, results and errors are those of `Dynamics`.
 
-    Parameters
-    ----------
-    robot
-        One that `record.fits`.
-    record
-        The record to read at each call, whose ends of cables may change; default: that of the robot.
+    - `robot`: one that `record.fits`.
+    - `record`: the record to read at each call, whose ends of cables may change; default: that of the robot.
     """
 
     def __init__(self, robot: Robot, record: np.ndarray | None = None):

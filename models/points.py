@@ -74,12 +74,8 @@ def default_home(anchor_points: np.ndarray, attachment_points: np.ndarray) -> np
     The platform is treated as suspended if the heights of its anchors differ by less than a tenth of their horizontal
     spread. Then it is placed as far below their centre as they are wide.
 
-    Parameters
-    ----------
-    anchor_points
-        In {G}, (m, 3) [m].
-    attachment_points
-        In the platform frame, (m, 3) [m].
+    - `anchor_points`: in {G}, (m, 3) [m].
+    - `attachment_points`: in the platform frame, (m, 3) [m].
     """
     centre = anchor_points.mean(axis=0)
     spread = np.linalg.norm(anchor_points[:, :2] - centre[:2], axis=1).max()

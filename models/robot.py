@@ -343,12 +343,8 @@ class Robot(DisplayedRobot):
 def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cables: tuple[Cable, ...]) -> None:
     """Refuse an attachment on the swivel axis of its pulley, or inside the sheave.
 
-    Parameters
-    ----------
-    offsets, axes
-        From anchors to attachments, (m, 3) [m], and the swivel axes, (m, 3) [-], in {G} at home.
-    radii
-        Radii of the sheaves, (m,) [m]; 0 for a cable without.
+    - `offsets`, `axes`: from anchors to attachments, (m, 3) [m], and the swivel axes, (m, 3) [-], in {G} at home.
+    - `radii`: radii of the sheaves, (m,) [m]; 0 for a cable without.
 
     Raises `ValueError` that names the attachment.
     """

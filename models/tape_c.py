@@ -55,12 +55,8 @@ class _Value(NamedTuple):
 def to_c_function(function: ca.Function, name: str) -> str:
     """Return C text of `static void NAME(inputs, outputs)`, matrices row by row.
 
-    Parameters
-    ----------
-    function
-        An SX Function with dense inputs and outputs, which become arrays of their names.
-    name
-        The name of the C function.
+    - `function`: an SX Function with dense inputs and outputs, which become arrays of their names.
+    - `name`: the name of the C function.
 
     Raises `InputError` if the tape has an operation that is not known here.
     """

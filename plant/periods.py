@@ -28,12 +28,9 @@ class Periods:
     def run(self, states: np.ndarray, commands: np.ndarray, history: np.ndarray, tensions: np.ndarray) -> None:
         """Write states and tensions at the beginning and at the end of a period.
 
-        Parameters
-        ----------
-        states, commands
-            (N, n) and (N, K, k), see `Plant`: the first command is that of the period; carriers move on to a second.
-        history, tensions
-            Results, (N, 2, n) and (N, 2, m) [N].
+        - `states`, `commands`: (N, n) and (N, K, k), see `Plant`: the first command is that of the period; carriers
+          move on to a second.
+        - `history`, `tensions`: results, (N, 2, n) and (N, 2, m) [N].
         """
         of_rows = (states, commands, history, tensions)
         run_plant(self._record, self._settings, *of_rows, 1, self._period, self._substeps, 1)

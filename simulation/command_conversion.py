@@ -22,14 +22,9 @@ class Orders:
     their file are assumed to have winches that measure their tension and reach it within the period:
     core/plant/winch_lengths.c. Carriers are commanded for one instant and move like the reference until the next.
 
-    Parameters
-    ----------
-    plant
-        The plant.
-    conditions
-        Conditions of the runs.
-    seeds
-        Seed of the wind and of the drives, one for each run.
+    - `plant`: the plant.
+    - `conditions`: conditions of the runs.
+    - `seeds`: seed of the wind and of the drives, one for each run.
     """
 
     def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int]):

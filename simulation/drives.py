@@ -15,12 +15,8 @@ SHORTEST = 1e-3  # of a period: of lags, which divide
 class Drives:
     """Turn commands into what the drives of N runs make of them.
 
-    Parameters
-    ----------
-    drawn
-        Numbers of each run.
-    period
-        Period of the commands [s].
+    - `drawn`: numbers of each run.
+    - `period`: period of the commands [s].
     """
 
     def __init__(self, drawn: Sequence[Drawn], period: float):

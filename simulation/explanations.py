@@ -31,47 +31,25 @@ LOST = 1e6  # what a residual is where the simulation diverges
 
 
 class Explanation(NamedTuple):
-    """Share of the residuals that one parameter alone explains.
+    """Share of the residuals that one parameter alone explains."""
 
-    Attributes
-    ----------
-    name
-        "delay", "friction", "mass" or "stiffness".
-    before, value, sigma
-        Its value in the model, the value with the least residual and the standard deviation of that, by the scatter of
-        the windows and the noise: in [s], [N], or as a factor of the file's.
-    explained
-        Share of the squared residuals beyond the noise that it removes.
-    shown
-        True if the recording shows it well enough to be found.
-    named
-        True if it certainly explains something.
-    """
-
-    name: str
+    name: str  # "delay", "friction", "mass" or "stiffness"
+    # its value in the model, the value with the least residual and the standard deviation of that, by the scatter of
+    # the windows and the noise: in [s], [N], or as a factor of the file's
     before: float
     value: float
     sigma: float
-    explained: float
-    shown: bool
-    named: bool
+    explained: float  # share of the squared residuals beyond the noise that it removes
+    shown: bool  # True if the recording shows it well enough to be found
+    named: bool  # True if it certainly explains something
 
 
 class Match(NamedTuple):
-    """Residuals with some parameters.
+    """Residuals with some parameters."""
 
-    Attributes
-    ----------
-    parameters
-        The parameters.
-    drift
-        Measured minus simulated over the noise, from the starts on, (W, R).
-    left
-        The same without what other starts would explain, and corrections of starts over their deviations, (W, R + P).
-    """
-
-    parameters: Parameters
-    drift: np.ndarray
+    parameters: Parameters  # the parameters
+    drift: np.ndarray  # measured minus simulated over the noise, from the starts on, (W, R)
+    # the same without what other starts would explain, and corrections of starts over their deviations, (W, R + P)
     left: np.ndarray
 
     @property
@@ -81,29 +59,21 @@ class Match(NamedTuple):
 
 
 class Matching:
-    """Compare a recording with its plant for different parameters.
-
-    Attributes
-    ----------
-    windows
-        The windows, their starts corrected within the noise of the recording. Their noise has that of simulations too.
-    first
-        Residuals with the first parameters.
-    kept
-        Windows that are no outliers, (W,) of bool.
-    noise
-        What residuals are if nothing except noise differs, in windows from the recorded state on, by kind.
-    """
+    """Compare a recording with its plant for different parameters."""
 
     def __init__(self, windows: Windows, parameters: Parameters):
+        # the windows, their starts corrected within the noise of the recording. Their noise has that of simulations
+        # too.
         self.windows = windows
         self._linearise(parameters)
         echo, sensors = self._echo(parameters), dict(windows.noise)
+        # what residuals are if nothing except noise differs, in windows from the recorded state on, by kind
         self.noise = self._with_echo(sensors, echo)
         windows.noise = self._with_echo(sensors, self._project(echo))
         self._linearise(parameters)
         self._echoed = self._project(self._echo(parameters))
-        self.first = self.at(parameters)
+        self.first = self.at(parameters)  # residuals with the first parameters
+        # windows that are no outliers, (W,) of bool
         self.kept = self._good & (self.first.cost <= OUTLYING * np.median(self.first.cost))
 
     def _linearise(self, parameters: Parameters) -> None:

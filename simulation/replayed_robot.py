@@ -10,20 +10,11 @@ STRAIN = 1e-3  # at t_max, of cables whose stiffness is not known
 
 
 class Parameters(NamedTuple):
-    """Parameters that a model may have wrong, besides its geometry.
+    """Parameters that a model may have wrong, besides its geometry."""
 
-    Attributes
-    ----------
-    delay
-        Time by which the robot is later than its recorded commands [s].
-    friction
-        Dry friction of the winches, as a force on each cable, the mean over the cables [N].
-    mass, stiffness
-        Mass of the platform and stiffness of the cables, as factors of the file's.
-    """
-
-    delay: float = 0.0
-    friction: float = 0.0
+    delay: float = 0.0  # time by which the robot is later than its recorded commands [s]
+    friction: float = 0.0  # dry friction of the winches, as a force on each cable, the mean over the cables [N]
+    # mass of the platform and stiffness of the cables, as factors of the file's
     mass: float = 1.0
     stiffness: float = 1.0
 

@@ -36,33 +36,18 @@ FLOOR = {"position": 2e-5, "rotation": 2e-5, "tensions": 1e-2, "lengths": 1e-5} 
 class Windows:
     """Windows of a recording.
 
-    Parameters
-    ----------
-    recorded
-        The recording.
-    drive
-        What is commanded: "lengths", "tensions", or "forces" of winches; default: commands where these are recorded,
-        otherwise measured lengths of cables with a stiffness, otherwise measured tensions, otherwise lengths.
-    window
-        Duration of a window [s].
+    - `recorded`: the recording.
+    - `drive`: what is commanded: "lengths", "tensions", or "forces" of winches; default: commands where these are
+      recorded, otherwise measured lengths of cables with a stiffness, otherwise measured tensions, otherwise lengths.
+    - `window`: duration of a window [s].
+    - `starts`: times at which windows start [s], (W,).
+    - `rows`, `inside`: samples of each window, (W, S), and which of these belong to it; the last of a shorter window is
+      repeated.
+    - `start`, `start_sigma`: corrections of the recorded states at the starts, (W, P), and their standard deviations,
+      (P,).
 
-    Attributes
-    ----------
-    starts
-        Times at which windows start [s], (W,).
-    rows, inside
-        Samples of each window, (W, S), and which of these belong to it; the last of a shorter window is repeated.
-    usual
-        Parameters of the file.
-    noise
-        Standard deviation of what is compared, by its sensors: position [m], rotation [rad], tensions [N], lengths [m].
-    start, start_sigma
-        Corrections of the recorded states at the starts, (W, P), and their standard deviations, (P,).
-
-    Raises
-    ------
-    InputError
-        If there are no commands, no measurements to compare with, no pose of a moving carrier, or no window.
+    Raises `InputError` if there are no commands, no measurements to compare with, no pose of a moving carrier, or no
+    window.
     """
 
     def __init__(self, recorded: Recorded, drive: str | None, window: float):
@@ -75,7 +60,7 @@ class Windows:
         self.assumed = any(cable.stiffness is None for cable in robot.cables)
         if self.assumed and self.drive != "tensions":
             self.notes.append("cables without a stiffness in the file are given one: 0.1 % of elongation at t_max")
-        self.usual = Parameters(friction=friction_of(self.robot))
+        self.usual = Parameters(friction=friction_of(self.robot))  # parameters of the file
         self._known = np.asarray(np.isfinite(recorded.pose).all(axis=1))
         if self._known.sum() < FEWEST:
             raise InputError(f"log must have a pose at {FEWEST} times or more, got {int(self._known.sum())}")
@@ -84,6 +69,8 @@ class Windows:
         self._carriers = self._carrier_tracks()
         apart = float(np.median(np.diff(times)))
         self._place(apart)
+        # standard deviation of what is compared, by its sensors: position [m], rotation [rad], tensions [N], lengths
+        # [m]
         self.noise = self._noise()
         self._neighbours = widest_parabola(times, self._command) if self.measured_command else 0
         self._sample()

@@ -37,18 +37,11 @@ class Facets(Displayed):
 def facets(A: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) -> Facets:
     """Describe the available wrench sets of many wrench matrices by half-spaces.
 
-    Parameters
-    ----------
-    A
-        (N, n, m), rows of one unit: moments divided by a length [N per N]. Where its columns do not span R^n the
-        half-spaces are those inside their span.
-    t_min, t_max
-        Finite limits, (m,) each [N]. A cable with equal ones has no choice and shifts the set.
+    - `A`: (N, n, m), rows of one unit: moments divided by a length [N per N]. Where its columns do not span R^n the
+      half-spaces are those inside their span.
+    - `t_min`, `t_max`: finite limits, (m,) each [N]. A cable with equal ones has no choice and shifts the set.
 
-    Returns
-    -------
-    Facets
-        With K = C(m, n - 1) normals: 56 for eight cables and six equations.
+    There are K = C(m, n - 1) normals: 56 for eight cables and six equations.
     """
     moving = t_min < t_max
     columns, low, high = A[:, :, moving], t_min[moving], t_max[moving]

@@ -36,21 +36,13 @@ class Projection(NamedTuple):
 def box_least_squares(M: Array, b: Array, lower: Array, upper: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Minimise |M x - b| over a box.
 
-    Parameters
-    ----------
-    M :
-        Matrix, shape (k, m), any rank.
-    b :
-        Right-hand side, shape (k,).
-    lower, upper :
-        Limits, shape (m,), may be infinite or equal.
+    - `M`: matrix, shape (k, m), any rank.
+    - `b`: right-hand side, shape (k,).
+    - `lower`, `upper`: limits, shape (m,), may be infinite or equal.
 
-    Returns
-    -------
-    x :
-        A minimiser, shape (m,), exactly inside the limits. Where it is not unique, the first one reached.
-    free :
-        Mask, shape (m,), of the variables that the minimisation determined; their columns are linearly independent.
+    Returns a minimiser, shape (m,), exactly inside the limits. Where it is not unique, the first one reached.
+    With it comes a mask, shape (m,), of the variables that the minimisation determined, whose columns are linearly
+    independent.
     """
     m = M.shape[1]
     norms = np.sqrt(np.einsum("ij,ij->j", M, M))

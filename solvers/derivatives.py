@@ -29,23 +29,13 @@ _RANK = 1e-9
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of the optimal tensions, each with the dimensions of its variable last.
+    """Derivatives of the optimal tensions, each with the dimensions of its variable last."""
 
-    Attributes
-    ----------
-    w :
-        dt / dw, shape (m, n).
-    t_min, t_max :
-        dt / dt_min and dt / dt_max, shape (m, m): columns of free cables are 0. Cables with equal limits count for
-        t_min.
-    A :
-        dt / dA, shape (m, n, m).
-    """
-
-    w: Array
+    w: Array  # dt / dw, shape (m, n)
+    # dt / dt_min and dt / dt_max, shape (m, m): columns of free cables are 0. Cables with equal limits count for t_min.
     t_min: Array
     t_max: Array
-    A: Array
+    A: Array  # dt / dA, shape (m, n, m)
 
 
 def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:

@@ -34,12 +34,8 @@ def exact_optimum(problem: TensionProblem, nearest: Array) -> Projection:
     The residual is that of the tensions before they are rounded. Where the wrench is not the nearest, rho is raised
     until its error falls no more.
 
-    Parameters
-    ----------
-    problem :
-        The problem.
-    nearest :
-        Tensions of the projection of w [N], (m,), to start from.
+    - `problem`: the problem.
+    - `nearest`: tensions of the projection of w [N], (m,), to start from.
     """
     size = problem.weights @ (nearest - problem.t_ref) ** 2
     wrench = accepted_error(problem, nearest) / FEASIBILITY

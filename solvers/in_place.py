@@ -24,34 +24,21 @@ class InPlace:
     A controller solves such a problem thousands of times a second: no array is made, and where no tensions give w, the
     tensions are those of the method "soft-wrench", with the least wrench error that the limits permit.
 
-    Parameters
-    ----------
-    rows, n, m :
-        How many problems, of how many wrench rows and cables.
-    length :
-        Characteristic length [m] of all problems.
-
-    Attributes
-    ----------
-    A, w :
-        Wrench matrices, shape (rows, n, m), and required wrenches, shape (rows, n), [N] and [N m].
-    bounds, t_ref :
-        Lowest and highest tensions, shape (2, rows, m), and tensions to stay near, shape (rows, m) [N].
-    tensions :
-        The tensions [N], shape (rows, m); nan where the numbers of a row are no problem.
-    code :
-        Status of each row, shape (rows,): `STATUSES[int(code)]`.
-    memory :
-        All of these arrays in one, as `core.control_step` writes and solves them;
-    solves :
-        How it does so: one after another (1), in lanes (2), or not at all (0).
-    direction, shortfall :
-        Where no tensions give w: a verified direction, shape (rows, n), along which they miss it, and by how much
-        [N].
+    - `rows`, `n`, `m`: how many problems, of how many wrench rows and cables.
+    - `length`: characteristic length [m] of all problems.
+    - `A`, `w`: wrench matrices, shape (rows, n, m), and required wrenches, shape (rows, n), [N] and [N m].
+    - `bounds`, `t_ref`: lowest and highest tensions, shape (2, rows, m), and tensions to stay near, shape (rows, m)
+      [N].
+    - `tensions`: the tensions [N], shape (rows, m); nan where the numbers of a row are no problem.
+    - `code`: status of each row, shape (rows,): `STATUSES[int(code)]`.
+    - `solves`: how it does so: one after another (1), in lanes (2), or not at all (0).
+    - `direction`, `shortfall`: where no tensions give w: a verified direction, shape (rows, n), along which they miss
+      it, and by how much [N].
     """
 
     def __init__(self, rows: int, n: int, m: int, length: float):
         self._shape, self.length = (rows, n, m), float(length)
+        # all of these arrays in one, as `core.control_step` writes and solves them;
         self.memory = np.zeros(rows * (n * m + 2 * n + 4 * m + 4))
         self._spare, self._has_core = (np.zeros((rows, n)), np.zeros((rows, 2))), n <= ROWS and m <= CABLES
         self._arrange()

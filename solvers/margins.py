@@ -38,14 +38,9 @@ def margins(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray) 
     Inside, they are positive and equal to `capacity_margin`, also for a flat set. Outside, they are negative bounds:
     the distance is at least as large, and equal if a facet is closest. Where A is not finite, the margin is -inf.
 
-    Parameters
-    ----------
-    A
-        (N, n, m), rows of one unit [N per N].
-    w
-        Required wrenches, (N, n), or one for all, (n,) [N].
-    t_min, t_max
-        Finite limits, (m,) each [N].
+    - `A`: (N, n, m), rows of one unit [N per N].
+    - `w`: required wrenches, (N, n), or one for all, (n,) [N].
+    - `t_min`, `t_max`: finite limits, (m,) each [N].
     """
     return _margins(A, w, t_min, t_max)
 
@@ -66,12 +61,8 @@ def all_reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndar
 def reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray, normal: np.ndarray) -> Reserves:
     """Return the reserves along one normal of each A, with their derivatives.
 
-    Parameters
-    ----------
-    A, w, t_min, t_max
-        As for `margins`.
-    normal
-        Number of the normal in `all_reserves`, (N,).
+    - `A`, `w`, `t_min`, `t_max`: as for `margins`.
+    - `normal`: number of the normal in `all_reserves`, (N,).
     """
     _, n, m = A.shape
     inside = _subsets(n, m)[normal]

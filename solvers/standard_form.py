@@ -103,11 +103,8 @@ class StandardForm(NamedTuple):
 def standard_forms(problem: TensionProblem) -> list[StandardForm]:
     """Bring a problem to standard form, by singular value decomposition of its scaled wrench matrix.
 
-    Returns
-    -------
-    :
-        The standard form, in which singular values below `RANK` of the largest are zero; before it, if some are
-        below `DOUBTFUL`, the coarse form without those.
+    Returns the standard form, in which singular values below `RANK` of the largest are zero; before it, if some are
+    below `DOUBTFUL`, the coarse form without those.
     """
     apart = problem.t_min < problem.t_max
     origin = np.where(apart, problem.t_ref, problem.t_min)

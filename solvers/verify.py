@@ -50,16 +50,11 @@ def verify(
     the boundary of the available wrench set, or near it. The least squares are then computed in exact arithmetic and
     are "optimal" too; a method with another aim proposes once more, for the cables that can still vary.
 
-    Parameters
-    ----------
-    problem, form :
-        The problem, and the form of it that the method got.
-    method, proposal, tensions :
-        The method, its proposal, and that in tensions [N], (m,).
-    exact :
-        The least squares [N], (m,), if the form is that of what is left to choose on the boundary; else None.
-    last :
-        False if another form is left to try: then only what is accepted is judged, and None is returned otherwise.
+    - `problem`, `form`: the problem, and the form of it that the method got.
+    - `method`, `proposal`, `tensions`: the method, its proposal, and that in tensions [N], (m,).
+    - `exact`: the least squares [N], (m,), if the form is that of what is left to choose on the boundary; else None.
+    - `last`: False if another form is left to try: then only what is accepted is judged, and None is returned
+      otherwise.
     """
     useful = tensions is not None and _gives_wrench(problem, tensions)
     if tensions is not None and useful and (not method.least_squares or form.is_optimal(tensions)):

@@ -27,22 +27,14 @@ OPTIONS |= {"ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": ITERATI
 
 
 class Formation(NamedTuple):
-    """A rest of a robot with flying carriers.
+    """A rest of a robot with flying carriers."""
 
-    Attributes
-    ----------
-    pose, carrier_pose
-        Poses of the platform, (6,), and of the carriers, (c, 6), in {G} [m, rad].
-    tensions
-        (m,) [N].
-    missing
-        What its cables lack to hold the platform: force [N] and moment about the CoM [N m] in {G}, (6,); zeros if it
-        rests.
-    """
-
+    # poses of the platform, (6,), and of the carriers, (c, 6), in {G} [m, rad]
     pose: np.ndarray
     carrier_pose: np.ndarray
-    tensions: np.ndarray
+    tensions: np.ndarray  # (m,) [N]
+    # what its cables lack to hold the platform: force [N] and moment about the CoM [N m] in {G}, (6,); zeros if it
+    # rests
     missing: np.ndarray
 
     __repr__ = record

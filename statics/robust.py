@@ -67,17 +67,12 @@ def uncertainty_of(robot: Robot) -> Uncertainty:
 class Spread:
     """Compute the first-order spread of tensions at n configurations due to geometric uncertainty.
 
-    Parameters
-    ----------
-    robot
-        Robot with an uncertainty.
-    pose, carrier_pose
-        Poses of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
-    rows
-        Wrench rows that the cables balance; default: those of the coordinates that can move.
+    - `robot`: robot with an uncertainty.
+    - `pose`, `carrier_pose`: poses of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
+    - `rows`: wrench rows that the cables balance; default: those of the coordinates that can move.
 
-    Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty or fewer cables
-    than rows.
+    Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty or fewer cables than
+    rows.
     """
 
     def __init__(self, robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike, rows: ArrayLike | None = None):

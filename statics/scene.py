@@ -73,10 +73,7 @@ def _scene(robot: Robot, poses: np.ndarray, carriers: np.ndarray, tensions: np.n
 def rotor_discs(robot: Robot, carriers: np.ndarray) -> np.ndarray:
     """Return a circle with the radius of each carrier that has rotors, (k, r, p, 3) in {G} [m].
 
-    Parameters
-    ----------
-    carriers
-        Poses of all carriers, (k, c, 6) [m, rad].
+    `carriers`: poses of all carriers, (k, c, 6) [m, rad].
     """
     which = [index for index, carrier in enumerate(robot.carriers) if carrier.drawing.rotors]
     circle = np.stack([np.cos(ROUND), np.sin(ROUND), np.zeros_like(ROUND)], axis=1)

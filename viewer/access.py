@@ -31,12 +31,8 @@ _ONE_AT_A_TIME = threading.Lock()
 def refusal(headers: Headers, listening: str) -> str | None:
     """Return why a request must be refused, or None if it may be answered.
 
-    Parameters
-    ----------
-    headers
-        Of the request, of `websockets`.
-    listening
-        The host that the server listens on, as the user gave it.
+    - `headers`: of the request, of `websockets`.
+    - `listening`: the host that the server listens on, as the user gave it.
     """
     hosts = headers.get_all("Host")
     name = _host_name(hosts[0]) if len(hosts) == 1 else None

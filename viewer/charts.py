@@ -20,16 +20,10 @@ OTHER = [4, 4]  # of the plan that the shown one is compared with
 class Charts:
     """Charts of tensions and margin in the panel of a viser server.
 
-    Parameters
-    ----------
-    gui
-        Of the server.
-    shown
-        The curves of what the scene shows.
-    limits
-        Tension limits, which are drawn as far as the tensions come near them [N].
-    other
-        Curves to compare them with, if there are any.
+    - `gui`: of the server.
+    - `shown`: the curves of what the scene shows.
+    - `limits`: tension limits, which are drawn as far as the tensions come near them [N].
+    - `other`: curves to compare them with, if there are any.
     """
 
     def __init__(self, gui: Any, shown: Curves, limits: np.ndarray, other: Curves | None = None):

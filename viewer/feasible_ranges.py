@@ -47,12 +47,8 @@ def strip(holds: np.ndarray) -> str:
 class Strips:
     """Strips that are updated a moment after the last change of the pose, until `close`.
 
-    Parameters
-    ----------
-    robot, settings
-        The robot and its sliders.
-    write
-        Receives the HTML of the strips, one for each slider.
+    - `robot`, `settings`: the robot and its sliders.
+    - `write`: receives the HTML of the strips, one for each slider.
     """
 
     def __init__(self, robot: Robot, settings: list[Slider], write: Callable[[list[str]], None]):

@@ -68,17 +68,13 @@ class Extent(NamedTuple):
 class Geometry:
     """Points of a robot as functions of the poses of its platform and carriers.
 
-    Attributes
-    ----------
-    extent
-        The smallest box around home, anchors and reach boxes.
-
     Raises `InputError` if the robot is too large, too small or too far away to be drawn.
     """
 
     def __init__(self, robot: Robot):
         self.robot = robot
         low, high = surrounding_box(robot, reach_boxes(robot))
+        # the smallest box around home, anchors and reach boxes
         self.extent = Extent.of(low, high, robot.home_anchors, robot.home_attachments, robot.carrier_home[:, :3])
         farthest = np.abs([self.extent.low, self.extent.high]).max()
         if not (farthest <= FARTHEST and self.extent.size >= SMALLEST):

@@ -36,16 +36,10 @@ NOTHING = "nothing"
 class Posing:
     """The controls of a robot's pose on a viser server.
 
-    Parameters
-    ----------
-    server
-        Its panel gets sliders, its scene handles.
-    frames
-        The marks of instants on it.
-    robot, geometry
-        The robot, and its geometry.
-    show, refuse
-        Draw an instant, and show why there is none.
+    - `server`: its panel gets sliders, its scene handles.
+    - `frames`: the marks of instants on it.
+    - `robot`, `geometry`: the robot, and its geometry.
+    - `show`, `refuse`: draw an instant, and show why there is none.
     """
 
     def __init__(
@@ -163,15 +157,10 @@ class Posing:
     def _go(self, pose: np.ndarray, carriers: np.ndarray, lengthen: bool = True, held: Any = None) -> None:
         """Show a pose, or where the platform comes to rest near it, in one update of sliders, handles and scene.
 
-        Parameters
-        ----------
-        pose, carriers
-            (6,) and (c, 6).
-        lengthen
-            Cables take the lengths of this pose; otherwise they keep theirs while "let it hang" is on.
-        held
-            The slider or handle that a user holds. It is not moved, because its next event may be on its way, unless
-            it is a slider and the platform hangs elsewhere.
+        - `pose`, `carriers`: (6,) and (c, 6).
+        - `lengthen`: cables take the lengths of this pose; otherwise they keep theirs while "let it hang" is on.
+        - `held`: the slider or handle that a user holds. It is not moved, because its next event may be on its way,
+          unless it is a slider and the platform hangs elsewhere.
 
         Sliders and handles agree about a pose that cannot be shown too: the next event begins there.
         """

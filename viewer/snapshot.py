@@ -17,45 +17,24 @@ FORCELESS = 0.05  # shorter force parts are no arrow: the certificate is about m
 
 @dataclass(frozen=True)
 class Snapshot(Displayed):
-    """A robot at one instant.
+    """A robot at one instant."""
 
-    Attributes
-    ----------
-    pose, carriers
-        In {G}, (6,) and (c, 6) [m, rad].
-    points
-        See `Points`.
-    tensions
-        (m,) [N], nan where there are none.
-    status
-        The status of the tensions.
-    margin
-        Smallest distance of a tension from its limits [N], and the index of that cable; nan and -1 without tensions.
-    reserve
-        Capacity margin at rest [N]: the distance of the wrench from the boundary of the available wrench set, negative
-        outside; nan if it was not computed.
-    certificate
-        The proof that no tensions exist; None if they do.
-    time
-        [s]; None at rest.
-    cut
-        Which cables have been cut, (m,); None if none have.
-    events
-        Events of a simulation until now, as texts.
-    """
-
+    # in {G}, (6,) and (c, 6) [m, rad]
     pose: np.ndarray
     carriers: np.ndarray
-    points: Points
-    tensions: np.ndarray
-    status: str
+    points: Points  # see `Points`
+    tensions: np.ndarray  # (m,) [N], nan where there are none
+    status: str  # the status of the tensions
+    # smallest distance of a tension from its limits [N], and the index of that cable; nan and -1 without tensions
     margin: float
     nearest: int
+    # capacity margin at rest [N]: the distance of the wrench from the boundary of the available wrench set, negative
+    # outside; nan if it was not computed
     reserve: float = float("nan")
-    certificate: Certificate | None = None
-    time: float | None = None
-    cut: np.ndarray | None = None
-    events: tuple[str, ...] = ()
+    certificate: Certificate | None = None  # the proof that no tensions exist; None if they do
+    time: float | None = None  # [s]; None at rest
+    cut: np.ndarray | None = None  # which cables have been cut, (m,); None if none have
+    events: tuple[str, ...] = ()  # events of a simulation until now, as texts
 
 
 def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Snapshot:

@@ -43,21 +43,10 @@ Colour = tuple[int, int, int]
 class Stage:
     """A subject's robot on a viser server.
 
-    Parameters
-    ----------
-    server
-        Only its scene and camera are used.
-    subject
-        The robot, plan or workspace to show.
-    geometry
-        The geometry of its robot.
-    captioned
-        Show time, status and margin in the scene, for a page without a panel.
-
-    Attributes
-    ----------
-    extent
-        Box around what is shown; the initial camera looks at its centre.
+    - `server`: only its scene and camera are used.
+    - `subject`: the robot, plan or workspace to show.
+    - `geometry`: the geometry of its robot.
+    - `captioned`: show time, status and margin in the scene, for a page without a panel.
     """
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
@@ -66,7 +55,7 @@ class Stage:
         extent = subject.replay.extent if subject.replay else geometry.extent
         if subject.other is not None:
             extent = Extent.of(*extent, *subject.other.extent)
-        self.extent = extent
+        self.extent = extent  # box around what is shown; the initial camera looks at its centre
         self._size = extent.size
         self.frame(server.initial_camera, WIDE, 1.0)
         self._draw_surroundings(subject)
@@ -155,14 +144,9 @@ class Stage:
 
         In a picture that is higher than wide, as on a phone, the camera is farther away, and the robot above the panel.
 
-        Parameters
-        ----------
-        camera
-            Of viser: the initial one, or that of a client.
-        width, height
-            Of its picture [pixels].
-        view
-            One of `VIEWS`.
+        - `camera`: of viser: the initial one, or that of a client.
+        - `width`, `height`: of its picture [pixels].
+        - `view`: one of `VIEWS`.
         """
         along = np.array(VIEWS[view])
         along /= np.linalg.norm(along)

@@ -32,18 +32,11 @@ SPEEDS = ("0.25x", "0.5x", "1x", "2x", "4x")
 class TimeLine:
     """The controls of time on a viser server, until `close`.
 
-    Parameters
-    ----------
-    server
-        Its panel gets the controls, its command palette the keys.
-    frames
-        The marks of instants on it.
-    replay
-        The motion to play.
-    show
-        Draws an instant.
-    other
-        Charted with it, if given.
+    - `server`: its panel gets the controls, its command palette the keys.
+    - `frames`: the marks of instants on it.
+    - `replay`: the motion to play.
+    - `show`: draws an instant.
+    - `other`: charted with it, if given.
     """
 
     def __init__(
@@ -110,12 +103,8 @@ class TimeLine:
     def _go(self, index: int, at: float | None = None, playing: bool = False) -> None:
         """Show an instant in scene, panel, charts and on the time line in one update.
 
-        Parameters
-        ----------
-        at
-            Position of the time line [s], between two instants; default: at the instant.
-        playing
-            Do nothing if it was paused meanwhile: while this waited, a user may have gone elsewhere.
+        - `at`: position of the time line [s], between two instants; default: at the instant.
+        - `playing`: do nothing if it was paused meanwhile: while this waited, a user may have gone elsewhere.
         """
         with self._busy:
             if playing and not self._playing.is_set():

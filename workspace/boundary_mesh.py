@@ -89,10 +89,7 @@ def boundary(
 def boundary_of_values(values: np.ndarray, low: np.ndarray, high: np.ndarray) -> Mesh:
     """Compute the zero level set of values on a grid, positive inside; it is closed at the faces of the box.
 
-    Parameters
-    ----------
-    values
-        (a, b, c), at points evenly spaced from `low` to `high`, ends included, two or more along each axis.
+    `values`: (a, b, c), at points evenly spaced from `low` to `high`, ends included, two or more along each axis.
     """
     try:
         from skimage.measure import marching_cubes

@@ -26,25 +26,18 @@ RESOLUTION = 32  # cells along each axis
 class Counts:
     """Numbers of samples so far. They are added in the order of the samples, so the result does not depend on timing.
 
-    Attributes
-    ----------
-    tried
-        Number of samples.
-    cells
-        Samples tried and accepted in each cell of the box of positions, (2, nx, ny, nz); an axis along which the box
-        has no thickness has one cell. Samples without a valid configuration are in no cell.
-    low, high
-        Bounds of the accepted positions, (3,) [m]; infinite if there are none.
-    samples, flags
-        Arrays of the samples that are kept, (n, k) as returned by `Domain.numbers` and their metrics, and True for each
-        accepted one.
-    left
-        Number of further samples that may be kept.
+    - `tried`: number of samples.
+    - `low`, `high`: bounds of the accepted positions, (3,) [m]; infinite if there are none.
+    - `samples`, `flags`: arrays of the samples that are kept, (n, k) as returned by `Domain.numbers` and their metrics,
+      and True for each accepted one.
+    - `left`: number of further samples that may be kept.
     """
 
     def __init__(self, domain: Domain, points_max: int = sys.maxsize):
         low, high = domain.box
         self.tried, self.left = 0, points_max
+        # samples tried and accepted in each cell of the box of positions, (2, nx, ny, nz); an axis along which the box
+        # has no thickness has one cell. Samples without a valid configuration are in no cell.
         self.cells = np.zeros((2, *np.where(high - low > THINNEST, RESOLUTION, 1)), dtype=np.int64)
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.samples: list[np.ndarray] = []
@@ -109,20 +102,12 @@ class Counter(Displayed):
     ) -> tuple[Counts, list[bytes]]:
         """Count some chunks, one after the other, with one processor.
 
-        Parameters
-        ----------
-        first
-            Number of the first chunk.
-        known
-            Known bits of each chunk, else None.
-        points
-            Points of each chunk in the unit cube (n, d); default: the sampler's.
-        keep
-            True to keep samples, not only count them.
+        - `first`: number of the first chunk.
+        - `known`: known bits of each chunk, else None.
+        - `points`: points of each chunk in the unit cube (n, d); default: the sampler's.
+        - `keep`: True to keep samples, not only count them.
 
-        Returns
-        -------
-        The counts, and which samples of each chunk are accepted, one bit per sample.
+        Returns the counts, and which samples of each chunk are accepted, one bit per sample.
         """
         counts, flags = Counts(self.domain), []
         with processors.at_most(1):

@@ -22,21 +22,14 @@ THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
 
 @dataclass(frozen=True)
 class Domain(Displayed):
-    """Ranges of the quantities that describe a configuration.
-
-    Attributes
-    ----------
-    low, high
-        Limits of position, attitude, carriers' positions and cable lengths, in this order, (k,) [m, rad]. With
-        `position_from_lengths` the position's limits are a box that contains every position the lengths allow.
-    position_from_lengths
-        True if three cable lengths determine the position.
-    """
+    """Ranges of the quantities that describe a configuration."""
 
     robot: Robot
+    # limits of position, attitude, carriers' positions and cable lengths, in this order, (k,) [m, rad]. With
+    # `position_from_lengths` the position's limits are a box that contains every position the lengths allow.
     low: np.ndarray
     high: np.ndarray
-    position_from_lengths: bool
+    position_from_lengths: bool  # True if three cable lengths determine the position
 
     @classmethod
     def of(cls, robot: Robot, region: Region) -> Domain:
@@ -129,14 +122,10 @@ class Domain(Displayed):
     def places(self, units: np.ndarray) -> tuple[Places, np.ndarray]:
         """Map points of the unit cube to configurations.
 
-        Parameters
-        ----------
-        units
-            (n, d), between 0 and 1.
+        `units`: (n, d), between 0 and 1.
 
-        Returns
-        -------
-        Configurations, and (n,) of bool: False where three cables of these lengths do not meet; the pose there is home.
+        Returns the configurations, and (n,) of bool: False where three cables of these lengths do not meet; the
+        pose there is home.
         """
         count, carriers = len(units), len(self.robot.carriers)
         values = np.empty((count, len(self.low)))

@@ -20,12 +20,8 @@ def nearest_feasible(
     The search samples poses and may miss a feasible set that is thin or has several parts. Distances are in metres,
     with radians multiplied by `Robot.length`.
 
-    Parameters
-    ----------
-    pose, carriers
-        (6,) and (c, 6) in {G} [m, rad]. Carriers are fixed.
-    size
-        Search radius [m].
+    - `pose`, `carriers`: (6,) and (c, 6) in {G} [m, rad]. Carriers are fixed.
+    - `size`: search radius [m].
     """
     rng, free = np.random.default_rng(0), robot.dof_mask.astype(bool)
     unit = np.where(np.arange(6) < 3, 1.0, 1.0 / robot.length) * free

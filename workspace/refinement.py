@@ -23,16 +23,9 @@ SMALLEST, LARGEST = 1e-9, 1e9  # [m], edge of a cell
 class Refinement:
     """Halve cells level by level.
 
-    Attributes
-    ----------
-    inside, mixed
-        Fractions of the box in cells with all corners accepted, and in cells with differing corners.
-    estimate
-        Accepted fraction of the box, with the fraction of accepted corners for each mixed cell.
-    cells
-        Lower corners of the mixed cells as points of the unit cube, (n, d).
-    edges
-        Edges of the smallest cells, in the unit cube, (d,).
+    - `inside`, `mixed`: fractions of the box in cells with all corners accepted, and in cells with differing corners.
+    - `cells`: lower corners of the mixed cells as points of the unit cube, (n, d).
+    - `edges`: edges of the smallest cells, in the unit cube, (d,).
     """
 
     def __init__(self, domain: Domain, samples: int, size: float | None):
@@ -41,6 +34,7 @@ class Refinement:
         if size is not None:
             number("size", size, SMALLEST, LARGEST, also=" [m], or None")
         whole_number("samples with method adaptive", samples, 1, MOST)
+        # accepted fraction of the box, with the fraction of accepted corners for each mixed cell
         self.inside = self.mixed = self.estimate = 0.0
         self._extent, self._samples, self._size = domain.extent, samples, size
         d = len(self._extent)

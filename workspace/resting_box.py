@@ -13,28 +13,16 @@ STEPS = 10  # from the middle of the grid to each of its sides
 
 
 class RestingBox(NamedTuple):
-    """Positions of the platform at which it can rest in its home attitude, its tensions inside their limits.
+    """Positions of the platform at which it can rest in its home attitude, its tensions inside their limits."""
 
-    Attributes
-    ----------
-    low, high
-        Corners in {G}, (3,) [m]; infinite where nothing bounds the box. A locked coordinate is that of home in both.
-    centre
-        The position about which the box was grown, (3,) [m]: home, or the nearest sample at which it can rest.
-    samples
-        How many positions were tried; 0 where none is needed, since carriers move along with the platform.
-    spacing
-        Distance of neighbouring samples in the box along each axis, (3,) [m].
-    resting
-        The samples about home and anchors at which it can rest, (k, 3) in {G} [m].
-    """
-
+    # corners in {G}, (3,) [m]; infinite where nothing bounds the box. A locked coordinate is that of home in both.
     low: np.ndarray
     high: np.ndarray
+    # the position about which the box was grown, (3,) [m]: home, or the nearest sample at which it can rest
     centre: np.ndarray
-    samples: int
-    spacing: np.ndarray
-    resting: np.ndarray
+    samples: int  # how many positions were tried; 0 where none is needed, since carriers move along with the platform
+    spacing: np.ndarray  # distance of neighbouring samples in the box along each axis, (3,) [m]
+    resting: np.ndarray  # the samples about home and anchors at which it can rest, (k, 3) in {G} [m]
 
 
 def resting_box(robot: Robot) -> RestingBox | None:
@@ -72,16 +60,10 @@ def largest_box(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the box of largest volume that contains a node and only nodes that are able.
 
-    Parameters
-    ----------
-    able
-        Flags of the nodes of a grid, (nx, ny, nz); that of `centre` is true.
-    axes
-        Coordinates of the nodes along each axis, rising. An axis with one node is left out of the volume.
-    centre
-        The node, (3,).
-    around
-        How many nodes more to go on every side, where there are so many.
+    - `able`: flags of the nodes of a grid, (nx, ny, nz); that of `centre` is true.
+    - `axes`: coordinates of the nodes along each axis, rising. An axis with one node is left out of the volume.
+    - `centre`: the node, (3,).
+    - `around`: how many nodes more to go on every side, where there are so many.
     """
     middle = [int(np.argmin(abs(axis - at))) for axis, at in zip(axes, centre, strict=True)]
     firsts = [np.arange(at, -1, -1) for at in middle]

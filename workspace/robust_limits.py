@@ -23,14 +23,9 @@ ROUNDING = 1e-12  # of the largest limit
 class Tightened:
     """Decide where a share of the robots has tensions inside their limits, all these robots at all places.
 
-    Parameters
-    ----------
-    robot
-        With an uncertainty.
-    share
-        Of the robots, above 0 and below 1.
-    rows
-        Wrench rows that the cables give.
+    - `robot`: with an uncertainty.
+    - `share`: of the robots, above 0 and below 1.
+    - `rows`: wrench rows that the cables give.
 
     Raises `InputError` if the robot has no uncertainty, or fewer cables than rows, or the share is none.
     """
@@ -45,14 +40,9 @@ class Tightened:
     def feasible(self, places: Places, A: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
         """Return where the robots have tensions for every one of some wrenches, (n,) of bool.
 
-        Parameters
-        ----------
-        places
-            The n places.
-        A
-            Their scaled wrench matrices, (n, rows, m) [N per N].
-        wrenches
-            (k, rows) for all places or (k, n, rows), scaled [N].
+        - `places`: the n places.
+        - `A`: their scaled wrench matrices, (n, rows, m) [N per N].
+        - `wrenches`: (k, rows) for all places or (k, n, rows), scaled [N].
         """
         held = np.zeros(len(places), dtype=bool)
         wrenches = np.broadcast_to(wrenches if wrenches.ndim == 3 else wrenches[:, None], (len(wrenches), *A.shape[:2]))

@@ -41,12 +41,8 @@ def unobservable_below(eigenvalues: np.ndarray, length: float) -> float:
     An eigenvalue is 1 / sigma^2 of its direction. If sigma exceeds the cable length, the direction is unobservable
     within the validity of the linearisation. Rounding turns zero eigenvalues into 1e-16 of the largest.
 
-    Parameters
-    ----------
-    eigenvalues
-        [1/m^2], (p,).
-    length
-        Length of the cables [m].
+    - `eigenvalues`: [1/m^2], (p,).
+    - `length`: length of the cables [m].
     """
     return max(1 / length**2, RELATIVE * float(eigenvalues.max(initial=0.0)))
 

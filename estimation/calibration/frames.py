@@ -62,14 +62,9 @@ BOTH = (True, True)
 def fitted_frames(robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray, y: np.ndarray) -> Frames:
     """Return the frames that fit lengths best: one if it fits nearly as well as both.
 
-    Parameters
-    ----------
-    table
-        `Parameters.table` of the robot.
-    position, rotation
-        Measured positions (N, 3) [m] and rotations (N, 3, 3).
-    y
-        Readings, (N, m) [m].
+    - `table`: `Parameters.table` of the robot.
+    - `position`, `rotation`: measured positions (N, 3) [m] and rotations (N, 3, 3).
+    - `y`: readings, (N, m) [m].
     """
     rows = np.unique(np.linspace(0, len(y) - 1, min(len(y), MOST_SAMPLES)).astype(int))
     few = position[rows], rotation[rows], y[rows]

@@ -11,21 +11,12 @@ from ...models.robot import Robot
 
 
 class Runs(NamedTuple):
-    """Lengths and directions of m cables at N samples; nan where no cable is tangent to its sheave.
+    """Lengths and directions of m cables at N samples; nan where no cable is tangent to its sheave."""
 
-    Attributes
-    ----------
-    lengths
-        Lengths from the anchor over the pulley to the attachment [m], (m, N).
-    directions
-        Unit vectors in {G} along the cable towards the attachment, (m, N, 3).
-    by_geometry
-        Derivatives of the length by the anchor in its carrier's frame (3), the attachment in the platform's (3) and the
-        radius of the pulley, (m, N, 7) [-].
-    """
-
-    lengths: np.ndarray
-    directions: np.ndarray
+    lengths: np.ndarray  # lengths from the anchor over the pulley to the attachment [m], (m, N)
+    directions: np.ndarray  # unit vectors in {G} along the cable towards the attachment, (m, N, 3)
+    # derivatives of the length by the anchor in its carrier's frame (3), the attachment in the platform's (3) and the
+    # radius of the pulley, (m, N, 7) [-]
     by_geometry: np.ndarray
 
 
@@ -34,13 +25,9 @@ def runs(
 ) -> Runs:
     """Return the cable geometry with the platform at positions (N, 3) and rotations (N, 3, 3).
 
-    Parameters
-    ----------
-    table
-        `Parameters.table`: anchors, attachments and, in its last column, radii, which replace the values of the robot,
-        (m, 9). No cable is tangent to a negative radius.
-    carriers
-        Their poses, (N, c, 6) or (c, 6) [m, rad]; default: at home.
+    - `table`: `Parameters.table`: anchors, attachments and, in its last column, radii, which replace the values of the
+      robot, (m, 9). No cable is tangent to a negative radius.
+    - `carriers`: their poses, (N, c, 6) or (c, 6) [m, rad]; default: at home.
     """
     record, m, count = record_of(robot).copy(), robot.m, len(position)
     cables = record["cable"][:m]

@@ -23,24 +23,13 @@ Turned = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class Interpretation(NamedTuple):
-    """A way to read a log, and the error that it corrects.
+    """A way to read a log, and the error that it corrects."""
 
-    Attributes
-    ----------
-    text
-        The error, "" if there is none.
-    placed
-        Function of the positions (N, 3) [m].
-    turned
-        Function of the rotations (N, 3, 3) and the angles (N, 3) as they were logged [rad]; None if they are right.
-    factor
-        Factor of the readings.
-    """
-
-    text: str
-    placed: Callable[[np.ndarray], np.ndarray] = lambda position: position
+    text: str  # the error, "" if there is none
+    placed: Callable[[np.ndarray], np.ndarray] = lambda position: position  # function of the positions (N, 3) [m]
+    # function of the rotations (N, 3, 3) and the angles (N, 3) as they were logged [rad]; None if they are right
     turned: Turned | None = None
-    factor: float = 1.0
+    factor: float = 1.0  # factor of the readings
 
 
 def interpretations(turns: bool) -> list[Interpretation]:

@@ -85,23 +85,13 @@ class Residuals(NamedTuple):
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of the residuals of readings, and balance and directions with their own.
+    """Derivatives of the residuals of readings, and balance and directions with their own."""
 
-    Attributes
-    ----------
-    cables
-        Derivatives by the parameters of the cable itself, (m, N, 14).
-    others
-        Derivatives by the parameters of the robot and slips, (m, N, 5 + slips).
-    poses
-        Derivatives by shift and rotation of the sample itself, and errors of its tensions, (m, N, 6 + d).
-    arms, lengths
-        R b of each cable (m, N, 3) [m], and its length (m, N) [m].
-    """
-
-    cables: np.ndarray
-    others: np.ndarray
+    cables: np.ndarray  # derivatives by the parameters of the cable itself, (m, N, 14)
+    others: np.ndarray  # derivatives by the parameters of the robot and slips, (m, N, 5 + slips)
+    # derivatives by shift and rotation of the sample itself, and errors of its tensions, (m, N, 6 + d)
     poses: np.ndarray
+    # R b of each cable (m, N, 3) [m], and its length (m, N) [m]
     arms: np.ndarray
     lengths: np.ndarray
     balance: Balanced | None = None
@@ -119,50 +109,23 @@ class Derivatives(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model(Displayed):
-    """Measurements of a robot, and the unknowns that explain them.
-
-    Attributes
-    ----------
-    weights
-        1 for each reading that is used, 0 for one that is left out, (m, N).
-    start
-        Initial poses where none was measured, (N, 6) [m, rad]; default: home.
-    track
-        Measured poses over time; default: the clock offset is 0.
-    upright
-        Standard deviation of unmeasured orientations about their initial values [rad]; inf: none.
-    noise
-        Factor of the stated standard deviations of forces.
-    unbalanced
-        Samples whose balance of forces is left out, (N,) of bool; default: none.
-    forces
-        Forces of the measurements; default: computed.
-    weighs
-        True if the balance of forces is part of the fit whatever the parameters are.
-    felt
-        Tensions that stretch the cables; default: the measured ones, without errors.
-    ahead
-        Clock offset of the platform's accelerations, near that of its poses [s].
-    interpolates
-        True if poses between measured ones are known, as with a track.
-    carriers
-        Measured poses of the carriers over time; default: those of the measurements, without a clock offset.
-    """
+    """Measurements of a robot, and the unknowns that explain them."""
 
     parameters: Parameters
     measurements: Measurements
     prior: dict[str, float]
-    weights: np.ndarray
-    start: np.ndarray | None = None
-    track: PoseTrack | None = None
-    upright: float = np.inf
-    noise: float = 1.0
-    unbalanced: np.ndarray | None = None
-    forces: Balance | None = None
-    weighs: bool = False
-    felt: FeltTensions | None = None
-    ahead: float = 0.0
-    interpolates: bool = False
+    weights: np.ndarray  # 1 for each reading that is used, 0 for one that is left out, (m, N)
+    start: np.ndarray | None = None  # initial poses where none was measured, (N, 6) [m, rad]; default: home
+    track: PoseTrack | None = None  # measured poses over time; default: the clock offset is 0
+    upright: float = np.inf  # standard deviation of unmeasured orientations about their initial values [rad]; inf: none
+    noise: float = 1.0  # factor of the stated standard deviations of forces
+    unbalanced: np.ndarray | None = None  # samples whose balance of forces is left out, (N,) of bool; default: none
+    forces: Balance | None = None  # forces of the measurements; default: computed
+    weighs: bool = False  # True if the balance of forces is part of the fit whatever the parameters are
+    felt: FeltTensions | None = None  # tensions that stretch the cables; default: the measured ones, without errors
+    ahead: float = 0.0  # clock offset of the platform's accelerations, near that of its poses [s]
+    interpolates: bool = False  # True if poses between measured ones are known, as with a track
+    # measured poses of the carriers over time; default: those of the measurements, without a clock offset
     carriers: CarrierMotion | None = None
 
     @property

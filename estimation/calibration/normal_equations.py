@@ -63,24 +63,16 @@ class Diagonals(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations(Displayed):
-    """The equations at one state.
+    """The equations at one state."""
 
-    Attributes
-    ----------
-    S, b
-        Of the parameters that vary, in metres, (p, p) and (p,).
-    inverse_root
-        L_k^-1, (N, 6, 6), and with it Y as (N, 6, p) and the right side; None if no pose varies.
-    diagonals
-        Without damping; of poses 0 if none varies.
-    """
-
+    # of the parameters that vary, in metres, (p, p) and (p,)
     S: np.ndarray
     b: np.ndarray
+    # l_k^-1, (N, 6, 6), and with it Y as (N, 6, p) and the right side; None if no pose varies
     inverse_root: np.ndarray | None
     Y: np.ndarray | None
     y: np.ndarray | None
-    diagonals: Diagonals
+    diagonals: Diagonals  # without damping; of poses 0 if none varies
 
     @classmethod
     def at(

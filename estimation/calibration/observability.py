@@ -27,26 +27,15 @@ AXES = "xyz"
 
 @dataclass(frozen=True, eq=False)
 class Observability(Displayed):
-    """Observable and unobservable directions of the parameters.
+    """Observable and unobservable directions of the parameters."""
 
-    Attributes
-    ----------
-    covariance
-        Covariance of the free parameters, in metres, (p, p); zero along unobservable directions.
-    sigmas
-        Standard deviations of the directions [m], (p,), inf along unobservable ones; the directions are the columns of
-        `directions`, (p, p).
-    determined
-        True for parameters without a part in an unobservable direction, (p,).
-    open
-        Names of the unobservable directions.
-    """
-
-    covariance: np.ndarray
+    covariance: np.ndarray  # covariance of the free parameters, in metres, (p, p); zero along unobservable directions
+    # standard deviations of the directions [m], (p,), inf along unobservable ones; the directions are the columns of
+    # `directions`, (p, p)
     sigmas: np.ndarray
     directions: np.ndarray
-    determined: np.ndarray
-    open: tuple[str, ...]
+    determined: np.ndarray  # True for parameters without a part in an unobservable direction, (p,)
+    open: tuple[str, ...]  # names of the unobservable directions
 
 
 def observability(
@@ -54,14 +43,9 @@ def observability(
 ) -> Observability:
     """Return the observability of normal equations.
 
-    Parameters
-    ----------
-    S
-        Matrix of the free parameters, in metres, (p, p) [1/m^2].
-    scale
-        Factors that convert parameters to lengths, (P,).
-    length
-        Length of the cables [m].
+    - `S`: matrix of the free parameters, in metres, (p, p) [1/m^2].
+    - `scale`: factors that convert parameters to lengths, (P,).
+    - `length`: length of the cables [m].
     """
     values, vectors = np.linalg.eigh(S)
     fixed = values > unobservable_below(values, length)

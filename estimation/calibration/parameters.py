@@ -42,21 +42,11 @@ SMALLEST_PRIOR = 1e-9
 
 @dataclass(frozen=True)
 class Parameters(Displayed):
-    """The parameters of a robot's calibration, free and fixed.
+    """The parameters of a robot's calibration, free and fixed."""
 
-    Attributes
-    ----------
-    robot
-        Robot with the initial values.
-    groups
-        Free groups, in the order of `GROUPS`.
-    slips
-        Cable and first sample of each slip.
-    """
-
-    robot: Robot
-    groups: tuple[str, ...]
-    slips: tuple[tuple[int, int], ...] = ()
+    robot: Robot  # robot with the initial values
+    groups: tuple[str, ...]  # free groups, in the order of `GROUPS`
+    slips: tuple[tuple[int, int], ...] = ()  # cable and first sample of each slip
 
     @property
     def count(self) -> int:

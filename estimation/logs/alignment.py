@@ -47,17 +47,11 @@ def align(
 ) -> Clock:
     """Return the clock of poses relative to that of readings.
 
-    Parameters
-    ----------
-    times, readings
-        (N,) [s], (N, m), in any unit.
-    pose_times, lengths, poses
-        (K,) [s], (K, m) [m] by the robot's file, (K, d): what the effect of wrong anchors is linear in.
+    - `times`, `readings`: (N,) [s], (N, m), in any unit.
+    - `pose_times`, `lengths`, `poses`: (K,) [s], (K, m) [m] by the robot's file, (K, d): what the effect of wrong
+      anchors is linear in.
 
-    Raises
-    ------
-    InputError
-        If the speeds have too little in common.
+    Raises `InputError` if the speeds have too little in common.
     """
     found = [_coarse(times, readings, pose_times, lengths, _speeds)]
     if found[0][2] < SURE:  # poses in another frame still show how fast the platform is

@@ -60,19 +60,11 @@ def in_world(
 ) -> tuple[np.ndarray, str | None]:
     """Return unit vectors (N, m, 3) in {G} from anchor to platform, and a note if they were recorded otherwise.
 
-    Parameters
-    ----------
-    measured
-        Measurements, with poses of the carriers if these move.
-    given
-        `vectors` of the log.
-    stated
-        Frame of the directions, world, carrier or platform; default: the one that fits best.
+    - `measured`: measurements, with poses of the carriers if these move.
+    - `given`: `vectors` of the log.
+    - `stated`: frame of the directions, world, carrier or platform; default: the one that fits best.
 
-    Raises
-    ------
-    InputError
-        If no frame fits, or the cables look exchanged.
+    Raises `InputError` if no frame fits, or the cables look exchanged.
     """
     position, rotation, known = measured_poses(robot, measured)
     measured_there = bool(known[:, :3][:, robot.dof_mask[:3] > 0].all(axis=1).any())

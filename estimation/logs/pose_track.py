@@ -19,16 +19,10 @@ class PoseTrack:
     They are first smoothed by parabolas through five neighbours. Without smoothing, poses between samples would have
     half the variance of the samples, and a clock offset of half a sample would fit best for that reason alone.
 
-    Parameters
-    ----------
-    times
-        Increasing, (N,) [s].
-    position, rotation
-        (N, 3) [m], (N, 3, 3).
-    known
-        Samples at which the pose was measured, (N,) of bool; at least four.
-    neighbours
-        Number of samples of a parabola.
+    - `times`: increasing, (N,) [s].
+    - `position`, `rotation`: (N, 3) [m], (N, 3, 3).
+    - `known`: samples at which the pose was measured, (N,) of bool; at least four.
+    - `neighbours`: number of samples of a parabola.
     """
 
     def __init__(

@@ -24,49 +24,23 @@ from .streams import Reader
 
 @dataclass(frozen=True, eq=False)
 class Recorded(Displayed):
-    """N samples of a robot's motion and of its commands, as far as they were recorded, with one clock.
+    """N samples of a robot's motion and of its commands, as far as they were recorded, with one clock."""
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    times
-        (N,) [s], increasing.
-    pose
-        Poses of the platform frame in {G}, (N, 6) [m, rad], nan where not measured.
-    measured
-        Which coordinates of the pose are measured, (6,) of bool; the others are computed from the lengths.
-    lengths
-        Unstrained cable lengths by the encoders of the file, (N, m) [m], or None.
-    tensions
-        (N, m) [N], or None.
-    commands
-        Commanded unstrained lengths [m] or tensions [N], (N, m), or None.
-    commanded
-        "lengths" or "tensions".
-    carrier_pose
-        Poses of the carriers in {G}, (N, c, 6) [m, rad]; those that never move are at home. A carrier that moves and
-        was not recorded has nan.
-    thrusts
-        Thrust of each carrier, (N, c) [N], nan where not recorded.
-    notes
-        Remarks, one line each.
-    doubt
-        Probable input error of the log, in one line, or None.
-    """
-
-    robot: Robot
-    times: np.ndarray
-    pose: np.ndarray
+    robot: Robot  # the robot
+    times: np.ndarray  # (N,) [s], increasing
+    pose: np.ndarray  # poses of the platform frame in {G}, (N, 6) [m, rad], nan where not measured
+    # which coordinates of the pose are measured, (6,) of bool; the others are computed from the lengths
     measured: np.ndarray
-    lengths: np.ndarray | None
-    tensions: np.ndarray | None
-    commands: np.ndarray | None
-    commanded: str
+    lengths: np.ndarray | None  # unstrained cable lengths by the encoders of the file, (N, m) [m], or None
+    tensions: np.ndarray | None  # (N, m) [N], or None
+    commands: np.ndarray | None  # commanded unstrained lengths [m] or tensions [N], (N, m), or None
+    commanded: str  # "lengths" or "tensions"
+    # poses of the carriers in {G}, (N, c, 6) [m, rad]; those that never move are at home. A carrier that moves and was
+    # not recorded has nan.
     carrier_pose: np.ndarray
-    thrusts: np.ndarray
-    notes: Sequence[str]
-    doubt: str | None = None
+    thrusts: np.ndarray  # thrust of each carrier, (N, c) [N], nan where not recorded
+    notes: Sequence[str]  # remarks, one line each
+    doubt: str | None = None  # probable input error of the log, in one line, or None
 
 
 def read_recorded(
@@ -77,17 +51,10 @@ def read_recorded(
 ) -> Recorded:
     """Read the motion and the commands of a robot from a log.
 
-    Parameters
-    ----------
-    robot
-        The robot; its moving carriers are found by their names.
-    log, poses, fields
-        As `path`, `poses` and `fields` of `read_measurements`.
+    - `robot`: the robot; its moving carriers are found by their names.
+    - `log`, `poses`, `fields`: as `path`, `poses` and `fields` of `read_measurements`.
 
-    Raises
-    ------
-    InputError
-        As `read_measurements`, and if the log has no times.
+    Raises `InputError` as `read_measurements`, and if the log has no times.
     """
     known = as_robot(robot)
     try:

@@ -18,31 +18,16 @@ OPEN = 1e-6  # of the gradient of the lengths, a singular value that is zero, re
 
 
 class Problem(NamedTuple):
-    """The geometry of a robot with common carrier poses, or one set per platform pose.
+    """The geometry of a robot with common carrier poses, or one set per platform pose."""
 
-    Attributes
-    ----------
-    robot, record
-        The robot, and its format in the core.
-    carriers
-        Poses of the carriers, (c, 6), or (N, c, 6) for N poses of the platform.
-    free
-        1 for coordinates that move, else 0, (6,).
-    home
-        Initial pose of the platform, (6,) [m, rad].
-    freedoms
-        Number of coordinates that move.
-    open
-        True if the lengths do not determine the pose at home, as with parallel cables, so that gravity does.
-    """
-
+    # the robot, and its format in the core
     robot: Robot
     record: np.ndarray
-    carriers: np.ndarray
-    free: np.ndarray
-    home: np.ndarray
-    freedoms: int
-    open: bool
+    carriers: np.ndarray  # poses of the carriers, (c, 6), or (N, c, 6) for N poses of the platform
+    free: np.ndarray  # 1 for coordinates that move, else 0, (6,)
+    home: np.ndarray  # initial pose of the platform, (6,) [m, rad]
+    freedoms: int  # number of coordinates that move
+    open: bool  # True if the lengths do not determine the pose at home, as with parallel cables, so that gravity does
 
     def of(self, rows: np.ndarray) -> Problem:
         """Return the problem of some of the poses."""
@@ -58,22 +43,13 @@ class Problem(NamedTuple):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Descend from `poses` to the poses that fit measured lengths best.
 
-        Parameters
-        ----------
-        lengths
-            (N, m) [m].
-        weights
-            Weight of each cable's error, (m,).
-        poses
-            Initial poses, (N, 6).
-        damping
-            Lambda of the first step; 0 if the initial pose is close.
-        free
-            1 for coordinates that move in this descent; default: all that the platform has.
+        - `lengths`: (N, m) [m].
+        - `weights`: weight of each cable's error, (m,).
+        - `poses`: initial poses, (N, 6).
+        - `damping`: lambda of the first step; 0 if the initial pose is close.
+        - `free`: 1 for coordinates that move in this descent; default: all that the platform has.
 
-        Returns
-        -------
-        Poses (N, 6), weighted errors (N, m) [m], and whether each descent ended at a minimum, (N,).
+        Returns poses (N, 6), weighted errors (N, m) [m], and whether each descent ended at a minimum, (N,).
         """
         moved, errors, steps = np.array(poses, order="C"), np.empty(lengths.shape), np.empty(len(lengths))
         free = self.free if free is None else free

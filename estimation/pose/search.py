@@ -29,14 +29,9 @@ MISFIT = 1e12  # beyond the score of any pose that fits
 class _Best:
     """The best poses so far.
 
-    Attributes
-    ----------
-    poses, errors, ended
-        (N, 6), (N, m) in standard deviations, and whether they are minima, (N,).
-    ambiguous
-        True if another pose fits too, held by the cables or not, (N,).
-    left
-        Rows that need a further search.
+    - `poses`, `errors`, `ended`: (N, 6), (N, m) in standard deviations, and whether they are minima, (N,).
+    - `ambiguous`: True if another pose fits too, held by the cables or not, (N,).
+    - `left`: rows that need a further search.
     """
 
     def __init__(self, problem: Problem, count: int):

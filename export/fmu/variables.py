@@ -52,14 +52,9 @@ class Variable(NamedTuple):
 def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str, Any]) -> list[Variable]:
     """Return the variables of a unit, in the order of their value references.
 
-    Parameters
-    ----------
-    part
-        One of `PARTS`.
-    winches
-        Drive of winches that an importer commands, a key of `CABLES`; None if tensions are commanded.
-    data
-        Values of the members of `towline_unit` at the start.
+    - `part`: one of `PARTS`.
+    - `winches`: drive of winches that an importer commands, a key of `CABLES`; None if tensions are commanded.
+    - `data`: values of the members of `towline_unit` at the start.
     """
     simulates, controls = part != "controller", part != "plant"
     sensor, sensed = ("output", -np.inf) if simulates else ("input", np.nan)

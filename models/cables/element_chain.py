@@ -164,20 +164,12 @@ def elastic_increment(
 
     The attachment is node n, which the last element alone holds, and that one shares the elongation equally.
 
-    Parameters
-    ----------
-    vectors
-        A - B of each cable [m], (..., 3).
-    stiffness
-        E A of each [N], (...).
-    displacements
-        Of the attachments [m], (..., 3).
-    elements
-        n.
-    winding
-        De of each element [m], (...).
-    pretension
-        Tension of each cable before [N], (...); `inf`: it cannot become slack.
+    - `vectors`: A - B of each cable [m], (..., 3).
+    - `stiffness`: E A of each [N], (...).
+    - `displacements`: of the attachments [m], (..., 3).
+    - `elements`: n.
+    - `winding`: de of each element [m], (...).
+    - `pretension`: tension of each cable before [N], (...); `inf`: it cannot become slack.
     """
     lengths = np.linalg.norm(vectors, axis=-1)
     end = -np.einsum("...i,...i->...", vectors, displacements) / lengths
@@ -191,16 +183,10 @@ def damping_increment(
 ) -> np.ndarray:
     """Return dT_C = C (l(B + dB) - l(B)) / dt of many cables [N], (...).
 
-    Parameters
-    ----------
-    vectors
-        A - B of each cable [m], (..., 3).
-    damping
-        C of each [N s/m], (...).
-    displacements
-        dB of the attachments [m], (..., 3).
-    time_step
-        Dt [s].
+    - `vectors`: A - B of each cable [m], (..., 3).
+    - `damping`: C of each [N s/m], (...).
+    - `displacements`: dB of the attachments [m], (..., 3).
+    - `time_step`: dt [s].
     """
     before = np.linalg.norm(vectors, axis=-1)
     after = np.linalg.norm(vectors - displacements, axis=-1)
@@ -212,12 +198,8 @@ def damping_increment(
 def attachment_displacements(arms: np.ndarray, vibration: np.ndarray) -> np.ndarray:
     """Return dB = dx_B + [dTheta]x R b [m], (..., m, 3), for a small change of pose.
 
-    Parameters
-    ----------
-    arms
-        R b of each cable [m], (..., m, 3), in the frame of `vibration`.
-    vibration
-        (dx_B, dTheta): displacement of the platform's origin [m] and small turn [rad], (..., 6).
+    - `arms`: R b of each cable [m], (..., m, 3), in the frame of `vibration`.
+    - `vibration`: (dx_B, dTheta): displacement of the platform's origin [m] and small turn [rad], (..., 6).
     """
     shift, turn = vibration[..., None, :3], vibration[..., None, 3:]
     return shift + np.cross(turn, arms)

@@ -20,21 +20,13 @@ MOST_STEPS = 2000  # over the whole plan
 
 
 class Drift(NamedTuple):
-    """The distance of open-loop forward dynamics from the plan; infinite if it diverges.
+    """The distance of open-loop forward dynamics from the plan; infinite if it diverges."""
 
-    Attributes
-    ----------
-    window
-        Duration of each window [s]; each starts on the plan, one after the other.
-    window_position, window_attitude
-        Largest distance [m] and largest difference of an Euler angle [rad] at the end of a window.
-    position, attitude
-        The same at any time of one run over the whole plan, from its start.
-    """
-
-    window: float
+    window: float  # duration of each window [s]; each starts on the plan, one after the other
+    # largest distance [m] and largest difference of an Euler angle [rad] at the end of a window
     window_position: float
     window_attitude: float
+    # the same at any time of one run over the whole plan, from its start
     position: float
     attitude: float
 

@@ -13,34 +13,17 @@ from ..limits.bodies import WITHIN
 
 @dataclass(frozen=True)
 class Excess(Displayed):
-    """One limit at the instant where it is exceeded by most. As text it is a sentence of a report.
+    """One limit at the instant where it is exceeded by most. As text it is a sentence of a report."""
 
-    Attributes
-    ----------
-    limit
-        Name of the limit in the task or the robot's file.
-    about
-        "cable 3", "quad1", "platform".
-    time
-        Instant [s]; None if the limit does not refer to one.
-    value, bound
-        The value and its bound, in `unit`; nan if there is no value.
-    unit
-        Unit of value and bound.
-    accepted
-        Side of the bound on which the value must be.
-    why
-        Explanation; may be empty.
-    """
-
-    limit: str
-    about: str
-    time: float | None
+    limit: str  # name of the limit in the task or the robot's file
+    about: str  # "cable 3", "quad1", "platform"
+    time: float | None  # instant [s]; None if the limit does not refer to one
+    # the value and its bound, in `unit`; nan if there is no value
     value: float
     bound: float
-    unit: str
-    accepted: Literal["at most", "at least", "exactly"] = "at most"
-    why: str = ""
+    unit: str  # unit of value and bound
+    accepted: Literal["at most", "at least", "exactly"] = "at most"  # side of the bound on which the value must be
+    why: str = ""  # explanation; may be empty
 
     @classmethod
     def of(cls, limit: Limit, which: int, time: float, value: float, why: str = "") -> Self:

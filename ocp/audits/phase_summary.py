@@ -9,26 +9,16 @@ from .audit import Audit
 
 
 class PhaseSummary(NamedTuple):
-    """A phase of a motion.
-
-    Attributes
-    ----------
-    start, end
-        [s].
-    load
-        The mass that the platform carries [kg].
-    tension_min, tension_max
-        Smallest and largest audited tension [N]; None if none exist at some time, or none were evaluated.
-    reaction_max
-        The largest sum of the forces of the ground [N]; None for a phase without ground, or without tensions.
-    """
+    """A phase of a motion."""
 
     name: str
-    start: float
+    start: float  # [s]
     end: float
-    load: float
+    load: float  # the mass that the platform carries [kg]
+    # smallest and largest audited tension [N]; None if none exist at some time, or none were evaluated
     tension_min: float | None
     tension_max: float | None
+    # the largest sum of the forces of the ground [N]; None for a phase without ground, or without tensions
     reaction_max: float | None
 
 

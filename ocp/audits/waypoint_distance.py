@@ -13,22 +13,13 @@ EXACT = 1e-5  # [m, rad]: less is within the tolerances of a program
 
 
 class Nearest(NamedTuple):
-    """The waypoint that a motion passes at the largest distance.
+    """The waypoint that a motion passes at the largest distance."""
 
-    Attributes
-    ----------
-    point
-        Name of the waypoint in the path: `points[2]`.
-    distance
-        Smallest distance of the motion from the waypoint, between the previous and the next waypoint, [m] for
-        positions, [rad] for attitudes.
-    time
-        Time of this distance [s].
-    """
-
-    point: str
+    point: str  # name of the waypoint in the path: `points[2]`
+    # smallest distance of the motion from the waypoint, between the previous and the next waypoint, [m] for positions,
+    # [rad] for attitudes
     distance: float
-    time: float
+    time: float  # time of this distance [s]
 
     def describe(self, unit: str) -> str:
         """Return the distance in a thousandth of [m] or [rad], with the waypoint and the time."""

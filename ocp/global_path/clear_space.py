@@ -27,14 +27,9 @@ NARROW = 0.03  # of the robot's size: gaps much narrower do not count for more
 class ClearSpace:
     """The configurations whose slack is the reserve or more; near an end that has less, as much as can be kept there.
 
-    Attributes
-    ----------
-    reserve
-        By how much all limits are kept [m].
-    evaluated, most
-        How many configurations have been evaluated, and how many are in a search.
-    deadline
-        When a search ends, by `time.perf_counter` [s].
+    - `reserve`: by how much all limits are kept [m].
+    - `evaluated`, `most`: how many configurations have been evaluated, and how many are in a search.
+    - `deadline`: when a search ends, by `time.perf_counter` [s].
     """
 
     def __init__(self, space: Space, rest: AtRest, reserve: float, most: float = np.inf, deadline: float = np.inf):

@@ -154,18 +154,11 @@ def _matrix(entries: Sequence[_Entries], height: int, width: int) -> ca.MX:
 class Columns:
     """The columns of a program.
 
-    Parameters
-    ----------
-    unknowns
-        Unknowns of all points, (width, points), one point after the other.
-    scheme
-        The scheme, which selects points and groups them into intervals.
-    references
-        The reference motions at all points, (18 (1 + c), points), as numbers or parameters.
-    carried
-        Loads and columns of the ground, (., nodes).
-    intervals
-        `Grid.intervals`, (2, steps), as numbers or parameters.
+    - `unknowns`: unknowns of all points, (width, points), one point after the other.
+    - `scheme`: the scheme, which selects points and groups them into intervals.
+    - `references`: the reference motions at all points, (18 (1 + c), points), as numbers or parameters.
+    - `carried`: loads and columns of the ground, (., nodes).
+    - `intervals`: `Grid.intervals`, (2, steps), as numbers or parameters.
     """
 
     def __init__(

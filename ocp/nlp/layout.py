@@ -21,53 +21,34 @@ class Layout(Displayed):
 
     Each node carries a copy of what all nodes share, the duration and the margin, equal to the copy of the next node,
     so that the program stays banded.
-
-    Attributes
-    ----------
-    n, derivatives
-        The number of free coordinates, and how many of these and their derivatives are unknowns.
-    winds, grounds
-        The number of decisive winds of a box or of extreme loads, and of forces of the ground.
-    soft, carried
-        The names of the soft limits, and of what all nodes share.
-    q, v, a
-        Rows of the column with the free coordinates, their rates and accelerations.
-    jerk, snap
-        Jerk and snap of a smooth scheme, times the first and second power of an interval's length at the scenario's
-        duration: so they are of the size of a. Empty for other schemes.
-    tensions, wind_tensions
-        Tensions in units of the robot's force: the planned ones, and those in each decisive wind or with each extreme
-        load, one after another.
-    supports
-        The forces of the ground, in the same unit; zero where the platform hangs.
-    missing
-        An elastic program's missing wrenches: as planned, then in each decisive wind.
-    slacks
-        The excesses over soft limits, in their scale.
-    shared
-        The shared unknowns.
-    width
-        How many unknowns a node has.
     """
 
+    # the number of free coordinates, and how many of these and their derivatives are unknowns
     n: int
     derivatives: int
+    # the number of decisive winds of a box or of extreme loads, and of forces of the ground
     winds: int
     grounds: int
+    # the names of the soft limits, and of what all nodes share
     soft: tuple[str, ...]
     carried: tuple[str, ...]
+    # rows of the column with the free coordinates, their rates and accelerations
     q: slice
     v: slice
     a: slice
+    # jerk and snap of a smooth scheme, times the first and second power of an interval's length at the scenario's
+    # duration: so they are of the size of a. Empty for other schemes.
     jerk: slice
     snap: slice
+    # tensions in units of the robot's force: the planned ones, and those in each decisive wind or with each extreme
+    # load, one after another
     tensions: slice
     wind_tensions: slice
-    supports: slice
-    missing: slice
-    slacks: slice
-    shared: slice
-    width: int
+    supports: slice  # the forces of the ground, in the same unit; zero where the platform hangs
+    missing: slice  # an elastic program's missing wrenches: as planned, then in each decisive wind
+    slacks: slice  # the excesses over soft limits, in their scale
+    shared: slice  # the shared unknowns
+    width: int  # how many unknowns a node has
 
     @staticmethod
     def of(scenario: Scenario, elastic: bool) -> Layout:

@@ -22,15 +22,8 @@ MOST_ITERATIONS = 150  # of a pass: those that end well take 10 to 90
 class LinearDistances:
     """The program, its solver, and the expressions that it needs about a motion.
 
-    Parameters
-    ----------
-    program
-        The true program.
-
-    Attributes
-    ----------
-    shares
-        Where its points are.
+    - `program`: the true program.
+    - `shares`: where its points are.
     """
 
     def __init__(self, program: Program):

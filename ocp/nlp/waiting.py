@@ -29,12 +29,8 @@ _arrived = threading.Event()
 def wait_for(work: Callable[[], Result], errands: Errands | None = None) -> Result:
     """Return what `work` returns, computed in a thread of its own.
 
-    Parameters
-    ----------
-    work
-        If the wait ends early, this is left to run: the process does not end before it does.
-    errands
-        What `work` puts here is called in the caller's thread, in order, while it waits.
+    - `work`: if the wait ends early, this is left to run: the process does not end before it does.
+    - `errands`: what `work` puts here is called in the caller's thread, in order, while it waits.
 
     Raises `KeyboardInterrupt` if an interrupt arrives meanwhile. Exceptions of `work` or of an errand are raised as
     well.

@@ -23,20 +23,13 @@ SLACK = 1e-6  # relative: by so much the linear programs may be off
 
 
 class Durations(NamedTuple):
-    """A necessary condition on a duration T: shortest <= T <= longest.
+    """A necessary condition on a duration T: shortest <= T <= longest."""
 
-    Attributes
-    ----------
-    shortest, longest
-        [s]; longest is infinite if rest is possible everywhere. If no duration is possible, shortest is infinite and
-        longest zero.
-    at
-        The decisive point, as a fraction of the duration: that of `shortest`, or where no duration is possible.
-    """
-
+    # [s]; longest is infinite if rest is possible everywhere. If no duration is possible, shortest is infinite and
+    # longest zero.
     shortest: float
     longest: float
-    at: float
+    at: float  # the decisive point, as a fraction of the duration: that of `shortest`, or where no duration is possible
 
     @property
     def exist(self) -> bool:

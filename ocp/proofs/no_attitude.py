@@ -19,16 +19,10 @@ def no_attitude(
 ) -> list[Excess]:
     """Return the largest violation at the reference attitude if there is one at every attitude, else nothing.
 
-    Parameters
-    ----------
-    time
-        When the platform is there [s].
-    angles
-        The coordinates of the attitude that the tube leaves free, of 3 to 5.
-    platform, carriers
-        Their poses there, (6,) and (c, 6).
-    usable
-        Which of the values of all limits depend on the platform's pose alone, (k,).
+    - `time`: when the platform is there [s].
+    - `angles`: the coordinates of the attitude that the tube leaves free, of 3 to 5.
+    - `platform`, `carriers`: their poses there, (6,) and (c, 6).
+    - `usable`: which of the values of all limits depend on the platform's pose alone, (k,).
     """
     robot, turn = scenario.robot, scenario.task.tube.turn
     points = np.vstack([robot.attachments, robot.platform.com, scenario.body_corners])

@@ -23,16 +23,11 @@ def too_fast(
 ) -> Iterator[Excess]:
     """Yield each limit that is exceeded, where it is exceeded by most.
 
-    Parameters
-    ----------
-    times
-        Equally spaced, from start to end, (n,) [s].
-    places
-        Poses of the platform and of each carrier in {G}, without what the planner chooses, (1 + c, n, 6) [m, rad].
-    spread
-        How far each of them, and every point of the platform, may be from its place, (1 + c, n) [m].
-    resting
-        Which of them are at rest at both ends, (1 + c,) of bool.
+    - `times`: equally spaced, from start to end, (n,) [s].
+    - `places`: poses of the platform and of each carrier in {G}, without what the planner chooses, (1 + c, n, 6) [m,
+      rad].
+    - `spread`: how far each of them, and every point of the platform, may be from its place, (1 + c, n) [m].
+    - `resting`: which of them are at rest at both ends, (1 + c,) of bool.
     """
     lengths = None
     for limit in scenario.limits:

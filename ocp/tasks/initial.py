@@ -94,10 +94,7 @@ class Final(_State):
 def check_ends(robot: Robot, initial: Initial | None, final: Final | None, frame: str, where: str) -> None:
     """Check that an initial and a final state fit a robot and the frame of a path.
 
-    Raises
-    ------
-    InputError
-        Naming the field, what is accepted and the value.
+    Raises `InputError` naming the field, what is accepted and the value.
     """
     count = len(robot.carriers)
     for name, state in (("initial", initial), ("final", final)):

@@ -20,15 +20,9 @@ from .task_checks import check_scenario, check_task
 def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, Any] | None = None) -> Scenario:
     """Check that `task` fits `robot` and lay it out.
 
-    Parameters
-    ----------
-    initial
-        The state from which the motion starts, instead of the task's (`initial_of`).
+    `initial`: the state from which the motion starts, instead of the task's (`initial_of`).
 
-    Raises
-    ------
-    InputError
-        Naming the field of the task that does not fit, its value and the accepted values.
+    Raises `InputError` naming the field of the task that does not fit, its value and the accepted values.
     """
     check_task(robot, task)
     task = with_timing(robot, task)

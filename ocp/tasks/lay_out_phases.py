@@ -22,10 +22,7 @@ BALANCED = 1e-9  # of the wrench: what supports miss of it
 def lay_out_phases(scenario: Scenario) -> Phases:
     """Check that the phases of a scenario's task fit its robot, and lay them out.
 
-    Raises
-    ------
-    InputError
-        Naming the field of the task that does not fit, its value and what would.
+    Raises `InputError` naming the field of the task that does not fit, its value and what would.
     """
     robot, task, where = scenario.robot, scenario.task, f"task {scenario.task.name!r}"
     if task.phases is None or not isinstance(task.path, SequencePath):

@@ -53,10 +53,7 @@ def initial_of(
     Of what the planner does not choose a measured state has to agree within the errors of sensors, and is replaced by
     what the task gives: coordinates of carriers, and of the platform those that are none of its degrees of freedom.
 
-    Raises
-    ------
-    InputError
-        Naming the field, if the state is none or does not fit the robot.
+    Raises `InputError` naming the field, if the state is none or does not fit the robot.
     """
     if isinstance(state, Initial):
         return state

@@ -91,14 +91,9 @@ class Scheme(Displayed):
     def acceleration(self, h: Values, a: Sequence[Values], jerk: tuple[Values, Values] | None = None) -> list[Values]:
         """Return the Bernstein points of the acceleration over an interval, `degree` + 1.
 
-        Parameters
-        ----------
-        h
-            Length of the interval [s].
-        a
-            Accelerations at its points, start and end included.
-        jerk
-            At start and end, for a smooth scheme; default: the line between the ends.
+        - `h`: length of the interval [s].
+        - `a`: accelerations at its points, start and end included.
+        - `jerk`: at start and end, for a smooth scheme; default: the line between the ends.
         """
         if self.smooth:
             start, end = a

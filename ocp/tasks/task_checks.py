@@ -28,10 +28,7 @@ TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on t
 def check_task(robot: Robot, task: Task) -> None:
     """Check frame, tensions, wind and times of a task.
 
-    Raises
-    ------
-    InputError
-        Naming the field of the task that does not fit, its value and what would.
+    Raises `InputError` naming the field of the task that does not fit, its value and what would.
     """
     where = f"task {task.name!r}"
     _check_frame(robot, task, where)
@@ -49,10 +46,7 @@ def check_task(robot: Robot, task: Task) -> None:
 def check_scenario(scenario: Scenario) -> None:
     """Check ends and bounds of a task after it is laid out.
 
-    Raises
-    ------
-    InputError
-        Naming the field of the task that does not fit, its value and what would.
+    Raises `InputError` naming the field of the task that does not fit, its value and what would.
     """
     robot, task = scenario.robot, scenario.task
     where = f"task {task.name!r}"
@@ -77,10 +71,7 @@ def _check_frame(robot: Robot, task: Task, where: str) -> None:
 def check_margin(robot: Robot, task: Task) -> None:
     """Refuse a margin that exceeds half the tension range of a cable.
 
-    Raises
-    ------
-    InputError
-        Naming the largest margin and the cable.
+    Raises `InputError` naming the largest margin and the cable.
     """
     for index, (low, high) in enumerate(zip(robot.t_min, robot.t_max, strict=True)):
         if low + task.margin > high - task.margin:

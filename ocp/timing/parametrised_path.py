@@ -52,18 +52,11 @@ class Wrench(NamedTuple):
 class ParametrisedPath:
     """A robot, the path of its platform and those of its carriers, parametrised by one s from 0 to 1.
 
-    Parameters
-    ----------
-    robot
-        Its carriers require no effort of their own: kinds ground, prescribed and mobile.
-    path
-        Of the platform, in {G} or in the frame of the only carrier.
-    carriers
-        Paths in {G} by the index of the carrier; the others stay at home.
-    until
-        When circles end by their own time [s]; default: after one turn.
-    wind
-        Zeros for still air; default: no air.
+    - `robot`: its carriers require no effort of their own: kinds ground, prescribed and mobile.
+    - `path`: of the platform, in {G} or in the frame of the only carrier.
+    - `carriers`: paths in {G} by the index of the carrier; the others stay at home.
+    - `until`: when circles end by their own time [s]; default: after one turn.
+    - `wind`: zeros for still air; default: no air.
 
     Raises `InputError` if robot and paths do not fit one another.
     """

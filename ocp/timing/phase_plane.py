@@ -24,20 +24,13 @@ class PhasePlane(Displayed):
     """The limits of a motion along a path, at N points of it.
 
     Wrenches are those of the coordinates that can move, moments over `Robot.length`, all in newtons.
-
-    Attributes
-    ----------
-    wrench, available
-        The wrench that the motion needs, (N, n) each, and the facets of the available wrench set.
-    x_max
-        The largest x that the limits of speed allow, (N,) [1/s^2].
-    acceleration_rows
-        Limits of accelerations, a u + b x + c <= 0 with (N, k) each.
     """
 
+    # the wrench that the motion needs, (N, n) each, and the facets of the available wrench set
     wrench: Wrench
     available: Facets
-    x_max: np.ndarray
+    x_max: np.ndarray  # the largest x that the limits of speed allow, (N,) [1/s^2]
+    # limits of accelerations, a u + b x + c <= 0 with (N, k) each
     acceleration_rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
 
     def rows(self, weight: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -100,10 +100,7 @@ def time_along(
 def _check(robot: Robot, task: Task) -> None:
     """Refuse a task that does not fit the robot, or that requires more than a time law along its path.
 
-    Raises
-    ------
-    InputError
-        Naming the field and what is accepted.
+    Raises `InputError` naming the field and what is accepted.
     """
     where = f"task {task.name!r}"
     if task.phases is not None:

@@ -23,10 +23,7 @@ ENTERED = 1e-3  # [m]: less inside is not worth a sentence
 def into_places(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.ndarray]) -> list[str]:
     """Return a sentence if a carrier enters a region, because the task states less than the radius of its body.
 
-    Parameters
-    ----------
-    limits, limited
-        Limits of the task, and what they bound at the instants, (n, k) each.
+    `limits`, `limited`: limits of the task, and what they bound at the instants, (n, k) each.
     """
     robot, meetings = seen.robot, []
     for limit, values in zip(limits, limited, strict=True):
@@ -69,10 +66,7 @@ def _worst(meetings: list[Meeting], mend: str) -> list[str]:
 def between_points(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.ndarray]) -> list[str]:
     """Return a sentence if a region enters the hull of centre of mass and attachments, all of which stay outside.
 
-    Parameters
-    ----------
-    limits, limited
-        Limits of the task, and what they bound at the instants, (n, k) each.
+    `limits`, `limited`: limits of the task, and what they bound at the instants, (n, k) each.
     """
     robot = seen.robot
     kept = [

@@ -31,10 +31,7 @@ class OfCable(Event, ABC):
     def check(self, robot: Robot) -> None:
         """Check that the robot has the cable.
 
-        Raises
-        ------
-        InputError
-            If it has not.
+        Raises `InputError` if it has not.
         """
         if not 1 <= self.cable <= robot.m:
             raise InputError(f"must name a cable of {robot.name!r}, 1 to {robot.m}, got {shown(self.cable)}")

@@ -26,10 +26,7 @@ SAME = 1e-12  # [rad]
 class Attitudes:
     """Attitudes in order, and the shortest turns between them.
 
-    Parameters
-    ----------
-    angles
-        (n, 3), (roll, pitch, yaw) [rad].
+    `angles`: (n, 3), (roll, pitch, yaw) [rad].
     """
 
     def __init__(self, angles: np.ndarray):

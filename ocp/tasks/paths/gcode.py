@@ -26,10 +26,7 @@ def read_gcode(text: str, where: str) -> dict[str, Any]:
     feed F, its mean speed; a G0 has none, for which the largest one of the file stands, and with one there are no
     times. Words of no meaning for a path (E, S, T, M, homing before the path) are listed as `ignored`.
 
-    Raises
-    ------
-    InputError
-        Naming `where` and the line.
+    Raises `InputError` naming `where` and the line.
     """
     reader = _Reader()
     for number, line in enumerate(text.splitlines(), 1):
@@ -74,10 +71,7 @@ class _Reader:
     def read(self, line: str) -> None:
         """Read one line.
 
-        Raises
-        ------
-        ValueError
-            With what it must be.
+        Raises `ValueError` with what it must be.
         """
         codes, words = self._words(line)
         if self._ended and (codes or words):

@@ -35,19 +35,12 @@ class Legs:
     A motion along them is where it is in a `leg`, (n,), and how much of this leg and of the next one is done, with two
     derivatives: those before are done, and only these two move.
 
-    Parameters
-    ----------
-    points
-        (n, 6) poses.
-    blend
-        The largest distance at which the path passes its points [m]; default: a share of their span.
-    times
-        (n,), the times at which it passes them [s]; default: any duration, all legs with the same
-        peak acceleration.
-    dwell
-        (n,), dwell time at each [s]; default: none.
-    shares
-        Whether `times` are shares of the duration, from 0 to 1: the way is then the same one as without.
+    - `points`: (n, 6) poses.
+    - `blend`: the largest distance at which the path passes its points [m]; default: a share of their span.
+    - `times`: (n,), the times at which it passes them [s]; default: any duration, all legs with the same peak
+      acceleration.
+    - `dwell`: (n,), dwell time at each [s]; default: none.
+    - `shares`: whether `times` are shares of the duration, from 0 to 1: the way is then the same one as without.
     """
 
     def __init__(

@@ -62,16 +62,10 @@ def largest_left(steps: np.ndarray, last: np.ndarray, most: np.ndarray, blend: f
     It is as large as the blend, the longest permitted overlap and the accelerations of both legs together permit, and
     zero where the path turns back.
 
-    Parameters
-    ----------
-    steps
-        The legs, (n - 1, 6).
-    last
-        How long each moves, (n - 1,).
-    most
-        The longest permitted overlap at each inner point, (n - 2,).
-    blend
-        The largest distance from the point, of the position [m] and of the attitude [rad].
+    - `steps`: the legs, (n - 1, 6).
+    - `last`: how long each moves, (n - 1,).
+    - `most`: the longest permitted overlap at each inner point, (n - 2,).
+    - `blend`: the largest distance from the point, of the position [m] and of the attitude [rad].
     """
     lengths = np.linalg.norm(steps, axis=1)
     along = steps / np.where(lengths > 0, lengths, 1.0)[:, None]
@@ -100,14 +94,9 @@ def even_out(steps: np.ndarray, last: np.ndarray, early: np.ndarray, late: np.nd
     A leg that accelerates more than others, alone or together with the one before or after it, lasts longer. This
     lowers the peak of the whole path at the same duration.
 
-    Parameters
-    ----------
-    steps
-        The legs, (n - 1, 6).
-    last
-        How long each moves at first, (n - 1,).
-    early, late
-        From `shares_of_time`: they are kept, and with them the path.
+    - `steps`: the legs, (n - 1, 6).
+    - `last`: how long each moves at first, (n - 1,).
+    - `early`, `late`: from `shares_of_time`: they are kept, and with them the path.
     """
     for _ in range(ROUNDS):
         peak = PEAK * size(steps) / last**2

@@ -22,10 +22,7 @@ GCODE = (".gcode", ".ngc", ".tap")
 def read_points(name: str, folder: Path) -> dict[str, Any]:
     """Return the points of a file, and its times [s] and how long it dwells [s] if it has them, as a path's fields.
 
-    Raises
-    ------
-    InputError
-        Naming file, line and column.
+    Raises `InputError` naming file, line and column.
     """
     path, where = folder / name, printable(name)
     ending = path.suffix.lower()
@@ -47,10 +44,7 @@ def read_points(name: str, folder: Path) -> dict[str, Any]:
 def read_csv(text: str) -> dict[str, Any]:
     """Return the fields of a path from CSV, with a header such as x [mm], y [mm], z [mm], yaw [deg], t [s].
 
-    Raises
-    ------
-    InputError
-        Naming line and column.
+    Raises `InputError` naming line and column.
     """
     names = ", ".join(UNITS)
     columns, lines = read_columns(text.lower(), lambda name, unit: unit_factor(name, unit, UNITS.get(name), names))

@@ -32,26 +32,11 @@ class Places(NamedTuple):
 class RoundedCorners:
     """Lines through points with rounded corners.
 
-    Parameters
-    ----------
-    points
-        (n, 3) [m]; neighbours differ.
-    tolerance
-        By how much the curve may miss a corner [m].
-    stops
-        Points at which the motion stops anyway, (n,): their corners stay sharp.
-
-    Attributes
-    ----------
-    edges
-        Lengths at which the pieces begin and end, (2 n - 2,) [m]: line, corner, line, ... , line.
-    tips
-        Lengths at the points, in the middle of their corners, (n,) [m].
-    sharp
-        Points at which a motion must stop, (n,).
-    lengths, curvature
-        Of each corner, (n - 2,): the length up to the ends of its cells, (CELLS + 1,) [m], and the largest curvature in
-        them, (CELLS,) [1/m].
+    - `points`: (n, 3) [m]; neighbours differ.
+    - `tolerance`: by how much the curve may miss a corner [m].
+    - `stops`: points at which the motion stops anyway, (n,): their corners stay sharp.
+    - `lengths`, `curvature`: of each corner, (n - 2,): the length up to the ends of its cells, (CELLS + 1,) [m], and
+      the largest curvature in them, (CELLS,) [1/m].
     """
 
     def __init__(self, points: np.ndarray, tolerance: float, stops: np.ndarray):
@@ -60,7 +45,7 @@ class RoundedCorners:
         self._points, self._along = points, lines / long[:, None]
         before, after = self._along[:-1], self._along[1:]
         turn = 2 * np.arctan2(np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1))
-        self.sharp = stops | np.r_[True, turn > TURNS_BACK, True]
+        self.sharp = stops | np.r_[True, turn > TURNS_BACK, True]  # points at which a motion must stop, (n,)
         rounded = (turn > STRAIGHT) & ~self.sharp[1:-1]
         tip = np.interp(turn, TURNS, NEAR_TIP)
         # B(1/2) misses the tip by this much for each metre that is cut off the lines.
@@ -83,7 +68,9 @@ class RoundedCorners:
         straight = long - np.append(0.0, cut) - np.append(cut, 0.0)
         pieces = np.zeros(2 * len(long) - 1)
         pieces[::2], pieces[1::2] = np.maximum(straight, 0.0), self.lengths[:, -1]
+        # lengths at which the pieces begin and end, (2 n - 2,) [m]: line, corner, line, ... , line.
         self.edges = np.append(0.0, np.cumsum(pieces))
+        # lengths at the points, in the middle of their corners, (n,) [m]
         self.tips = np.concatenate([[0.0], (self.edges[1:-1:2] + self.edges[2:-1:2]) / 2, self.edges[-1:]])
         self._starts = points[:-1] + np.append(0.0, cut)[:, None] * self._along
 

@@ -101,10 +101,7 @@ class SequencePath(PathBase):
 def lasting(path: SinglePath, duration: float | None) -> float:
     """Return the duration of a path of a sequence [s].
 
-    Raises
-    ------
-    ValueError
-        Naming `duration`, if that is missing or does not fit the path.
+    Raises `ValueError` naming `duration`, if that is missing or does not fit the path.
     """
     own = path.natural_duration
     if duration is None:
@@ -121,10 +118,7 @@ def lasting(path: SinglePath, duration: float | None) -> float:
 def check_continuity(paths: Sequence[tuple[SinglePath, float]], key: str) -> None:
     """Check that each of the paths, with their durations [s], begins where and as the one before ends.
 
-    Raises
-    ------
-    ValueError
-        Naming the first one that does not, as an item of `key`, and the gap.
+    Raises `ValueError` naming the first one that does not, as an item of `key`, and the gap.
     """
     for index, ((before, lasts), (after, seconds)) in enumerate(pairwise(paths)):
         end, start = before.at(np.array([lasts]), lasts), after.at(np.zeros(1), seconds)

@@ -12,12 +12,8 @@ class SmoothedLaw:
 
     Where the law rests it waits for as long, so that the mean rests there too.
 
-    Parameters
-    ----------
-    law
-        The law.
-    window
-        Time over which the mean is taken [s].
+    - `law`: the law.
+    - `window`: time over which the mean is taken [s].
     """
 
     def __init__(self, law: TimeLaw, window: float):

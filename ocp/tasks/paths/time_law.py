@@ -8,14 +8,9 @@ import numpy as np
 class TimeLaw:
     """A motion s(t): d2s/dt2 is constant between the given points; where ds/dt is zero it can dwell.
 
-    Parameters
-    ----------
-    s
-        Increasing, (n,), of any unit.
-    speeds
-        ds/dt there, (n,), never zero at two neighbours.
-    dwell
-        How long it stops at each s, (n,) [s].
+    - `s`: increasing, (n,), of any unit.
+    - `speeds`: ds/dt there, (n,), never zero at two neighbours.
+    - `dwell`: how long it stops at each s, (n,) [s].
     """
 
     def __init__(self, s: np.ndarray, speeds: np.ndarray, dwell: np.ndarray):

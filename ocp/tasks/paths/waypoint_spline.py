@@ -17,12 +17,8 @@ class WaypointSpline:
 
     Velocity and acceleration are zero at its ends. Angles change by less than half a turn from point to point.
 
-    Parameters
-    ----------
-    points
-        (n, 6) poses.
-    times
-        (n,), the times of the points [s]; default: any duration.
+    - `points`: (n, 6) poses.
+    - `times`: (n,), the times of the points [s]; default: any duration.
     """
 
     def __init__(self, points: Sequence[Sequence[float]], times: Sequence[float] | None):
@@ -33,10 +29,7 @@ class WaypointSpline:
     def check(self) -> None:
         """Refuse points without times that are too near to each other.
 
-        Raises
-        ------
-        ValueError
-            Naming the second of them.
+        Raises `ValueError` naming the second of them.
         """
         near = np.flatnonzero(self._steps <= NEAREST * self._steps.sum())
         if self._times is None and near.size:

@@ -50,16 +50,10 @@ _FAR = 1e9
 def barrier_point(form: StandardForm, square: float, mu: float, start: Array | None) -> Proposal:
     """Find the minimiser.
 
-    Parameters
-    ----------
-    form :
-        The problem.
-    square :
-        c, 0 or 1. With 0 the feasible tensions must be bounded.
-    mu :
-        Weight of the logarithms.
-    start :
-        Where to begin, shape (k,), anywhere; None = in the middle of the limits.
+    - `form`: the problem.
+    - `square`: c, 0 or 1. With 0 the feasible tensions must be bounded.
+    - `mu`: weight of the logarithms.
+    - `start`: where to begin, shape (k,), anywhere; None = in the middle of the limits.
     """
     if not form.lower.size:
         return Proposal(np.zeros(0))

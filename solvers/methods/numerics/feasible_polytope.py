@@ -35,10 +35,7 @@ def corners(form: StandardForm) -> Array | None:
     Polygons come in order around their middle; corners may be repeated. No rows if nothing is feasible, or if m - rank
     > 2 and the feasible tensions have no interior: then w is on the very boundary of the available wrench set.
 
-    Returns
-    -------
-    :
-        The corners, or None if the feasible tensions are unbounded.
+    Returns None if the feasible tensions are unbounded.
     """
     freedom = form.N.shape[0]
     base = form.b @ form.Q

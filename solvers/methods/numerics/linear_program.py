@@ -30,18 +30,11 @@ def optimise(
 ) -> Proposal:
     """Minimise cost . (s, extra) subject to Q s = b, the limits of s, and rows (s, extra) <= limits.
 
-    Parameters
-    ----------
-    form :
-        The problem.
-    cost :
-        Shape (k + extras,).
-    rows, limits :
-        Shape (rows, k + extras) and (rows,); infinite limits are no limits.
-    nonnegative :
-        True if the extra variables are not negative.
-    most :
-        What the extra variables may be at most.
+    - `form`: the problem.
+    - `cost`: shape (k + extras,).
+    - `rows`, `limits`: shape (rows, k + extras) and (rows,); infinite limits are no limits.
+    - `nonnegative`: True if the extra variables are not negative.
+    - `most`: what the extra variables may be at most.
     """
     from scipy.optimize import linprog
 
