@@ -8,162 +8,10 @@ from scipy.optimize import minimize_scalar
 
 from towline.base.errors import InputError
 from towline.models.batch import call
-from towline.models.cables import LumpedChain, exit_points, hang, pulley_motion
+from towline.models.cables import exit_points, hang
 
 EA, RHO, L0 = 13000.0, 0.02, 2.0
 UP = np.array([0.0, 0.0, 1.0])
-
-# --- lumped chain
-
-
-def resting(chain, start, end):
-    return {"start": start, "start_velocity": np.zeros(3), "end": end, "end_velocity": np.zeros(3)}
-
-
-def test_power_balance_at_random_states():
-    """dE/dt is what the ends put in less what the dampers take, with segments of all kinds, slack ones among them."""
-    chain = LumpedChain(L0, EA, RHO, damping=0.3, segments=6)
-    names = chain.energy.name_in()
-    inputs = [ca.SX.sym(name, *chain.energy.size_in(name)) for name in names]
-    state, start, start_velocity, end, end_velocity = inputs
-    total = chain.energy(**dict(zip(names, inputs, strict=True)))["total"]
-    motion = chain.dynamics(**dict(zip(names, inputs, strict=True)))
-    moved = ca.vertcat(state, start, end)
-    rate = ca.jtimes(total, moved, ca.vertcat(motion["dstate"], start_velocity, end_velocity))
-    put_in = -ca.dot(motion["start_force"], start_velocity) - ca.dot(motion["end_force"], end_velocity)
-    balance = ca.Function("balance", inputs, [rate - put_in, motion["tensions"]])
-    rng = np.random.default_rng(1)
-    slack = taut = 0
-    for _ in range(200):
-        ends = rng.normal(size=3), rng.normal(size=3), rng.normal(size=3), rng.normal(size=3)
-        values = chain.straight(ends[0], ends[2]) + 0.1 * rng.normal(size=chain.state_size)
-        difference, tensions = balance(values, *ends)
-        lost = float(chain.energy(values, *ends)[4])
-        assert lost >= 0
-        assert float(difference) == pytest.approx(-lost, rel=1e-9, abs=1e-7)
-        slack += int((tensions.full() == 0).sum())
-        taut += int((tensions.full() > 0).sum())
-    assert slack > 100
-    assert taut > 100
-
-
-@pytest.mark.parametrize("span", [1.2, 2.005])
-def test_energy_decays_monotonically_when_undriven(span):
-    """A cable let go in a straight line, slack or taut, between resting ends."""
-    chain = LumpedChain(L0, 500.0, RHO, damping=0.5, segments=6)
-    start, end = np.zeros(3), np.array([span, 0.0, 0.0])
-    ends = resting(chain, start, end)
-    state = chain.straight(start, end)
-    state[1:15:3] += 0.02 * np.sin(np.arange(5))  # out of the plane, too
-    solution = solve_ivp(
-        lambda _, x: chain.dynamics(x, *ends.values())[0].full().ravel(), (0, 0.5), state, rtol=1e-8, atol=1e-10
-    )
-    energy = call(chain.energy, {"state": solution.y.T} | ends)["total"][..., 0]
-    allowed = 1e-9 * np.abs(energy).max()  # of the integrator
-    assert len(energy) > 200
-    assert np.diff(energy).max() < allowed
-    assert energy[-1] < energy[0] - 1e-3 * np.abs(energy[0])
-
-
-def test_energy_of_an_undamped_chain_is_constant():
-    chain = LumpedChain(L0, 500.0, RHO, segments=4)
-    ends = resting(chain, np.zeros(3), np.array([2.05, 0.0, 0.0]))
-    state = chain.straight(ends["start"], ends["end"])
-    state[1] = 0.01
-    solution = solve_ivp(
-        lambda _, x: chain.dynamics(x, *ends.values())[0].full().ravel(),
-        (0, 0.2),
-        state,
-        "DOP853",
-        rtol=1e-9,
-        atol=1e-11,
-    )
-    energy = call(chain.energy, {"state": solution.y.T} | ends)["total"][..., 0]
-    np.testing.assert_allclose(energy, energy[0], rtol=1e-11)
-
-
-@pytest.mark.parametrize("segments", [10, 40])
-def test_frequencies_of_a_taut_string(segments):
-    """K / (2 l) sqrt(T / rho_l) across and k / (2 L0) sqrt(E A / rho) along, within (k pi / 2 n)^2 / 6."""
-    T = 60.0
-    stretched = L0 * (1 + T / EA)
-    chain = LumpedChain(L0, EA, RHO, segments=segments, gravity=(0.0, 0.0, 0.0))
-    ends = resting(chain, np.zeros(3), np.array([0.0, stretched, 0.0]))
-    inputs = {"state": chain.straight(ends["start"], ends["end"])} | ends
-    jacobian = chain.dynamics.factory("J", chain.dynamics.name_in(), ["jac:dstate:state"])
-    half = chain.state_size // 2
-    stiffness = -jacobian(**inputs)["jac_dstate_state"].full()[half:, :half]
-    axes = {axis: stiffness[axis::3, axis::3] for axis in range(3)}
-    k = np.arange(1, segments)
-    for axis, speed, span in [
-        (0, np.sqrt(T * stretched / (RHO * L0)), stretched),  # rho_l = rho L0 / l
-        (2, np.sqrt(T * stretched / (RHO * L0)), stretched),
-        (1, np.sqrt(EA / RHO), L0),
-    ]:
-        found = np.sqrt(np.sort(np.linalg.eigvalsh(axes[axis])))
-        string = np.pi * k * speed / span
-        error = 1 - found / string
-        bound = (k * np.pi / (2 * segments)) ** 2 / 6
-        low = k <= 3
-        assert (error[low] > 0).all()
-        assert (error[low] < bound[low]).all()
-        np.testing.assert_allclose(found, 2 * segments * speed / span * np.sin(k * np.pi / (2 * segments)), rtol=1e-8)
-
-
-def test_longitudinal_wave_is_damped_as_the_whole_cable_says():
-    """Of end velocities v apart at the right length, the damper gives C v, for every number of segments."""
-    for segments in (2, 7):
-        chain = LumpedChain(L0, EA, RHO, damping=3.0, segments=segments, gravity=(0.0, 0.0, 0.0))
-        state = chain.straight([0, 0, 0], [L0 * 1.01, 0, 0])
-        shares = np.arange(1, segments) / segments
-        state[chain.state_size // 2 :: 3] = 0.4 * shares
-        tensions = chain.dynamics(state, [0, 0, 0], [0, 0, 0], [L0 * 1.01, 0, 0], [0.4, 0, 0])[3]
-        np.testing.assert_allclose(tensions.full(), EA * 0.01 + 3.0 * 0.4, rtol=1e-10)
-
-
-def test_resting_chain_is_irvines_catenary():
-    """Equilibrium of 60 segments against the closed form: forces at both ends, half a segment's weight added."""
-    chain = LumpedChain(L0, 50.0, RHO, segments=60)
-    start, end = np.array([0.1, 0.2, 0.3]), np.array([1.5, -0.5, 1.0])
-    smooth = hang(start, end, L0, 50.0, RHO * 9.81)
-    state = chain.straight(start, end)
-    half = chain.state_size // 2
-    state[:half] = smooth.points(np.arange(1, 60) / 60).ravel()
-    place = ca.SX.sym("place", half)
-    ends = [start, np.zeros(3), end, np.zeros(3)]
-    pulled = chain.dynamics(ca.vertcat(place, np.zeros(half)), *ends)
-    balance = ca.Function("balance", [place], [pulled[0][half:]])
-    rest = ca.rootfinder("rest", "newton", balance)(state[:half])
-    _, start_force, end_force, _ = chain.dynamics(ca.vertcat(rest, np.zeros(half)), *ends)
-    weight = -UP * chain.end_mass * 9.81
-    np.testing.assert_allclose(start_force.full().ravel() + weight, smooth.start_force, atol=2e-3 * RHO * L0 * 9.81)
-    np.testing.assert_allclose(end_force.full().ravel() + weight, smooth.end_force, atol=2e-3 * RHO * L0 * 9.81)
-    np.testing.assert_allclose(rest.full().ravel(), state[:half], atol=2e-3)
-
-
-def test_chain_of_coincident_nodes_is_finite():
-    chain = LumpedChain(L0, EA, RHO, damping=1.0, segments=4)
-    outputs = chain.dynamics(np.zeros(chain.state_size), *[np.zeros(3)] * 4)
-    assert all(np.isfinite(value.full()).all() for value in outputs)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "field"),
-    [
-        ({"length": 0}, "length"),
-        ({"stiffness": -1}, "stiffness"),
-        ({"density": np.nan}, "density"),
-        ({"damping": -1}, "damping"),
-        ({"segments": 1}, "segments"),
-        ({"segments": 2.5}, "segments"),
-        ({"gravity": (0, 0)}, "gravity"),
-        ({"stiffness": "stiff"}, "stiffness"),
-    ],
-)
-def test_lumped_chain_refuses(arguments, field):
-    with pytest.raises(InputError, match=field):
-        LumpedChain(**({"length": L0, "stiffness": EA, "density": RHO} | arguments))
-
 
 # --- sag
 
@@ -384,8 +232,15 @@ def test_zero_radius_is_a_point_anchor():
     assert float(mixed.wraps[1]) > 0
 
 
-def test_pulley_motion_against_differences():
-    """dl/dB = -u, and both orders of length and direction along random smooth motions."""
+def over_pulley(anchor, axis, radius):
+    """Length and direction of a cable over a pulley as a function of its attachment."""
+    attachment = ca.SX.sym("attachment", 3)
+    leaving = exit_points(ca.DM(anchor), ca.DM(axis / np.linalg.norm(axis)), radius, attachment)
+    return ca.Function("over_pulley", [attachment], [leaving.lengths, leaving.directions], ["attachment"], ["l", "u"])
+
+
+def test_length_over_a_pulley_changes_along_the_cable():
+    """dl/dB = -u and du/dB, by CasADi and by differences."""
     rng = np.random.default_rng(9)
     r, step = 0.1, 2e-3
     weights = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
@@ -395,32 +250,18 @@ def test_pulley_motion_against_differences():
 
     anchors, axes, attachments = random_pulleys(rng, 60, r)
     for anchor, axis, B in zip(anchors, axes, attachments, strict=True):
-        motion = pulley_motion(anchor, 3 * axis, r)
-        dB, ddB = 0.3 * rng.normal(size=(2, 3))
-        still = np.zeros(3)
-        length, d_length, dd_length, u, d_u, dd_u = (v.full().ravel() for v in motion(B, dB, ddB))
-        along = [float(derivative(lambda h, d=d: motion(B + h * d, still, still)[0])) for d in np.eye(3)]
-        np.testing.assert_allclose(along, -u, atol=1e-8)
-
-        def at(t, B=B, dB=dB, ddB=ddB):
-            return B + dB * t + ddB * t**2 / 2
-
-        def place(t, motion=motion):
-            value = motion(at(t), still, still)
-            return np.r_[value[0].full().ravel(), value[3].full().ravel()]
-
-        def speed(t, motion=motion):
-            value = motion(at(t), dB + ddB * t, ddB)
-            return np.r_[value[1].full().ravel(), value[4].full().ravel()]
-
-        size = 1 + np.abs(dd_u).max()
-        np.testing.assert_allclose(derivative(place), np.r_[d_length, d_u], atol=1e-7 * size)
-        np.testing.assert_allclose(derivative(speed), np.r_[dd_length, dd_u], atol=1e-7 * size)
-        assert d_length == pytest.approx(-u @ dB, abs=1e-12)
+        cable = over_pulley(anchor, 3 * axis, r)
+        slopes = cable.factory("slopes", ["attachment"], ["l", "u", "jac:l:attachment", "jac:u:attachment"])
+        length, u, by_length, by_direction = (value.full() for value in slopes(B))
+        along = [derivative(lambda h, d=d: cable(B + h * d)[0].full()) for d in np.eye(3)]
+        turned = np.hstack([derivative(lambda h, d=d: cable(B + h * d)[1].full()) for d in np.eye(3)])
+        np.testing.assert_allclose(np.ravel(along), -u[:, 0], atol=1e-8)
+        np.testing.assert_allclose(by_length[0], -u[:, 0], atol=1e-12)
+        np.testing.assert_allclose(by_direction, turned, atol=1e-7 * (1 + np.abs(by_direction).max()))
         assert length > 0
 
 
-def test_pulley_motion_by_complex_step():
+def test_length_over_a_pulley_by_complex_step():
     """First order once more, of the formula written for complex numbers: exact to rounding."""
     r, B, dB = 0.1, np.array([0.5, 0.4, -0.9]), np.array([0.3, -0.2, 0.5])
 
@@ -432,9 +273,9 @@ def test_pulley_motion_by_complex_step():
 
     step = 1e-30
     slope = complex_length(B + 1j * step * dB).imag / step
-    motion = pulley_motion([0, 0, 0], [0, 0, 1], r)
-    assert float(motion(B, dB, np.zeros(3))[1]) == pytest.approx(slope, rel=1e-13)
-    assert float(motion(B, dB, np.zeros(3))[0]) == pytest.approx(complex_length(B + 0j).real, rel=1e-13)
+    length, u = (value.full().ravel() for value in over_pulley(np.zeros(3), UP, r)(B))
+    assert -u @ dB == pytest.approx(slope, rel=1e-13)
+    assert length == pytest.approx(complex_length(B + 0j).real, rel=1e-13)
 
 
 def test_symbols_and_batches():
@@ -445,19 +286,11 @@ def test_symbols_and_batches():
         value = function(np.array([[1.0, 1.0], [0.0, 0.0], [-1.0, -1.0]]))
         assert float(value[1]) == pytest.approx(np.sqrt(2))
         assert float(value[0]) > float(value[1])
-    motion = pulley_motion([0, 0, 0], [0, 0, 1], 0.1)
     points = np.random.default_rng(10).normal(size=(4, 5, 3)) - 3 * UP
-    batch = call(motion, {"attachment": points, "velocity": np.ones(3), "acceleration": np.zeros(3)})
-    assert batch["dd_direction"].shape == (4, 5, 3)
+    assert call(over_pulley(np.zeros(3), UP, 0.1), {"attachment": points})["u"].shape == (4, 5, 3)
 
 
 def test_outside_the_domain_is_nan():
-    motion = pulley_motion([0, 0, 0], [0, 0, 1], 0.1)
-    inside = motion([0.12, 0, 0.02], np.zeros(3), np.zeros(3))
-    assert all(np.isnan(value.full()).all() for value in (inside[0], inside[3]))
-    on_axis = motion([0, 0, -1], np.zeros(3), np.zeros(3))
-    assert np.isnan(on_axis[3].full()).any()
-    with pytest.raises(InputError, match="radius"):
-        pulley_motion([0, 0, 0], [0, 0, 1], -0.1)
-    with pytest.raises(InputError, match="axis"):
-        pulley_motion([0, 0, 0], [0, 0, 0], 0.1)
+    cable = over_pulley(np.zeros(3), UP, 0.1)
+    assert all(np.isnan(value.full()).all() for value in cable([0.12, 0, 0.02]))
+    assert np.isnan(cable([0, 0, -1])[1].full()).any()

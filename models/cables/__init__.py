@@ -4,8 +4,7 @@
 """
 
 from .element_chain import ElementChain
-from .lumped_chain import LumpedChain
-from .pulley import Exit, exit_points, pulley_motion
+from .pulley import Exit, exit_points
 from .sag import SaggingCable, hang
 
-__all__ = ["ElementChain", "Exit", "LumpedChain", "SaggingCable", "exit_points", "hang", "pulley_motion"]
+__all__ = ["ElementChain", "Exit", "SaggingCable", "exit_points", "hang"]

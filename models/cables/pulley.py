@@ -1,4 +1,4 @@
-r"""A swivelling pulley: where the cable leaves it, in which direction it pulls, how long it is, and how these change.
+r"""A swivelling pulley: where the cable leaves it, in which direction it pulls, how long it is.
 
 The cable comes up the swivel axis k, touches the sheave at the anchor A and runs on along +k over the sheave. The
 sheave, of radius r, turns about the axis so that its plane holds the attachment B. With e the unit vector across the
@@ -20,8 +20,7 @@ touches the axis at A; inside it no cable is tangent, and everything is nan. On 
 direction to turn to: point and direction are nan there, and close to it, below A, they jump when B passes to the other
 side.
 
-Source: the usual model of a swivel pulley, as in A. Pott, Cable-Driven Parallel Robots, Springer, 2018, derived anew;
-the second order by algorithmic differentiation.
+Source: the usual model of a swivel pulley, as in A. Pott, Cable-Driven Parallel Robots, Springer, 2018, derived anew.
 """
 
 from typing import Any, NamedTuple
@@ -30,7 +29,6 @@ import casadi as ca
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.inputs import HUGE, TINY, number
 from ..batch import as_array
 from ..rotation import Matrix
 
@@ -106,51 +104,3 @@ def _over_sheave(anchor: Matrix, axis: Matrix, radius: float, attachment: Matrix
     t = ((s * out + radius * up) * e + (s * up - radius * out) * axis) / D_squared
     wrap = np.pi - ca.atan2(s, radius) - ca.atan2(up, out)
     return Exit(anchor + radius * (e + n), -t, radius * wrap + s, wrap)
-
-
-def pulley_motion(anchor: Any, axis: Any, radius: float) -> ca.Function:
-    """Return length and direction of a cable over a pulley at rest, with their first and second time derivatives.
-
-    Parameters
-    ----------
-    anchor
-        A in the frame that the pulley rests in, as that of a carrier [m], (3,).
-    axis
-        Swivel axis in the same frame, (3,), of any length.
-    radius
-        R [m]; zero: a point anchor.
-
-    Returns
-    -------
-    CasADi Function
-        Inputs `attachment`, `velocity`, `acceleration`: B and its time derivatives in that frame, (3,) each. Outputs
-        `length`, `d_length`, `dd_length` [m, m/s, m/s^2] and `direction`, `d_direction`, `dd_direction`, (3,) each.
-
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value.
-    """
-    anchor = as_array("anchor", anchor, (3,)).reshape(3)
-    axis = as_array("axis", axis, (3,)).reshape(3)
-    axis = axis / number("the length of axis", np.linalg.norm(axis), TINY, HUGE)
-    radius = number("radius", radius, 0.0, HUGE)
-    motion = [ca.SX.sym(name, 3) for name in ("attachment", "velocity", "acceleration")]
-    leaving = exit_points(ca.DM(anchor), ca.DM(axis), radius, motion[0])
-    outputs = [
-        value
-        for quantity in (leaving.lengths, leaving.directions)
-        for value in (quantity, *time_derivatives(quantity, *motion))
-    ]
-    names = ["attachment", "velocity", "acceleration"]
-    results = ["length", "d_length", "dd_length", "direction", "d_direction", "dd_direction"]
-    return ca.Function("pulley_motion", motion, outputs, names, results)
-
-
-def time_derivatives(
-    value: Matrix, coordinates: Matrix, velocity: Matrix, acceleration: Matrix
-) -> tuple[Matrix, Matrix]:
-    """Return first and second time derivative of an SX or MX column `value` of `coordinates` that move as given."""
-    first = ca.jtimes(value, coordinates, velocity)
-    second = ca.jtimes(first, coordinates, velocity) + ca.jtimes(value, coordinates, acceleration)
-    return first, second
