@@ -20,3 +20,18 @@ def chromium():
         opened = started.chromium.launch(executable_path=CHROMIUM, args=list(WEBGL))
         yield opened
         opened.close()
+
+
+@contextlib.contextmanager
+def watched(browser, *own):
+    """Open a page; yield it, and the list of its errors and of what it asks for that does not begin with one of `own`.
+
+    A page costs its process half a second, so the tests of a module share one.
+    """
+    page, wrong = browser.new_page(), []
+    page.set_default_timeout(PATIENCE)
+    page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("request", lambda asked: None if asked.url.startswith(own) else wrong.append(asked.url))
+    yield page, wrong
+    page.close()

@@ -17,7 +17,7 @@ from towline.viewer import read, save_page
 from towline.viewer.posing import at_rest_with
 from towline.viewer.subject import Subject
 
-from .chromium import PATIENCE, chromium
+from .chromium import chromium, watched
 
 ROOT = Path(__file__).parents[1]
 ROBOTS = [
@@ -33,9 +33,9 @@ SIZES = {"desk": (1600, 1000), "phone": (400, 800)}
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with chromium() as opened:
-        yield opened
+def kept_open():
+    with chromium() as browser, watched(browser, "file:", "data:") as (page, wrong):
+        yield page, wrong
 
 
 @pytest.fixture(scope="module")
@@ -45,26 +45,21 @@ def files(tmp_path_factory):
 
 
 @pytest.fixture
-def opened(browser, files):
-    """Open a robot's page, and fail if anything is wrong in it or it asks for anything but itself."""
-    pages, wrong = [], []
+def opened(kept_open, files):
+    """Open the page of a robot, or a file, and fail if anything is wrong in it or it asks for anything but itself."""
+    page, wrong = kept_open
 
     def load_page(name, size="desk", after=""):
         width, height = SIZES[size]
-        page = browser.new_page(viewport={"width": width, "height": height})
-        page.set_default_timeout(PATIENCE)
-        page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-        page.on("pageerror", lambda error: wrong.append(str(error)))
-        page.on("request", lambda asked: None if asked.url.startswith(("file:", "data:")) else wrong.append(asked.url))
-        page.goto(files[name].as_uri() + after)
+        page.goto("about:blank")  # an address that differs only after a # would not be loaded
+        page.set_viewport_size({"width": width, "height": height})
+        page.goto(files.get(name, name).as_uri() + after)
         page.wait_for_function("window.towline")
-        pages.append(page)
         return page
 
     yield load_page
-    for page in pages:
-        page.close()
-    assert wrong == []
+    found, wrong[:] = wrong[:], []
+    assert found == []
 
 
 def poses(robot, count, seed):
@@ -210,7 +205,7 @@ def test_a_link_with_another_pose_opens_at_home(opened, after):
 @pytest.mark.parametrize(
     ("size", "force", "limits", "z"), [(1e-3, 1e-5, "mN", "0.00075 m"), (100, 1e6, "MN", "75.000 m")]
 )
-def test_robots_of_other_sizes_have_numbers_that_can_be_read(browser, tmp_path, size, force, limits, z):
+def test_robots_of_other_sizes_have_numbers_that_can_be_read(opened, tmp_path, size, force, limits, z):
     robot = load("planar-4")
     data = robot.model_dump(mode="json")
     data["platform"] |= {
@@ -221,9 +216,7 @@ def test_robots_of_other_sizes_have_numbers_that_can_be_read(browser, tmp_path, 
     for cable in data["cables"]:
         cable |= {name: [size * one for one in cable[name]] for name in ("anchor", "attachment")}
         cable |= {name: force * cable[name] for name in ("t_min", "t_max")}
-    page = browser.new_page()
-    page.goto(save_page(Subject("sized", type(robot).model_validate(data)), tmp_path / "sized.html").as_uri())
-    page.wait_for_function("window.towline")
+    page = opened(save_page(Subject("sized", type(robot).model_validate(data)), tmp_path / "sized.html"))
     prefix, wanted = limits[0], solve(pose_problem(Dynamics(robot), robot.home)).tensions
     unit = {"m": 1e-3, "M": 1e6}[prefix]
     assert page.locator("#cables td:nth-child(2)").all_inner_texts() == [
@@ -232,7 +225,6 @@ def test_robots_of_other_sizes_have_numbers_that_can_be_read(browser, tmp_path, 
     assert page.inner_text("#limits") == f"limits [{limits}]"
     assert page.locator("#cables td:last-child").first.inner_text() == f"{5 * force / unit:g} to {200 * force / unit:g}"
     assert z in page.locator("output").all_inner_texts()
-    page.close()
 
 
 def test_names_from_files_stay_text(tmp_path):

@@ -1,7 +1,7 @@
 """Pages of reports in headless Chromium: on a phone nothing is cut, in the dark they are dark, links unfold claims."""
 
 import re
-import shutil
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,12 +13,9 @@ from towline.studies.accounts import page as accounts
 from towline.studies.accounts.account import Account, Chapter, Paper
 from towline.studies.accounts.claim import Claim, Verdict
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-if CHROMIUM is None:
-    pytest.skip("no browser is installed; to run these: apt-get install chromium", allow_module_level=True)
-playwright = pytest.importorskip("playwright.sync_api", reason="to run these: pip install playwright")
+from .chromium import chromium, watched
 
-PHONE = {"width": 400, "height": 800}
+PHONE, DESK = {"width": 400, "height": 800}, {"width": 1280, "height": 800}
 LEAST_CONTRAST = 4.5  # of text with its background: level AA of WCAG
 BEYOND = """() => [...document.querySelectorAll("body *")].filter(
   element => element.getBoundingClientRect().right > window.innerWidth + 0.5 && !element.closest("pre")
@@ -29,11 +26,19 @@ SCROLLING = """() => [...document.querySelectorAll("table, div, td")].filter(
 
 
 @pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as started:
-        chromium = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
+def kept_open():
+    with chromium() as browser, watched(browser) as (page, wrong):
+        yield page
+        assert wrong == []
+
+
+@pytest.fixture
+def page(kept_open):
+    """The one page of these tests, on a desk."""
+    kept_open.goto("about:blank")  # of an address, what a link before added
+    kept_open.set_viewport_size(DESK)
+    kept_open.emulate_media(color_scheme="light")
+    return kept_open
 
 
 def drawing():
@@ -42,6 +47,7 @@ def drawing():
     return Drawing("A plot", canvas)
 
 
+@cache
 def report():
     """A page as a plan has it, with rows that are longer than a phone is wide."""
     rows = [("stage " + "x" * 30, "1.2 m/s^2", "a long text " * 8, *("12 345.67 N",) * 4)] * 3
@@ -51,6 +57,7 @@ def report():
     return html.page("A plan", "feasible", "margin 1.2 N", style.colour(0), parts)
 
 
+@cache
 def account():
     """The page of an account with as many claims as those of the papers have."""
     words = ("Eq. 12", "the wrench matrix has the rank 6 at every pose of the workspace " * 2, None, "rank 5")
@@ -63,20 +70,19 @@ def account():
 
 
 @pytest.mark.parametrize("make", [report, account])
-def test_nothing_is_cut_on_a_phone(make, browser):
-    page = browser.new_page(viewport=PHONE)
+def test_nothing_is_cut_on_a_phone(make, page):
+    page.set_viewport_size(PHONE)
     page.set_content(make())
     page.evaluate("() => document.querySelectorAll('details').forEach(one => { one.open = true })")
     assert page.evaluate("() => document.documentElement.scrollWidth") <= PHONE["width"]
     assert page.evaluate(BEYOND) == []
     assert page.evaluate(SCROLLING) == []
-    page.close()
 
 
 @pytest.mark.parametrize("make", [report, account])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_is_legible_in_either_scheme(make, scheme, browser):
-    page = browser.new_page(color_scheme=scheme)
+def test_text_is_legible_in_either_scheme(make, scheme, page):
+    page.emulate_media(color_scheme=scheme)
     page.set_content(make())
     paper = luminance(page, "body", "backgroundColor")
     assert paper < 0.05 if scheme == "dark" else paper > 0.9
@@ -84,7 +90,6 @@ def test_text_is_legible_in_either_scheme(make, scheme, browser):
         ink = luminance(page, selector, "color")
         light, dark = max(ink, paper), min(ink, paper)
         assert (light + 0.05) / (dark + 0.05) >= LEAST_CONTRAST, selector
-    page.close()
 
 
 def luminance(page, selector, colour):
@@ -94,8 +99,7 @@ def luminance(page, selector, colour):
     return float(np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722])
 
 
-def test_a_link_leads_to_its_claim_and_unfolds_it(browser):
-    page = browser.new_page()
+def test_a_link_leads_to_its_claim_and_unfolds_it(page):
     page.set_content(account())
     entry = page.locator("#errata a").first
     target = page.locator(f'[id="{entry.get_attribute("href")[1:]}"]')
@@ -105,11 +109,8 @@ def test_a_link_leads_to_its_claim_and_unfolds_it(browser):
     assert "it has rank 5" in target.inner_text()
     hrefs = page.evaluate("() => [...document.querySelectorAll('a')].map(one => one.getAttribute('href').slice(1))")
     assert all(page.evaluate("id => document.getElementById(id) !== null", href) for href in hrefs)
-    page.close()
 
 
-def test_eighty_claims_are_a_page_that_can_be_overlooked(browser):
-    page = browser.new_page(viewport={"width": 1280, "height": 800})
+def test_eighty_claims_are_a_page_that_can_be_overlooked(page):
     page.set_content(account())
     assert page.evaluate("() => document.documentElement.scrollHeight") < 15 * 800
-    page.close()
