@@ -16,7 +16,6 @@ LIVE := viewer/live/robot_at_rest.c $(sort $(wildcard core/*.h $(patsubst %,core
 demo: .venv/core.stamp
 	$(BIN)/towline demo
 
-# The type checker takes minutes with one processor: it runs beside the tests.
 test: .venv/dev.stamp
 	$(MAKE) --jobs=2 lint docs
 	$(MAKE) --jobs=2 types unit
@@ -29,7 +28,7 @@ lint: .venv/dev.stamp
 	$(BIN)/clang-format --dry-run -Werror --style=file:core/.clang-format core/*.h core/*/*.[ch] export/fmu/sources/*.[ch] viewer/live/*.c
 
 types: .venv/dev.stamp
-	$(BIN)/basedpyright --pythonpath $(BIN)/python
+	$(BIN)/pyrefly check --python-interpreter-path $(BIN)/python
 
 # Each worker starts with half of the tests in order, so that what a file's tests share is computed once. Linear algebra has
 # one thread: two workers with two each would wait for one another.
@@ -81,6 +80,7 @@ clean:
 .venv/venv.stamp:
 	@$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "towline needs python3 >= 3.11, this is " + sys.version.split()[0] + ": make PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
 	touch $@
 
 .venv/core.stamp: pyproject.toml constraints.txt $(CORE) | .venv/venv.stamp

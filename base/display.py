@@ -97,7 +97,7 @@ def brief(value: Any) -> str:
     """Return a field in a few words."""
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
-    if isinstance(value, float | int | np.number):
+    if isinstance(value, float | int | np.floating | np.integer):
         return quantity(value.item() if isinstance(value, np.number) else value)
     if isinstance(value, np.ndarray):
         if value.ndim == 1 and value.size <= FEW and value.dtype.kind in "fiu":

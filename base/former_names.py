@@ -22,7 +22,7 @@ NOW = {
     "solvers.core": "core",
 }
 # Where each name is now, and its new name if it was renamed: the old one goes with the next release.
-MOVED = {
+MOVED: dict[tuple[str | None, str], tuple[str, str | None]] = {
     (None, "Flight"): ("simulation", "Simulation"),
     (None, "Timing"): ("ocp", "Plan"),
     ("ocp", "Timing"): ("ocp", "Plan"),

@@ -58,7 +58,7 @@ class _Spawning(SpawnContext):
         self._ended = False
         _running.add(self)
 
-    def Process(self, *args: Any, **kwargs: Any) -> SpawnProcess:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def Process(self, *args: Any, **kwargs: Any) -> SpawnProcess:  # pyrefly: ignore[bad-override]
         """Return a process that is not started yet, as the executor makes it."""
         process = _Process(*args, **kwargs)
         process.started_by = self

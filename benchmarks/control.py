@@ -107,7 +107,8 @@ class Recording(Predictive):
 
     def __init__(self, robot: Robot, **options: Any):
         super().__init__(robot, **options)
-        self._horizon = self.keeping = Keeping(self._horizon)
+        self.keeping = Keeping(self._horizon)
+        self._horizon = self.keeping  # pyrefly: ignore[bad-override-mutable-attribute]
 
 
 def record(task: Task, robot: Robot, steps: int) -> list[Program]:
@@ -218,7 +219,7 @@ def _steps(task: Task, robot: Robot, steps: int) -> list[Step]:
 
 def _errors(task: Task, robot: Robot, steps: int, seeds: int) -> list[Error]:
     """Fly all seeds with each controller."""
-    given = {**task.conditions(), "duration": steps * 1e-3, "runs": seeds}
+    given: dict[str, Any] = {**task.conditions(), "duration": steps * 1e-3, "runs": seeds}
     accepted, _ = _accepted(task, robot)
     flown = {name: simulate(robot, robot.home, make(robot), **given) for name, make in accepted.items()}
     known, rows = flown[STANDARD]["error_max"].values, []

@@ -169,7 +169,7 @@ def _over_and_over(rows: Array) -> Array:
     return np.tile(rows, (-(-BATCH // len(rows)),) + (1,) * (rows.ndim - 1))
 
 
-def _daqp_arguments(task: Task) -> list[tuple[Array, ...]]:
+def _daqp_arguments(task: Task) -> list[tuple[Any, ...]]:
     arguments = []
     for qp in task.qps:
         sense = np.zeros(qp["q"].size + qp["b"].size, dtype=np.int32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -136,7 +136,7 @@ def _of_log(
     if picture is not None:
         drawn = calibration.consistency(found.estimate.residuals, found.cost, found.largest, found.times)
         files.append(style.save(drawn, picture))
-    data = {"robot": robot.name, **found.to_dict(), "notes": read.notes, "files": files}
+    data: dict[str, Any] = {"robot": robot.name, **found.to_dict(), "notes": read.notes, "files": files}
     if as_json:
         print_json(data)
     else:

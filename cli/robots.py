@@ -71,7 +71,7 @@ def robots(
 def _list(library: list[dict[str, Any]], as_json: bool) -> None:
     from ..base.text import quantity
 
-    rows = [{**robot, "carriers": _count(robot["carriers"])} for robot in library]
+    rows: list[dict[str, Any]] = [{**robot, "carriers": _count(robot["carriers"])} for robot in library]
     if as_json:
         print_json({"robots": rows})
         return

@@ -239,6 +239,6 @@ def _without(robot: Robot, index: int, options: dict[str, Any]) -> Rest | None:
     offsets = found.carrier_pose.copy()
     offsets[:, :3] -= home[:3]
     offsets[:, :2] = offsets[:, :2] @ np.array([[c, -s], [s, c]])
-    options = {"reach": (ROOM * float(lengths.mean()), 0.0)} | options
+    options = {"reach": (ROOM * float(lengths.mean()), 0.0), **options}
     controller = Others(Robot.model_validate(data), **options)
     return Rest(carriers, cables, controller, found.pose[3:5] - home[3:5], offsets, found.tensions)

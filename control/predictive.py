@@ -170,6 +170,7 @@ class Predictive(ComputedTorque):
         rates = 2 * self._bandwidth + float(self._settings["observer"])
         self._watch = Watch(scale, usual, None if correct else ripple(self.robot, self._limits, rates))
         self._from_the_start: HandOver | None = None
+        self.handed_over: HandOver | None
         self.reset()
         if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
             self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def convergence(iterates: Sequence[Iterate]) -> Figure:
     starts = np.cumsum([0, *(len(part) for part in parts)])
     for index, (part, start) in enumerate(zip(parts, starts, strict=False)):
         at = start + np.arange(len(part))
-        look = {**style.look(index), "marker": ".", "markersize": 3, "label": f"run {index + 1}"}
+        look: dict[str, Any] = {**style.look(index), "marker": ".", "markersize": 3, "label": f"run {index + 1}"}
         above.plot(at, np.maximum(part[:, 2], FLOOR), **look)
         below.plot(at, part[:, 1], **look)
     for ax in (above, below):

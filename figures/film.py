@@ -94,7 +94,7 @@ def _write_mp4(path: Path, draw: Draw, count: int, rate: float, program: str) ->
             try:
                 assert process.stdin is not None
                 for k in range(count):
-                    process.stdin.write(np.ascontiguousarray(draw(k)))
+                    process.stdin.write(np.ascontiguousarray(draw(k)).data)
                 process.stdin.close()
             except BrokenPipeError:
                 pass  # its exit code and its last line give the reason

@@ -111,8 +111,17 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> None:
     if missing.any():
         shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N", digits=3)
         label = f"no tensions inside the limits:\nshortfall up to {shortfall}; thin\nlines: needed without limits"
-        across = {"transform": ax.get_xaxis_transform(), "step": "mid", "label": label}
-        ax.fill_between(time, 0, 1, where=missing, color="#e4e4e4", linewidth=0, **across)
+        ax.fill_between(
+            time,
+            0,
+            1,
+            where=missing,
+            step="mid",
+            transform=ax.get_xaxis_transform(),
+            color="#e4e4e4",
+            linewidth=0,
+            label=label,
+        )
     _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
 
 

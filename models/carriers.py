@@ -377,7 +377,7 @@ class QuadrotorCarrier(Carrier):
 def _adapter(classes: tuple[type[Carrier], ...]) -> TypeAdapter[Carrier]:
     """Return the check of a carrier of one of these classes, chosen by its kind."""
     one: Any = reduce(or_, classes)
-    return TypeAdapter(Annotated[one, Field(discriminator="kind")])  # pyright: ignore[reportArgumentType, reportInvalidTypeForm]
+    return TypeAdapter(Annotated[one, Field(discriminator="kind")])
 
 
 class _ByKind:

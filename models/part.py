@@ -58,7 +58,7 @@ class Part(Displayed, BaseModel):
             raise InputError(one_line(error, type(self).__name__.lower(), type(self))) from None
 
     # As of pydantic's own: parts inside of parts are checked without a call of it, so that errors keep their place.
-    __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
+    __init__.__pydantic_base_init__ = True  # pyrefly: ignore[missing-attribute]
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:

@@ -37,7 +37,7 @@ class Sphere(Part, _Round):
 
     kind: Literal["sphere"]
     centre: Vector3 = Field(description="centre [m]")
-    radius: Positive = Field(description="radius [m]")
+    radius: Positive = Field(description="radius [m]")  # pyrefly: ignore[bad-override]
 
 
 class Capsule(Part, _Round):
@@ -46,7 +46,7 @@ class Capsule(Part, _Round):
     kind: Literal["capsule"]
     start: Vector3 = Field(description="start of the axis [m]")
     end: Vector3 = Field(description="end of the axis [m]")
-    radius: Positive = Field(description="radius [m]")
+    radius: Positive = Field(description="radius [m]")  # pyrefly: ignore[bad-override]
 
 
 class Block(Part):

@@ -23,7 +23,7 @@ def complete(rows: np.ndarray, cables: int, carriers: int, period: float) -> np.
     sudden[1:-1] = np.abs(np.diff(pose, 2, axis=0)) > layout.SUDDEN * period**2
     for before, order in ((pose, 1), (motion[:, 1], 2)):
         change = before - before[:1]  # exactly 0 of what rests
-        slope = np.gradient(change, period, axis=0, edge_order=min(2, K - 1)) if K > 1 else change
+        slope = np.gradient(change, period, axis=0, edge_order=2 if K > 2 else 1) if K > 1 else change
         slope[sudden | ~(np.abs(slope) <= layout.SUDDEN)] = 0.0
         motion[:, order] = np.where(np.isnan(motion[:, order]), slope, motion[:, order])
     return rows

@@ -176,7 +176,7 @@ class Windows:
             add(carrier_pose[:, index, 3:])
             add(thrusts[:, [index]])
         named = {"lengths": of.lengths, "tensions": of.tensions}
-        noisy = {name: values.copy() for name, values in named.items() if values is not None}
+        noisy: dict[str, Any] = {name: values.copy() for name, values in named.items() if values is not None}
         for values in noisy.values():
             add(values)
         other = copy(self)

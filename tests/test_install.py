@@ -121,16 +121,17 @@ def test_an_editable_installation_runs_the_sources(editable):
 
 
 def test_type_checkers_follow_an_editable_installation(editable, tmp_path):
-    checker = shutil.which("basedpyright", path=str(Path(sys.executable).parent)) or shutil.which("basedpyright")
+    checker = shutil.which("pyrefly", path=str(Path(sys.executable).parent)) or shutil.which("pyrefly")
     if checker is None:
-        pytest.skip("basedpyright is not installed; to run this: pip install basedpyright")
+        pytest.skip("pyrefly is not installed; to run this: pip install pyrefly")
     calls = ('load("cogiro")', 'plan(load("cogiro"), "lift.yaml")')
     code = "\n".join(["from towline import load, plan", *(f"reveal_type({call})" for call in calls)])
     (tmp_path / "user.py").write_text(code)
-    command = [checker, "--outputjson", "--pythonpath", editable[0] / "bin" / "python", "user.py"]
+    interpreter = editable[0] / "bin" / "python"
+    command = [checker, "check", "--python-interpreter-path", interpreter, "--output-format", "json", "user.py"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    types = [each["message"].rpartition(" is ")[2] for each in json.loads(done.stdout)["generalDiagnostics"]]
-    assert types == ['"Robot"', '"Plan"'], done.stdout
+    texts = [each["description"] for each in json.loads(done.stdout)["errors"]]
+    assert texts == ["revealed type: Robot", "revealed type: Plan"], done.stdout
 
 
 def test_editors_complete_the_names_of_an_editable_installation(editable):

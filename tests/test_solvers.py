@@ -343,7 +343,7 @@ def test_wrong_choices_list_what_there_is(arguments, message):
 
 def test_solving_something_else_is_told():
     with pytest.raises(InputError, match=r"problem must be a TensionProblem, got an array .*, a ndarray"):
-        solve(A8)  # pyright: ignore[reportArgumentType]
+        solve(A8)
 
 
 def test_a_problem_keeps_its_own_read_only_copy():

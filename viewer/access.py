@@ -67,7 +67,7 @@ def guarded(listening: str, asked: Callable[[str], None] | None = None) -> Itera
             super().__init__(*args, process_request=_checked(process_request, listening, asked), **options)
 
     with _ONE_AT_A_TIME:
-        websockets_server.serve = Guarded
+        websockets_server.serve = Guarded  # pyrefly: ignore[bad-assignment]
         try:
             yield started
         finally:

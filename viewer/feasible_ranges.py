@@ -53,7 +53,8 @@ class Strips:
 
     def __init__(self, robot: Robot, settings: list[Slider], write: Callable[[list[str]], None]):
         self._robot, self._settings, self._write = robot, settings, write
-        self._changed, self._wanted, self._closed = Condition(), None, False
+        self._changed, self._closed = Condition(), False
+        self._wanted: tuple[np.ndarray, np.ndarray] | None = None  # what the thread is to do next
         Thread(target=self._follow, daemon=True).start()
 
     def want(self, pose: np.ndarray, carriers: np.ndarray) -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.display import Displayed
-from ..base.errors import InputError
 from ..models import Robot
 from .boundary_mesh import Mesh, boundary_of_values
 from .conditions.margin import Margin
@@ -126,7 +125,7 @@ def _varies(dataset: xr.Dataset, robot: Robot) -> bool:
         return True
     try:
         domain = Domain.of(robot, Region.model_validate(json.loads(dataset.attrs["region"])))
-    except (KeyError, TypeError, ValueError, RecursionError, InputError):  # the file of another program
+    except (KeyError, TypeError, ValueError, RecursionError):  # the file of another program
         return False
     return domain.attitude_varies or domain.carriers_vary
 

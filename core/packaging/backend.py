@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import compiler
+import compiler  # pyrefly: ignore[missing-import]
 from setuptools import build_meta
-from setuptools.build_meta import *  # noqa: F403  # pyright: ignore[reportWildcardImportFromLibrary]
+from setuptools.build_meta import *  # noqa: F403
 
 
 def get_requires_for_build_wheel(config_settings: Any = None) -> list[str]:

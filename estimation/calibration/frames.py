@@ -37,7 +37,7 @@ class Frames(NamedTuple):
         return (position + rotation @ b) @ T.T + t, T @ rotation @ B
 
     def __str__(self) -> str:
-        texts = []
+        texts: list[str] = []
         for (shift, turn), what in (
             (self.outer, "the poses seem to be measured in a frame that is"),
             (self.inner, "the poses look like those of a body whose frame is, seen from the platform frame,"),

@@ -259,10 +259,10 @@ class Model(Displayed):
         base_position, base_rotation, velocity, rate = self._base(state.x[parameters.clock])
         position, rotation = base_position + state.shift, state.turn @ base_rotation
         arms = np.matmul(table[:, None, None, 3:6], np.swapaxes(rotation, 1, 2))[:, :, 0]  # (m, N, 3), R b
-        moving = self.carriers and self.carriers.at(state.x[parameters.clock])
+        moving = None if self.carriers is None else self.carriers.at(state.x[parameters.clock])
         at = carriers_of(robot, self.measurements) if moving is None else moving.poses
         run = runs(robot, table, position, rotation, at)
-        carried = moving and moving.of_cables(robot, position + arms)
+        carried = None if moving is None else moving.of_cables(robot, position + arms)
         slip, y = self.slips(state.x), self.measurements.lengths.T
         stretch, tensions, by_errors = self._stretch(state)
         scale0 = parameters.table(parameters.first)[:, 7:8]
@@ -280,9 +280,10 @@ class Model(Displayed):
             turned = Rotation.from_matrix(state.turn).as_rotvec()
             moved = np.concatenate([state.shift, turned, state.errors], axis=1)
             poses[held] = moved[held] / sigmas[held]
-        forces = self.balanced and self.balanced.at(
-            parameters, state.x, (position, rotation), self.ahead, self.noise, derive
-        )
+        forces = None
+        if self.balanced is not None:
+            placed = position, rotation
+            forces = self.balanced.at(parameters, state.x, placed, self.ahead, self.noise, derive)
         weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
         in_balance = np.zeros((len(position), 6)) if forces is None else forces.residuals * weighs[:, None]
         by_prior = (state.x - parameters.first) / self.prior_sigmas

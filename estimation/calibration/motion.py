@@ -44,10 +44,10 @@ class Motion(NamedTuple):
         """Return the motion with that of the platform at the times (N,) + `clock` [s]; its ends stay as they are."""
         if times is None or clock == 0.0:
             return self
-        names = ("gravity", "rate", "spin", "turning")
-        values = np.hstack([getattr(self, name) for name in names])
+        values = np.hstack([self.gravity, self.rate, self.spin, self.turning])
         moved = np.stack([np.interp(times + clock, times, column) for column in values.T], axis=1)
-        return self._replace(**dict(zip(names, np.split(moved, 4, axis=1), strict=True)))
+        gravity, rate, spin, turning = np.split(moved, 4, axis=1)
+        return self._replace(gravity=gravity, rate=rate, spin=spin, turning=turning)
 
     def only(self, rows: np.ndarray) -> Motion:
         """Return the motion at some samples, (k,)."""

@@ -28,7 +28,10 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
     moving = [] if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
     carriers: dict[str, list[str]] = {}
     try:
-        found, problem = fields_of(recordings, given, robot and robot.m, moving, free_axes(robot)), None
+        found, problem = (
+            fields_of(recordings, given, None if robot is None else robot.m, moving, free_axes(robot)),
+            None,
+        )
         for name in moving:
             of = carrier_fields(recordings, given, name)
             carriers[name] = [one.label for one in (*of.position, *of.orientation, *of.thrusts, *of.directions)]

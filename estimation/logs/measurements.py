@@ -229,7 +229,8 @@ class Measurements(Displayed):
 def changed(measurements: Measurements, **new: Any) -> Measurements:
     """Return measurements with other arguments; raise InputError as the class does."""
     given: dict[str, Any] = {name: getattr(measurements, name) for name in ARRAYS}
-    return Measurements(**{**given, "sigma": measurements.sigma._asdict(), **new})
+    given |= {"sigma": measurements.sigma._asdict(), **new}
+    return Measurements(**given)
 
 
 def check_measurements(robot: Robot, measurements: object) -> Measurements:

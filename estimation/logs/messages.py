@@ -239,7 +239,7 @@ def _decoder(encoding: str, schema: Any) -> Decoder | None:
         return lambda data: json.loads(data, object_hook=lambda parts: SimpleNamespace(**parts))
     if encoding == "protobuf" and schema is not None:
         try:
-            from mcap_protobuf.decoder import DecoderFactory  # pyright: ignore
+            from mcap_protobuf.decoder import DecoderFactory  # pyrefly: ignore[missing-import]
         except ImportError:
             return None
         return DecoderFactory().decoder_for(encoding, schema)

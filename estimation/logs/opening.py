@@ -30,7 +30,7 @@ def recordings(paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]])
     """
     several = isinstance(paths, Sequence) and not isinstance(paths, str | bytes)
     files: list[Path] = []
-    for given in paths if several else [paths]:  # pyright: ignore
+    for given in paths if several else [paths]:
         path = file_path("log", given, f"the path of {WHAT}")
         parts = sorted(part for part in path.iterdir() if part.suffix in PARTS) if os.path.isdir(path) else [path]
         if not parts:

@@ -177,7 +177,7 @@ def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Lo
         recorded[name] = np.pad(part, ((0, 0), (0, 0), (0, 1)), constant_values=np.nan) if flat else part
     world, note = next(iter(recorded.values())), None
     if robot is not None:
-        world, note = in_world(robot, measured, recorded, given and given.directions_in)
+        world, note = in_world(robot, measured, recorded, None if given is None else given.directions_in)
     return read._replace(measurements=measured.with_directions(world), notes=[*read.notes, *([note] if note else [])])
 
 

@@ -250,7 +250,7 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
         known_covariance=excess**2 * covariances,
     )
     times = None if given.times is None else given.times + begin
-    return LogPoses(estimate, times, squares / excess**2, more, excess, misread and misread.text)
+    return LogPoses(estimate, times, squares / excess**2, more, excess, None if misread is None else misread.text)
 
 
 def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[np.ndarray, ...]:

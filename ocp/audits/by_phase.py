@@ -57,7 +57,7 @@ def worst_certificate(scenario: Scenario, time: float, platform: Motion, carrier
     """
     robot, phase = scenario.robot, scenario.phases.at(time)
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers)
-    proofs = []
+    proofs: list[Certificate] = []
     for wind, extreme in scenario.cases_at(platform.pose, platform.velocity):
         motion = Motion(*(part[None] for part in platform))
         w = scenario.required_wrench(np.array([time]), motion, wind=wind, extreme=extreme)

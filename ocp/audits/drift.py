@@ -42,7 +42,7 @@ def drift(scenario: Scenario, times: np.ndarray, motion: Motion, carriers: Motio
     starts = np.arange(0, intervals - 2 * pairs + 1, 2 * pairs)
     forward, plan = _forward(scenario), (motion, carriers, tensions)
     of_pairs = forward.mapaccum(pairs)
-    ends = np.array([_run(of_pairs, plan, start, pairs, 1, step)[-1] for start in starts])
+    ends = np.array([_run(of_pairs, plan, start, pairs, 1, step)[-1] for start in starts.tolist()])
     windows = _differences(ends, motion.pose[starts + 2 * pairs])
     stride = max(int(np.ceil(intervals / 2 / MOST_STEPS)), 1)
     count = intervals // (2 * stride)

@@ -56,11 +56,10 @@ class AtRest:
         robot, function = self.scenario.robot, self.scenario.limits.function
         arguments = [*(np.zeros(18) for _ in range(1 + len(robot.carriers))), np.zeros(robot.m), np.zeros(6)]
         values = np.zeros(function.numel_out(0))
-        buffer: Any
         buffer, evaluate = function.buffer()
         for i, argument in enumerate(arguments):
-            buffer.set_arg(i, argument.data)
-        buffer.set_res(0, values.data)
+            buffer.set_arg(i, argument.data)  # pyrefly: ignore[missing-argument]
+        buffer.set_res(0, values.data)  # pyrefly: ignore[missing-argument]
         return buffer, evaluate, arguments, values
 
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -47,13 +47,12 @@ def in_blocks(block: ca.Function, arguments: list[np.ndarray]) -> np.ndarray:
     n = len(arguments[0])
     whole = [np.concatenate([each, np.repeat(each[-1:], -n % BLOCK, axis=0)]) for each in arguments]
     values = np.empty((len(whole[0]), block.size1_out(0)))
-    buffer: Any  # in place: as DM the arguments would take longer than all that is computed
-    buffer, evaluate = block.buffer()
+    buffer, evaluate = block.buffer()  # in place: as DM the arguments would take longer than all that is computed
     for start in range(0, len(values), BLOCK):
         rows = slice(start, start + BLOCK)
         for i, each in enumerate(whole):
-            buffer.set_arg(i, each[rows].data)
-        buffer.set_res(0, values[rows].data)
+            buffer.set_arg(i, each[rows].data)  # pyrefly: ignore[missing-argument]
+        buffer.set_res(0, values[rows].data)  # pyrefly: ignore[missing-argument]
         evaluate()
     return values[:n]
 

@@ -1,6 +1,7 @@
 """Write the rows and the cost of one node: the balance A t = w, and the limits that hold at an instant."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -61,7 +62,8 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
         cost = OTHER_COSTS * cost + SLACK_COST * ca.sumsqr(missing)
 
     axes = ("fx", "fy", "fz", "mx", "my", "mz")
-    constraints = [(balances, [Row(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving])]
+    in_balance = [Row(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving]
+    constraints: list[tuple[list[Any], list[Row]]] = [(balances, in_balance)]
     if robot.fixed_lengths is not None and not scenario.relative:
         lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
         squares = (lengths / robot.fixed_lengths) ** 2  # no square root in the derivatives

@@ -96,10 +96,11 @@ def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
     wind = scenario.task.wind
     if wind is None or isinstance(wind, WindBox) or not any(wind):
         return []
-    speed = float(np.linalg.norm(wind))
+    velocity = np.array(wind)
+    speed = float(np.linalg.norm(velocity))
 
     def with_wind(share: float) -> Variation:
-        task = scenario.task.model_copy(update={"wind": tuple(share * component for component in wind)})
+        task = scenario.task.model_copy(update={"wind": tuple((share * velocity).tolist())})
         return lay_out(scenario.robot, task), share * speed, f"instead of {quantity(speed, 'm/s')}"
 
     return _largest(search, with_wind, "wind", "m/s")

@@ -96,8 +96,9 @@ def _of_platform(given: TaskLimits) -> Iterator[Limit]:
 def _of_carriers(robot: Robot, task: Task) -> Iterator[Limit]:
     """Return the limits of the robot's file together with the task's, whichever is tighter."""
     given, free = task.limits, task.base if isinstance(task.base, FreeBase) else None
-    speed = _tighter(given.carrier_speed, free and free.speed_max)
-    acceleration = _tighter(given.carrier_acceleration, free and free.acceleration_max)
+    speed, acceleration = given.carrier_speed, given.carrier_acceleration
+    if free is not None:
+        speed, acceleration = _tighter(speed, free.speed_max), _tighter(acceleration, free.acceleration_max)
     if given.carrier_separation == "radius":
         yield from _apart(robot)
     elif given.carrier_separation is not None and len(robot.carriers) > 1:
@@ -110,7 +111,7 @@ def _of_carriers(robot: Robot, task: Task) -> Iterator[Limit]:
             yield CarrierAcceleration(robot, index, most)
         if (most := _tighter(speed, own.speed)) is not None:
             yield CarrierSpeed(robot, index, most)
-        if (most := _tighter(turns and (turns.tilt_max or None), own.tilt)) is not None:
+        if (most := _tighter((turns.tilt_max or None) if turns is not None else None, own.tilt)) is not None:
             yield CarrierTilt(robot, index, most)
         if turns is not None and turns.turn_acceleration_max is not None:
             yield CarrierTurnAcceleration(robot, index, turns.turn_acceleration_max)
@@ -166,7 +167,7 @@ def bodies(robot: Robot, task: Task) -> Iterator[tuple[AnyBody, str, frozenset[i
     """Yield the bodies in the platform's frame, what texts call them, and the phases in which they are there."""
     if robot.platform.body is not None:
         yield robot.platform.body, PLATFORM, None
-    loads = [phase.load and phase.load.body for phase in task.phases or ()]
+    loads = [phase.load.body if phase.load else None for phase in task.phases or ()]
     for index, body in enumerate(loads):
         if body is not None and body not in loads[:index]:
             yield body, LOAD, frozenset(other for other, its in enumerate(loads) if its == body)

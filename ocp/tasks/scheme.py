@@ -123,7 +123,7 @@ class Scheme(Displayed):
         motion = []
         for points in (position, speed, acceleration, change):
             weights = bernstein.basis(len(points) - 1, shares)
-            motion.append(sum(weights[:, i : i + 1] * point[index] for i, point in enumerate(points)))
+            motion.append(np.sum([weights[:, i : i + 1] * point[index] for i, point in enumerate(points)], axis=0))
         return motion
 
 

@@ -235,15 +235,15 @@ def _check_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:
     for place in task.limits.keep_out:
         if place.frame == "platform" and place.cables is not None:
             _check_attachments(robot, place, place.cables, f"{where}: limits.keep_out {place.name!r}", "cables")
-    around = [task.limits.carrier_platform_clearance, task.limits.cable_platform_clearance]
+    carrier, cable = task.limits.carrier_platform_clearance, task.limits.cable_platform_clearance
     its = list(bodies(robot, task))
-    if not its and any(distance is not None for distance in around):
-        key = ("carrier", "cable")[around[0] is None] + "_platform_clearance"
+    if not its and not (carrier is None and cable is None):
+        key = ("cable" if carrier is None else "carrier") + "_platform_clearance"
         missing = f"a body: robot {robot.name!r} has no platform.body, and no load one"
         raise InputError(f"{where}: limits.{key} must be left out without {missing}")
-    if around[1] is not None:
+    if cable is not None:
         for body, whose, _ in its:
-            _check_attachments(robot, body, around[1], f"{where}: {whose}", "limits.cable_platform_clearance")
+            _check_attachments(robot, body, cable, f"{where}: {whose}", "limits.cable_platform_clearance")
 
 
 def _check_attachments(robot: Robot, body: Shape, least: float, which: str, key: str) -> None:

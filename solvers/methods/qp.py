@@ -90,8 +90,8 @@ def _call_once(
     G = np.vstack([identity[use_upper], -identity[use_lower]])
     h = np.concatenate([form.upper[use_upper], -form.lower[use_lower]])
     convert = np.ascontiguousarray if name in qpsolvers.dense_solvers else csc_matrix
-    limits = {"G": convert(G), "h": h} if h.size else {}
-    equations = {"A": convert(form.Q), "b": form.b} if form.b.size else {}
+    limits: dict[str, Any] = {"G": convert(G), "h": h} if h.size else {}
+    equations: dict[str, Any] = {"A": convert(form.Q), "b": form.b} if form.b.size else {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

@@ -1,5 +1,7 @@
 """An account as Markdown: the report, and the errata from the same claims."""
 
+from collections.abc import Sequence
+
 from .account import Account
 from .claim import Claim, Verdict, value_text
 
@@ -56,7 +58,7 @@ def _row(claim: Claim) -> tuple[str, ...]:
     return claim.id, claim.place, claim.statement, printed, computed, claim.why
 
 
-def _table(heads: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:
     """Return a table; characters that would end a cell are escaped."""
     safe = [tuple(cell.replace("|", "\\|").replace("\n", " ") for cell in row) for row in (heads, *rows)]
     first, *others = ("| " + " | ".join(row) + " |" for row in safe)

@@ -184,7 +184,7 @@ def _volumes() -> Claim:
     return claim("volumes").stated([size.value for size in sizes], rising, volumes=volumes)
 
 
-def _inside_both(samples: Mapping[str, Loops]) -> Claim:
+def _inside_both(samples: Mapping[Drive, Loops]) -> Claim:
     shares = []
     for drive in ("fixed-length", "variable-length"):
         places = samples[drive].places.only(samples[drive].held)
@@ -214,7 +214,7 @@ def _fixed_inside_variable() -> Claim:
     )
 
 
-def _repeated(samples: Mapping[str, Loops]) -> Claim:
+def _repeated(samples: Mapping[Drive, Loops]) -> Claim:
     """Compare the ends of the ranges from either half of the loops."""
     apart = []
     for system in samples.values():

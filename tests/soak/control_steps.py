@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,7 +137,7 @@ def kept(
     problems = controller.problems
     along = np.einsum("nj,nji->ni", direction, problems.A)
     most = np.where(along > 0, along * problems.bounds[1], along * problems.bounds[0]).sum(axis=1)
-    found = {
+    found: dict[str, Any] = {
         "finite": np.all([np.isfinite(part).reshape(rows, -1).all(axis=1) for part in parts], axis=0),
         "inside limits": ((t >= robot.t_min) & (t <= robot.t_max)).all(axis=1),
         "answered": (ways >= 0) & (ways < len(ANSWERS)),

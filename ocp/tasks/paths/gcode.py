@@ -62,7 +62,7 @@ class _Reader:
         self.feeds: list[float | None] = []  # of the lines between the points [m/s]
         self.ignored: set[str] = set()
         self._at: dict[str, float] = {}  # what is known of the position in the program's coordinates [m]
-        self._moved = dict.fromkeys("XYZ", 0.0)  # of these coordinates by G92 [m]
+        self._moved: dict[str, float] = dict.fromkeys("XYZ", 0.0)  # of these coordinates by G92 [m]
         self._unit: float | None = None
         self._relative, self._ended, self._homed = False, False, False
         self._move: int | None = None
