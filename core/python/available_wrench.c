@@ -22,8 +22,7 @@ static PyObject *none_or_refusal(arrays *given, int fits) {
     Py_RETURN_NONE;
 }
 
-PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(facets) {
     enum { A, LOW, HIGH, NORMALS, LEAST, MOST_, ALL };
     arrays given;
     towline_matrices matrices;
@@ -46,8 +45,7 @@ PyObject *towline_py_facets(PyObject *module, PyObject *const *arguments, Py_ssi
     return none_or_refusal(&given, fits);
 }
 
-PyObject *towline_py_margins(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(margins) {
     enum { A, W, LOW, HIGH, MARGINS, RESERVES, ALL };
     arrays given;
     towline_matrices matrices;
@@ -71,8 +69,7 @@ PyObject *towline_py_margins(PyObject *module, PyObject *const *arguments, Py_ss
     return none_or_refusal(&given, fits);
 }
 
-PyObject *towline_py_full_rank(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(full_rank) {
     enum { N, TOLERANCE, BEFORE };
     enum { A, FULL, ALL };
     arrays given;

@@ -109,8 +109,7 @@ static int are_given(PyObject *state, PyObject *reference) {
     return PyTuple_Check(state) && PyTuple_Size(state) >= 5 && PyTuple_Check(reference) && PyTuple_Size(reference) >= 7;
 }
 
-PyObject *towline_py_control_take(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_take) {
     enum { ROBOT, MEASURED, CABLES, REFERENCE, CARRIERS, T_REF, ALL };
     arrays given;
     PyObject *state = count > 1 ? arguments[0] : NULL, *reference = count > 1 ? arguments[1] : NULL;
@@ -257,8 +256,7 @@ static int are_of_step(const arrays *given, const towline_robot *robot, const to
     return fits;
 }
 
-PyObject *towline_py_control_step(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_step) {
     enum { DT, SINCE, LENGTH, NUMBERS, SOLVES = NUMBERS, STATE, TAKEN, BEFORE };
     arrays given;
     double numbers[NUMBERS] = {0, 0, 0};
@@ -309,8 +307,7 @@ PyObject *towline_py_control_step(PyObject *module, PyObject *const *arguments, 
     return Py_BuildValue("(nn)", cut, optimal);
 }
 
-PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_thrusts) {
     enum { ROBOT, CONTROLLER, MEASURED, CARRIERS, TENSIONS, CABLES, PLATFORM, MEMORY, TURNING, ACTUATION, ALL };
     arrays given;
     double dt = 0, lacking = 0;
@@ -350,8 +347,7 @@ PyObject *towline_py_control_thrusts(PyObject *module, PyObject *const *argument
     return number_done(&given, fits, lacking);
 }
 
-PyObject *towline_py_control_move_on(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_move_on) {
     enum { ROBOT, DISTURBANCE, TENSIONS, ACCELERATIONS, MEASURED, ALL };
     arrays given;
     double dt = 0;

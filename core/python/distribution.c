@@ -30,8 +30,7 @@ static int solve(const double *data, Py_ssize_t size, double *t, Py_ssize_t m, d
     return (int)status;
 }
 
-PyObject *towline_py_solve_packed(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(solve_packed) {
     Py_buffer given, tensions, proof;
     Py_ssize_t size, m, n = 0;
     int status = -1;
@@ -93,8 +92,7 @@ static towline_column column(const arrays *given, int i) {
     return (towline_column){given->size[i] > 0 ? given->of[i] : NULL, (ptrdiff_t)given->of[PER][i]};
 }
 
-PyObject *towline_py_solve_rows(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(solve_rows) {
     enum { N, M, RHO, IN_LANES, BEFORE };
     arrays given;
     if (count < BEFORE) {

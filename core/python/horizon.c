@@ -40,8 +40,7 @@ static towline_horizon horizon_in(const int *sizes, int processor, double *memor
     return towline_horizon_in(sizes[STAGES], sizes[STATES], sizes[CONTROLS], sizes[SOFT], processor, memory);
 }
 
-PyObject *towline_py_horizon_size(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(horizon_size) {
     int sizes[SIZES];
     const Py_ssize_t size = sizes_of(arguments, count, SIZES, sizes);
     return size < 0 ? NULL : PyLong_FromSsize_t(size);
@@ -59,8 +58,7 @@ static double *memory_of(PyObject *array, Py_ssize_t size, Py_buffer *view) {
     return memory;
 }
 
-PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(horizon_places) {
     int sizes[SIZES];
     Py_buffer view;
     const Py_ssize_t size = sizes_of(arguments, count, SIZES + 1, sizes);
@@ -102,8 +100,7 @@ PyObject *towline_py_horizon_places(PyObject *module, PyObject *const *arguments
     return places;
 }
 
-PyObject *towline_py_horizon_relative_to(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(horizon_relative_to) {
     enum { REFERENCE_STATES, REFERENCE_CONTROLS, MEMORY, ARRAYS };
     int whole[SIZES + 1];
     arrays given;
@@ -128,8 +125,7 @@ PyObject *towline_py_horizon_relative_to(PyObject *module, PyObject *const *argu
     Py_RETURN_NONE;
 }
 
-PyObject *towline_py_horizon_solve(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(horizon_solve) {
     enum { PROCESSOR = SIZES, BEGINNING, ITERATIONS, WHOLE };
     enum { TOLERANCE = WHOLE, MEMORY, RESIDUALS, ALL };
     int whole[WHOLE];

@@ -18,8 +18,7 @@ static int places_of(const arrays *given, const towline_robot **robot, towline_p
     return shared || given->size[CARRIERS] == rows * carriers;
 }
 
-PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(lines) {
     enum { ROBOT, POSES, CARRIERS, LENGTHS, A, J, ANCHORS, SENSITIVITY, ALL };
     arrays given;
     const towline_robot *robot;
@@ -42,8 +41,7 @@ PyObject *towline_py_lines(PyObject *module, PyObject *const *arguments, Py_ssiz
     return done(&given, fits);
 }
 
-PyObject *towline_py_ends(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(ends) {
     enum { ROBOT, POSES, CARRIERS, ANCHORS, ATTACHMENTS, ALL };
     arrays given;
     const towline_robot *robot;
@@ -63,8 +61,7 @@ PyObject *towline_py_ends(PyObject *module, PyObject *const *arguments, Py_ssize
     return done(&given, fits);
 }
 
-PyObject *towline_py_cable_distances(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(cable_distances) {
     enum { ROBOT, POSES, CARRIERS, DISTANCES, ALL };
     arrays given;
     const towline_robot *robot;
@@ -82,8 +79,7 @@ PyObject *towline_py_cable_distances(PyObject *module, PyObject *const *argument
     return done(&given, fits);
 }
 
-PyObject *towline_py_columns_by_geometry(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(columns_by_geometry) {
     enum { ROBOT, POSES, CARRIERS, S, ALL };
     arrays given;
     const towline_robot *robot;
@@ -119,18 +115,11 @@ static PyObject *wrench_derivative(PyObject *const *arguments, Py_ssize_t count,
     return done(&given, fits);
 }
 
-PyObject *towline_py_wrench_by_pose(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
-    return wrench_derivative(arguments, count, 0);
-}
+TOWLINE_PY(wrench_by_pose) { return wrench_derivative(arguments, count, 0); }
 
-PyObject *towline_py_wrench_by_axes(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
-    return wrench_derivative(arguments, count, 1);
-}
+TOWLINE_PY(wrench_by_axes) { return wrench_derivative(arguments, count, 1); }
 
-PyObject *towline_py_required_wrench(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(required_wrench) {
     enum { ROBOT, POSES, VELOCITIES, ACCELERATIONS, WIND, W, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, W)) {

@@ -17,8 +17,7 @@ static int whole_number(PyObject *argument, Py_ssize_t most, Py_ssize_t *number)
     return 1;
 }
 
-PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(run_plant) {
     enum { ROBOT, SETTINGS, STATES, COMMANDS, HISTORY, TENSIONS, ARRAYS };
     enum { STEPS = ARRAYS, PERIOD, SUBSTEPS, KEEP, ALL };
     arrays given;
@@ -56,8 +55,7 @@ PyObject *towline_py_run_plant(PyObject *module, PyObject *const *arguments, Py_
     return done(&given, fits);
 }
 
-PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(sense) {
     enum { ROBOT, STATES, MOTIONS, LENGTHS, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, MOTIONS)) {
@@ -78,8 +76,7 @@ PyObject *towline_py_sense(PyObject *module, PyObject *const *arguments, Py_ssiz
     return done(&given, fits);
 }
 
-PyObject *towline_py_winch_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(winch_lengths) {
     enum { ROBOT, STATES, LENGTHS, TENSIONS, LAST_RATES, COMMANDS, ARRAYS, PERIOD = ARRAYS, ALL };
     arrays given;
     if (count != ALL) {

@@ -11,8 +11,7 @@ static int carriers_fit(const towline_robot *robot, Py_ssize_t size, Py_ssize_t 
     return size == one || size == rows * one;
 }
 
-PyObject *towline_py_pose_from_lengths(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(pose_from_lengths) {
     enum { ROBOT, CARRIERS, LENGTHS, WEIGHTS, FREE, DAMPING, POSES, ERRORS, STEPS, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, POSES)) {
@@ -38,8 +37,7 @@ PyObject *towline_py_pose_from_lengths(PyObject *module, PyObject *const *argume
     return done(&given, fits);
 }
 
-PyObject *towline_py_pose_covariance(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(pose_covariance) {
     enum { ROBOT, CARRIERS, WEIGHTS, POSES, COVARIANCES, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, COVARIANCES)) {

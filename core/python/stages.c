@@ -112,8 +112,7 @@ static int moved_of(const arrays *given, int freed, int tethers, const towline_r
     return towline_moved_count(*moved) <= MOST_MOVED;
 }
 
-PyObject *towline_py_control_stages(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_stages) {
     enum { ROBOT, FREED, TETHERS, STEPS, DISTURBANCE, CARRIERS, AT_STATES, CONTROLS, ALL };
     arrays given;
     dynamics to;
@@ -143,8 +142,7 @@ PyObject *towline_py_control_stages(PyObject *module, PyObject *const *arguments
     return done(&given, fits);
 }
 
-PyObject *towline_py_control_aim(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_aim) {
     enum { LENGTH, A, B, C, FIRST };
     enum { STEPS, EFFORTS, WANTED, PLANNED, ALL };
     arrays given;
@@ -171,8 +169,7 @@ PyObject *towline_py_control_aim(PyObject *module, PyObject *const *arguments, P
     return done(&given, fits);
 }
 
-PyObject *towline_py_control_coordinates(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_coordinates) {
     enum { ROBOT, TETHERS, MOTIONS, COORDINATES, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, COORDINATES)) {
@@ -194,8 +191,7 @@ PyObject *towline_py_control_coordinates(PyObject *module, PyObject *const *argu
     return done(&given, fits);
 }
 
-PyObject *towline_py_control_carriers(PyObject *module, PyObject *const *arguments, Py_ssize_t count) {
-    (void)module;
+TOWLINE_PY(control_carriers) {
     enum { ROBOT, TETHERS, MOTION, CARRIERS, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, CARRIERS)) {
