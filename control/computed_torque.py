@@ -216,11 +216,8 @@ class ComputedTorque(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the command for the time from `time` [s] until the next step.
 
-        Raises
-        ------
-        InputError
-            If the time is not later than that of the previous step, an array has a wrong shape, or another thread uses
-            the controller.
+        Raises `InputError` if the time is not later than that of the previous step, an array has a wrong shape, or
+        another thread uses the controller.
         """
         with self._alone:
             return self._step(time, state, reference)

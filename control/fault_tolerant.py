@@ -124,10 +124,7 @@ class FaultTolerant(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the command for the time from `time` [s] until the next step. Arguments as in `Predictive.step`.
 
-        Raises
-        ------
-        InputError
-            If an argument is wrong.
+        Raises `InputError` if an argument is wrong.
         """
         if self._rest is None:
             command = self._team.step(time, state, reference)

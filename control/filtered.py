@@ -73,10 +73,7 @@ class Filtered(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the command of the controller for the estimated state at the time of the measurement.
 
-        Raises
-        ------
-        InputError
-            If the filter or the controller refuses an argument.
+        Raises `InputError` if the filter or the controller refuses an argument.
         """
         required("state", state, State)
         seen = time if state.time is None else state.time

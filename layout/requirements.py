@@ -235,10 +235,7 @@ class Requirements(Part):
 def read_requirements(requirements: Requirements | dict[str, Any] | str | os.PathLike[str]) -> Requirements:
     """Return `Requirements` from requirements, a mapping or a YAML file.
 
-    Raises
-    ------
-    InputError
-        If they are invalid; the message names the field, the accepted values and the value.
+    Raises `InputError` if they are invalid; the message names the field, the accepted values and the value.
     """
     if isinstance(requirements, Requirements):
         return requirements

@@ -344,10 +344,7 @@ class Dynamics(Displayed):
     def relative(self) -> RelativeDynamics:
         """Return the form of paper F, in the frame {A} of the robot's only carrier.
 
-        Raises
-        ------
-        InputError
-            If the robot has more than one carrier: then no carrier's frame is {A}.
+        Raises `InputError` if the robot has more than one carrier: then no carrier's frame is {A}.
         """
         return RelativeDynamics(self.robot)
 

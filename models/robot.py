@@ -159,10 +159,7 @@ class Robot(DisplayedRobot):
     def with_parameters(self, values: Mapping[str, float]) -> Robot:
         """Return the robot with other cable parameters [m], by the names of `parameter_values`.
 
-        Raises
-        ------
-        InputError
-            If `values` is not a mapping, the robot has no such parameter, or a value is impossible.
+        Raises `InputError` if `values` is not a mapping, the robot has no such parameter, or a value is impossible.
         """
         data = self.model_dump()
         cables = [dict(cable) for cable in data["cables"]]
@@ -204,10 +201,7 @@ class Robot(DisplayedRobot):
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the robot as a robot file atomically; `load` reads an equal robot from it.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises `InputError` if the file cannot be written.
         """
         from .parsing import save_yaml
 

@@ -48,10 +48,7 @@ class Plan(PlanData, Filmed, Reported):
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the trajectory atomically: as NetCDF (.nc), which `xarray.load_dataset` reads, or as MCAP (.mcap).
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises `InputError` if the file cannot be written.
         """
         from .reports.trajectory import trajectory
 

@@ -170,10 +170,7 @@ class Planner(Displayed):
     def plan(self, progress: Progress | None = None, start: Plan | AnyPath | dict[str, Any] | None = None) -> Plan:
         """Plan the task, starting from `start`, the last solution or a guess.
 
-        Raises
-        ------
-        InputError
-            If `progress` is not a function, or `start` does not fit.
+        Raises `InputError` if `progress` is not a function, or `start` does not fit.
         """
         check_progress(progress)
         with heeding():

@@ -192,9 +192,6 @@ def report(dataset: xr.Dataset) -> Report:
 def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:
     """Save the statistics of many runs as NetCDF atomically; the same seeds give the same bytes.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises `InputError` if the file cannot be written.
     """
     return save_netcdf(Contents.of(dataset), check_ending("file", file_path("file", file), ".nc"))

@@ -157,10 +157,7 @@ class Replay(Drawn, Reported, Displayed):
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the residuals as NetCDF (.nc) atomically.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises `InputError` if the file cannot be written.
         """
         path, times = check_ending("file", file_path("file", file), ".nc"), self._times
         variables = {"time": Variable(("window", "sample"), times, {"units": "s"})}

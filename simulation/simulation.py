@@ -134,10 +134,7 @@ class Simulation(SimulationData, Filmed, Reported):
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the motion atomically, as NetCDF (.nc) or MCAP (.mcap); the same seed gives the same bytes.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises `InputError` if the file cannot be written.
         """
         return save_motion(self.robot, self._contents(), file)
 

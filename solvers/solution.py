@@ -87,10 +87,7 @@ class TensionSolution(Displayed):
         (nearly parallel cables with huge tensions; about one problem in 10^5 of that kind) the certificate has the
         method's direction, and its shortfall is smaller than the distance.
 
-        Raises
-        ------
-        SolverError
-            If neither certificate proves the status. No problem is known for which this happens.
+        Raises `SolverError` if neither certificate proves the status. No problem is known for which this happens.
         """
         if callable(self.proof):
             proof = self.proof(self.problem)

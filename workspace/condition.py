@@ -45,10 +45,7 @@ class Condition(Part, ABC):
     def holds(self, robot: Robot, places: Places) -> np.ndarray:
         """Return whether the condition holds at each of n configurations, (n,) of bool; False at one with nan or inf.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong type or shape, or the condition does not apply to the robot.
+        Raises `InputError` if an argument has a wrong type or shape, or the condition does not apply to the robot.
         """
         check_places(robot, places)
         finite = np.all(np.isfinite(places.pose), axis=1) & np.all(np.isfinite(places.carriers), axis=(1, 2))
@@ -83,10 +80,7 @@ class Condition(Part, ABC):
     def for_robots(self, robust: float) -> Condition:
         """Return the condition for a fraction `robust` of the uncertain robots; unchanged without such a key.
 
-        Raises
-        ------
-        InputError
-            If `robust` is not a number between 0 and 1.
+        Raises `InputError` if `robust` is not a number between 0 and 1.
         """
         share = number("robust", robust, LEAST_SHARE, 1 - LEAST_SHARE)
         return self.model_copy(update={"robust": share}) if "robust" in type(self).model_fields else self

@@ -59,10 +59,8 @@ def save(result: xr.Dataset, file: str | os.PathLike[str]) -> Path:
     `xarray.load_dataset` reads the former, `xarray.open_zarr` the latter (extra `cluster`). Attributes of the run, such
     as its duration, are left out, so that equal results are equal NetCDF files.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists already.
+    Raises `InputError` if an argument has a wrong type, the file cannot be written, or is a Zarr folder that exists
+    already.
     """
     import xarray as xr
 

@@ -41,10 +41,7 @@ def metric_values(metric: str, robot: Robot, places: Places) -> np.ndarray:
 
     It is nan where tensions or a pose at rest are needed and do not exist.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or value, or the metric does not apply to the robot.
+    Raises `InputError` if an argument has a wrong type or value, or the metric does not apply to the robot.
     """
     check_places(robot, places)
     return METRICS[one_of("metric", metric, METRICS)].values(robot, places)

@@ -105,10 +105,7 @@ class _Way(NamedTuple):
 def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     """Detect the probable input error of a log by the robot's file, before any fit; None if there is none.
 
-    Raises
-    ------
-    InputError
-        If the measurements have another number of cables.
+    Raises `InputError` if the measurements have another number of cables.
     """
     robot = as_robot(robot)
     given = check_measurements(robot, measurements)

@@ -145,40 +145,28 @@ class Measurements(Displayed):
     def with_sigma(self, sigma: float | Mapping[str, float]) -> Measurements:
         """Return the measurements with other standard deviations, as for the class.
 
-        Raises
-        ------
-        InputError
-            If they have a wrong value.
+        Raises `InputError` if they have a wrong value.
         """
         return changed(self, sigma=sigma)
 
     def with_lengths(self, lengths: ArrayLike) -> Measurements:
         """Return the measurements with other lengths (N, m) [m].
 
-        Raises
-        ------
-        InputError
-            If they have a wrong shape or value.
+        Raises `InputError` if they have a wrong shape or value.
         """
         return changed(self, lengths=lengths)
 
     def with_carriers(self, carrier_poses: ArrayLike, tensions: ArrayLike | None = None) -> Measurements:
         """Return the measurements with other poses of carriers (N, c, 6) [m, rad], and tensions (N, m) [N] if given.
 
-        Raises
-        ------
-        InputError
-            If they have a wrong shape or value.
+        Raises `InputError` if they have a wrong shape or value.
         """
         return changed(self, carrier_poses=carrier_poses, tensions=self.tensions if tensions is None else tensions)
 
     def with_directions(self, directions: ArrayLike | None) -> Measurements:
         """Return the measurements with other directions of cables in {G}, (N, m, 3), as for the class, or without any.
 
-        Raises
-        ------
-        InputError
-            If they have a wrong shape or value.
+        Raises `InputError` if they have a wrong shape or value.
         """
         return changed(self, directions=directions)
 

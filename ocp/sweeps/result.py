@@ -136,10 +136,7 @@ class Sweep(Displayed, Reported):
     def plan(self, index: int) -> Plan:
         """Recompute plan `index` (from 0) to get its full result.
 
-        Raises
-        ------
-        InputError
-            If there is no such plan, or planning raises an error again.
+        Raises `InputError` if there is no such plan, or planning raises an error again.
         """
         return plan(*self.cases.case(whole_number("index", index, 0, len(self.rows) - 1)))
 
@@ -197,10 +194,7 @@ class Sweep(Displayed, Reported):
 
         One field: curves. Two: maps. Three: maps for each value of the third. Plans that are not feasible are marked.
 
-        Raises
-        ------
-        InputError
-            If there are more than three fields, or more than six values of the third.
+        Raises `InputError` if there are more than three fields, or more than six values of the third.
         """
         from ...figures.sweep import Axis, sweep
 

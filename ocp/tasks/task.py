@@ -278,10 +278,7 @@ class Task(Part):
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the task as a task file (YAML) atomically: `towline plan` and `plan` read an equal task from it.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written, or the task has limits or costs defined in Python.
+        Raises `InputError` if the file cannot be written, or the task has limits or costs defined in Python.
         """
         return save_yaml(self, file)
 
@@ -307,10 +304,7 @@ class Task(Part):
 def read_task(task: Task | dict[str, Any] | str | os.PathLike[str]) -> Task:
     """Return a `Task` from a task, a mapping or a YAML file.
 
-    Raises
-    ------
-    InputError
-        If the task is invalid; the message names the field, the accepted values and the value.
+    Raises `InputError` if the task is invalid; the message names the field, the accepted values and the value.
     """
     if isinstance(task, Task):
         return task

@@ -90,10 +90,7 @@ class Event(Part, ABC):
     def check(self, robot: Robot) -> None:
         """Check that it can happen to the robot.
 
-        Raises
-        ------
-        InputError
-            If it cannot: "must ..., got ...".
+        Raises `InputError` if it cannot: "must ..., got ...".
         """
 
     @abstractmethod
