@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
-DOUBT = 0.05  # probability that an interval does not have the true value
 ROUNDING = 1e-9  # of the duration
 FAILED = {"error": "position error", "tension": "tension", "slack": "slack", "diverged": "divergence"}
 
@@ -73,18 +72,6 @@ def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:
     return lasted_near & (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
 
 
-def share_interval(successes: int, count: int) -> tuple[float, float]:
-    """Return the interval of a probability with a confidence of 95 %, after so many successes.
-
-    Source: C. J. Clopper and E. S. Pearson, Biometrika 26, 1934.
-    """
-    from scipy.special import betaincinv
-
-    fails = count - successes
-    low = 0.0 if successes == 0 else float(betaincinv(successes, fails + 1, DOUBT / 2))
-    return low, 1.0 if fails == 0 else float(betaincinv(successes + 1, fails, 1 - DOUBT / 2))
-
-
 def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], tolerance: float, of: np.ndarray) -> xr.Dataset:
     """Return the statistics of all runs, (N,) of `FIGURES`, as a dataset indexed by their seeds."""
     periods, period = len(conditions.references), conditions.period
@@ -125,6 +112,8 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
 
 def summary(dataset: xr.Dataset) -> dict[str, Any]:
     """Return the output of `towline simulate --runs N --json`, ready for JSON."""
+    from ..workspace.volume import share_interval  # of 95 %; its package takes longer to load than a short run
+
     worst, passes, count = dataset["error_max"].values, dataset["passed"].values, int(dataset.sizes["seed"])
     likely = dict(zip(("low", "high"), share_interval(int(passes.sum()), count), strict=True))
     return {

@@ -12,8 +12,9 @@ from towline.cli.main import app
 from towline.control import ComputedTorque, Controller, references
 from towline.control.open_loop import planned_command
 from towline.simulation.drives import Drives
-from towline.simulation.flights import report, share_interval, summary
+from towline.simulation.flights import report, summary
 from towline.simulation.mismatch import Mismatch
+from towline.workspace.volume import share_interval
 
 PERIOD = 1e-3
 
