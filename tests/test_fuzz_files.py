@@ -79,14 +79,14 @@ XML_VALUES = [
     "&#x1F600;", "<![CDATA[1]]>", "<!-- -->", "<x/>", "<?x y?>", "]]>", "١", "9" * 400, '" x="', "\x1b", "é" * 100,
     "<!DOCTYPE a [<!ENTITY b 'c'>]>",
 ]
-YAML_CHANGES = ["bytes", "lines", "number", "number", "scalar", "scalar", "word", "cut", "spelling", "special"]
-XML_CHANGES = ["bytes", "lines", "number", "number", "text", "text", "word", "cut", "spelling", "special"]
 # fmt: on
 NUMBERS = re.compile(rb"-?\d+(\.\d+)?(e\d+)?")
 SCALARS = re.compile(rb"(?<=[:,\[] )[^,\]}\n]+|(?<=\[)[^,\]\n]+")
 WORDS = re.compile(rb"[A-Za-z_]+(?=:)")
 XML_TEXTS = re.compile(rb"(?<=>)[^<>\s][^<>]*(?=<)|(?<==\")[^\"]*(?=\")")
 XML_WORDS = re.compile(rb"(?<=[</ ])[A-Za-z_]+(?=[ =>/])")
+IN_YAML = {"number": (NUMBERS, VALUES), "scalar": (SCALARS, VALUES)}
+IN_XML = {"number": (NUMBERS, XML_VALUES), "text": (XML_TEXTS, XML_VALUES)}
 
 
 def pick(rng, pattern, data):
@@ -200,39 +200,25 @@ def xml_special(rng, data):
     )
 
 
-def mutate_yaml(rng, data):
+def mutate(rng, data, pieces, words, special):
+    """Change a file a few times: its bytes, lines, words, or `pieces`, by name a pattern and what replaces a match."""
+    plain = {
+        "bytes": bytes_flipped,
+        "lines": lines_moved,
+        "cut": cut,
+        "spelling": spelled_otherwise,
+        "special": special,
+    }
     for _ in range(rng.choice([1, 1, 1, 2, 3])):
         if not data:
             return data
-        change = rng.choice(YAML_CHANGES)
-        if change == "bytes":
-            data = bytes_flipped(rng, data)
-        elif change == "lines":
-            data = lines_moved(rng, data)
-        elif change in ("number", "scalar"):
-            data = piece_replaced(rng, data, NUMBERS if change == "number" else SCALARS, VALUES)
+        change = rng.choice(["bytes", "lines", *2 * list(pieces), "word", "cut", "spelling", "special"])
+        if change in pieces:
+            data = piece_replaced(rng, data, *pieces[change])
         elif change == "word":
-            data = word_changed(rng, data, WORDS)
+            data = word_changed(rng, data, words)
         else:
-            data = {"cut": cut, "spelling": spelled_otherwise, "special": yaml_special}[change](rng, data)
-    return data
-
-
-def mutate_xml(rng, data):
-    for _ in range(rng.choice([1, 1, 1, 2, 3])):
-        if not data:
-            return data
-        change = rng.choice(XML_CHANGES)
-        if change == "bytes":
-            data = bytes_flipped(rng, data)
-        elif change == "lines":
-            data = lines_moved(rng, data)
-        elif change in ("number", "text"):
-            data = piece_replaced(rng, data, NUMBERS if change == "number" else XML_TEXTS, XML_VALUES)
-        elif change == "word":
-            data = word_changed(rng, data, XML_WORDS)
-        else:
-            data = {"cut": cut, "spelling": spelled_otherwise, "special": xml_special}[change](rng, data)
+            data = plain[change](rng, data)
     return data
 
 
@@ -274,7 +260,7 @@ def test_mutated_robot_files(seed, tmp_path):
     file = tmp_path / "my.yaml"
     robots, lines = 0, set()
     for count in range(500):
-        data = mutate_yaml(rng, rng.choice(ROBOTS).encode())
+        data = mutate(rng, rng.choice(ROBOTS).encode(), IN_YAML, WORDS, yaml_special)
         file.write_bytes(data)
         result = outcome(lambda: load(file), data)
         if isinstance(result, Robot):
@@ -294,7 +280,7 @@ def test_mutated_caspr_files(seed, tmp_path):
     robots, lines = 0, set()
     for count in range(300):
         which, text = rng.choice([("bodies", BODIES), ("cables", CABLES)])
-        data = mutate_xml(rng, text.encode())
+        data = mutate(rng, text.encode(), IN_XML, XML_WORDS, xml_special)
         write(tmp_path, **{which: data})
         result = outcome(lambda: read_caspr(tmp_path).robot, data)
         if isinstance(result, Robot):

@@ -31,6 +31,21 @@ base: {kind: free}
 tube: {position: free, attitude: free}
 objective: {time: 1}
 """
+HALF_WRITTEN = """\
+import pathlib, sys, time
+from towline.base.writing import whole_file
+from towline.cli import stopping
+
+stopping.listen()
+with whole_file(pathlib.Path(sys.argv[1])) as temporary:
+    temporary.write_text("half")
+    while True:
+        try:
+            print("ready", flush=True)
+            time.sleep(60)
+        except KeyboardInterrupt:
+            pass
+"""
 SCRIPT = """\
 from towline.models import load
 from towline.ocp import plan
@@ -186,21 +201,7 @@ def test_an_interrupt_ends_the_command_with_one_line(folder, seconds):
 
 def test_an_interrupt_that_a_library_swallows_ends_the_command_all_the_same(tmp_path):
     """The thread that listens does not depend on what the main thread is doing, and leaves nothing half written."""
-    code = (
-        "import time, pathlib\n"
-        "from towline.cli import stopping\n"
-        "from towline.base.writing import whole_file\n"
-        "stopping.listen()\n"
-        "with whole_file(pathlib.Path('half')) as temporary:\n"
-        "    temporary.write_text('half')\n"
-        "    while True:\n"
-        "        try:\n"
-        "            print('ready', flush=True)\n"
-        "            time.sleep(60)\n"
-        "        except KeyboardInterrupt:\n"
-        "            pass\n"
-    )
-    process = start([sys.executable, "-c", code], tmp_path)
+    process = start([sys.executable, "-c", HALF_WRITTEN, "half"], tmp_path)
     assert process.stdout.readline() == "ready\n"
     assert len(os.listdir(tmp_path)) == 1
     _, err, took = stop(process)
@@ -304,21 +305,7 @@ def test_a_signal_while_workers_start_is_one_line(running, tmp_path):
 
 
 def test_sigterm_leaves_nothing_half_written(tmp_path):
-    code = (
-        "import time, pathlib\n"
-        "from towline.cli import stopping\n"
-        "from towline.base.writing import whole_file\n"
-        "stopping.listen()\n"
-        "with whole_file(pathlib.Path('new/half')) as temporary:\n"
-        "    temporary.write_text('half')\n"
-        "    while True:\n"
-        "        try:\n"
-        "            print('ready', flush=True)\n"
-        "            time.sleep(60)\n"
-        "        except KeyboardInterrupt:\n"
-        "            pass\n"
-    )
-    process = start([sys.executable, "-c", code], tmp_path)
+    process = start([sys.executable, "-c", HALF_WRITTEN, "new/half"], tmp_path)
     assert process.stdout.readline() == "ready\n"
     _, err, _ = stop(process, signal.SIGTERM)
     assert (process.returncode, err) == (143, "towline: stopped\n")
