@@ -1,7 +1,5 @@
 """Replay a recording, for `towline simulate ROBOT LOG`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 Arrays go through `Function.map`. What is called for every step of a loop is in the numeric core, see `mechanics`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

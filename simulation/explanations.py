@@ -1,7 +1,5 @@
 """`Matching`: a recording compared with its plant, and which of the model's parameters explains the difference."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Natural frequencies of a robot with elastic cables, and the tensions with which they are largest."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 

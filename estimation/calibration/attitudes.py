@@ -4,8 +4,6 @@ The orientation in which the platform hangs or is held by its cables follows fro
 measured one by a rotation of the sensor's world, such as that to magnetic north, or of the sensor on the platform.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

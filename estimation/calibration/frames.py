@@ -5,8 +5,6 @@ in {G} and the pose B of the platform frame in the body. Both are fitted to the 
 and attachments, up to the offsets of the readings, from all turns of the axes by right angles.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

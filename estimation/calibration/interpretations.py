@@ -1,7 +1,5 @@
 """`interpretations`: ways to read a log in which units, signs, axes or conventions of angles are mistaken."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import permutations
 from typing import NamedTuple

@@ -5,8 +5,6 @@ to either end. Those of the robot's file, at the measured poses, decide. Without
 the directions themselves, and all cables must lead to the same one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import product
 

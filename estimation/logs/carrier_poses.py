@@ -1,7 +1,5 @@
 """`carriers_at`: poses and thrusts of a robot's carriers over a recording."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`clock_of_poses`: the clock of poses in another file than the lengths, by cable speeds."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

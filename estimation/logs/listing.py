@@ -1,7 +1,5 @@
 """`listing`: what logs contain, and what can be done with them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

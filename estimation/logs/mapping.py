@@ -1,7 +1,5 @@
 """`Fields`: which fields of a log are lengths, pose, tensions and time, as a map says or as their names suggest."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """`read_log`: the measurements of a robot from one log or several, with one clock."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

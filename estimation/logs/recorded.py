@@ -1,7 +1,5 @@
 """`read_recorded`: the motion and the commands of a robot over a recording, for its replay."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

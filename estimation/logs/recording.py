@@ -1,7 +1,5 @@
 """`Recording`: the topics of a log, each with times and fields of numbers, from whichever kind of file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple

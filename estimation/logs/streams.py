@@ -1,7 +1,5 @@
 """`Reader`: fields of recordings as samples over time, and `at_times`: the same at other times."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables: CSV with a header of names and units, and NetCDF with variables of one dimension."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

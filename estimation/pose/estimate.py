@@ -1,7 +1,5 @@
 """`PoseEstimate`: the pose that fits measured cable lengths best, with its uncertainty."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property

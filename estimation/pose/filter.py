@@ -6,8 +6,6 @@ error to the reference, whose bandwidth may be far below that of the motion. Err
 alpha) and, once an inertial sensor is used, the biases of its rates and accelerations.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

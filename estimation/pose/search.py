@@ -7,8 +7,6 @@ as coordinates many poses fit, so six cables continue from turns about oblique a
 the weight are preferred. The others still make the result ambiguous, because CoM and load are not exact.
 """
 
-from __future__ import annotations
-
 from itertools import combinations, product
 
 import numpy as np

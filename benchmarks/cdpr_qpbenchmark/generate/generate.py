@@ -6,8 +6,6 @@ Needs towline and qpbenchmark. Everything is seeded. Each QP that is declared fe
 each that is declared infeasible has a verified certificate.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from pathlib import Path
