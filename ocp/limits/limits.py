@@ -143,6 +143,11 @@ class Limits(Displayed):
 
         Its inputs are the motions of platform and carriers (18 each) at the first, then at the second.
         """
+        if limit not in self._ways:
+            self._ways[limit] = self._way(limit)
+        return self._ways[limit]
+
+    def _way(self, limit: Limit) -> ca.Function | None:
         count = 1 + len(self.robot.carriers)
         whole = [ca.SX.sym(f"body{i}", 18) for i in range(2 * count)]
         bodies = [Body(*ca.vertsplit(body, 6)) for body in whole]
@@ -198,6 +203,10 @@ class Limits(Displayed):
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
         values = in_blocks(self._of_block, arguments)
         return [values[:, place] for place in self.places]
+
+    @cached_property
+    def _ways(self) -> dict[Limit, ca.Function | None]:
+        return {}
 
     def at_rest(self, platform: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
         """Return the values of each limit at poses of platform (n, 6) and carriers (n, c, 6) at rest, (n, k)."""

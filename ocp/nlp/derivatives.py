@@ -7,57 +7,87 @@ left, 2 to 15 %, are not looked for: that takes longer than it saves in a hundre
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
+from ...base.display import Displayed
+from ..limits import Limit
 from ..tasks.scheme import Scheme
 from .held import eased
-from .rows import Row
+from .rows import Row, Tightening
+
+
+@dataclass(frozen=True, eq=False)
+class Differentiable(Displayed):
+    """A function of a node or an interval, whose derivatives are made once for all programs that have it."""
+
+    function: ca.Function  # its first inputs are unknowns, the others numbers or parameters; its one output is a column
+    unknowns: int  # entries of the first inputs
+
+    def _expressions(self) -> tuple[list[ca.SX], ca.SX, ca.SX]:
+        """Return symbols for its inputs, those that are unknown as one column, and the values."""
+        function = self.function
+        inputs = [ca.SX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
+        unknown = ca.vertcat(*inputs)[: self.unknowns]
+        return inputs, unknown, function(*inputs)
+
+    @cached_property
+    def slopes(self) -> tuple[ca.Function, np.ndarray, np.ndarray]:
+        """Return the function of the nonzero derivatives by the unknowns, and their rows and columns."""
+        inputs, unknown, values = self._expressions()
+        jacobian = ca.jacobian(values, unknown)
+        return ca.Function("slopes", inputs, [jacobian.nz[:]]), *_triplet(jacobian)
+
+    @cached_property
+    def curvature(self) -> tuple[ca.Function, np.ndarray, np.ndarray]:
+        """Return the function of the second derivatives of the values times multipliers, the last input.
+
+        It has those above the diagonal that are not zero; rows and columns follow.
+        """
+        inputs, unknown, values = self._expressions()
+        multiplier = ca.SX.sym("multiplier", values.numel())
+        hessian = ca.triu(ca.hessian(ca.dot(multiplier, values), unknown)[0])
+        return ca.Function("curvature", [*inputs, multiplier], [hessian.nz[:]]), *_triplet(hessian)
+
+
+def _triplet(matrix: ca.SX) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows and columns of the nonzeros of a matrix."""
+    rows, columns = matrix.sparsity().get_triplet()
+    return np.array(rows, dtype=int), np.array(columns, dtype=int)
 
 
 class Mapped(NamedTuple):
     """A function of some unknowns that is evaluated for k sets of them."""
 
-    function: ca.Function  # its first inputs are unknowns, the others numbers or parameters; its one output is a column
+    differentiable: Differentiable
     inputs: list[Any]  # (., k) each
     places: np.ndarray  # (u, k), the place of each entry of the first inputs among all unknowns
 
     @property
     def values(self) -> ca.MX:
         """Return the values, (r, k)."""
-        return self.function.map(self.inputs[0].shape[1])(*self.inputs)
-
-    def _expressions(self) -> tuple[list[ca.SX], ca.SX, ca.SX]:
-        """Return symbols for one set of inputs, those that are unknown as one column, and the values."""
-        function = self.function
-        inputs = [ca.SX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
-        unknown = ca.vertcat(*inputs)[: len(self.places)]
-        return inputs, unknown, function(*inputs)
+        return self.differentiable.function.map(self.places.shape[1])(*self.inputs)
 
     def slopes(self, width: int) -> ca.MX:
         """Return the derivatives of all values with respect to all unknowns, (r k, width)."""
-        inputs, unknown, values = self._expressions()
-        jacobian = ca.jacobian(values, unknown)
-        rows, columns = (np.array(part, dtype=int) for part in jacobian.sparsity().get_triplet())
-        count = self.places.shape[1]
-        function = ca.Function("slopes", inputs, [jacobian.nz[:]])
+        function, rows, columns = self.differentiable.slopes
+        count, height = self.places.shape[1], self.differentiable.function.numel_out(0)
         entries = _Entries(
             ca.vec(function.map(count)(*self.inputs)),
-            (rows[:, None] + values.numel() * np.arange(count)).ravel(order="F"),
+            (rows[:, None] + height * np.arange(count)).ravel(order="F"),
             self.places[columns].ravel(order="F"),
         )
-        return _matrix([entries], values.numel() * count, width)
+        return _matrix([entries], height * count, width)
 
     def curvature(self, multipliers: ca.MX) -> _Entries:
         """Return the second derivatives of the values times `multipliers` (r, k), those above the diagonal."""
-        inputs, unknown, values = self._expressions()
-        multiplier = ca.SX.sym("multiplier", values.numel())
-        hessian = ca.triu(ca.hessian(ca.dot(multiplier, values), unknown)[0])
-        first, second = (self.places[np.array(part, dtype=int)] for part in hessian.sparsity().get_triplet())
-        function = ca.Function("curvature", [*inputs, multiplier], [hessian.nz[:]])
+        function, rows, columns = self.differentiable.curvature
+        first, second = self.places[rows], self.places[columns]
         return _Entries(
             ca.vec(function.map(self.places.shape[1])(*self.inputs, multipliers)),
             np.minimum(first, second).ravel(order="F"),
@@ -74,17 +104,18 @@ class Block(NamedTuple):
     mapped: Mapped | None = None  # what the values are computed by, where it is a function of places among the unknowns
     slopes: ca.MX | None = None  # the derivatives of values that are linear, (r k, unknowns)
 
-    def bounds(self, nodes: np.ndarray) -> np.ndarray:
+    def bounds(self, nodes: np.ndarray, tightening: Mapping[Limit, Tightening]) -> np.ndarray:
         """Return the bounds of the rows, one stage after the other, (r k, 2): tightened where the task permits it.
 
         `nodes` are where the stages begin, as shares of the duration. A row of a stage may be about all of it.
         """
         first, last = nodes[self.stages], nodes[np.minimum(self.stages + 1, len(nodes) - 1)]
-        parts = {held: eased(held, first, last) for held in {row.held for row in self.rows}}
-        bounds = np.empty((len(self.stages), len(self.rows), 2))
-        for i, row in enumerate(self.rows):
-            bounds[:, i, 0] = row.low + parts[row.held] * row.tighter[0]
-            bounds[:, i, 1] = row.high - parts[row.held] * row.tighter[1]
+        bounds = np.tile(np.array([(row.low, row.high) for row in self.rows]), (len(self.stages), 1, 1))
+        for limit, tighter in tightening.items():
+            its = [i for i, row in enumerate(self.rows) if row.limit is limit]
+            if its:
+                inwards = np.array([tighter.of(self.rows[i]) for i in its]) * [1.0, -1.0]
+                bounds[:, its] += eased(tighter.held, first, last)[:, None, None] * inwards
         return bounds.reshape(-1, 2)
 
 
@@ -176,17 +207,17 @@ class Columns:
         self._at_nodes = where
         self._between = np.vstack([where[:, :-1].T.reshape(-1, len(where) * size).T, where[:, size::size]])
 
-    def at_nodes(self, function: ca.Function, chosen: np.ndarray | None = None) -> Mapped:
+    def at_nodes(self, function: Differentiable, chosen: np.ndarray | None = None) -> Mapped:
         """Return a function of nodes at those `chosen` among them; default: at all."""
         return _mapped(function, self._of_nodes, self._at_nodes, chosen)
 
-    def between(self, function: ca.Function, chosen: np.ndarray | None = None) -> Mapped:
+    def between(self, function: Differentiable, chosen: np.ndarray | None = None) -> Mapped:
         """Return a function of intervals for those `chosen`; default: for all."""
         return _mapped(function, self._of_intervals, self._between, chosen)
 
 
-def _mapped(function: ca.Function, columns: dict[str, Any], places: np.ndarray, chosen: Any) -> Mapped:
-    inputs = [columns[name] for name in function.name_in()]
+def _mapped(function: Differentiable, columns: dict[str, Any], places: np.ndarray, chosen: Any) -> Mapped:
+    inputs = [columns[name] for name in function.function.name_in()]
     if chosen is not None:
         inputs = [each[:, chosen.tolist()] for each in inputs]
         places = places[:, chosen]

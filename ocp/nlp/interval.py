@@ -85,7 +85,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     cost = bernstein.mean_square(jerks, ca.dot)
     cost += _rate_cost(scenario, layout, h, columns, whole, take_up)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
-    constraints += _rate_rows(scenario, mesh, layout, h, columns, whole)
+    constraints += _rate_rows(scenario, layout, h, columns, whole)
 
     @cache
     def points_of(carrier: int | None) -> Points:
@@ -100,7 +100,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         jerk = [of_body @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
         return _total(scenario, h, motion, [of_body @ column[layout.a] for column in columns], jerk)
 
-    constraints += _hull_rows(scenario, mesh, points_of)
+    constraints += _hull_rows(scenario, points_of)
     unknowns, known = {"x": x, "x_end": x_end}, {"p": parameters, "p_end": parameters_end, "grid": numbers}
     of_limits = _way_rows(scenario, mesh, layout, columns, whole)
     return part_of("interval", unknowns, known, cost, constraints, scenario.limits, of_limits)
@@ -181,7 +181,7 @@ def _pieces(scenario: Scenario, at_points: list[ca.SX]) -> list[tuple[float, ca.
 
 
 def _rate_rows(
-    scenario: Scenario, mesh: Mesh, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: _Whole
+    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: _Whole
 ) -> Iterator[Constraints]:
     """Yield values and rows of the limits of how fast something changes, from point to point."""
     limits = scenario.limits
@@ -195,24 +195,22 @@ def _rate_rows(
         if isinstance(limit, Rate):
             for share, first, second in _pieces(scenario, at_points):
                 rate = (second[place] - first[place]) / (h * share)
-                yield bounded(limit, rate, mesh, layout.slack(columns[0], limit), {})
+                yield bounded(limit, rate, layout.slack(columns[0], limit))
 
 
 def _way_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], whole: _Whole
 ) -> Iterator[tuple[int, Constraints]]:
     """Yield index and constraints of the distances from thin regions on the straight way from point to point."""
-    held = mesh.held(scenario)
     for limit, on_the_way in swept(scenario, mesh).items():
         slack = layout.slack(columns[0], limit)
-        pieces = [bounded(limit, on_the_way(*first, *second), mesh, slack, held) for first, second in pairwise(whole())]
+        pieces = [bounded(limit, on_the_way(*first, *second), slack) for first, second in pairwise(whole())]
         values, rows = ([*chain(*parts)] for parts in zip(*pieces, strict=True))
         yield scenario.limits.all.index(limit), (values, rows)
 
 
-def _hull_rows(scenario: Scenario, mesh: Mesh, points_of: Callable[[int | None], Points]) -> Iterator[Constraints]:
+def _hull_rows(scenario: Scenario, points_of: Callable[[int | None], Points]) -> Iterator[Constraints]:
     """Yield values and rows of the hard convex limits at Bernstein points: so they hold between the nodes too."""
-    held = mesh.held(scenario)
     for limit in scenario.limits:
         hull = limit.hull
         if hull is None or not limit.is_convex or not scenario.moves(hull):
@@ -225,7 +223,7 @@ def _hull_rows(scenario: Scenario, mesh: Mesh, points_of: Callable[[int | None],
             points = points[1:-1]
         evaluate = scenario.limits.hull(limit)
         for point in points:
-            yield bounded(limit, evaluate(point), mesh, None, held)
+            yield bounded(limit, evaluate(point), None)
 
 
 def _total(

@@ -1,4 +1,4 @@
-"""`leaving_rows`: a motion that starts or ends exactly with the largest speed is not faster just after or before.
+"""`leaving`: a motion that starts or ends exactly with the largest speed is not faster just after or before.
 
 At a fixed end that lies on a bound, the value of a limit of speed is given, and its slope is a matter of the
 acceleration there, which may be free. The nodes alone would permit a slope that leads beyond the bound and back before
@@ -6,6 +6,7 @@ the next one, in steps of any length.
 """
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -14,7 +15,7 @@ from ..limits import Body
 from ..limits.limits import motions as whole_motions
 from ..tasks.ends import fixed_values
 from ..tasks.scenario import Scenario
-from .derivatives import Block, Columns
+from .derivatives import Differentiable
 from .held import at_ends, held_spans
 from .layout import Layout
 from .part import function_of
@@ -23,15 +24,23 @@ from .rows import Row, in_world, motions, reference_symbols
 ON_IT = 1e-6  # of the scale of a limit: an end so near to a bound is on it
 
 
-def leaving_rows(scenario: Scenario, layout: Layout, references: np.ndarray, columns: Columns) -> list[Block]:
+class Leaving(NamedTuple):
+    """Rows of an end."""
+
+    function: Differentiable  # of its point
+    rows: list[Row]
+    point: int
+
+
+def leaving(scenario: Scenario, layout: Layout, references: np.ndarray) -> list[Leaving]:
     """Return the rows of both ends: what is on its bound there has a slope to the inside, in parts of its scale.
 
     `references` are the motions at all points, (18 (1 + c), points).
     """
     if all(limit.is_convex or limit.is_equation for limit in scenario.limits):
         return []  # they hold between the nodes anyway
-    blocks, size, last = [], scenario.scheme.size, references.shape[1] - 1
-    for end, node, forwards in ((0, 0, 1.0), (-1, last, -1.0)):
+    ends, last = [], references.shape[1] - 1
+    for end, point, forwards in ((0, 0, 1.0), (-1, last, -1.0)):
         fixed = [value.column for value in fixed_values(scenario) if (value.end, value.order) == (end, 2)]
         free = [column for column in range(layout.n) if column not in fixed]
         x = ca.SX.sym("x", layout.width)
@@ -46,9 +55,8 @@ def leaving_rows(scenario: Scenario, layout: Layout, references: np.ndarray, col
                 rows.append(Row(f"slope of {name}", -np.inf, 0.0))
         if rows:
             function = function_of("leaving", {"x": x}, {"p": parameters}, ca.vertcat(*values))
-            mapped = columns.at_nodes(function, np.array([node]))
-            blocks.append(Block(mapped.values, rows, np.array([node // size]), mapped))
-    return blocks
+            ends.append(Leaving(function, rows, point))
+    return ends
 
 
 def _slopes_outwards(scenario: Scenario, end: int) -> Iterator[tuple[str, ca.Function]]:

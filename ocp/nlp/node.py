@@ -114,7 +114,7 @@ def _limit_rows(
     scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX, state: list[ca.SX]
 ) -> Iterator[tuple[int, Constraints]]:
     """Yield index and constraints of each limit that holds at a node; `interval` has those between two points."""
-    limits, held = scenario.limits, mesh.held(scenario)
+    limits = scenario.limits
     if not limits.all:
         return
     evaluated, on_the_way = limits.function(*state), swept(scenario, mesh)
@@ -123,7 +123,7 @@ def _limit_rows(
         elsewhere = isinstance(limit, Rate) or limit in on_the_way
         if elsewhere or (hull is not None and (hull.order < ACCELERATION or not scenario.moves(hull))):
             continue
-        yield index, bounded(limit, evaluated[place], mesh, layout.slack(x, limit), held)
+        yield index, bounded(limit, evaluated[place], layout.slack(x, limit))
 
 
 def _node_cost(scenario: Scenario, layout: Layout, x: ca.SX, cost: ca.SX) -> ca.SX:

@@ -1,13 +1,14 @@
 """`Part`: a node or an interval of a program as functions of its columns, which `part_of` makes of expressions."""
 
 from collections.abc import Callable, Iterable
-from functools import partial
+from functools import cache, partial
 from itertools import chain
 from typing import NamedTuple, TypeAlias
 
 import casadi as ca
 
 from ..limits.limits import Limits
+from .derivatives import Differentiable
 from .near import is_local
 from .rows import Row
 
@@ -17,11 +18,11 @@ Constraints: TypeAlias = tuple[list[ca.SX], list[Row]]  # values, and their name
 class Part(NamedTuple):
     """A node or an interval."""
 
-    cost: ca.Function  # A function of its own, since IPOPT evaluates objective and constraints one after the other
-    function: ca.Function  # the values of its rows
+    cost: Differentiable  # A function of its own, since IPOPT evaluates objective and constraints one after the other
+    function: Differentiable  # the values of its rows
     rows: list[Row]  # names and bounds of these
     # Index of each local limit, what returns the function of some of its values, and its rows.
-    local: list[tuple[int, Callable[[list[int]], ca.Function], list[Row]]]
+    local: list[tuple[int, Callable[[tuple[int, ...]], Differentiable], list[Row]]]
 
 
 def part_of(
@@ -40,7 +41,8 @@ def part_of(
     local = []
     for index, (values, rows) in of_limits:
         if is_local(limits.all[index]):
-            local.append((index, partial(_function_of_some, unknowns, parameters, ca.vertcat(*values)), rows))
+            function_of_some = partial(_function_of_some, unknowns, parameters, ca.vertcat(*values))
+            local.append((index, cache(function_of_some), rows))
         else:
             constraints.append((values, rows))
     values, rows = ([*chain(*parts)] for parts in zip(*constraints, strict=True))
@@ -49,12 +51,12 @@ def part_of(
 
 
 def _function_of_some(
-    unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], values: ca.SX, picked: list[int]
-) -> ca.Function:
-    return function_of("near", unknowns, parameters, values[picked])
+    unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], values: ca.SX, picked: tuple[int, ...]
+) -> Differentiable:
+    return function_of("near", unknowns, parameters, values[list(picked)])
 
 
-def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> ca.Function:
+def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.SX], value: ca.SX) -> Differentiable:
     """Return the function of all unknowns and of those parameters on which its value depends.
 
     CasADi would differentiate with respect to the parameters too and throw the result away: a Hessian took 6 times as
@@ -62,4 +64,5 @@ def function_of(name: str, unknowns: dict[str, ca.SX], parameters: dict[str, ca.
     """
     inputs = unknowns | {key: each for key, each in parameters.items() if ca.depends_on(value, each)}
     options = {"cse": True, "is_diff_in": [key in unknowns for key in inputs]}
-    return ca.Function(name, [*inputs.values()], [value], [*inputs], ["value"], options)
+    function = ca.Function(name, [*inputs.values()], [value], [*inputs], ["value"], options)
+    return Differentiable(function, sum(each.numel() for each in unknowns.values()))

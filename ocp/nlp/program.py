@@ -13,12 +13,13 @@ duration T too where the task leaves it free:
           their slopes lead inside where a fixed end is on one          (`leaving`)
           tube, reach, speed, tilt, acceleration at the Bernstein points: so they hold between points too
 
-What holds at one point is in `node`, what binds an interval's in `interval`. Tensions are in units of
-`Robot.force_scale`, the weight, moments over `Robot.length`.
+What holds at one point is in `node`, what binds an interval's in `interval`; `stages` has both as functions. Tensions
+are in units of `Robot.force_scale`, the weight, moments over `Robot.length`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,22 +27,22 @@ import casadi as ca
 import numpy as np
 
 from ...base.display import Displayed
+from ..limits import Limit
 from ..tasks import bernstein
 from ..tasks.deviation import Deviation
 from ..tasks.ends import carrier_ends, fixed_values, platform_ends
-from ..tasks.paths import RestPath
 from ..tasks.resting import known_tensions
 from ..tasks.scenario import ATTITUDE, START_BAND, Scenario
 from .derivatives import Block, Columns, Mapped, derivatives
 from .grid import Grid, passed
 from .held import eased, held_wrench
-from .interval import interval_of, points
+from .interval import points
 from .layout import DURATION, MARGIN, Layout
-from .leaving import leaving_rows
+from .leaving import Leaving
 from .near import Near, parts
-from .node import node_of
 from .part import Part
-from .rows import Mesh, Row, stretch
+from .rows import Mesh, Row, Tightening, stretch
+from .stages import Stages, reference_motions
 
 LEGS = 0.3, 3.0  # times its duration in the motion before: what one of a leg may be
 SAME = 1e-9  # of the duration: rounding of where a leg ends
@@ -73,13 +74,15 @@ class Program(Displayed):
         """
         times = self.shares * scenario.duration
         lower, upper = _simple_bounds(scenario, self.mesh, self.layout, times)
-        parameters = _values(_parameters(scenario, times), scenario.duration / self.mesh.steps)
+        parameters = _values(reference_motions(scenario, times), scenario.duration / self.mesh.steps)
         return replace(self, scenario=scenario, parameters=parameters, lower=lower, upper=upper)
 
-    def bounded_as(self, other: Program) -> Program:
-        """Return this program with the mesh and bounds of one with the same rows."""
-        lower, upper, lower_g, upper_g = other.lower, other.upper, other.lower_g, other.upper_g
-        return replace(self, mesh=other.mesh, lower=lower, upper=upper, lower_g=lower_g, upper_g=upper_g)
+    def tightened(self, mesh: Mesh) -> Program:
+        """Return this program with the bounds of another mesh of as many steps."""
+        scenario = self.scenario
+        lower, upper = _simple_bounds(scenario, mesh, self.layout, self.shares * scenario.duration)
+        lower_g, upper_g = _bounds(scenario, mesh, Grid.of(scenario, mesh.steps), self.blocks)
+        return replace(self, mesh=mesh, lower=lower, upper=upper, lower_g=lower_g, upper_g=upper_g)
 
     def columns(self, x: np.ndarray) -> np.ndarray:
         """Return the unknowns of each point, one row per point."""
@@ -147,27 +150,30 @@ class Program(Displayed):
         return columns.ravel()
 
 
-def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: bool = False) -> Program:
+def build(
+    scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: bool = False, stages: Stages | None = None
+) -> Program:
     """Build the nonlinear program of `scenario` on `mesh`, with local limits where they are `near`; default: all.
 
     A `movable` one has the references and the length of the intervals as parameters (`Program.of`). Its ends are not
-    yet known, so that it has no `leaving_rows`.
+    yet known, so that it has no rows of `leaving`. `stages` are those of the scenario and the mesh; default: new ones.
     """
-    steps, layout, scheme = mesh.steps, Layout.of(scenario, mesh.elastic), scenario.scheme
-    grid = Grid.of(scenario, steps)
+    steps, scheme, stages = mesh.steps, scenario.scheme, stages or Stages.of(scenario, mesh, movable)
+    layout, grid, references, node, interval = (
+        stages.layout,
+        stages.grid,
+        stages.references,
+        stages.node,
+        stages.interval,
+    )
     near = near or Near.everywhere(scenario, grid.shares)
     times = grid.shares * scenario.duration
-    references, carried = _parameters(scenario, times), _carried(scenario, times)
     p, given, intervals = ca.MX.sym("p", 0), ca.DM(references), ca.DM(grid.intervals)
-    shown, lengths = references, grid.intervals
     if movable:
         p, given, intervals = _as_parameters(references.shape, steps)
-        shown, lengths = _made_to_vary(scenario, references), np.hstack([lengths, lengths * [[2.0], [1.0]]])
-    node = node_of(scenario, mesh, layout, shown, carried)
-    interval = interval_of(scenario, mesh, layout, shown, lengths)
     x = ca.MX.sym("x", len(times) * layout.width)
     X = ca.reshape(x, layout.width, len(times))
-    columns = Columns(X, scheme, given, carried, intervals)
+    columns = Columns(X, scheme, given, stages.carried, intervals)
     costs = [
         (columns.at_nodes(node.cost), grid.weights),
         (columns.between(interval.cost), grid.steps / scenario.duration),
@@ -183,12 +189,11 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         Block(everywhere.values, node.rows, np.arange(len(times)) // scheme.size, everywhere),
         Block(between.values, interval.rows, np.arange(steps), between),
         *_single_rows(scenario, layout, X, grid),
-        *([] if movable else leaving_rows(scenario, layout, references, columns)),
+        *_end_rows(stages.ends, columns, scheme.size),
     ]
-    starts = np.concatenate([[0.0], np.cumsum(grid.steps)]) / grid.steps.sum()
-    bounds = np.concatenate([_bounds_of(block, starts, scenario) for block in blocks])
-    g = ca.vertcat(*(ca.vec(block.values) for block in blocks))
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
+    lower_g, upper_g = _bounds(scenario, mesh, grid, blocks)
+    g = ca.vertcat(*(ca.vec(block.values) for block in blocks))
     return Program(
         scenario=scenario,
         mesh=mesh,
@@ -197,8 +202,8 @@ def build(scenario: Scenario, mesh: Mesh, near: Near | None = None, movable: boo
         problem={"x": x, "p": p, "f": objective, "g": g},
         lower=lower,
         upper=upper,
-        lower_g=bounds[:, 0],
-        upper_g=bounds[:, 1],
+        lower_g=lower_g,
+        upper_g=upper_g,
         near=near,
         costs=costs,
         blocks=blocks,
@@ -219,15 +224,6 @@ def _values(references: np.ndarray, step: float) -> np.ndarray:
     return np.append(references.ravel(order="F"), step)
 
 
-def _made_to_vary(scenario: Scenario, references: np.ndarray) -> np.ndarray:
-    """Return references that are constant only where all motions of a movable program are: carriers without a path."""
-    varies = np.zeros((1 + len(scenario.robot.carriers), 18, 1))
-    varies[0] = 1.0
-    for index, path in scenario.carrier_paths.items():
-        varies[1 + index] = not isinstance(path, RestPath)
-    return np.hstack([references, references + varies.reshape(-1, 1)])
-
-
 def _near_rows(scenario: Scenario, near: Near, node: Part, interval: Part, columns: Columns) -> list[Block]:
     """Return the rows of local limits where they are near, at nodes and between them."""
     blocks, size = [], scenario.scheme.size
@@ -244,29 +240,32 @@ def _near_rows(scenario: Scenario, near: Near, node: Part, interval: Part, colum
                     together.setdefault(near_to[i].tobytes(), []).extend(range(len(rows))[picked])
             for where, picked in together.items():
                 chosen = np.flatnonzero(np.frombuffer(where, dtype=bool))
-                mapped = mapped_at(function(picked), chosen)
+                mapped = mapped_at(function(tuple(picked)), chosen)
                 blocks.append(Block(mapped.values, [rows[i] for i in picked], chosen // points_of_stage, mapped))
     return blocks
 
 
-def _parameters(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
-    """Return the reference motions, one column per node: platform, then carriers; pose, velocity, acceleration."""
-    platform, carriers = scenario.references(nodes)
-    return np.hstack([part for motion in (platform, *carriers) for part in motion]).T
+def _end_rows(ends: list[Leaving], columns: Columns, size: int) -> Iterator[Block]:
+    """Yield the rows of both ends, at points of which each stage has so many."""
+    for function, rows, point in ends:
+        mapped = columns.at_nodes(function, np.array([point]))
+        yield Block(mapped.values, rows, np.array([point // size]), mapped)
 
 
-def _carried(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:
-    """Return loads, columns of the ground and extreme loads, (10 + 6 s + 10 k, nodes); (0, nodes) for none."""
-    phases = scenario.phases
-    if not (phases.carry or phases.rest):
-        return np.zeros((0, len(nodes)))
-    columns = phases.columns_at(nodes).swapaxes(1, 2).reshape(len(nodes), -1)
-    return np.hstack([phases.loads_at(nodes), columns, *(phases.loads_at(nodes, k) for k in range(phases.extremes))]).T
+def _bounds(scenario: Scenario, mesh: Mesh, grid: Grid, blocks: list[Block]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bounds of the rows of all blocks."""
+    starts = np.append(0.0, np.cumsum(grid.steps)) / grid.steps.sum()
+    limits = {row.limit for block in blocks for row in block.rows if row.limit is not None}
+    tightening = mesh.tightening(scenario, limits)
+    bounds = np.concatenate([_bounds_of(block, starts, tightening, scenario) for block in blocks])
+    return bounds[:, 0], bounds[:, 1]
 
 
-def _bounds_of(block: Block, starts: np.ndarray, scenario: Scenario) -> np.ndarray:
+def _bounds_of(
+    block: Block, starts: np.ndarray, tightening: Mapping[Limit, Tightening], scenario: Scenario
+) -> np.ndarray:
     """Return the bounds of a block; what a point has of the duration may change where a leg ends."""
-    bounds = block.bounds(starts)
+    bounds = block.bounds(starts, tightening)
     ends = np.searchsorted(starts, np.array(passed(scenario)) - SAME) - 1
     for index, row in enumerate(block.rows):
         if row.name == DURATION and len(ends):

@@ -1,6 +1,6 @@
 """Define what the parts of a program share: its mesh, its rows, and the motions that its unknowns stand for."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -20,13 +20,25 @@ STEPS = 4  # a motion is rarely that many times as fast as its reference
 
 
 class Row(NamedTuple):
-    """A row of a program: its bounds, by how much these move inwards, and when the task fixes what it bounds."""
+    """A row of a program: its bounds, and the limit that tightens them, if it is one's."""
 
     name: str
     low: float
     high: float
-    tighter: tuple[float, float] = (0.0, 0.0)  # lower and upper bound
+    limit: Limit | None = None
+    side: float = 0.0  # of a soft limit, whose bounds are rows with only a lower bound: the lower (1) or the upper (-1)
+
+
+class Tightening(NamedTuple):
+    """By how much the bounds of a limit's rows move inwards, and when the task fixes what it bounds."""
+
+    lower: float = 0.0
+    upper: float = 0.0
     held: Spans = ()
+
+    def of(self, row: Row) -> tuple[float, float]:
+        """Return by how much the lower and the upper bound of a row move inwards."""
+        return (self.lower if row.side > 0 else self.upper, 0.0) if row.side else (self.lower, self.upper)
 
 
 @dataclass(frozen=True)
@@ -46,26 +58,28 @@ class Mesh(Displayed):
         of_it = [share for name, about, share in self.further if limit.name == name and limit.is_about(about)]
         return self.shrink + max(of_it, default=0.0)
 
-    def held(self, scenario: Scenario) -> dict[Limit, Spans]:
-        """Return when the task fixes what each limit bounds, as far as limits are reduced."""
-        return held_spans(scenario, self.shrink_of) if self.shrink or self.further else {}
+    def tightening(self, scenario: Scenario, limits: Iterable[Limit]) -> dict[Limit, Tightening]:
+        """Return by how much the rows of some limits are tightened, if any are."""
+        if not (self.shrink or self.further):
+            return {}
+        held = held_spans(scenario, self.shrink_of)
+        return {limit: Tightening(*self._inwards(limit), held.get(limit, ())) for limit in limits}
+
+    def _inwards(self, limit: Limit) -> tuple[float, float]:
+        """Return by how much the bounds of a limit's rows move inwards."""
+        nothing = ca.SX.zeros(len(limit.labels))
+        _, low, high = limit.rows(nothing)
+        _, lowest, highest = limit.rows(nothing, self.shrink_of(limit))
+        return (lowest - low if np.isfinite(low) else 0.0), (high - highest if np.isfinite(high) else 0.0)
 
 
-def bounded(
-    limit: Limit, values: ca.SX, mesh: Mesh, slack: ca.SX | None, held: Mapping[Limit, Spans]
-) -> tuple[list[ca.SX], list[Row]]:
-    """Return values and rows of a limit; if it is soft with its slack, in units of its scale.
-
-    `held` is when the task fixes what each limit bounds.
-    """
+def bounded(limit: Limit, values: ca.SX, slack: ca.SX | None) -> tuple[list[ca.SX], list[Row]]:
+    """Return values and rows of a limit; if it is soft with its slack, in units of its scale."""
     value, low, high = limit.rows(values)
     if slack is None:
-        _, lowest, highest = limit.rows(values, mesh.shrink_of(limit))
-        tighter = lowest - low if np.isfinite(low) else 0.0, high - highest if np.isfinite(high) else 0.0
-        return [value], [Row(limit.name, low, high, tighter, held.get(limit, ()))] * value.numel()
-    _, low, high = limit.rows(values, mesh.shrink_of(limit))
+        return [value], [Row(limit.name, low, high, limit)] * value.numel()
     sides = [(sign, bound) for sign, bound in ((1.0, low), (-1.0, -high)) if np.isfinite(bound)]
-    rows = [Row(limit.name, bound, np.inf) for _, bound in sides for _ in range(value.numel())]
+    rows = [Row(limit.name, bound, np.inf, limit, sign) for sign, bound in sides for _ in range(value.numel())]
     return [sign * value + slack for sign, _ in sides], rows
 
 

@@ -17,6 +17,7 @@ from ..nlp.near import Near, has_places
 from ..nlp.program import Program, build
 from ..nlp.rows import Mesh
 from ..nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
+from ..nlp.stages import Stages
 from ..nlp.waiting import raise_if_swallowed, wait_for
 from ..plan import Plan
 from ..result import PlannerStep
@@ -67,6 +68,7 @@ class Search:
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[PlannerStep] = []
         self.mesh: Mesh | None = None  # of the program that was solved last
+        self._stages: list[tuple[Scenario, Mesh, Stages]] = []  # of programs that were built
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
@@ -75,6 +77,7 @@ class Search:
         """Go on with another scenario, without what is known of the one before."""
         self.scenario = scenario
         self._solvers.clear()
+        self._stages.clear()
         self._audited.clear()
 
     @contextmanager
@@ -139,8 +142,7 @@ class Search:
         """
         if self.mesh is not None and self.mesh in self._solvers:
             solver = self._solvers[mesh] = self._solvers.pop(self.mesh)
-            near = solver.program.near
-            solver.program = solver.program.bounded_as(wait_for(lambda: build(self.scenario, mesh, near)))
+            solver.program = solver.program.tightened(mesh)
 
     def solve_again(self, mesh: Mesh, guess: Deviation) -> Outcome:
         """Solve the program with parameters of `mesh` from a guess near its last solution, of another scenario."""
@@ -180,7 +182,7 @@ class Search:
             objective, iterations, missed = np.inf, 0, np.inf
             for passed in range(PASSES + ROUNDS):
                 if linear is None:
-                    linear = wait_for(lambda near=near: LinearDistances(build(scenario, mesh, near)))
+                    linear = wait_for(lambda near=near: LinearDistances(self._build(scenario, mesh, near)))
                 self.build_s += time.perf_counter() - start
                 start = time.perf_counter()
                 outcome = linear.solve(motion, self._iteration, self.seconds_left)
@@ -218,7 +220,7 @@ class Search:
         known = self._solvers.get(mesh)
         again = known is not None and guess is None and known.has_solution  # continues from there, with its own rows
         if near is not None:
-            self._solvers[mesh] = wait_for(lambda: Solver(build(self.scenario, mesh, near)))
+            self._solvers[mesh] = wait_for(lambda: Solver(self._build(self.scenario, mesh, near)))
         elif known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
             self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach)))
         solver = self._solvers[mesh]
@@ -238,10 +240,18 @@ class Search:
         """Return the program of `mesh`, without the rows of regions that are farther than `reach` from the guess."""
         scenario = self.scenario
         if not has_places(scenario) or not np.isfinite(reach):
-            return build(scenario, mesh)
+            return self._build(scenario, mesh, None)
         shares = Grid.of(scenario, mesh.steps).shares
         motion = initial_guess(scenario, shares * scenario.duration) if guess is None else guess
-        return build(scenario, mesh, Near.along(scenario, shares, motion, reach))
+        return self._build(scenario, mesh, Near.along(scenario, shares, motion, reach))
+
+    def _build(self, scenario: Scenario, mesh: Mesh, near: Near | None) -> Program:
+        """Build a program from the stages of an earlier one of the same scenario and as many steps, if there is one."""
+        for its, of_mesh, stages in self._stages:
+            if its is scenario and (of_mesh.steps, of_mesh.elastic) == (mesh.steps, mesh.elastic):
+                return build(scenario, mesh, near, stages=stages)
+        self._stages.append((scenario, mesh, Stages.of(scenario, mesh)))
+        return build(scenario, mesh, near, stages=self._stages[-1][2])
 
     def audit(self, outcome: Outcome) -> Audit:
         """Audit the motion of a program's solution, which `best` then chooses from."""
