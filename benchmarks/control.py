@@ -19,6 +19,7 @@ from ..control import ComputedTorque, Controller, OpenLoop, Predictive
 from ..models import Robot, load
 from ..simulation import simulate
 from ..solvers import Horizon
+from .acados import ACADOS
 from .control_contenders import CONTENDERS, FIELDS, REFERENCE, TOWLINE, Program, fill
 from .control_programs import BLOCK, FAILED, Row, measure
 from .harness import machine, table
@@ -26,6 +27,7 @@ from .harness import machine, table
 STANDARD = "computed torque"
 Progress = Callable[[str, int, int], None]
 TIMED = ("casadi", "daqp", "osqp", "numpy")
+EVERYONE = (*CONTENDERS, *ACADOS)  # acados, where it is installed
 
 
 @dataclass(frozen=True)
@@ -245,7 +247,7 @@ def _programs(task: Task, robot: Robot, steps: int) -> list[Row]:
         programs = record(task, robot, steps)
     except InputError:
         return []
-    return measure(task.name, programs, CONTENDERS)
+    return measure(task.name, programs, EVERYONE)
 
 
 def markdown(report: Report) -> str:

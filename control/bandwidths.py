@@ -107,6 +107,16 @@ def bandwidths_for(
     return Bandwidths(*given, h)
 
 
+def noise_of_velocity(robot: Robot, sensors: Noise | Mapping[str, Any] | None) -> float:
+    """Return the standard deviation of the measured velocity, of all coordinates together [m/s]; 0 without `sensors`.
+
+    Rates of angles are multiplied by the robot's length. Raises `InputError` if `sensors` has a wrong value.
+    """
+    if sensors is None:
+        return 0.0
+    return float(np.linalg.norm(robot.dof_mask * np.repeat(_errors_of(_noise_of(sensors), robot).velocities, 3)))
+
+
 def _noise_of(sensors: Any) -> Noise:
     return sensors if isinstance(sensors, Noise) else validate(sensors, Noise, "sensors")
 
@@ -117,18 +127,19 @@ class _Errors(NamedTuple):
     age: float  # of all states
     late: float  # what of the age and of lags is not predicted
     position: float
-    velocity: float
+    velocities: np.ndarray  # (2,), of the position and by rates of angles
     ripple: float  # two standard deviations of tensions by velocities, of their distance from limits [s]
 
     def permit(self, bandwidth: float, observer: float) -> tuple[float, str]:
         """Return by which factor both bandwidths may be multiplied, and what does not permit more."""
         by_age = 1.0 / max((bandwidth + observer) * self.late, TINY)
-        a, b = bandwidth**2 * self.position, (2 * bandwidth + observer) * self.velocity
+        velocity = float(self.velocities.max())
+        a, b = bandwidth**2 * self.position, (2 * bandwidth + observer) * velocity
         by_noise = 2 * NOISE * GRAVITY / max(b + np.sqrt(b * b + 4 * a * NOISE * GRAVITY), TINY)
         by_noise = min(by_noise, 1.0 / max((2 * bandwidth + observer) * self.ripple, TINY))
         if by_age < by_noise:
             return by_age, f"a state that is {quantity(self.late, 's')} late"
-        return by_noise, f"noise of {quantity(self.position, 'm')} and {quantity(self.velocity, 'm/s')}"
+        return by_noise, f"noise of {quantity(self.position, 'm')} and {quantity(velocity, 'm/s')}"
 
 
 def _errors_of(noise: Noise, robot: Robot) -> _Errors:
@@ -145,4 +156,4 @@ def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     strict = robot.fixed_lengths is None and robot.m >= len(robot.platform.dof)
     of_tensions = ripple(robot, limits_of(robot, None), np.repeat(velocity, 3)) if strict and velocity.any() else None
     most = 0.0 if of_tensions is None else OFTEN * float(np.linalg.norm(of_tensions, axis=1).max())
-    return _Errors(age, late, float((size * position).max()), float((size * velocity).max()), most)
+    return _Errors(age, late, float((size * position).max()), size * velocity, most)

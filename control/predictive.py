@@ -19,7 +19,7 @@ from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
 from .as_floats import as_floats
-from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for
+from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_velocity
 from .carrier_references import Flown, Freed, Moved, Tethered
 from .command import HOLD, OTHERWISE, SHIFTED, Command
 from .computed_torque import ComputedTorque, agree
@@ -57,10 +57,11 @@ class Predictive(ComputedTorque):
     command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold").
 
     The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. This
-    `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight is unexplained over about
-    50 ms, if there is no solution for that long, if noise of the velocity requires more tension than the limits permit,
-    or if carriers turn too late (core/control/turning.c). It controls the robot from the start, with a warning, if the
-    loop is unstable at home because carriers turn before they accelerate, as with cables that begin below their CoM.
+    `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
+    `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity requires
+    more tension than the limits permit, or if carriers turn too late (core/control/turning.c). It controls the robot
+    from the start, with a warning, if the loop is unstable at home because carriers turn before they accelerate, as
+    with cables that begin below their CoM.
 
     Parameters
     ----------
@@ -168,7 +169,8 @@ class Predictive(ComputedTorque):
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
         usual = self.robot.force_scale / self.robot.platform.mass
         rates = 2 * self._bandwidth + float(self._settings["observer"])
-        self._watch = Watch(scale, usual, None if correct else ripple(self.robot, self._limits, rates))
+        noise = noise_of_velocity(self.robot, sensors)
+        self._watch = Watch(scale, usual, noise, None if correct else ripple(self.robot, self._limits, rates))
         self._from_the_start: HandOver | None = None
         self.handed_over: HandOver | None
         self.reset()

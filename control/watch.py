@@ -36,14 +36,17 @@ class Watch:
     - `scale`: factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for
       locked coordinates.
     - `usual`: acceleration of the platform by the robot's force scale [m/s^2]: `BOUND` times this is permitted, and a
-      step without a solution is treated as an unexplained acceleration of this size.
+      step without a solution is treated as an unexplained acceleration of at least this size.
+    - `noise`: standard deviation of the known noise of the scaled velocity, of all coordinates together [m/s]. The
+      difference of two velocities has the square root of two of it, which is permitted as well.
     - `ripple`: tensions commanded for unit rates of the pose, relative to the distance of tensions from their limits,
       (m, 6) [s/m, s/rad]. The limits clip the effect of rate noise, more on one side than on the other, so `OFTEN`
       standard deviations beyond the limits are a reason to hand over. Default: noise is ignored.
     """
 
-    def __init__(self, scale: np.ndarray, usual: float, ripple: np.ndarray | None = None):
-        self._scale, self._usual = scale, usual
+    def __init__(self, scale: np.ndarray, usual: float, noise: float = 0.0, ripple: np.ndarray | None = None):
+        self._scale = scale
+        self._bound = BOUND * usual + sqrt(2) * noise / WINDOW
         self._ripple = None if ripple is None else (OFTEN * ripple) ** 2
         self.reset()
 
@@ -90,11 +93,11 @@ class Watch:
             steps.popleft()
         since = time - steps[0][0]
         if time - self._solved > WINDOW:
-            self._add(dt, self._usual)
+            self._add(dt, self._bound / BOUND)
         elif since >= WINDOW * (1 - EARLY):
             self._off += min(dt / SMOOTH, 1.0) * (left - steps[0][1] - self._off)
             self._add(dt, sqrt(self._off @ self._off) / since)
-        if self.unexplained <= BOUND * self._usual:
+        if self.unexplained <= self._bound:
             return None
         return HandOver(time, f"{self.unexplained:.2g} m/s^2 of its acceleration are not as predicted")
 

@@ -7,8 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline import simulate
-from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
+from towline.control import ANSWERS, ComputedTorque, Filtered, Predictive, Reference, State
 from towline.control.lag import Lead
+from towline.control.watch import Watch
+from towline.estimation import PoseFilter
 from towline.models import Robot, load
 from towline.statics.distribution import tensions
 
@@ -289,6 +291,40 @@ def test_noise_and_pushes_on_a_team_are_no_reason_to_give_predictions_up():
     for conditions in ({"noise": noise}, {"disturbance": push}):
         flight = simulate(robot, robot.home, controller, duration=0.5, **conditions)
         assert flight.handed_over is None, conditions
+
+
+def test_known_noise_of_a_filter_is_not_taken_for_a_wrong_model(load_on_three):
+    """Poses of 1 mm and 1 mrad without velocities: the filter's are 30 mm/s off, which looks like 0.2 g in 50 ms."""
+    robot, last = load_on_three.robot, []
+    for known, steps in ((True, 800), (False, 300)):
+        task = shorter(load_on_three, steps)
+        follow = PoseFilter(robot)
+        for k in range(200):
+            found = follow.update(1e-3 * k, pose=robot.home)
+        position, attitude, velocity, rate = np.sqrt(np.diag(found.covariance))[[0, 3, 6, 9]]
+        sensors = {"position": position, "attitude": attitude, "velocity": velocity, "attitude_rate": rate}
+        controller = Predictive(robot, sensors=sensors if known else None)
+        flown = fly(task, Filtered(controller, follow), **TEAMS["mocap 1 mm"])
+        assert (controller.handed_over is None) == known
+        assert flown.error.max() < 0.02
+        last.append(flown.unexplained.max())
+    assert last[0] > 0.1 * 9.81
+
+
+@pytest.mark.parametrize(("factor", "breaks"), [(0.5, False), (3.0, True)])
+def test_what_noise_does_not_explain_is_no_noise(factor, breaks):
+    """Velocities with white noise at 20 Hz, and an acceleration that nobody predicts, beside what both permit."""
+    dt, sigma, rng = 1e-3, 0.03, np.random.default_rng(0)
+    watch = Watch(np.ones(6), 9.81, np.sqrt(6) * sigma)
+    noise = np.repeat(sigma * rng.normal(size=(40, 6)), 50, axis=0)
+    more = factor * (0.1 * 9.81 + np.sqrt(12) * sigma / 0.05) * np.array([1, 0, 0, 0, 0, 0])
+    handed_over = None
+    for k in range(1000):
+        rate = noise[k] + dt * max(k - 500, 0) * more
+        handed_over = handed_over or watch.compare(dt * k, dt, rate, np.zeros(1))
+        watch.explain(dt * k, np.zeros(6), np.zeros((6, 1)), True)
+        assert k > 500 or handed_over is None
+    assert (handed_over is not None) == breaks
 
 
 def test_a_jump_of_the_reference_is_no_fault_of_the_model():
