@@ -166,7 +166,10 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
 
     attitude = "in its home attitude"
     if box is None:
-        return [f"  can rest, {attitude} and with its carriers at home, at none of the positions that were sampled"]
+        movable = any(carrier.moves for carrier in robot.carriers)
+        hint = ["    (in a plan with `base: {kind: free}` the carriers move, too)"] if movable else []
+        where = "at none of the positions that were sampled"
+        return [f"  can rest, {attitude} and with its carriers at home, {where}", *hint]
     sides = [
         f"{'xyz'[axis]} {quantity_range([box.low[axis], box.high[axis]], 'm', 3)}"
         for axis in np.flatnonzero(robot.dof_mask[:3])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from towline import Robot, load, plan
+from towline.ocp.reports.report import sections
 
 WAYS = {
     "beyond the frame": ("cogiro", [0, 0, 2], [9, 0, 2], {}),
@@ -38,6 +39,7 @@ def test_there_is_advice_and_all_of_it_is_feasible_when_planned_anew(refused):
             ),
             "platform.mass": lambda robot=robot: robot.platform.mass,
             "cables.t_max": lambda robot=robot: robot.t_max.max(),
+            "cables.t_min": lambda robot=robot: robot.t_min.max(),
         }[offer.name]()
         assert value == pytest.approx(offer.possible, rel=2e-3)
 
@@ -113,9 +115,89 @@ def test_without_a_feasible_change_the_report_says_what_may_help():
     line = {"kind": "line", "start": [-1, 0, 2.5], "end": [1, 0, 2.5]}
     blocked = plan("ipanema-2", {"path": line, "duration": 4, "limits": {"keep_out": [wall]}})
     assert not blocked.relaxations
-    assert "`tube: {position: 0.5}` permits the planner to leave the path" in blocked.report()
+    assert "`tube: {position: free}`: the planner then searches for a path round the obstacle" in blocked.report()
     away = {"kind": "line", "start": [1.1, 0.9, 0.2], "end": [4, 4, 2]}
     above = plan("wang-ctmrts", {"path": away, "duration": 6})
     assert not above.relaxations
     assert "no cable pulls along force (0.00, 0.00, 1.00)" in above.report()  # above all anchors
     assert "a nearer path" in above.report()
+
+
+def advice(found, name):
+    """The text of a row of what can be tried."""
+    return dict(next(section for section in sections(found) if section.title == "What you can try").facts)[name]
+
+
+def with_cables(robot, **fields):
+    data = load(robot).model_dump()
+    data["cables"] = [cable | fields for cable in data["cables"]]
+    return Robot.model_validate(data)
+
+
+def test_cables_that_pull_too_hard_have_the_largest_t_min_that_is_feasible():
+    task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [0.4, 0.2, 1.3]}, "duration": 3}
+    found = plan(with_cables("cogiro", t_min=1500.0), task)
+    (offer,) = (each for each in found.relaxations if each.name == "cables.t_min")
+    assert 0 < offer.possible < 1500
+    for factor, possible in ((1.0, True), (1.05, False)):
+        assert plan(with_cables("cogiro", t_min=factor * offer.possible), task).feasible == possible
+
+
+@pytest.mark.parametrize("width", [0.0, 0.05])
+def test_a_region_on_the_way_has_a_way_round(width):
+    post = {"kind": "sphere", "name": "post", "centre": [0, 0, 2], "radius": 0.7, "cables": None}
+    task = {"path": {"kind": "line", "start": [-2, 0, 2], "end": [2, 0, 2]}, "duration": 6, "steps": 30}
+    task |= {"limits": {"keep_out": [post]}, "tube": {"position": width}}
+    found = plan("cogiro", task)
+    assert not found.relaxations
+    assert "`tube: {position: free}`" in advice(found, "a way round")
+    assert plan("cogiro", task | {"tube": {"position": "free"}}).feasible
+
+
+@pytest.mark.parametrize(("which", "tube"), [("start", {}), ("end", {}), ("start", {"position": "free"})])
+def test_an_end_inside_a_region_has_a_clear_one_near_by(which, tube):
+    crate = {"kind": "box", "name": "crate", "min": [-1, -1, 1], "max": [1, 1.4, 3], "cables": None}
+    inside, outside = [0, 0, 2], [3, 2, 2]
+    ends = {"start": inside, "end": outside} if which == "start" else {"start": outside, "end": inside}
+    task = {"path": {"kind": "line", **ends}, "duration": 6, "limits": {"keep_out": [crate]}, "steps": 30}
+    task |= {"tube": tube} if tube else {}
+    found = plan("cogiro", task)
+    assert found.status == "infeasible"
+    text = advice(found, f"another {which}")
+    place = [float(each) for each in text[1 : text.index(")")].split(", ")]
+    assert float(text.split(" m, ")[1].split()[0]) == pytest.approx(np.linalg.norm(np.subtract(place, inside)))
+    assert plan("cogiro", task | {"path": {"kind": "line", **ends, which: place}}).feasible
+
+
+def test_numbers_in_another_unit_come_first_and_nothing_else_is_tried():
+    found = plan(
+        "ipanema-2", {"path": {"kind": "line", "start": [0, 0, 2500], "end": [1000, 500, 2500]}, "duration": 4}
+    )
+    assert "are these millimetres?" in advice(found, "other units")
+    assert "no single change" not in found.report()
+
+
+def test_carriers_that_are_too_weak_for_the_weight_have_the_factor_with_which_they_are_not():
+    data = load("multi-quadrotor-3").model_dump()
+    for carrier in data["carriers"]:
+        carrier["thrust_max"] = 19.0
+    task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1.3]}, "duration": 4}
+    task |= {"base": {"kind": "free", "ends": "rest"}, "steps": 30}
+    found = plan(Robot.model_validate(data), task)
+    assert found.status == "infeasible"
+    factor = float(advice(found, "a larger thrust_max").split()[0])
+    for carrier in data["carriers"]:
+        carrier["thrust_max"] *= factor
+    assert plan(Robot.model_validate(data), task).feasible
+
+
+def test_a_team_in_a_storm_learns_the_force_of_its_wind():
+    data = load("multi-quadrotor-3").model_dump()
+    data["platform"]["aero"] = {"air_density": 1.2, "drag": 1.0, "lift": 0.0, "area": 0.1}
+    robot = Robot.model_validate(data)
+    task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1.3]}, "duration": 4}
+    task |= {"base": {"kind": "free", "ends": "rest"}, "steps": 20, "wind": [40, 0, 0], "time_limit": 1}
+    text = advice(plan(robot, task), "a weaker wind")
+    force, weight = 0.5 * 1.2 * 0.1 * 40**2, 2.4 * 9.81
+    assert text.startswith(f"this one exerts {force:g} N on a platform that weighs {weight:.4g} N")
+    assert "(20, 0, 0) m/s exerts a quarter" in text

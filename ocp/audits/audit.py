@@ -17,7 +17,7 @@ from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
 from .checks import START_TENSIONS, excesses
 from .clearances import came_too_near
 from .drift import Drift, drift
-from .excess import Excess
+from .excess import TENSIONS, Excess
 from .instants import instants
 from .peaks import with_peaks
 from .tensions import INDEPENDENT, TOLERANCE, scaled
@@ -115,8 +115,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     exceeded = excesses(seen) + came_too_near(seen)
     beyond, at = seen.beyond
     if beyond > TOLERANCE:
-        why = "wrench error of tensions inside their limits, reduced by the margin"
-        exceeded.append(Excess("tensions", "platform", at, beyond, 0.0, "N", "exactly", why))
+        exceeded.append(Excess(TENSIONS, "platform", at, beyond, 0.0, "N", "exactly"))
     soft = {limit.name for limit in scenario.limits if limit.soft is not None}
     hangs = not (scenario.phases.carry or scenario.phases.rest)
     motion, carriers, tensions = regular.motion, regular.carriers, regular.tensions

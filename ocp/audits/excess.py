@@ -10,6 +10,8 @@ from ...base.text import quantity
 from ..limits import Limit
 from ..limits.bodies import WITHIN
 
+TENSIONS = "tensions"  # the limit of an audit that finds no tensions for the wrench
+
 
 @dataclass(frozen=True)
 class Excess(Displayed):
@@ -27,9 +29,15 @@ class Excess(Displayed):
 
     @classmethod
     def of(cls, limit: Limit, which: int, time: float, value: float, why: str = "") -> Self:
-        """Return the excess of one value of a limit, `which`, over the bound that it is beyond."""
+        """Return the excess of one value of a limit, `which`, over the bound that it is beyond.
+
+        If both bounds have one size, as those of a speed, it is the size of the value that must be at most the bound.
+        """
         side, bound = ("at least", limit.low) if value < limit.low else ("at most", limit.high)
-        side = "exactly" if limit.is_equation else side
+        if limit.is_equation:
+            side = "exactly"
+        elif limit.low == -limit.high:
+            side, bound, value = "at most", limit.high, abs(value)
         return cls(limit.name, limit.about(which), float(time), float(value), bound, limit.unit, side, why)
 
     def __str__(self) -> str:
@@ -44,8 +52,12 @@ class Excess(Displayed):
         body, _, room = self.about.partition(WITHIN)
         if room and self.value < 0:
             return f"{body} is {quantity(-self.value, self.unit)} beyond {room}{at}{why}"
+        if self.limit == TENSIONS:
+            return f"with tensions inside their limits the wrench is off by {quantity(self.value, self.unit)}{at}{why}"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "
-        value, bound = (quantity(number, self.unit, digits=6) for number in (self.value, self.bound))
+        value, bound = (quantity(number, self.unit) for number in (self.value, self.bound))
+        if value == bound:
+            value, bound = (quantity(number, self.unit, digits=6) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value
         return f"{self.limit} of {self.about} must be {side}{bound}, is {value}{at}{why}"
 

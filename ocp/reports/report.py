@@ -5,22 +5,21 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ...base.display import Fact
-from ...base.text import at_most, column, quantity, quantity_range, quantity_row
+from ...base.text import at_most, column, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Report, Section, Table
 from ...models.parsing import to_yaml
-from ...solvers import Certificate
 from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
-from ..tasks.task_limits import OF_BODY
-from ..warnings.outside_frame import LEAVES
+from .ideas import ideas, units
 from .motion_facts import motion_facts, wind
+from .reasons import exceeded, in_phase, reasons, up
 
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
 RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding
 SAME_LENGTH = 1e-9  # [m]
+AT_REST = 1e-5  # [m/s]: a smaller speed of a cable is rounding
 TRY = "What you can try"
-LEVEL = 1e-3  # [rad]: of a smaller attitude nothing is said
 
 
 def headline(plan: PlanData) -> str:
@@ -40,8 +39,8 @@ def sections(plan: PlanData) -> list[Section]:
     titles = {"infeasible": "Why it is infeasible", "not-found": "What the closest motion violates"}
     bottlenecks = [] if plan.law is None else [("", each.describe()) for each in plan.law.bottlenecks]
     every = [
-        Section(titles.get(plan.status.value, "Limits"), _reasons(plan)),
-        Section(TRY, [_relaxation(plan, relaxed) for relaxed in plan.relaxations] or _ideas(plan)),
+        Section(titles.get(plan.status.value, "Limits"), reasons(plan)),
+        Section(TRY, units(plan) + ([_relaxation(plan, relaxed) for relaxed in plan.relaxations] or ideas(plan))),
         Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
         Section("Active limits along the path (s = 0 at its start, 1 at its end)", bottlenecks),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),
@@ -58,7 +57,7 @@ def sections(plan: PlanData) -> list[Section]:
 def facts_at_once(plan: PlanData) -> list[Fact]:
     """Return the facts that need no further plans or motions, the most important first."""
     certificate = plan.certificate
-    why = [] if certificate is None else certificate.text(_up(plan))._asdict().items()
+    why = [] if certificate is None else certificate.text(up(plan))._asdict().items()
     facts = [*why, *_tensions(plan), *motion_facts(plan), *_audit(plan), *_computation(plan)]
     return [(name.replace("_", " "), fact) for name, fact in facts]
 
@@ -70,7 +69,7 @@ def spans_table(plan: PlanData) -> Table | None:
     """
     rows = []
     for certificate in plan.infeasible_spans:
-        text = certificate.text(_up(plan))
+        text = certificate.text(up(plan))
         start, end = certificate.span or (certificate.time, certificate.time)
         times = tuple(f"{time:.3f}" for time in (start, end, certificate.time))
         numbers = (certificate.demand, certificate.support, certificate.shortfall)
@@ -90,6 +89,7 @@ def cables_table(plan: PlanData) -> Table | None:
     passed = np.diff(audit.times)
     moves = passed > 0  # phases meet at two instants of one time
     speeds = np.abs(np.diff(lengths, axis=0)[moves] / passed[moves, None]).max(axis=0)
+    speeds[speeds < AT_REST] = 0.0
     tensions = np.where(np.isfinite(audit.tensions), audit.tensions, np.nan)
     known = np.asarray(np.isfinite(tensions).any(axis=0))
     every = [lengths[0], lengths[-1], lengths.min(axis=0), lengths.max(axis=0), speeds]
@@ -149,11 +149,6 @@ def report(plan: PlanData, drawings: Callable[[], Iterable[Drawing]] = tuple) ->
     )
 
 
-def _up(plan: PlanData) -> np.ndarray:
-    """Return the direction against gravity in {G}, (3,)."""
-    return -np.array(plan.scenario.robot.gravity)
-
-
 def _of_the_motion(plan: PlanData) -> str:
     if plan.law is not None and not plan.law.exists:
         if (proof := plan.law.certificate) is None:
@@ -169,95 +164,22 @@ def _of_the_motion(plan: PlanData) -> str:
         if margin is None or margin < WORTH_A_NUMBER:
             return f"every tension inside its limits{where}"
         return f"every tension at least {quantity(margin, 'N')} inside its limits{where}"
-    certificate, excess = plan.certificate, plan.audit.excess
+    certificate, excess = plan.certificate, exceeded(plan)
     if certificate is None and excess:
-        return f"{excess[0]}{_in_phase(plan, excess[0].time)}{_more(len(excess) - 1)}"
+        return f"{excess[0]}{in_phase(plan, excess[0].time)}{_more(len(excess) - 1)}"
     if certificate is None:
         return "see the stages"
     short = f"short by {quantity(certificate.shortfall, 'N')} at t = {certificate.time:.3f} s"
-    short += _in_phase(plan, certificate.time)
+    short += in_phase(plan, certificate.time)
     if certificate.wind is not None:
         short += f" in wind {wind(certificate.wind)}"
     short += "" if certificate.load is None else f" with {certificate.load_text}"
     return f"{short}{_more(len(excess))}"
 
 
-def _in_phase(plan: PlanData, time: float | None) -> str:
-    """Return the phase of a time, to follow it; empty for a task without phases."""
-    phase = None if time is None else plan.scenario.phases.at(time)
-    return "" if phase is None else f" in phase {phase.name!r}"
-
-
 def _more(count: int) -> str:
     """Return the number of limits that a sentence leaves out, to follow it; empty for none."""
     return f", {count} other limit{'s' * (count > 1)} exceeded" if count else ""
-
-
-def _reasons(plan: PlanData) -> list[Fact]:
-    if plan.feasible:
-        return []
-    facts: list[Fact] = []
-    if plan.law is not None and not plan.law.exists:
-        place = f"s = {plan.law.at:.4g} of the path (0 at its start, 1 at its end)"
-        if plan.law.certificate is None:
-            facts.append(("search ended at", place))
-        else:
-            facts.append(("worst position", f"{place}, where no time law is feasible"))
-        facts.append(("motion", f"the motion below only shows the path, in {quantity(plan.duration, 's')}"))
-    if (certificate := plan.certificate) is not None:
-        text, phase = certificate.text(_up(plan)), _in_phase(plan, certificate.time)
-        facts += [
-            *([("cause", cause)] if (cause := _cause(plan, certificate)) else []),
-            ("time", f"t = {certificate.time:.3f} s of {quantity(plan.scenario.duration, 's')}{phase}"),
-            ("pose", _pose_then(plan, certificate.time)),
-            *([("wind", wind(certificate.wind))] if certificate.wind is not None else []),
-            *([("load", certificate.load_text)] if certificate.load is not None else []),
-            ("direction", text.along),
-            ("needed", text.needed),
-            ("available", text.available),
-            ("short by", text.short_by),
-            ("limits", _bounds(plan, certificate) or text.limits),
-        ]
-    facts += [("limit exceeded", f"{excess}{_in_phase(plan, excess.time)}") for excess in plan.audit.excess]
-    return facts
-
-
-def _cause(plan: PlanData, certificate: Certificate) -> str:
-    """Return in a sentence where the platform is and which tensions would help; empty where no cable pulls."""
-    scenario, time = plan.scenario, certificate.time
-    low, high = scenario.bounds_in(None if time is None else scenario.phases.at(time))
-    ways = [
-        f"cable {' or '.join(', '.join(str(k + 1) for k in cables).rsplit(', ', 1))} would have to go {way} "
-        f"{quantity_range(bound[cables], 'N')}"
-        for way, cables, bound in (("below", certificate.at_min, low), ("above", certificate.at_max, high))
-        if cables.size
-    ]
-    nothing = f"no cable pulls along {certificate.text(_up(plan)).along.partition('; ')[0]}"
-    return f"at {_pose_then(plan, time)}, {', or '.join(ways) or nothing}"
-
-
-def _pose_then(plan: PlanData, time: float | None) -> str:
-    """Return where the platform is at a time, and its attitude if it is not level."""
-    row = int(np.argmin(np.abs(plan.audit.times - (0.0 if time is None else time))))
-    pose = plan.audit.motion.pose[row]
-    place = f"({', '.join(f'{value + 0.0:.4g}' for value in np.round(pose[:3], 6))}) m"
-    turned = ", ".join(f"{np.rad2deg(value) + 0.0:.3g}" for value in np.round(pose[3:], 6))
-    return place if np.abs(pose[3:]).max() < LEVEL else f"{place}, roll, pitch, yaw ({turned}) degrees"
-
-
-def _ideas(plan: PlanData) -> list[Fact]:
-    """Return what may help a plan for which no feasible change was found; nothing of it is computed."""
-    if plan.feasible:
-        return []
-    scenario, ideas = plan.scenario, list[Fact]()
-    inside = {excess.limit for excess in plan.audit.excess} & {"keep_out", "cable_clearance", *OF_BODY}
-    if inside and not scenario.platform_free:
-        ideas.append(("another path", "`tube: {position: 0.5}` permits the planner to leave the path by 0.5 m"))
-    if outside := [sentence for sentence in plan.warnings if sentence.startswith(LEAVES)]:
-        ideas.append(("a nearer path", f"inside the frame: {outside[0].partition(':')[2].partition(';')[0].strip()}"))
-    tried = "shorter line, weaker wind, lighter platform or stronger cables"
-    found = [("no single change", f"is known that makes it feasible: no duration, limit, {tried}")]
-    return ideas or (found if plan.certificate is not None else [])
 
 
 def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
@@ -268,20 +190,6 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
         return "feasible duration", f"{fact}, close to the {side} feasible one for this time law{other}"
     others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]
     return f"feasible {relaxed.name}", fact + (f", together with {', '.join(others)}" if others else "")
-
-
-def _bounds(plan: PlanData, certificate: Certificate) -> str:
-    """Return the tension limits of a certificate with their values; empty if no cable pulls along it."""
-    scenario, time = plan.scenario, certificate.time
-    low, high = scenario.bounds_in(None if time is None else scenario.phases.at(time))
-    limits = [
-        f"{name} of {'cables' if len(cables) > 1 else 'cable'} {', '.join(str(k + 1) for k in cables)} "
-        f"({quantity_row(np.unique(bound[cables]), 'N')})"
-        for name, cables, bound in (("t_min", certificate.at_min, low), ("t_max", certificate.at_max, high))
-        if cables.size
-    ]
-    margin = plan.scenario.hard_margin
-    return "; ".join(limits) + (f", with the margin of {quantity(margin, 'N')}" if limits and margin else "")
 
 
 def _tensions(plan: PlanData) -> list[Fact]:

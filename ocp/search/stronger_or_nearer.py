@@ -1,4 +1,4 @@
-"""What else would make a motion feasible: a nearer end of its path, a lighter platform, or stronger cables."""
+"""What else would make a motion feasible: a nearer end, less wind, a lighter platform, stronger or slacker cables."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,6 +10,7 @@ from ...base.text import quantity
 from ...models import Robot
 from ...solvers import solve_batch
 from ..audits.audit import Audit
+from ..audits.excess import TENSIONS
 from ..plan import Plan
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
@@ -44,7 +45,7 @@ def near_chosen_motion(
 
 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
-    """Return feasible variations of what a task does not name: where its line ends, the platform's mass, t_max.
+    """Return feasible variations of what a task does not name: where its line ends, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change; if speeds or accelerations are
     exceeded too, it may need a longer duration beside. The list is empty if the motion exceeds other limits, or for
@@ -53,13 +54,13 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     task = scenario.task
     if task.phases is not None or isinstance(task.wind, WindBox) or task.robust is not None or scenario.carrier_free:
         return []
-    others = [excess for excess in audit.excess if excess.limit != "tensions"]
+    others = [excess for excess in audit.excess if excess.limit != TENSIONS]
     factors = [slower(excess) for excess in others]
     if min(factors, default=2.0) <= 1.0 or (others and not scenario.stretches):
         return []
     found = list[Relaxed]()
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
-    for make in (_nearer_end, _less_wind, _lighter_platform, _stronger_cables):
+    for make in (_nearer_end, _less_wind, _lighter_platform, _stronger_cables, _slacker_cables):
         its = make(search, scenario)
         if not its and others and seconds * AUDIT_RATE <= MOST_SAMPLES:
             longer = lay_out(scenario.robot, task.model_copy(update={"duration": seconds}))
@@ -132,6 +133,21 @@ def _stronger_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
         return lay_out(stronger, scenario.task), factor * largest, f"instead of {quantity(largest, 'N')}{others}"
 
     return _largest(search, with_limits, "cables.t_max", "N", up=True)
+
+
+def _slacker_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the largest factor of all t_min that is feasible, as the largest t_min."""
+    data, t_min = scenario.robot.model_dump(), scenario.robot.t_min
+    largest, others = float(t_min.max()), "" if np.ptp(t_min) == 0 else ", the others by the same factor"
+    if largest == 0.0:
+        return []
+
+    def with_limits(share: float) -> Variation:
+        cables = [cable | {"t_min": share * cable["t_min"]} for cable in data["cables"]]
+        slacker = Robot.model_validate(data | {"cables": cables})
+        return lay_out(slacker, scenario.task), share * largest, f"instead of {quantity(largest, 'N')}{others}"
+
+    return _largest(search, with_limits, "cables.t_min", "N")
 
 
 def _largest(

@@ -18,6 +18,7 @@ TURN, QUARTER = 2 * np.pi + 0.1, np.pi / 2 + 0.1  # [rad]: larger angles occur i
 FAST = {"m/s": 60.0, "m/s^2": 500.0, "rad/s": 20.0}  # no cable robot is faster or accelerates more
 LEAST = 0.02  # of the robot's size: what would be smaller in millimetres is taken for centimetres
 GRAMS = 1000.0  # in a kilogram
+TOO_LARGE = "is too large for this robot"
 _UNIT = re.compile(r"\[([^\]]+)\]")  # in the description of a field
 
 
@@ -66,7 +67,7 @@ def slipped_units(robot: Robot, task: Task) -> list[str]:
     of_wind = _above(numbers, "m/s", "kilometres per hour", lambda key: FAST["m/s"] if key == "wind" else np.inf)
     suspects.append(("m/s", "metres per second", of_wind))
     return [
-        f"{', '.join(suspect.keys)}: {quantity(suspect.largest, unit, 4)} is too large for this robot; "
+        f"{', '.join(suspect.keys)}: {quantity(suspect.largest, unit, 4)} {TOO_LARGE}; "
         f"are these {suspect.named}? towline reads {read}"
         for unit, read, suspect in suspects
         if suspect is not None

@@ -1,0 +1,143 @@
+"""What may help a plan for which no feasible change was found: `ideas`, rows of its report.
+
+None of them is planned: a relaxation is, and takes the place of these. Positions are checked at rest.
+"""
+
+import numpy as np
+
+from ...base.display import Fact
+from ...base.text import quantity, quantity_row
+from ..audits.excess import Excess
+from ..global_path.at_rest import AtRest
+from ..global_path.space import Space
+from ..proofs.too_heavy import OF_WEIGHT
+from ..result import PlanData
+from ..tasks.paths import LinePath
+from ..tasks.scenario import POSITION, Scenario
+from ..tasks.task_limits import OF_BODY
+from ..tasks.wind_set import WindBox
+from ..warnings.outside_frame import LEAVES
+from ..warnings.slipped_units import TOO_LARGE
+
+IN_THE_WAY = {"keep_out", "cable_clearance", *OF_BODY}
+TO_MOVE = 1.5  # times what carries the weight: tilted thrust and acceleration need more
+STEPS = 100  # from an end of the path to the farthest position that is tried
+ALONG = 51  # positions of a line that are checked
+ENDS = ("start", "end")
+
+
+def ideas(plan: PlanData) -> list[Fact]:
+    """Return what may help, the most likely first; empty for a feasible plan, or if nothing is known to."""
+    if plan.feasible:
+        return []
+    found = [*_obstacles(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
+    tried = "shorter line, weaker wind, lighter platform, stronger cables or lower t_min"
+    nothing = [("no single change", f"is known that makes it feasible: no duration, limit, {tried}")]
+    return found or (nothing if plan.certificate is not None and not units(plan) else [])
+
+
+def units(plan: PlanData) -> list[Fact]:
+    """Return the numbers of an infeasible task that seem to be in another unit; these come before all else."""
+    if plan.feasible:
+        return []
+    return [("other units", sentence) for sentence in plan.warnings if TOO_LARGE in sentence]
+
+
+def _obstacles(plan: PlanData) -> list[Fact]:
+    """Return other ends where an end of the path is inside a region, else a way round."""
+    scenario = plan.scenario
+    if not {excess.limit for excess in plan.audit.excess} & IN_THE_WAY:
+        return []
+    if moved := _clear_ends(scenario):
+        return moved
+    if (width := scenario.task.tube.position) == "free":
+        return []
+    now = f" instead of {quantity(width, 'm')}" if width else ""
+    return [
+        ("a way round", f"`tube: {{position: free}}`{now}: the planner then searches for a path round the obstacle")
+    ]
+
+
+def _clear_ends(scenario: Scenario) -> list[Fact]:
+    """Return, for each end of the path at which the platform is in the way of something, a near one at which not."""
+    space = Space(scenario)
+    platform, carriers = space.references
+    kept = AtRest(scenario, space.size, spare=0.0)
+    limits_alone = AtRest(scenario, space.size, balance=False)(platform, carriers)
+    facts = []
+    for end, (slack, worst) in enumerate(zip(limits_alone.slack, limits_alone.worst, strict=True)):
+        limit = scenario.limits.all[worst].name if slack < 0 and worst >= 0 else ""
+        if limit in IN_THE_WAY and (place := _nearest(scenario, kept, space, end)) is not None:
+            away = quantity(float(np.linalg.norm(place - platform[end, :3])), "m")
+            where = f"({quantity_row(place + 0.0)}) m, {away} away, is clear of everything (checked at rest)"
+            facts.append((f"another {ENDS[end]}", where))
+    return facts
+
+
+def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> np.ndarray | None:
+    """Return the position nearest to an end, along an axis of {G}, at which the robot can rest; None if none is found.
+
+    For a line that the platform follows, the nearest from which that line is clear is preferred.
+    """
+    (from_, loose), axes = space.references, [axis for axis in POSITION if scenario.robot.dof_mask[axis]]
+    points = np.vstack([scenario.robot.home_anchors, from_[:, :3]])
+    step = 10.0 ** np.floor(np.log10(float(np.linalg.norm(np.ptp(points, axis=0))) / STEPS))
+    ways = [sign * np.eye(3)[axis] for axis in axes for sign in (1, -1)]
+    away = step * np.arange(1, 5 * STEPS)
+    nearest = []
+    for way in ways:
+        clear = _slack(kept, space, from_[end], loose[end], away[:, None] * way) >= 0
+        clear = clear[:-1] & clear[1:]  # a step farther than necessary
+        if clear.any():
+            nearest.append((away[1 + clear.argmax()], way))
+    places = [from_[end, :3] + far * way for far, way in sorted(nearest, key=lambda pair: pair[0])]
+    if isinstance(scenario.task.path, LinePath) and not scenario.platform_free:
+        share = np.linspace(0.0, 1.0, ALONG)[:, None]
+        other = from_[1 - end, :3]
+        lines = ((place, place + share * (other - place) - from_[end, :3]) for place in places)
+        straight = [place for place, line in lines if (_slack(kept, space, from_[end], loose[end], line) >= 0).all()]
+        places = straight or places
+    return next(iter(places), None)
+
+
+def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Return by how much limits are kept at rest, (n,), by a robot moved by (n, 3) [m] with its flying carriers."""
+    platform = np.tile(pose, (len(moved), 1))
+    every = np.tile(carriers, (len(moved), 1, 1))
+    platform[:, :3] += moved
+    every[:, space.loose, :3] += moved[:, None]
+    return kept(platform, every).slack
+
+
+def _strength(plan: PlanData) -> list[Fact]:
+    """Return how much stronger what is too weak for the weight must be."""
+    weak = [excess for excess in plan.audit.excess if excess.limit in OF_WEIGHT]
+    return [(f"a larger {excess.limit}", _times(excess)) for excess in weak[:1]]
+
+
+def _times(excess: Excess) -> str:
+    least = excess.bound / excess.value
+    return (
+        f"{quantity(TO_MOVE * least, digits=3)} times as large; {quantity(least, digits=3)} times would carry the "
+        "weight at rest, but tilt and acceleration need more"
+    )
+
+
+def _wind(plan: PlanData) -> list[Fact]:
+    """Return the force of a task's wind on the platform at rest, in proportion to its weight."""
+    wind, scenario = plan.scenario.task.wind, plan.scenario
+    if wind is None or isinstance(wind, WindBox) or not any(wind):
+        return []
+    home, still = scenario.robot.home, np.zeros(6)
+    force = float(np.linalg.norm(scenario.dynamics.aerodynamic_wrench(home, still, wind=np.array(wind))[:3]))
+    half = quantity_row(np.array(wind) / 2)
+    pushes = f"{quantity(force, 'N')} on a platform that weighs {quantity(scenario.robot.weight, 'N')}"
+    return [("a weaker wind", f"this one exerts {pushes}; ({half}) m/s exerts a quarter of that")]
+
+
+def _frame(plan: PlanData) -> list[Fact]:
+    """Return where the platform leaves the robot's frame, if no number is in another unit."""
+    outside = [sentence for sentence in plan.warnings if sentence.startswith(LEAVES)]
+    if not outside or units(plan):
+        return []
+    return [("a nearer path", f"inside the frame: {outside[0].partition(':')[2].partition(';')[0].strip()}")]
