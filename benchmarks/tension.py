@@ -225,10 +225,10 @@ def markdown(report: Report) -> str:
         "# Tension distribution in a hot loop",
         "",
         f"Measured on {report.machine}.",
-        f"{report.count} random problems per task, {report.repeats} rounds after a warm-up round.",
-        f"Ratio: to `{REFERENCE}` in the same round. Error: largest error of a tension, in units of the largest "
-        "tension; - if there is nothing to compare.",
-        f"Failures: no result, or off by more than {FAILED:g}; for infeasible problems, a result.",
+        f"Random problems per task: {report.count}. Rounds after a warm-up round: {report.repeats}.",
+        f"The ratio is that to `{REFERENCE}` in the same round. The error is the largest one of a tension, divided by "
+        "the largest tension; it is - if there is nothing to compare.",
+        f"A failure is a missing result, an error above {FAILED:g}, or a result for an infeasible problem.",
     ]
     for task in dict.fromkeys(row.task for row in report.rows):
         rows = []

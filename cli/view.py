@@ -19,14 +19,14 @@ def view(
     target: Annotated[
         str | None,
         typer.Argument(
-            metavar="[TARGET]",
+            metavar="TARGET",
             help="A robot (name or YAML file), or a plan, simulation or workspace file (NetCDF); default: the first "
             "robot of the library, in a view that has a list of all.",
             autocompletion=robot_names,
         ),
     ] = None,
     other: Annotated[
-        str | None, typer.Argument(metavar="[OTHER]", help="A second plan or simulation file, for comparison.")
+        str | None, typer.Argument(metavar="OTHER", help="A second plan or simulation file, for comparison.")
     ] = None,
     html: Annotated[
         Path | None,

@@ -50,8 +50,8 @@ def workspace(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help=f"Metric to compute at the samples in the file and to draw as --figure: {METRICS}. May be repeated. "
-            "Default: none.",
+            help=f"Metric to compute at the samples that the file keeps; --figure draws it: {METRICS}. May be "
+            "repeated. Default: none.",
         ),
     ] = None,
     robust: Annotated[

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Plan(PlanData, Filmed, Reported):
-    """A planned motion and its audit: the numbers of `PlanData`, with files, figures and report."""
+    """A planned motion and its audit: `PlanData`, which can also be saved, drawn and reported."""
 
     def _headline(self) -> str:
         return headline(self)

@@ -35,7 +35,7 @@ RESOLVED = 0.01  # [mm]: the digits of a smaller position error mean nothing
 
 @dataclass(frozen=True, eq=False)
 class Simulation(SimulationData, Filmed, Reported):
-    """A simulated motion: the numbers of `SimulationData`, with files, figures and report."""
+    """A simulated motion: `SimulationData`, which can also be saved, drawn and reported."""
 
     def figures_of_merit(self) -> dict[str, Any]:
         """Return the result metrics, without wall times: the same seed gives the same metrics."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Calibration(CalibrationData, Drawn, Reported):
-    """The result of `calibrate`: the numbers of `CalibrationData`, with files, figures and report."""
+    """The result of `calibrate`: `CalibrationData`, which can also be saved, drawn and reported."""
 
     def _headline(self) -> str:
         return headline(self)

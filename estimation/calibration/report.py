@@ -91,7 +91,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         )
     elif held_out.after > 1.5 * fitted:
         lines.append(
-            f"training samples have {_mm(fitted)}: too few samples for this number of parameters, measure more"
+            f"the residual on training samples is only {_mm(fitted)}: for so many parameters, more samples are needed"
         )
     return lines
 

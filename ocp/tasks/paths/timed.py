@@ -44,8 +44,8 @@ class TimedPath(PathBase):
     )
     smoothing: Positive | None = Field(
         default=None,
-        description="time over which the mean of the law is taken, so that the acceleration does not jump and is zero "
-        "at rest [s]; the motion then lasts as long as the task; default: not",
+        description="time over which the law is averaged, so that the acceleration does not jump and is zero at "
+        "rest [s]; the motion then has the duration of the task; default: no smoothing",
     )
 
     @model_validator(mode="after")
