@@ -68,6 +68,10 @@ def test_a_jump_over_a_place_between_two_points_is_noticed():
     assert not Near(nothing).suffices(scenario, shares, guess)
     assert Near(nothing | (shares == 0.4)).suffices(scenario, shares, guess)  # that interval has rows
     assert Near(nothing[:, :2]).suffices(scenario, shares[:2] / 2, guess)
+    # However few are near, those where it may be exceeded are added: the same program would have the same solution.
+    widened = Near(nothing).widened(scenario, shares, guess, reach=-np.inf)
+    assert widened.suffices(scenario, shares, guess)
+    assert not widened.is_everywhere
 
 
 def test_a_platform_that_does_not_turn_keeps_true_distances_where_it_keeps_linear_ones():

@@ -65,8 +65,9 @@ class AtRest:
     def __call__(self, platform: np.ndarray, carriers: np.ndarray, off_path: np.ndarray | None = None) -> Kept:
         """Return by how much limits are kept by platform (n, 6) and carriers (n, c, 6)."""
         anchors, attachments = self.scenario.dynamics.points(platform, carriers)
-        corners = placed(platform, self.scenario.body_corners)
-        points = np.concatenate([attachments, anchors, corners], axis=1)
+        corners = self.scenario.body_corners
+        bodies = [placed(platform, corners)] if len(corners) else []
+        points = np.concatenate([attachments, anchors, *bodies], axis=1)
         A, w, tensions, exist, spans = self._balance(platform, carriers)
         tilted = with_tilts(self.scenario, A, tensions, carriers, np.zeros_like(carriers))
         slack, worst = self._slack(platform, tilted, tensions, off_path)

@@ -80,15 +80,19 @@ class Space(Displayed):
         platform, carriers = self.scenario.references(np.linspace(0.0, self.scenario.duration, TIMES))
         return platform.pose, np.stack([carrier.pose for carrier in carriers], axis=1)
 
+    @cached_property
+    def _way(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return start and direction of the way, the latter over its squared length, and the law along it (TIMES,)."""
+        start, end = self.ends[:, : len(self.scenario.platform_free)]
+        way = (end - start) * np.isin(self.scenario.platform_free, POSITION)
+        far = float(way @ way)
+        return start, way / far if far > 0 else way, rest_to_rest(np.linspace(0.0, 1.0, TIMES))[0]
+
     def _without_deviation(self, configurations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the poses of platform (n, 6) and carriers (n, c, 6) that are given, at their share of the way."""
-        start, end = self.ends[:, : len(self.scenario.platform_free)]
-        places = np.isin(self.scenario.platform_free, POSITION)
-        way = (end - start) * places
-        far = float(way @ way)
-        done = np.clip((configurations[:, : len(start)] - start) @ way / far, 0.0, 1.0) if far > 0 else np.zeros(1)
-        laws = rest_to_rest(np.linspace(0.0, 1.0, TIMES))[0]
-        where = np.interp(np.broadcast_to(done, len(configurations)), laws, np.arange(TIMES))
+        start, way, law = self._way
+        done = np.clip((configurations[:, : len(start)] - start) @ way, 0.0, 1.0)
+        where = np.interp(done, law, np.arange(TIMES))
         before = np.minimum(where.astype(int), TIMES - 2)
         after = where - before
 

@@ -38,17 +38,16 @@ class Near(Displayed):
         `shares` are those of the motion's duration at the program's points.
         """
         slack, _, extent = _kept(scenario, shares, motion)
-        chosen = slack <= reach * extent
-        wide = chosen.copy()
-        wide[:, 1:] |= chosen[:, :-1]
-        wide[:, :-1] |= chosen[:, 1:]
         holds = _holds(scenario, shares)
         of_limits = [[not is_local(scenario.limits.all[index])] for index, _ in parts(scenario.limits)]
-        return cls((wide | of_limits) & holds, holds)
+        return cls((_wider(slack <= reach * extent) | of_limits) & holds, holds)
 
-    def __or__(self, other: Self) -> Self:
-        """Return the points of both."""
-        return replace(self, chosen=self.chosen | other.chosen)
+    def widened(self, scenario: Scenario, shares: np.ndarray, motion: Deviation, reach: float) -> Self:
+        """Return these points, those that `along` returns, and those where the motion may exceed what is left out."""
+        slack, moved, extent = _kept(scenario, shares, motion)
+        holds = np.ones_like(self.chosen) if self.holds is None else self.holds
+        more = _wider(slack <= reach * extent) & holds | self._exceeded(slack, moved)
+        return replace(self, chosen=self.chosen | more)
 
     @property
     def is_everywhere(self) -> bool:
@@ -64,9 +63,24 @@ class Near(Displayed):
     def suffices(self, scenario: Scenario, shares: np.ndarray, motion: Deviation) -> bool:
         """Return whether a motion can exceed no limit where it is left out, at the points or between them."""
         slack, moved, _ = _kept(scenario, shares, motion)
+        return not self._exceeded(slack, moved).any()
+
+    def _exceeded(self, slack: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """Return where a motion may exceed a limit that is left out, at the points or beside them, (parts, points)."""
         left_out = ~self.chosen
         between = left_out[:, 1:] & left_out[:, :-1] & (slack[:, 1:] + slack[:, :-1] < moved)
-        return not ((slack < 0.0) & left_out).any() and not between.any()
+        exceeded = (slack < 0.0) & left_out
+        exceeded[:, 1:] |= between
+        exceeded[:, :-1] |= between
+        return exceeded
+
+
+def _wider(chosen: np.ndarray) -> np.ndarray:
+    """Return the chosen points and those beside them."""
+    wide = chosen.copy()
+    wide[:, 1:] |= chosen[:, :-1]
+    wide[:, :-1] |= chosen[:, 1:]
+    return wide
 
 
 def parts(limits: Limits) -> list[tuple[int, slice]]:

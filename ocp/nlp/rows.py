@@ -120,8 +120,8 @@ def motions(scenario: Scenario, layout: Layout, x: ca.SX, parameters: ca.SX) -> 
 def offsets(scenario: Scenario, layout: Layout, x: ca.SX) -> list[ca.SX]:
     """Return the deviations of platform and carriers from their references, (18, 1) each, as `motions` has them."""
     owners: list[int | None] = [None, *range(len(scenario.robot.carriers))]
-    deviation = (x[layout.q], x[layout.v], x[layout.a])
-    return [ca.vertcat(*(spread(scenario, owner) @ part for part in deviation)) for owner in owners]
+    deviation = ca.horzcat(x[layout.q], x[layout.v], x[layout.a])
+    return [ca.vec(spread(scenario, owner) @ deviation) for owner in owners]
 
 
 def costs_at(scenario: Scenario, layout: Layout, x: ca.SX, bodies: Sequence[ca.SX]) -> tuple[ca.SX, ca.SX]:

@@ -121,12 +121,13 @@ class Search:
                 return self._unsolved(mesh, guess)
             # Of few regions rows that are not needed cost less than another round.
             crowded = len(self.scenario.task.limits.keep_out) > FEW
-            outcome = self._run(mesh, guess, coarser, NEAR if coarser or (clear and crowded) else 2 * NEAR)
+            reach = NEAR if coarser or (clear and crowded) else 2 * NEAR
+            outcome = self._run(mesh, guess, coarser, reach)
             for added in range(ROUNDS + 1):
                 program = self._solvers[mesh].program
                 if not outcome.success or self.seconds_left <= 0 or program.suffices(outcome.deviation):
                     break
-                more = program.near | Near.along(self.scenario, program.shares, outcome.deviation, NEAR)
+                more = program.near.widened(self.scenario, program.shares, outcome.deviation, NEAR)
                 # From the guess again: a solution through a region would come out of it on any side.
                 outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf, more if added < ROUNDS else None)
             how = ended(outcome.message)
@@ -193,7 +194,8 @@ class Search:
                     break
                 start = time.perf_counter()
                 if not near.suffices(scenario, shares, outcome.deviation):
-                    near, linear, missed = near | Near.along(scenario, shares, outcome.deviation, NEAR), None, np.inf
+                    near = near.widened(scenario, shares, outcome.deviation, NEAR)
+                    linear, missed = None, np.inf
                     continue
                 motion, missed = outcome.deviation, linear.missed(outcome.deviation)
                 settled = missed <= APPROACHED and outcome.objective > objective - GAIN * abs(objective)
