@@ -37,8 +37,8 @@ def anneal(
 
     def score(y: np.ndarray, least: float) -> float:
         found = evaluation.margins(y)
-        frequency = evaluation.lowest_frequency(y, goal) if found.min() > 0.0 else 0.0
-        value = goal.value(float(found.min()), y, frequency) + _NEGATIVE * float(np.minimum(found, 0.0).mean())
+        value = goal.value(y, evaluation.outcome_besides(y, goal, float(found.min())))
+        value += _NEGATIVE * float(np.minimum(found, 0.0).mean())
         if value > least:  # else it is refused without the distances
             value -= _MISSING_COSTS * force * evaluation.missing(y)
         return value

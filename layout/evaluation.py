@@ -28,6 +28,7 @@ from .variables import Variables, parts
 
 NO_BOUNDS = Room()
 MOST_SLOW = 40  # lowest frequencies, which a linear program has
+MOST_LONG = 4  # longest lengths of each cable, which a linear program has
 _STEP = 1e-6  # of the range of a variable, for differences of frequencies
 _STEEP = 1e7  # times the length: slopes of a facet whose columns nearly depend on each other say nothing
 
@@ -166,11 +167,13 @@ class Evaluation:
 
     def outcome(self, y: np.ndarray, goal: Goal) -> Outcome:
         """Return what counts of a layout."""
-        return Outcome(float(self.margins(y).min()), self.missing(y), self.lowest_frequency(y, goal))
+        return self.outcome_besides(y, goal, float(self.margins(y).min()))._replace(missing=self.missing(y))
 
-    def lowest_frequency(self, y: np.ndarray, goal: Goal) -> float:
-        """Return the lowest natural frequency of all rows if it has a value for a goal, otherwise 0 [Hz]."""
-        return float(self.frequencies(y).min()) if goal.per_hertz else 0.0
+    def outcome_besides(self, y: np.ndarray, goal: Goal, margin: float) -> Outcome:
+        """Return what counts besides a known margin, without the room; no frequency where no tensions exist."""
+        frequency = float(self.frequencies(y).min()) if goal.per_hertz and margin > 0.0 else 0.0
+        cable = float(self.lengths(y).max(axis=0).sum()) if goal.per_metre else 0.0
+        return Outcome(margin, 0.0, frequency, cable)
 
     def frequency_slopes(self, y: np.ndarray) -> Slopes:
         """Return the lowest frequencies of some rows with their derivatives, by differences."""
@@ -221,16 +224,29 @@ class Evaluation:
             found.append(Slopes(slow.value / room.frequency - 1.0, slow.by_variables / room.frequency))
         return Slopes(*(np.concatenate(part) for part in zip(*((f.value, f.by_variables) for f in found), strict=True)))
 
+    def longest_slopes(self, y: np.ndarray) -> tuple[Slopes, np.ndarray]:
+        """Return the largest lengths of each cable with their derivatives, and the cable of each, (k,)."""
+        lengths = self.lengths(y)
+        poses = np.argsort(-lengths, axis=0)[:MOST_LONG]
+        cables = np.broadcast_to(np.arange(self._m), poses.shape).ravel()
+        return Slopes(
+            lengths[poses.ravel(), cables], self._by_length(poses.ravel(), cables, np.ones(cables.size))
+        ), cables
+
     def _length_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
-        lengths, m = self.lengths(y), self._m
-        A = np.empty((len(self._poses), 6, m))
-        core.lines(self._record, self._poses, self._home, None, A, None, None, None)
+        lengths = self.lengths(y)
         every = np.stack([lengths - self.room.shortest, self.room.longest - lengths]).ravel()
         chosen = _smallest(every, most, below)
         side, poses, cables = np.unravel_index(chosen, (2, *lengths.shape))
+        return Slopes(every[chosen], self._by_length(poses, cables, np.where(side == 0, 1.0, -1.0)))
+
+    def _by_length(self, poses: np.ndarray, cables: np.ndarray, sign: np.ndarray) -> np.ndarray:
+        """Return the derivatives of the lengths of cables at poses, times a sign (k,), by the variables, (k, p)."""
+        A = np.empty((len(self._poses), 6, self._m))
+        core.lines(self._record, self._poses, self._home, None, A, None, None, None)
         # A cable pulls the attachment towards the anchor along u: its length grows if either moves away from the other.
-        u = A[poses, :3, cables] * np.where(side == 0, 1.0, -1.0)[:, None]
-        return Slopes(every[chosen], self._by_ends(poses, cables, u, -u))
+        u = A[poses, :3, cables] * sign[:, None]
+        return self._by_ends(poses, cables, u, -u)
 
     def _height_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
         heights = self._ends(y)[..., 2] - self.room.lowest

@@ -24,6 +24,7 @@ class Judgement(NamedTuple):
     lengths: tuple[float, float]  # shortest and longest length of a cable [m]
     distances: tuple[tuple[str, float], ...]  # name of each region, and the distance of cables from it [m]
     height: float  # of the lowest end of a cable [m]
+    cable: float  # sum of the longest lengths of all cables [m]
     frequency: float | None  # lowest natural frequency [Hz]; None if it does not count
 
     def keeps(self, room: Room) -> bool:
@@ -51,6 +52,7 @@ def judge(robot: Robot, rows: Rows, room: Room, frequency: bool) -> Judgement:
         (float(lengths.min()), float(lengths.max())),
         tuple(distances),
         float(min(starts[..., 2].min(), ends[..., 2].min())),
+        float(lengths.max(axis=0).sum()),
         _lowest_frequency(robot, rows) if frequency else None,
     )
 

@@ -43,25 +43,37 @@ class _Program:
         self.found, slopes = evaluation.reserves(y, rows, normals)
         good = evaluation.usable(slopes)
         self.rows, self.good = rows[good], good
-        parts = [Slopes(every.ravel()[chosen][good], slopes[good])]
-        parts.append(evaluation.space_slopes(y, MOST_DISTANCES, 4.0 * delta * float(self.scale.max(initial=0.0))))
+        # Variables: steps as shares of the ranges, the margin, what the room misses, the lowest frequency, and the
+        # longest length of each cable.
+        lengths = variables.robot.m if goal.per_metre else 0
+        one = np.eye(3 + lengths)
+        parts = [(Slopes(every.ravel()[chosen][good], slopes[good]), one[0])]
+        near = 4.0 * delta * float(self.scale.max(initial=0.0))
+        parts.append((evaluation.space_slopes(y, MOST_DISTANCES, near), -one[1]))
         if goal.per_hertz:
-            parts.append(evaluation.frequency_slopes(y))
-        # Variables: steps as shares of the ranges, the margin, what the room misses, the lowest frequency.
+            parts.append((evaluation.frequency_slopes(y), one[2]))
+        if lengths:
+            longest, cables = evaluation.longest_slopes(y)
+            parts.append((Slopes(-longest.value, -longest.by_variables), -one[3 + cables]))
         A = np.vstack(
             [
-                np.hstack([-part.by_variables * self.scale, np.tile(column, (len(part.value), 1))])
-                for part, column in zip(parts, ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]), strict=False)
+                np.hstack([-part.by_variables * self.scale, np.broadcast_to(column, (len(part.value), len(one)))])
+                for part, column in parts
             ]
         )
-        b = np.concatenate([part.value for part in parts])
-        cost = np.r_[goal.price * self.scale, -1.0, _PER_METRE * variables.robot.force_scale, -goal.per_hertz]
+        b = np.concatenate([part.value for part, _ in parts])
+        missing = _PER_METRE * variables.robot.force_scale
+        cost = np.r_[goal.price * self.scale, -1.0, missing, -goal.per_hertz, np.full(lengths, goal.per_metre)]
         below, above = (variables.low - y) / self.scale, (variables.high - y) / self.scale
         self.low, self.high = np.maximum(below, -delta), np.minimum(above, delta)
         self.at_low, self.at_high = below >= -delta, above <= delta
         most = _LARGEST if goal.per_hertz else 0.0
         bounds = np.vstack(
-            [np.c_[self.low, self.high], [-_LARGEST, min(goal.enough, _LARGEST)], [0.0, _LARGEST], [-most, most]]
+            [
+                np.c_[self.low, self.high],
+                [[-_LARGEST, min(goal.enough, _LARGEST)], [0.0, _LARGEST], [-most, most]],
+                np.tile([0.0, _LARGEST], (lengths, 1)),
+            ]
         )
         options = {"presolve": False}  # of which such small dense programs have nothing
         self.solution = linprog(cost, A_ub=A, b_ub=b, bounds=bounds, method="highs", options=options)
@@ -84,8 +96,8 @@ def maximise(evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, de
 
     def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
         every = evaluation.all_reserves(z)
-        frequency = evaluation.lowest_frequency(z, goal)
-        return goal.value(float(every.min()), z, frequency) - price * evaluation.missing(z), every
+        outcome = evaluation.outcome_besides(z, goal, float(every.min()))
+        return goal.value(z, outcome) - price * evaluation.missing(z), every
 
     value, every = merit(y)
     for _ in range(_PROGRAMS):
@@ -131,5 +143,5 @@ def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float 
         program.found.direction[program.good][keep],
         np.where(program.at_high, upper, 0.0),
         np.where(program.at_low, lower, 0.0),
-        program.value - goal.value(float(every.min()), y, evaluation.lowest_frequency(y, goal)),
+        program.value - goal.value(y, evaluation.outcome_besides(y, goal, float(every.min()))),
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..models import Robot
 from .evaluation import Evaluation
-from .goal import PRICE, Goal
+from .goal import Goal
 from .linear_programs import multipliers
 from .variables import Variables
 
@@ -30,7 +30,7 @@ class Binding(NamedTuple):
 
 
 class Advice(NamedTuple):
-    """The gain per unit of a change, to first order: of margin or frequency, or by which the mean t_max falls."""
+    """The gain per unit of a change, to first order: of margin or frequency, or by which mean t_max or cost falls."""
 
     change: str
     gain: float
@@ -71,17 +71,17 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     span = variables.high - variables.low
     bound = (span > 0.0) & (np.minimum(y - variables.low, variables.high - y) <= 1e-9 * np.maximum(span, 1.0))
     wants_margin = np.isfinite(goal.wanted)  # so much, of which the rest is for t_max or the frequency
-    value = goal.per_hertz or (PRICE if wants_margin else 1.0)  # in the goal, of a unit of what is improved
     advice = _advice(robot, found.weights, found.pull, direction, rows.accelerations[found.rows])
     if wants_margin:
         advice[:1] = [Advice("margin lower by 1 N", total, "N/N")]
     if goal.per_hertz or evaluation.room.frequency:
         del advice[1:]  # t_min and mass change the frequencies, too
     advice += _of_boxes(variables, found.by_high, found.by_low)
-    unit = "Hz" if goal.per_hertz else "N"
     return Reasons(
         tuple(binding),
-        tuple(Advice(one.change, one.gain / value, one.unit.replace("N/", f"{unit}/", 1)) for one in advice),
+        tuple(
+            Advice(one.change, one.gain / goal.unit, one.unit.replace("N/", f"{goal.unit_text}/", 1)) for one in advice
+        ),
         bool(found.left <= _CONVERGED * max(1.0, abs(margin))),
         int(bound.sum()),
     )

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.inputs import file_path
+from ..models import Robot
 from ..models.parsing import read_yaml, validate
 from ..models.part import Box, Name, NonNegative, Part, Pose, Positive, Rows, Vector3, Whole
 from ..models.ranges import PositiveRange, Range
@@ -153,6 +154,20 @@ class Requirement(Part):
         return poses * len(self.wrenches) * len(self.accelerations) * len(self.winds or (0,))
 
 
+class Prices(Part):
+    """Prices of cables and winches, in any currency."""
+
+    cable: NonNegative = Field(
+        default=0.0,
+        description="price of a metre of cable; each cable has its longest length at the required positions",
+    )
+    t_max: NonNegative = Field(default=0.0, description="price of a newton of the t_max of one cable")
+
+    def cost(self, robot: Robot, cable: float) -> float:
+        """Return what the winches of a robot and a length of cable [m] cost."""
+        return self.t_max * float(robot.t_max.sum()) + self.cable * cable
+
+
 class Requirements(Part):
     """Requirements of a design: free numbers, poses and wrenches. In a file: YAML with these keys."""
 
@@ -195,16 +210,17 @@ class Requirements(Part):
         description="shortest and longest length of every cable at the required positions, as the winches have [m]; "
         "default: no limit",
     )
-    maximise: Literal["margin", "natural_frequency"] = Field(
+    maximise: Literal["margin", "natural_frequency", "volume"] = Field(
         default="margin",
-        description="objective: the smallest capacity margin, or the lowest natural frequency with the smallest margin "
-        "`margin`",
+        description="objective: the smallest capacity margin; or, with the smallest margin `margin`, the lowest "
+        "natural frequency, or the volume of the required boxes, which grow about their centres",
     )
-    minimise: Literal["t_max"] | None = Field(
+    minimise: Literal["t_max", "cost"] | None = Field(
         default=None,
-        description="objective instead: the mean t_max of the cables with which the smallest margin is `margin`; t_max "
-        "must be free",
+        description="objective instead, with the smallest margin `margin`: the mean t_max of the cables, which must be "
+        "free, or the cost of cables and winches",
     )
+    prices: Prices | None = Field(default=None, description="for minimise: cost, the prices of cables and winches")
     start: Literal["robot", "random"] = Field(
         default="robot", description="first layout: the robot's own, moved into the boxes, or a random one"
     )
@@ -215,12 +231,7 @@ class Requirements(Part):
     def _not_too_many(self) -> Self:
         if len(self.free) > 1 and any(each.pairing for each in self.free):
             raise ValueError(f"free must have no item besides a pairing, got {len(self.free) - 1} more")
-        if self.minimise is not None and not any(each.part == "t_max" for each in self.free):
-            raise ValueError("free must have an item with part t_max for minimise: t_max, got none")
-        if self.maximise != "margin" and self.minimise is not None:
-            raise ValueError(f"maximise must be left out with minimise, got {self.maximise!r}")
-        if self.maximise != "margin" and any(each.pairing for each in self.free):
-            raise ValueError(f"maximise must be margin with a pairing, got {self.maximise!r}")
+        self._check_objective()
         for number, place in enumerate(self.keep_out):
             for name in ("platform", "carriers"):
                 value = getattr(place, name)
@@ -230,6 +241,26 @@ class Requirements(Part):
         if size > MOST_ROWS:
             raise ValueError(f"require must have at most {MOST_ROWS} pairs of pose and wrench, got {size}")
         return self
+
+    def _check_objective(self) -> None:
+        """Raise ValueError if something is missing for the objective, or contradicts it."""
+        winches = any(each.part == "t_max" for each in self.free)
+        if self.minimise == "t_max" and not winches:
+            raise ValueError("free must have an item with part t_max for minimise: t_max, got none")
+        if (self.minimise == "cost") != (self.prices is not None):
+            wanted = "given for" if self.prices is None else "left out without"
+            raise ValueError(f"prices must be {wanted} minimise: cost")
+        if self.prices is not None and not (self.prices.cable > 0.0 or (winches and self.prices.t_max > 0.0)):
+            raise ValueError("prices must have one above 0 of something that is free: cable, or t_max if it is free")
+        if self.maximise != "margin" and self.minimise is not None:
+            raise ValueError(f"maximise must be left out with minimise, got {self.maximise!r}")
+        for name, usual in (("maximise", "margin"), ("minimise", None)):
+            if getattr(self, name) != usual and any(each.pairing for each in self.free):
+                wanted = "margin" if usual else "left out"
+                raise ValueError(f"{name} must be {wanted} with a pairing, got {getattr(self, name)!r}")
+        boxes = [each.box for each in self.require if each.box is not None]
+        if self.maximise == "volume" and not any(box.min != box.max for box in boxes):
+            raise ValueError("require must have a box with an extent for maximise: volume, got none")
 
 
 def read_requirements(requirements: Requirements | dict[str, Any] | str | os.PathLike[str]) -> Requirements:

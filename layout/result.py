@@ -60,6 +60,9 @@ class Design(Reported, Displayed):
         Whether the search was interrupted.
     plans
         A plan of each task of the requirements; empty if the margin or the clearance is not as required.
+    size, size_before
+        With maximise: volume, the size of the boxes in which both robots meet the requirements, in those of the
+        requirements: a size of 2 is 8 times the volume. `requirements` then has the larger boxes.
     """
 
     robot: Robot
@@ -78,6 +81,8 @@ class Design(Reported, Displayed):
     starts: int
     stopped: bool
     plans: tuple[Plan, ...] = ()
+    size: float = 1.0
+    size_before: float | None = None
 
     @property
     def feasible(self) -> bool:
@@ -94,14 +99,33 @@ class Design(Reported, Displayed):
         """Return the shortest and the longest length of a cable [m], or None if the requirements are impossible."""
         return None if self.judgement is None else self.judgement.lengths
 
+    @property
+    def cost(self) -> float | None:
+        """Return what cables and winches cost, or None without prices."""
+        return self._cost_of(self.robot, self.judgement)
+
+    @property
+    def cost_before(self) -> float | None:
+        """Return what those of the initial robot cost, or None without prices."""
+        return self._cost_of(self.before, self.judgement_before)
+
+    def _cost_of(self, robot: Robot, judgement: Judgement | None) -> float | None:
+        prices = self.requirements.prices
+        return None if prices is None or judgement is None else prices.cost(robot, judgement.cable)
+
     def _summary(self) -> str:
         if self.impossibility is not None:
             return "no layout inside the boxes meets the requirements"
         text = f"capacity margin {quantity(self.margin, 'N')} (before {quantity(self.margin_before, 'N')})"
-        if self.requirements.minimise is not None:
+        if self.cost is not None and self.cost_before is not None:
+            text = f"cost {quantity(self.cost)} (before {quantity(self.cost_before)}), {text}"
+        if self.requirements.minimise == "t_max":
             mean, before = (quantity(robot.t_max.mean(), "N") for robot in (self.robot, self.before))
             text = f"mean t_max {mean} (before {before}), {text}"
         frequency = self._frequency()
+        if self.size_before is not None:
+            size, before = (f"{one:.2f} times" for one in (self.size, self.size_before))
+            text = f"boxes {size} as long and wide as required (before {before}), {text}"
         if self.requirements.maximise == "natural_frequency":
             text, frequency = f"{frequency}, {text}", ""
         text += f", {frequency}" * bool(frequency)
@@ -142,6 +166,8 @@ class Design(Reported, Displayed):
         facts = [
             ("searched", f"{searched}, audited at {quantity(self.audited)} random pair{'s' * (self.audited != 1)}")
         ]
+        if self.size_before is not None:
+            facts += _boxes(self.requirements)
         if self.stopped:
             facts.append(("", "INTERRUPTED: this is the best layout so far"))
         facts += [("task", each.report().splitlines()[0]) for each in self.plans]
@@ -200,7 +226,9 @@ class Design(Reported, Displayed):
         return [("layout", f"{state}; {bounds}")]
 
     def _why(self, found: Reasons) -> list[Part]:
-        gain = "mean t_max -" if self.requirements.minimise else f"{self.requirements.maximise.replace('_', ' ')} +"
+        falls = {"t_max": "mean t_max -", "cost": "cost -"}
+        grows = "natural frequency +" if self.requirements.maximise == "natural_frequency" else "margin +"
+        gain = falls.get(str(self.requirements.minimise), grows)
         gains = [
             (one.change, f"{gain}{quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
             for one in found.advice
@@ -229,6 +257,10 @@ class Design(Reported, Displayed):
             "feasible": self.feasible,
             "margin": self.margin,
             "margin_before": self.margin_before,
+            "size": self.size,
+            "size_before": self.size_before,
+            "cost": self.cost,
+            "cost_before": self.cost_before,
             "t_max": self.robot.t_max.tolist(),
             "clearance": self.clearance,
             "cable_lengths": None if self.lengths is None else list(self.lengths),
@@ -254,6 +286,12 @@ class Design(Reported, Displayed):
                 **self.impossibility.certificate.to_dict(),
             },
         }
+
+
+def _boxes(requirements: Requirements) -> list[Fact]:
+    """Return the boxes of the required positions."""
+    boxes = [each.box for each in requirements.require if each.box is not None]
+    return [("box", f"from {quantity_row(box.min)} to {quantity_row(box.max)} [m]") for box in boxes]
 
 
 def _direction(one: Binding, robot: Robot) -> str:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from ..models.files import as_robot
 from ..ocp.planner import plan
 from .evaluation import Evaluation, Rows, rows_of
 from .goal import goal_of
+from .growth import grow
 from .impossibility import find_impossibility
 from .judgement import judge, judged_margin
 from .pairings import best_pairing, with_attachments
@@ -50,14 +52,14 @@ def design(
     require
         Poses and wrenches: `Requirement`, or mappings with its keys.
     maximise
-        Objective: "margin". With the option minimise="t_max" instead: the smallest mean t_max with at least the
-        option `margin`.
+        Objective: "margin", "natural_frequency" or "volume", of the boxes. With the option minimise="t_max" or
+        "cost" instead: the smallest mean t_max or cost with at least the option `margin`.
     requirements
         Instead of all of these: `Requirements`, a mapping, or the path of a file.
     progress
         Called with a description of the step, the elapsed share of the time, and the best margin so far [N].
     **options
-        Other keys of `Requirements`: name, minimise, margin, clearance, cable_length, tasks, start,
+        Other keys of `Requirements`: name, minimise, prices, margin, clearance, cable_length, tasks, start,
         time_limit, seed.
 
     Returns
@@ -102,12 +104,19 @@ def design(
         attachment_of, count = best_pairing(chosen, grid, cables, wanted)
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
         return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)
-    found = search(variables, wanted, progress or (lambda what, share, best: None))
+    on_progress, largest = progress or (lambda what, share, best: None), None
+    if wanted.maximise == "volume":
+        largest = grow(variables, wanted, on_progress)
+        wanted, found = largest.requirements, largest.found
+    else:
+        found = search(variables, wanted, on_progress)
     result = _designed(chosen, variables, wanted, found.y, found.rows, len(grid.pose_of), found.starts, found.stopped)
     if not result.feasible:  # the robot itself may meet the requirements, as nearly as its numbers may be chosen
         own = variables.of_robot()
         kept = _designed(chosen, variables, wanted, own, found.rows, len(grid.pose_of), found.starts, found.stopped)
         result = kept if kept.feasible else result
+    if largest is not None:
+        result = replace(result, size=largest.size, size_before=largest.size_before)
     return result
 
 

@@ -46,8 +46,13 @@ class Found:
         return self.goal.better(y, outcome, self.y, self.outcome)
 
 
-def search(variables: Variables, requirements: Requirements, progress: Progress) -> Found:
-    """Search until the time limit for the layout with the largest margin; an interrupt ends it with the best so far."""
+def search(
+    variables: Variables, requirements: Requirements, progress: Progress, first: np.ndarray | None = None
+) -> Found:
+    """Search until the time limit for the layout with the largest margin; an interrupt ends it with the best so far.
+
+    The first layout is the robot's own unless another is given, (p,).
+    """
     robot, started = variables.robot, time.perf_counter()
     until = started + requirements.time_limit
     enough = started + _STARTING * requirements.time_limit
@@ -58,7 +63,7 @@ def search(variables: Variables, requirements: Requirements, progress: Progress)
     room = room_of(robot, requirements)
     annealed = Evaluation(variables, with_tasks(coarse, robot, tasks, FEW_INSTANTS), room.with_spare(_FEW_SPARE))
     goal = goal_of(variables, requirements)
-    found = Found(goal, variables.of_robot(), rows)
+    found = Found(goal, variables.of_robot() if first is None else first, rows)
 
     def improve(what: str, delta: float) -> None:
         share = (time.perf_counter() - started) / requirements.time_limit
@@ -115,6 +120,7 @@ def _take(
         min(audited.margin, promised.margin),
         max(audited.missing, promised.missing),
         min(audited.frequency, promised.frequency),
+        max(audited.cable, promised.cable),
     )
     if found.better(y, outcome):
         found.y, found.outcome, found.audit_agrees = y.copy(), outcome, agrees
@@ -132,16 +138,17 @@ def _audit(
     worst, margin = rows.only(_apart(rows, np.argsort(values)[:300])), float(values.min())
     some = few(rows, rng, ROOM_AUDITED)
     evaluation = Evaluation(variables, some, room)
-    spaces, short, frequency = evaluation.spaces(y), 0.0, 0.0
+    spaces, short = evaluation.spaces(y), 0.0
+    outcome = evaluation.outcome_besides(y, goal._replace(per_hertz=0.0), margin)
     if spaces.size:
         least = spaces.min(axis=1)
         short = max(0.0, -float(least.min()))
         worst = worst.joined(some.only(_apart(some, np.argsort(least)[:100])))
     if goal.per_hertz:
         frequencies = evaluation.frequencies(y)[:, 0]
-        frequency = float(frequencies.min())
+        outcome = outcome._replace(frequency=float(frequencies.min()))
         worst = worst.joined(some.only(_apart(some, np.argsort(frequencies)[:100])))
-    return Outcome(margin, short, frequency), worst
+    return outcome._replace(missing=short), worst
 
 
 def _apart(rows: Rows, order: np.ndarray) -> np.ndarray:

@@ -395,7 +395,7 @@ def test_wrong_arguments_are_refused():
         ({"free": "anchor", "require": parts["require"]}, "free must be a list"),
         ({**parts, "requirements": wanted(robot)}, "free must be left out"),
         ({**parts, "seeds": 3}, "did you mean 'seed'"),
-        ({**parts, "maximise": "volume"}, "maximise"),
+        ({**parts, "maximise": "largest"}, "maximise"),
         ({}, "free is missing"),
     ):
         with pytest.raises(InputError, match=names):
