@@ -38,7 +38,7 @@ def part_of(
 
     `of_limits` are the constraints of `limits`, each with the index of its limit.
     """
-    local = []
+    local: list[tuple[int, Callable[[tuple[int, ...]], Differentiable], list[Row]]] = []
     for index, (values, rows) in of_limits:
         if is_local(limits.all[index]):
             function_of_some = partial(_function_of_some, unknowns, parameters, ca.vertcat(*values))
