@@ -141,7 +141,7 @@ def workspace(
         kept = {"size": size, "keep": keep, "metrics": metric or ()}
         result = sample(loaded, required, region, _count(samples), method, seed, execution=where, **kept)
     add_to_message("")
-    written = _write(result, loaded, metric or [], target, figure, mesh, surface)
+    written = _write(result, loaded, target, figure, mesh, surface)
     summary = _summary(result, metric or [])
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
     if as_json:
@@ -171,25 +171,15 @@ def _check_files(
 
 
 def _write(
-    result: xr.Dataset,
-    robot: Robot,
-    metrics: list[str],
-    target: Path,
-    figure: Path | None,
-    mesh: Path | None,
-    surface: Mesh | None,
+    result: xr.Dataset, robot: Robot, target: Path, figure: Path | None, mesh: Path | None, surface: Mesh | None
 ) -> list[Path]:
     """Write the samples, their picture and the boundary, and return the files."""
     from ..figures import style
-    from ..figures.metric_map import metric_map
-    from ..figures.workspace import reached
-    from ..workspace import save
+    from ..workspace import draw, save
 
     written = [save(result, target)]
     if figure is not None:
-        anchors = robot.home_anchors
-        drawn = metric_map(result, metrics, anchors) if metrics else reached(result, anchors)
-        written.append(style.save(drawn, figure))
+        written.append(style.save(draw(result, robot), figure))
     if mesh is not None and surface is not None:
         written.append(surface.save(mesh))
     return written

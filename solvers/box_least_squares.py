@@ -22,6 +22,9 @@ _NOISE = 4e-15
 # A cable whose column has a larger part than this along the residual, relative to both, is at a limit.
 _STILL = 1e-5
 
+# A residual that is shorter than this, relative to w, is rounding: no other number is so near to w.
+_NOTHING = 1e-20
+
 
 class Projection(NamedTuple):
     """The projection of w on the available wrench set, in newtons (moments divided by the problem's length)."""
@@ -102,13 +105,15 @@ def project(problem: TensionProblem) -> Projection:
     M, residual = problem.scaled_A, problem.scaled_w
     closest = np.zeros(problem.m)
     # Rounding is relative to w, and a short residual has lost the digits that make its direction. Projecting what is
-    # left, from where we stand, brings them back.
+    # left, from where we stand, brings them back, until it is so short that w is in the set.
+    nothing = _NOTHING**2 * (residual @ residual)
     for _ in range(4):
         given = residual
         step, _ = box_least_squares(M, given, problem.t_min - closest, problem.t_max - closest)
         closest = np.minimum(np.maximum(closest + step, problem.t_min), problem.t_max)
         residual = given - M @ step
-        if residual @ residual > 1e-2 * (given @ given):
+        left = residual @ residual
+        if left > 1e-2 * (given @ given) or left <= nothing:
             break
     # A cable that is not at a limit has no part along the residual, but for rounding. One that has is at its limit, and
     # only rounding puts it inside.

@@ -18,7 +18,7 @@ from towline.base.errors import InputError
 from towline.cli import workspace as cli
 from towline.cli.main import app
 from towline.solvers import capacity_margin
-from towline.workspace import METRICS, Margin, MetricInRange, Places, StaticEquilibrium, metric_values
+from towline.workspace import METRICS, Margin, MetricInRange, Places, StaticEquilibrium, draw, metric_values
 
 from .stiff_robots import elastic, inertia
 
@@ -172,6 +172,7 @@ def test_what_has_no_value_is_nan_and_what_does_not_apply_is_refused():
         (lambda: sample(pendulum, StaticEquilibrium(), metrics=["margin", 3]), "metrics must be one of"),
         (lambda: sample(pendulum, StaticEquilibrium(), metrics=3), "metrics must be names"),
         (lambda: sample(pendulum, StaticEquilibrium(), metrics="margin", keep="none"), "keep must be accepted or all"),
+        (lambda: draw(xr.Dataset({"x": 1.0})), "result must be a result of sample"),
         (lambda: MetricInRange(metric="speed", min=1), "metric must be one of"),
         (lambda: MetricInRange(metric="margin"), "min or max must be given"),
         (lambda: MetricInRange(metric="margin", min=np.nan), "min must"),
@@ -179,6 +180,15 @@ def test_what_has_no_value_is_nan_and_what_does_not_apply_is_refused():
         with pytest.raises(InputError, match=message) as error:
             call()
         assert "\n" not in str(error.value)
+
+
+def test_a_workspace_is_drawn_with_its_metrics():
+    robot = load("ipanema-2")
+    region = {"position": {"min": [-2, -1, 3], "max": [2, 1, 3]}}
+    mapped, plain = (sample(robot, StaticEquilibrium(), region, 500, metrics=names) for names in (["margin"], []))
+    assert draw(mapped, robot).axes[-1].get_xlabel() == "margin [N]"
+    np.testing.assert_allclose(draw(mapped, robot).axes[0].lines[-1].get_xydata(), robot.home_anchors[:, :2])
+    assert "accepted" in draw(plain).get_suptitle() + "".join(ax.get_title() for ax in draw(plain).axes)
 
 
 def test_a_metric_as_a_condition():

@@ -9,6 +9,7 @@ from .condition import AllOf, AnyOf, Condition, TensionCondition, condition_from
 from .conditions import *  # noqa: F403  the only list of them is there
 from .dataset import save
 from .metrics import METRICS, metric_values
+from .picture import draw
 from .places import Places
 from .region import Region
 from .run import sample
@@ -23,6 +24,7 @@ __all__ = [
     "TensionCondition",
     "boundary",
     "condition_from",
+    "draw",
     "metric_values",
     "sample",
     "save",
