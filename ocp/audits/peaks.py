@@ -143,15 +143,15 @@ def _missing_and_reached(
     The second derivatives are those at `rows`. The second value is known where the first is more than is tolerated.
     """
     times, A, w, robot = seen.times, seen.A, seen.w, seen.scenario.robot
-    h = np.diff(times)
-    after = ((A[rows + 1] - A[rows]) @ t[rows, :, None])[..., 0] - (w[rows + 1] - w[rows])
-    before = ((A[rows] - A[rows - 1]) @ t[rows, :, None])[..., 0] - (w[rows] - w[rows - 1])
+    h, dA, dw, product = np.diff(times), np.diff(A, axis=0), np.diff(w, axis=0), "nij,nj->ni"
+    after = np.einsum(product, dA[rows], t[rows]) - dw[rows]
+    before = np.einsum(product, dA[rows - 1], t[rows]) - dw[rows - 1]
     bent = np.zeros(len(times))
     slopes = after / h[rows, None] - before / h[rows - 1, None]
     bent[rows] = 2 * np.linalg.norm(slopes, axis=1) / (h[rows] + h[rows - 1])
     bent[1:-1][jumps[1:] | jumps[:-1]] = 0.0
     missing = between(times, bent)
-    missing += np.linalg.norm((np.diff(A, axis=0) @ np.diff(t, axis=0)[..., None])[..., 0], axis=1) / 4
+    missing += np.linalg.norm(np.einsum(product, dA, np.diff(t, axis=0)), axis=1) / 4
     reached = np.zeros(len(missing))
     spans = np.flatnonzero((missing > seen.tolerance) & ~jumps)
     room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * robot.force_scale)
