@@ -26,7 +26,8 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     how long the robot takes to stop, not on the plan.
 
     Carriers that fly, each with one cable of fixed length, leave their path: each is where the force of its cable,
-    which changes as little as possible, points to (`statics.team_stops`).
+    which changes as little as possible, points to (`statics.team_stops`). Carriers that fly with several cables of
+    fixed length, which begin at one point of each and give every wrench, keep the path of that point.
 
     Parameters
     ----------
@@ -44,8 +45,7 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     Raises
     ------
     InputError
-        If an argument has a wrong type or value, or the robot has flying carriers, but not each with one cable of fixed
-        length.
+        If an argument has a wrong type or value, or the robot has flying carriers with other cables.
     """
     robot, trajectory = planned(plan)
     return stop_along(robot, trajectory, number("time", time, 0.0, 1e9))

@@ -121,7 +121,7 @@ class Stop(Displayed):
 def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
     """Stop as `control.stop` does, on a trajectory with a duration.
 
-    Raises `InputError` if the robot has flying carriers, but not each with one cable of fixed length.
+    Raises `InputError` if the robot has flying carriers with other cables than `control.stop` describes.
     """
     end = trajectory.duration or 0.0
     begins = min(time, end)

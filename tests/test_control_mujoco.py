@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from towline import simulate
 from towline.control import ANSWERS, ComputedTorque, Filtered, Predictive, Reference, State
@@ -14,6 +13,7 @@ from towline.estimation import PoseFilter
 from towline.models import Robot, load
 from towline.statics.distribution import tensions
 
+from .robots_hooked_below import hooked_below
 from .soak.control_mujoco import TEAMS, WINCHES, Task, cogiro, fly, team, wang_flying
 from .soak.mujoco_plant import Hardware
 
@@ -255,17 +255,6 @@ def test_known_lags_of_rotors_and_sensors_slow_a_team_down_before_it_is_lost(loa
     for kind in (ComputedTorque, Predictive):
         controller = kind(task.robot, rotor_lag=0.03, sensors=late)
         assert fly(task, controller, rotor_lag=0.03, **late).error.max() < 0.025
-
-
-def hooked_below(depth):
-    """Return flycrane with its anchors `depth` [m] below the quadrotors' CoM, where its cables end as before."""
-    data = load("flycrane").model_dump(mode="json")
-    for cable in data["cables"]:
-        cable["anchor"] = [0, 0, -depth]
-    for carrier in data["carriers"]:
-        up = Rotation.from_euler("ZYX", carrier["home"][:2:-1]).as_matrix()[:, 2]
-        carrier["home"][:3] = (np.array(carrier["home"][:3]) + depth * up).tolist()
-    return Robot.model_validate(data)
 
 
 @pytest.mark.parametrize("depth", [0.05, 0.1])

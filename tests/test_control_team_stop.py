@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, InputError, Robot, load, plan, simulate
-from towline.control import Predictive, longest_stop, references, stop
+from towline.control import ComputedTorque, Predictive, longest_stop, references, stop
 from towline.control.planned_references import planned
+from towline.models import points
 from towline.statics.team_stops import team_stop_along
 
+from .robots_hooked_below import hooked_below
 from .warm import towline as run
 
 
@@ -95,9 +97,56 @@ def test_an_event_stops_a_team_from_the_command_line(made, tmp_path):
     assert json.loads(done.stdout)["passed"]
 
 
+def test_the_rest_of_a_plan_for_stronger_rotors_is_no_feasible_stop(made):
+    """Thrusts by Newton's law, from the positions of carriers and the pull of their cables."""
+    robot, found = made
+    begins, carrier = found.duration - 0.15, 1
+    trajectory, g = planned(found)[1], np.array(robot.gravity)
+    its = stop(found, begins)
+    along = Dynamics(robot).wrench_matrix(its.platform[0], its.carriers[0])[:, :3, carrier]
+    force = robot.carriers[carrier].mass * (its.carriers[2][:, carrier, :3] - g) + its.tensions[:, [carrier]] * along
+    most = float(np.linalg.norm(force, axis=1).max())
+    carriers = [each.model_dump() | {"thrust_max": 0.9 * most if k == carrier else 1e3}
+                for k, each in enumerate(robot.carriers)]  # fmt: skip
+    weak = team_stop_along(Robot.model_validate({**robot.model_dump(), "carriers": carriers}), trajectory, begins)
+    assert weak.limit.startswith(f"thrust of {robot.carriers[carrier].name}: ")
+    assert weak.excess == pytest.approx(1 / 0.9 - 1, rel=0.02)
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.1])
+def test_carriers_with_two_cables_keep_the_path_of_their_hooks(depth):
+    robot = hooked_below(depth)
+    line = {"path": {"kind": "line", "start": [0, 0, 0], "end": [1.5, 0, 0.2]}, "duration": 3.0}
+    found = plan(robot, {**line, "base": {"kind": "free"}})
+    assert found.feasible
+    its, dynamics, g = stop(found, 1.5), Dynamics(robot), np.array(robot.gravity)
+    assert its.feasible
+    assert its.duration < 1.5  # what is left of the plan
+    (pose, velocity, acceleration), (carriers, _, bends) = its.platform, its.carriers
+    A = dynamics.wrench_matrix(pose, carriers)
+    missing = dynamics.required_wrench(pose, velocity, acceleration) - (A @ its.tensions[..., None])[..., 0]
+    assert np.abs(missing).max() < 1e-3 * robot.weight
+    lengths = dynamics.cable_lengths(pose, carriers)
+    np.testing.assert_allclose(lengths, np.broadcast_to(robot.fixed_lengths, lengths.shape), atol=1e-4)
+    assert its.tensions.min() > 0.49
+    fine = references(found, 1e-3)
+    hooks = np.stack([points.anchors(robot, each.carrier_pose[None])[0] for each in fine])
+    own = points.anchors(robot, carriers)
+    off = np.linalg.norm(own[:, None] - hooks[None], axis=3).min(axis=1)
+    assert off.max() < 2e-3
+    for index, carrier in enumerate(robot.carriers):
+        mine = robot.carrier_of_cable == index
+        pull = -(its.tensions[:, None, mine] * A[:, :3, mine]).sum(axis=2)
+        thrust = np.linalg.norm(carrier.mass * (bends[:, index, :3] - g) - pull, axis=1)
+        assert (thrust < carrier.thrust_max).all()
+    flown = simulate(robot, found, ComputedTorque(robot), duration=1.5 + its.duration + 0.2, events=["stop at 1.5"])
+    assert flown.passed
+    assert flown.error.max() < 1e-3
+
+
 def test_what_is_no_such_team_is_refused_in_one_line():
-    found = plan("flycrane", {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.5, 0, 0]}, "duration": 4.0,
-                              "base": {"kind": "free"}})  # fmt: skip
-    with pytest.raises(InputError, match=r"with one cable of fixed length each, .* got 'flycrane'") as error:
-        stop(found, 1.0)
+    line = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.1, 0, 0]}, "duration": 2.0}
+    robot = load("wang-flying-quadrotor")
+    with pytest.raises(InputError, match=r"with one cable of fixed length each, .* got 'wang-flying-quad") as error:
+        stop(plan(robot, line), 1.0)
     assert "\n" not in str(error.value)
