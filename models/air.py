@@ -4,6 +4,7 @@ Each is a function of times and returns (n, 3) in [m/s]. Random parts are seeded
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -103,17 +104,9 @@ def _along(step: float, noise: np.ndarray) -> np.ndarray:
 
 
 def _across(step: float, noise: np.ndarray) -> np.ndarray:
-    """Filter unit white noise by (1 + sqrt(3) s) / (1 + s)^2, sampled every `step`, to variance one.
-
-    The state (x, dx) of dx' = -x - 2 dx + noise answers a unit impulse with e^-s (s, 1 - s). Its covariance after a
-    step is the integral of that with itself, by quadrature: rounding would ruin a difference of large numbers.
-    """
+    """Filter unit white noise by (1 + sqrt(3) s) / (1 + s)^2, sampled every `step`, to variance one."""
     h = min(step, 40.0)
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    s = h * (nodes + 1) / 2
-    impulse = np.exp(-s) * np.stack([s, 1 - s])
-    root = np.linalg.cholesky(h / 2 * (impulse * weights) @ impulse.T)
-    kicks = noise[:-1] @ root.T
+    kicks = noise[:-1] @ _covariance_root(h).T
     kicks[0] = noise[0] / 2  # in its stationary distribution x and dx have variance 1/4
     # Over a step x and dx turn into e^-h (x + h (x + dx)) and e^-h (dx - h (x + dx)), so that their sum only decays.
     decay = float(np.exp(-h))
@@ -121,6 +114,19 @@ def _across(step: float, noise: np.ndarray) -> np.ndarray:
     kicks[1:, 0] += decay * h * both[:-1]
     x = _decaying(decay, kicks[:, 0])
     return x + np.sqrt(3) * (both - x)
+
+
+@lru_cache(maxsize=64)  # quadrature takes longer than the wind of a short run, and all runs have the same step
+def _covariance_root(h: float) -> np.ndarray:
+    """Return the Cholesky factor, (2, 2), of the covariance of the state of `_across` after a step.
+
+    The state (x, dx) of dx' = -x - 2 dx + noise answers a unit impulse with e^-s (s, 1 - s). Its covariance is the
+    integral of that with itself over the step, by quadrature: rounding would ruin a difference of large numbers.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    s = h * (nodes + 1) / 2
+    impulse = np.exp(-s) * np.stack([s, 1 - s])
+    return np.linalg.cholesky(h / 2 * (impulse * weights) @ impulse.T)
 
 
 def _decaying(keep: float, kicks: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ STEEP = 0.3  # of the slope at the start of a step: what the line search lets th
 TAUT = 10.0  # sum of both end tensions in weights of the cable
 BEGIN = 0.3  # of the weight: tension of a slack cable in the first step
 VERTICAL = 1e-13  # horizontal distance in unstrained lengths: below, the cable hangs in a vertical line
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 @dataclass(frozen=True)
@@ -238,9 +239,8 @@ def _compliance(h: np.ndarray, v: np.ndarray) -> np.ndarray:
     c_xz = h / T_2 - h / T_1
     c_xx = 2 * _artanh(h, v, np.asarray(0.5), T_1, T_2) - c_zz
     # Of a taut cable these are small differences; there three points of Gauss and Legendre are exact enough
-    nodes, weights = np.polynomial.legendre.leggauss(3)
-    V = v[:, None] + nodes / 2
+    V = v[:, None] + _NODES / 2
     T = np.hypot(h[:, None], V)
-    along = [(f / T**3) @ (weights / 2) for f in (V**2, -h[:, None] * V, h[:, None] ** 2 + 0 * V)]
+    along = [(f / T**3) @ (_WEIGHTS / 2) for f in (V**2, -h[:, None] * V, h[:, None] ** 2 + 0 * V)]
     xx, xz, zz = np.where(T_1 + T_2 > TAUT, along, [c_xx, c_xz, c_zz])
     return np.array([[xx, xz], [xz, zz]])
