@@ -22,6 +22,7 @@ from towline.models import Dynamics, Robot, load, points
 from towline.models.cables.pulley import exit_points
 from towline.models.rotation import rotation
 
+from .framed import framed
 from .robots_as_built import NOISE, as_built, random_poses, rigidly_aligned
 
 ANCHORS = ("anchors",)
@@ -185,18 +186,8 @@ def test_a_point_mass_does_not_tell_anchors_from_attachments():
 
 def test_locked_cables_leave_scale_and_offset_open():
     """A platform that swings on cables of constant length: their readings never change."""
-    robot = Robot.model_validate(
-        {
-            "name": "swing",
-            "source": "a test",
-            "platform": {"mass": 2, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], "home": [0, 0, 0, 0, 0, 0]},
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": [
-                {"carrier": "frame", "anchor": [2 * x, 2 * y, 7], "attachment": [x, y, 0.1], "t_min": 0, "t_max": 99}
-                for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))
-            ],
-        }
-    )
+    ends = [([2 * x, 2 * y, 7], [x, y, 0.1]) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    robot = framed(ends, {"mass": 2, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], "home": [0, 0, 0, 0, 0, 0]})
     t = np.linspace(0, 20, 1000)
     poses = np.zeros((1000, 6))
     poses[:, 0], poses[:, 1] = 0.8 * np.sin(1.2 * t), 0.6 * np.sin(1.1 * t + 1)

@@ -17,6 +17,7 @@ from towline.estimation.calibration.model import Model
 from towline.estimation.calibration.parameters import GROUPS, OF_CABLE, Parameters
 from towline.models import Robot, load
 
+from .framed import framed
 from .warm import towline as run
 
 CORNERS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
@@ -27,24 +28,8 @@ AHRS = np.radians(0.5)
 
 
 def robot_file(anchors, attachments, com, mass, home, dof=("x", "y", "z", "roll", "pitch", "yaw"), stiffness=None):
-    return Robot.model_validate(
-        {
-            "name": "as-drawn",
-            "source": "a test",
-            "platform": {
-                "mass": mass,
-                "com": list(com),
-                "inertia": [0.1, 0.1, 0.1, 0, 0, 0],
-                "home": home,
-                "dof": list(dof),
-            },
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": [
-                {"carrier": "frame", "anchor": a, "attachment": b, "t_min": 0, "t_max": 900, "stiffness": stiffness}
-                for a, b in zip(anchors.tolist(), attachments.tolist(), strict=True)
-            ],
-        }
-    )
+    body = {"mass": mass, "com": list(com), "inertia": [0.1, 0.1, 0.1, 0, 0, 0], "home": home, "dof": list(dof)}
+    return framed(zip(anchors, attachments, strict=True), body, stiffness=stiffness)
 
 
 def lines(pose, anchors=ANCHORS, attachments=ATTACHMENTS):

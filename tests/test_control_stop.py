@@ -7,9 +7,11 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag
 from scipy.spatial import KDTree
 
-from towline import Dynamics, InputError, Planner, Robot, load, plan, simulate
+from towline import Dynamics, InputError, Planner, load, plan, simulate
 from towline.control import Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
+
+from .framed import framed
 
 PLANS = {
     "cogiro": {"path": {"kind": "line", "start": [-3, -1, 1.5], "end": [3, 1, 2]}, "duration": 2.5},
@@ -141,24 +143,6 @@ def test_a_remainder_is_not_planned_with_stops():
         planner.replan({"pose": [-1, -0.5, 1, 0, 0, 0]}, 0.0)
 
 
-SLING = {
-    "name": "sling",
-    "source": "made up",
-    "platform": {"mass": 10.0, "dof": ["x", "y", "z"], "home": [0, 0, -2, 0, 0, 0]},
-    "carriers": [{"name": "base", "kind": "ground"}],
-    "cables": [
-        {
-            "anchor": [float(np.cos(angle)), float(np.sin(angle)), 0.0],
-            "attachment": [0.0, 0.0, 0.0],
-            "carrier": "base",
-            "t_min": 1.0,
-            "t_max": 500.0,
-        }
-        for angle in 2 * np.pi * np.arange(3) / 3
-    ],
-}
-
-
 def spiral():
     """Return a motion that swings around outside of the anchors, where it cannot rest, and then spirals in to rest."""
     turn, end = np.sqrt(9.81 / 2.0), 24.0
@@ -171,7 +155,9 @@ def spiral():
     )
     velocity = np.gradient(pose, t, axis=0, edge_order=2)
     acceleration = np.gradient(velocity, t, axis=0, edge_order=2)
-    robot = Robot.model_validate(SLING)
+    ends = [([np.cos(angle), np.sin(angle), 0], [0, 0, 0]) for angle in 2 * np.pi * np.arange(3) / 3]
+    platform = {"mass": 10, "dof": ["x", "y", "z"], "home": [0, 0, -2, 0, 0, 0]}
+    robot = framed(ends, platform, t_min=1, t_max=500)
     still = np.zeros((len(t), 1, 6))
     parts = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
     variables = {name: (("time", "coordinate"), part) for name, part in parts.items()}

@@ -19,6 +19,8 @@ from towline.models.record import record_of
 from towline.statics import equilibria as statics
 from towline.statics.equilibria import equilibria
 
+from .framed import framed
+
 FIVE = ["ipanema-1", "cogiro", "wang-flying", "caroca-pulleys", "nist-robocrane"]
 
 
@@ -307,14 +309,7 @@ def test_six_cables_at_random_hardly_hide_a_pose():
 def suspended(anchors, attachments, **platform):
     """Return a platform of 2 kg under cables from a frame."""
     body = {"mass": 2, "inertia": [0.1, 0.1, 0.1, 0, 0, 0], **platform}
-    cables = [
-        {"carrier": "frame", "anchor": a, "attachment": b, "t_min": 0, "t_max": 500}
-        for a, b in zip(anchors, attachments, strict=True)
-    ]
-    carriers = [{"name": "frame", "kind": "ground"}]
-    return Robot.model_validate(
-        {"name": "hung", "source": "test", "platform": body, "carriers": carriers, "cables": cables}
-    )
+    return framed(zip(anchors, attachments, strict=True), body)
 
 
 def test_fewer_cables_give_the_rest_and_its_spread():

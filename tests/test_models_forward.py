@@ -9,23 +9,14 @@ from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.statics.equilibria import equilibria
 
+from .framed import framed
+
 GRAVITY = 9.81
 
 
 def hanging(cables, mass=2.0, inertia=(0.3, 0.2, 0.4, 0, 0, 0), **platform):
     """A platform under ground cables, given as (anchor, attachment) pairs."""
-    return Robot.model_validate(
-        {
-            "name": "hanging",
-            "source": "a test",
-            "platform": {"mass": mass, "inertia": inertia, **platform},
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": [
-                {"carrier": "frame", "anchor": a, "attachment": b, "t_min": 0, "t_max": 1000, "stiffness": 1e4}
-                for a, b in cables
-            ],
-        }
-    )
+    return framed(cables, {"mass": mass, "inertia": inertia, **platform}, stiffness=1e4)
 
 
 def test_acceleration_inverts_the_required_wrench():

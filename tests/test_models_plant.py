@@ -10,22 +10,15 @@ from towline.base.errors import InputError
 from towline.models.points import rotations
 from towline.plant import Plant
 
+from .framed import framed
+
 G = 9.81
 
 
 def mass_on_cables(cables=1, mass=2.0, dof=("x", "y", "z"), gravity=(0, 0, -G), anchor=(0.0, 0.0, 0.0), **cable):
     """Return a mass of 2 kg, 1 m below its anchor."""
-    one = {"carrier": "top", "anchor": list(anchor), "attachment": [0, 0, 0], "t_min": 0, "t_max": 1e4, **cable}
-    return Robot.model_validate(
-        {
-            "name": "mass",
-            "source": "a test",
-            "gravity": list(gravity),
-            "platform": {"mass": mass, "dof": list(dof), "home": [0, 0, -1, 0, 0, 0]},
-            "carriers": [{"name": "top", "kind": "ground"}],
-            "cables": [one] * cables,
-        }
-    )
+    platform = {"mass": mass, "dof": list(dof), "home": [0, 0, -1, 0, 0, 0]}
+    return framed([(anchor, (0, 0, 0))] * cables, platform, {"gravity": list(gravity)}, **{"t_max": 1e4, **cable})
 
 
 def held(plant, steps, *arguments, **others):

@@ -2,11 +2,13 @@
 
 import pytest
 
-from towline.models import Robot, load
+from towline.models import load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
+
+from .framed import framed
 
 TEAM = load("multi-quadrotor-3")
 G = 9.81
@@ -52,15 +54,8 @@ def test_where_the_weight_need_not_be_carried_nothing_is_proven():
 @pytest.mark.parametrize("share", [0.98, 1.02])
 def test_one_vertical_cable_carries_its_largest_tension_and_no_more(share):
     """The bound is sharp: what weighs 2 % less is lifted, slowly."""
-    robot = Robot.model_validate(
-        {
-            "name": "winch",
-            "source": "one cable",
-            "platform": {"mass": share * 100 / G, "dof": ["z"], "home": [0, 0, 0, 0, 0, 0]},
-            "carriers": [{"name": "ceiling", "kind": "ground"}],
-            "cables": [{"carrier": "ceiling", "anchor": [0, 0, 9], "attachment": [0, 0, 0], "t_min": 1, "t_max": 100}],
-        }
-    )
+    platform = {"mass": share * 100 / G, "dof": ["z"], "home": [0, 0, 0, 0, 0, 0]}
+    robot = framed([([0, 0, 9], [0, 0, 0])], platform, t_min=1, t_max=100)
     path = {"kind": "line", "start": [0, 0, 0], "end": [0, 0, 1]}
     task = {"path": path, "duration": 8, "tube": {"position": 0.01}, "steps": 20}
     lifted = plan(robot, task)

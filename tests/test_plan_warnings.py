@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline import Robot, Task, available, load, plan, time_along
+from towline import Task, available, load, plan, time_along
 from towline.errors import InputError
 from towline.ocp.tasks.task import read_task
 from towline.ocp.warnings.slipped_units import slipped_units
 
+from .framed import framed
 from .warm import towline as run
 
 COGIRO = load("cogiro")
@@ -27,18 +28,9 @@ DIVE = line([-1, 0, 1.5], [1, 0, -0.3])
 
 def hanging(anchors, mass_at=(0, 0, 1), dof=("x", "y", "z"), **more):
     """A point mass under ground anchors."""
-    end = {"carrier": "frame", "attachment": [0, 0, 0], "t_min": 0, "t_max": 500}
     home = {} if mass_at is None else {"home": [*mass_at, 0, 0, 0]}
-    return Robot.model_validate(
-        {
-            "name": "mass",
-            "source": "test",
-            "platform": {"mass": 2, "dof": list(dof), **home},
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": [{**end, "anchor": anchor} for anchor in anchors],
-            **more,
-        }
-    )
+    ends = [(anchor, (0, 0, 0)) for anchor in anchors]
+    return framed(ends, {"mass": 2, "dof": list(dof), **home}, more, t_max=500)
 
 
 def square(z, half=2.0):

@@ -10,21 +10,13 @@ from towline.solvers import solve
 from towline.statics.distribution import pose_problem
 from towline.workspace.resting_box import largest_box, resting_box
 
+from .framed import framed
+
 
 def camera(home, t_max=1e4, **platform):
     """A point mass of 1 kg below the corners of a square of 2 m, 3 m above the floor."""
-    return Robot.model_validate(
-        {
-            "name": "camera",
-            "source": "a test",
-            "platform": {"mass": 1, "dof": ["x", "y", "z"], "home": home, **platform},
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": [
-                {"carrier": "frame", "anchor": [x, y, 3], "attachment": [0, 0, 0], "t_min": 0, "t_max": t_max}
-                for x, y in product((-1, 1), repeat=2)
-            ],
-        }
-    )
+    ends = [((x, y, 3), (0, 0, 0)) for x, y in product((-1, 1), repeat=2)]
+    return framed(ends, {"mass": 1, "dof": ["x", "y", "z"], "home": home, **platform}, t_max=t_max)
 
 
 def test_a_point_mass_rests_anywhere_between_its_anchors():

@@ -8,12 +8,13 @@ from numpy.testing import assert_allclose
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from towline import Dynamics, Robot, simulate, solve_batch, tensions
+from towline import Dynamics, simulate, solve_batch, tensions
 from towline.base.errors import InputError
 from towline.control import LengthControl
 from towline.plant import Plant
 from towline.statics.stiffness import natural_frequencies, stiffest
 
+from .framed import framed
 from .stiff_robots import elastic, inertia
 
 
@@ -79,14 +80,9 @@ def test_frequencies_of_many_poses_are_generalised_eigenvalues():
 def test_a_locked_platform_has_the_frequencies_of_what_is_free():
     """A platform in a plane between two vertical pairs of cables: stiffness by hand."""
     EA, b, mass, turning, t = 1e4, 0.5, 3.0, 0.4, 50.0
-    cables = [
-        {"carrier": "frame", "anchor": [x, 0, z], "attachment": [x, 0, 0], "t_min": 1, "t_max": 99, "stiffness": EA}
-        for x in (-b, b)
-        for z in (-2, 2)
-    ]
+    ends = [((x, 0, z), (x, 0, 0)) for x in (-b, b) for z in (-2, 2)]
     platform = {"mass": mass, "inertia": [1, turning, 1, 0, 0, 0], "dof": ["x", "z", "pitch"], "home": [0] * 6}
-    data = {"name": "lift", "source": "a test", "platform": platform, "cables": cables}
-    robot = Robot.model_validate({**data, "carriers": [{"name": "frame", "kind": "ground"}]})
+    robot = framed(ends, platform, t_min=1, t_max=99, stiffness=EA)
     up = 4 * (EA + t) / 2.0  # of E A / L0 with L0 = 2 m / (1 + t / E A)
     sideways = 4 * t / 2.0
     turn = up * b**2  # the pulls on the turned arms cancel

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
-from towline.models import Dynamics, Robot, load
+from towline.models import Dynamics, load
 from towline.solvers import solve
 from towline.statics.distribution import pose_problem
 from towline.workspace.resting_box import resting_box
+
+from .framed import framed
 
 
 def test_a_suspended_robot_rests_inside_its_anchors():
@@ -19,35 +21,18 @@ def test_a_suspended_robot_rests_inside_its_anchors():
 
 def test_a_point_mass_balances_forces_only():
     """Three cables hold a point mass, although they cannot hold a body: the moment rows do not count."""
-    data = {
-        "name": "point",
-        "source": "a test",
-        "platform": {"mass": 1, "dof": ["x", "y", "z"], "home": [0, 0, -1, 0, 0, 0]},
-        "carriers": [{"name": "frame", "kind": "ground"}],
-        "cables": [
-            {"carrier": "frame", "anchor": [np.cos(a), np.sin(a), 0], "attachment": [0, 0, 0], "t_min": 0, "t_max": 100}
-            for a in (0, 2, 4)
-        ],
-    }
-    solution = solve(pose_problem(Dynamics(Robot.model_validate(data)), [0, 0, -1, 0, 0, 0]))
+    ends = [([np.cos(a), np.sin(a), 0], [0, 0, 0]) for a in (0, 2, 4)]
+    robot = framed(ends, {"mass": 1, "dof": ["x", "y", "z"], "home": [0, 0, -1, 0, 0, 0]}, t_max=100)
+    solution = solve(pose_problem(Dynamics(robot), [0, 0, -1, 0, 0, 0]))
     assert solution.feasible
     directions = np.array([[np.cos(a), np.sin(a), 1] for a in (0, 2, 4)]).T / np.sqrt(2)
     np.testing.assert_allclose(solution.tensions, np.linalg.solve(directions, [0, 0, 9.81]), rtol=1e-9)
 
 
 def test_a_planar_robot_ignores_what_its_guide_takes():
-    data = {
-        "name": "planar",
-        "source": "a test",
-        "platform": {"mass": 2, "inertia": [1, 1, 1, 0, 0, 0], "dof": ["x", "z", "pitch"], "home": [0, 0, 0, 0, 0, 0]},
-        "carriers": [{"name": "frame", "kind": "ground"}],
-        "cables": [
-            {"carrier": "frame", "anchor": [x, 0, z], "attachment": [0.1 * x, 0, 0.1 * -z], "t_min": 1, "t_max": 500}
-            for x in (-1, 1)
-            for z in (-1, 1)
-        ],
-    }
-    robot = Robot.model_validate(data)
+    platform = {"mass": 2, "inertia": [1, 1, 1, 0, 0, 0], "dof": ["x", "z", "pitch"], "home": [0, 0, 0, 0, 0, 0]}
+    ends = [([x, 0, z], [0.1 * x, 0, 0.1 * -z]) for x in (-1, 1) for z in (-1, 1)]
+    robot = framed(ends, platform, t_min=1, t_max=500)
     dynamics = Dynamics(robot)
     pose, acceleration = np.array([0.1, 0, 0.2, 0, 0.1, 0]), np.array([1.0, 5.0, 0.5, 3.0, 0.3, 4.0])
     problem = pose_problem(dynamics, pose, acceleration=acceleration)

@@ -12,6 +12,8 @@ from towline.workspace import Places, Region, StaticEquilibrium, sample, save
 from towline.workspace.domain import Domain
 from towline.workspace.sampling import CHUNK, Sampler, cells_of
 
+from .framed import framed
+
 REST = StaticEquilibrium()
 HEIGHT, RADIUS = 3.0, 2.0
 AREA = 3 * np.sqrt(3) / 4 * RADIUS**2  # of the triangle of the anchors
@@ -21,18 +23,8 @@ BOX = {"min": [-2, -2, 0], "max": [2, 2, 1]}
 def hanging_mass():
     """A point mass on three cables, whose anchors are level: it rests anywhere inside the prism below them."""
     angles = np.array([0, 2, 4]) * np.pi / 3
-    anchors = [[RADIUS * np.cos(a), RADIUS * np.sin(a), HEIGHT] for a in angles]
-    return Robot.model_validate(
-        {
-            "name": "hanging-mass",
-            "source": "a test",
-            "platform": {"mass": 1, "dof": ["x", "y", "z"], "home": [0, 0, 1, 0, 0, 0]},
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": [
-                {"carrier": "frame", "anchor": a, "attachment": [0, 0, 0], "t_min": 0, "t_max": 1000} for a in anchors
-            ],
-        }
-    )
+    ends = [([RADIUS * np.cos(a), RADIUS * np.sin(a), HEIGHT], [0, 0, 0]) for a in angles]
+    return framed(ends, {"mass": 1, "dof": ["x", "y", "z"], "home": [0, 0, 1, 0, 0, 0]})
 
 
 def towed_body():

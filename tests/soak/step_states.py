@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from towline.models import Dynamics, Robot
 
+from ..framed import framed
 from .step_code import Array, States
 
 __all__ = ["KINDS", "random_states", "twelve_cables"]
@@ -115,15 +116,5 @@ def twelve_cables() -> Robot:
     middle_inner = np.array([[0.9, -0.7, -1.0], [-0.9, 0.7, -1.0], [-1.0, -0.6, -1.0], [1.0, 0.6, -1.0]])
     swapped = inner[[1, 0, 3, 2, 6, 7, 4, 5]] * np.array([1.0, 1.0, 0.8])
     ends = zip(np.vstack([corners, middles]), np.vstack([swapped, middle_inner]), strict=True)
-    return Robot.model_validate(
-        {
-            "name": "twelve",
-            "source": "made up, for measurements",
-            "platform": {"mass": 60.0, "inertia": [20.0, 25.0, 18.0, 0.5, -0.3, 0.2], "home": [0, 0, 4, 0, 0, 0]},
-            "carriers": [{"name": "frame", "kind": "ground"}],
-            "cables": [
-                {"carrier": "frame", "anchor": list(a), "attachment": list(b), "t_min": 20.0, "t_max": 1500.0}
-                for a, b in ends
-            ],
-        }
-    )
+    body = {"mass": 60.0, "inertia": [20.0, 25.0, 18.0, 0.5, -0.3, 0.2], "home": [0, 0, 4, 0, 0, 0]}
+    return framed(ends, body, {"name": "twelve"}, t_min=20.0, t_max=1500.0)
