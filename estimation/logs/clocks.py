@@ -12,8 +12,7 @@ from ...models.robot import Robot
 from .alignment import Clock, align
 from .carrier_poses import carriers_at
 from .mapping import Field, LogMap
-from .recording import Recording, Samples
-from .streams import check_rising
+from .recording import Recording, Samples, check_rising
 
 MOST_ALIGNED = 200_000  # poses
 

@@ -124,8 +124,7 @@ def fields_of(
         for name in ("position", "orientation"):
             found[name] = found[name] or _usual(parts, name, m, (), free=free)
     everything = _everything(recordings)
-    others = [_prefix(given, name) for name in carriers]
-    of_platform = [one for one in everything if not any(_within(one[1].full(one[2]), name) for name in others)]
+    of_platform = _everything(recordings, [_prefix(given, name) for name in carriers])
     for name in roles:
         if not found.get(name) and not (given and given.pose and name in ("position", "orientation")):
             fields = of_platform if name in ("position", "orientation", "directions") else everything
@@ -145,8 +144,7 @@ def command_fields(
     roles = ("commands", "thrusts")
     found = {name: _named(recordings, name, given) for name in roles} if given else {}
     everything = _everything(recordings)
-    others = [_prefix(given, name) for name in carriers]
-    alone = [one for one in everything if not any(_within(one[1].full(one[2]), name) for name in others)]
+    alone = _everything(recordings, [_prefix(given, name) for name in carriers])
     for name in (*roles, "efforts", "time"):
         if not found.get(name):
             found[name] = _usual(alone if name == "thrusts" else everything, name, m, ())
@@ -162,8 +160,10 @@ def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrie
     return Fields(**found, time=_usual(everything, "time", None, ()))
 
 
-def _everything(recordings: Sequence[Recording]) -> list[tuple[Recording, Topic, str]]:
-    return [(one, topic, name) for one in recordings for topic in one.topics.values() for name in topic.fields]
+def _everything(recordings: Sequence[Recording], but: Sequence[str] = ()) -> list[tuple[Recording, Topic, str]]:
+    """Return all fields, except those below some prefixes."""
+    every = [(one, topic, name) for one in recordings for topic in one.topics.values() for name in topic.fields]
+    return [one for one in every if not any(_within(one[1].full(one[2]), prefix) for prefix in but)]
 
 
 def _prefix(given: LogMap | None, carrier: str) -> str:
@@ -287,8 +287,7 @@ def _named(recordings: Sequence[Recording], what: str, given: LogMap, free: str 
         name, unit = match[1], match[2] or ""
         found = list(_matching(recordings, name))
         if not found:
-            there = ", ".join(plain(topic.name or "the table") for one in recordings for topic in one.topics.values())
-            raise InputError(f"map: {what} must name fields of the log, got {plain(name)}; the log has {there}")
+            raise _not_there(f"{what} must name fields of the log", name, recordings)
         for recording, topic, field in found:
             result.append(Field(recording, topic, field, unit or topic.fields[field]))
     sizes = {"position": [0, 3], "orientation": [0, 3, 4]}.get(what)
@@ -321,16 +320,12 @@ def _matching(recordings: Sequence[Recording], name: str) -> Iterator[tuple[Reco
 def _below(recordings: Sequence[Recording], prefix: str) -> list[tuple[Recording, Topic, str]]:
     """Return the fields below a topic or a structure."""
     start = prefix.replace(".", "/").rstrip("/") + "/"
-    found = [
-        (one, topic, name)
-        for one in recordings
-        for topic in one.topics.values()
-        for name in topic.fields
-        if topic.full(name).replace(".", "/").startswith(start)
-    ]
+    found = [one for one in _everything(recordings) if one[1].full(one[2]).replace(".", "/").startswith(start)]
     if not found:
-        there = ", ".join(plain(topic.name or "the table") for one in recordings for topic in one.topics.values())
-        raise InputError(
-            f"map: pose must name a topic or a structure of the log, got {plain(prefix)}; the log has {there}"
-        )
+        raise _not_there("pose must name a topic or a structure of the log", prefix, recordings)
     return found
+
+
+def _not_there(wanted: str, name: str, recordings: Sequence[Recording]) -> InputError:
+    there = ", ".join(plain(topic.name or "the table") for one in recordings for topic in one.topics.values())
+    return InputError(f"map: {wanted}, got {plain(name)}; the log has {there}")

@@ -18,6 +18,7 @@ from ...base.netcdf import Contents, Variable, save_netcdf
 from ...models import points
 from ...models.part import COORDINATES, LARGEST
 from ...models.robot import Robot
+from .recording import check_rising
 
 SIGMA = 1e-3  # [m] of lengths
 LARGEST_SIGMA = 100.0  # [m], [rad] or [-]
@@ -347,14 +348,7 @@ def _rising(times: Any, count: int) -> np.ndarray:
     if array.shape != (count,):
         raise InputError(f"times must have the shape ({count},), got {array.shape}")
     _check_finite("times", array)
-    falling = np.flatnonzero(np.diff(array) <= 0)
-    if falling.size:
-        row = int(falling[0])
-        raise InputError(
-            f"times must increase from sample to sample, got {array[row]:.9g} s and then {array[row + 1]:.9g} s at "
-            f"sample "
-            f"{row + 1}"
-        )
+    check_rising(array)
     return array
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...base.inputs import printable
 
 GAP = 5.0  # median times between samples
@@ -74,3 +75,14 @@ class Recording:
 def plain(name: object) -> str:
     """Return a name of a file as a terminal shows it."""
     return printable(str(name), 120)
+
+
+def check_rising(times: np.ndarray) -> None:
+    """Raise InputError unless times (N,) increase."""
+    falling = np.flatnonzero(~(np.diff(times) > 0))
+    if falling.size:
+        row = int(falling[0])
+        raise InputError(
+            f"times must increase from sample to sample, got {times[row]:.15g} s and then {times[row + 1]:.15g} s at "
+            f"sample {row + 1}"
+        )

@@ -8,7 +8,7 @@ from ...base.errors import InputError
 from ...base.text import quantity
 from .mapping import Field, Fields
 from .names import UNITS, epoch_unit
-from .recording import GAP, Samples
+from .recording import GAP, Samples, check_rising
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
 MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
@@ -96,14 +96,3 @@ def interpolated(times: np.ndarray, samples: Samples) -> np.ndarray:
     outside = (own[after] - own[after - 1] > GAP * apart) | (times < own[0]) | (times > own[-1])
     result[outside] = np.nan
     return result
-
-
-def check_rising(times: np.ndarray) -> None:
-    """Raise InputError unless times (N,) increase."""
-    falling = np.flatnonzero(~(np.diff(times) > 0))
-    if falling.size:
-        row = int(falling[0])
-        raise InputError(
-            f"times must increase from sample to sample, got {times[row]:.15g} s and then {times[row + 1]:.15g} s at "
-            f"sample {row + 1}"
-        )
