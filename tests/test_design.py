@@ -412,7 +412,6 @@ def test_the_command_writes_a_robot_and_says_no(tmp_path):
     file, out = tmp_path / "wanted.yaml", tmp_path / "better.yaml"
     file.write_text(json.dumps(wanted(robot, name="box", time_limit=0.5)))
     done = towline("design", "ipanema-2", str(file), "--out", str(out), "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
     data = json.loads(done.stdout)
     assert data["feasible"]
     assert data["margin"] > data["margin_before"]
@@ -420,8 +419,7 @@ def test_the_command_writes_a_robot_and_says_no(tmp_path):
     assert load(out).m == 8
     heavy = {"poses": [robot.home.tolist()], "wrenches": [[0, 0, -1e4, 0, 0, 0]]}
     file.write_text(json.dumps(wanted(robot) | {"require": [heavy]}))
-    done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
-    assert done.returncode == 1
+    done = towline("design", "ipanema-2", str(file), cwd=tmp_path, code=1)
     assert "INFEASIBLE" in done.stdout
     assert sorted(path.name for path in tmp_path.iterdir()) == ["better.yaml", "wanted.yaml"]
     for text in ("", "free: [", "free: 3", "\x00", "free: [{part: anchor}]"):
@@ -429,11 +427,10 @@ def test_the_command_writes_a_robot_and_says_no(tmp_path):
         with pytest.raises(InputError, match=r"wanted\.yaml") as error:
             read_requirements(file)
         assert len(str(error.value).splitlines()) == 1
-    done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
-    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    done = towline("design", "ipanema-2", str(file), cwd=tmp_path, code=2)
+    assert len(done.stderr.splitlines()) == 1
     file.write_text(json.dumps(wanted(robot) | {"free": [winches(robot) | {"cables": [9]}]}))
-    done = towline("design", "ipanema-2", str(file), cwd=tmp_path)
-    assert done.returncode == 2
+    done = towline("design", "ipanema-2", str(file), cwd=tmp_path, code=2)
     assert f"{file}: free[0].cables must be cables of the robot, 1 to 8, got 9" in done.stderr
 
 
@@ -511,7 +508,6 @@ def test_weaker_winches_are_enough_for_a_better_layout(tmp_path):
     fixed = design(robot, requirements=requirements | {"free": [winches(robot)], "time_limit": 0.5})
     (tmp_path / "wanted.yaml").write_text(json.dumps(requirements | {"free": [*requirements["free"], winches(robot)]}))
     done = towline("design", "ipanema-2", str(tmp_path / "wanted.yaml"), "--json", "--out", str(tmp_path / "out.yaml"))
-    assert done.returncode == 0, done.stderr
     better = json.loads(done.stdout)
     assert max(better["t_max"]) < 0.95 * fixed.robot.t_max.max()
     assert load(tmp_path / "out.yaml").t_max.tolist() == better["t_max"]

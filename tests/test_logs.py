@@ -65,7 +65,7 @@ def test_logs_of_every_kind_say_the_same(name, files, log):
 
 
 def test_a_log_is_listed(files):
-    done = towline("log", str(files["ros2.mcap"]), str(files["ros1.bag"]), "--json")
+    done = towline("log", str(files["ros2.mcap"]), str(files["ros1.bag"]), "--json", code=1)
     told = json.loads(done.stdout)
     first, second = told["files"]
     assert (first["kind"], second["kind"]) == ("MCAP", "a bag of ROS 1")
@@ -74,9 +74,7 @@ def test_a_log_is_listed(files):
     assert topics["/winches"]["rate"] == pytest.approx(100, rel=1e-3)
     assert set(topics) == {"/winches", "/mocap/pose"}
     assert "must have one candidate for lengths" in told["problem"]
-    assert done.returncode == 1
     done = towline("log", str(files["json.mcap"]))
-    assert done.returncode == 0, done.stderr
     assert "/joints/joints[cable 1].position [m]" in done.stdout
     assert "pose from lengths          yes" in done.stdout
 
@@ -211,7 +209,6 @@ def test_the_command_takes_two_files(tmp_path):
     write_csv(tmp_path / "l.csv", "t," + ",".join(f"l{i}" for i in range(8)), times, readings + 0.1)
     write_csv(tmp_path / "p.csv", "t [s],x,y,z,qx,qy,qz,qw", clock, poses[:, :3], quaternions(poses))
     done = towline("calibrate", "cogiro", "l.csv", "--poses", "p.csv", "--free", "offsets", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     ahead, ppm = re.match(r"the clock of the poses is ([\d.]+) s ahead, ([\d.]+) ppm fast", told["notes"][0]).groups()
     assert float(ahead) == pytest.approx(7200, abs=1e-3)
@@ -219,8 +216,7 @@ def test_the_command_takes_two_files(tmp_path):
     assert told["residual_after"] < 1.1e-3
     for parameter in told["parameters"]:
         assert parameter["value"] == pytest.approx(-0.1, abs=1e-3)
-    done = towline("calibrate", "cogiro", "p.csv", cwd=tmp_path)
-    assert done.returncode == 2
+    done = towline("calibrate", "cogiro", "p.csv", cwd=tmp_path, code=2)
     assert "must have columns l0, l1, ... of lengths, got t, x, y" in done.stderr
 
 
@@ -332,10 +328,8 @@ def test_plans_and_simulations_are_written_as_mcap(tmp_path):
         "name: lift\npath: {kind: line, start: [0, 0, 1], end: [0.3, 0.2, 1.3]}\nduration: 1\n"
     )
     done = towline("plan", "ipanema-1", "lift.yaml", "--out", "lift.mcap", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
     towline("plan", "ipanema-1", "lift.yaml", "--out", "lift.nc", cwd=tmp_path)
     done = towline("simulate", "ipanema-1", "lift.nc", "--out", "run.mcap", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
     robot = load("ipanema-1")
     (tmp_path / "map.yaml").write_text("lengths: /cables/joints[*].position\npose: /pose\n")
     for name, rate in (("lift.mcap", 100), ("run.mcap", 1000)):
@@ -357,6 +351,5 @@ def test_plans_and_simulations_are_written_as_mcap(tmp_path):
         ends = np.array([[point[axis] for axis in "xyz"] for point in lines["points"]]).reshape(-1, 2, 3)
         np.testing.assert_allclose(ends[:, 0], robot.home_anchors)
         np.testing.assert_allclose(ends[:, 1], points.attachments(robot, read.poses[0]), atol=1e-6)
-    done = towline("plan", "ipanema-1", "lift.yaml", "--out", "lift.bag", cwd=tmp_path)
-    assert done.returncode == 2
+    done = towline("plan", "ipanema-1", "lift.yaml", "--out", "lift.bag", cwd=tmp_path, code=2)
     assert "--out must end in .nc or .mcap" in done.stderr

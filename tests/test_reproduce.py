@@ -343,8 +343,7 @@ def test_the_command_reproduces_the_paper(tmp_path):
 
 
 def test_an_unknown_paper_is_one_line(tmp_path):
-    done = towline("reproduce", "walking", cwd=tmp_path)
-    assert done.returncode == 2
+    done = towline("reproduce", "walking", cwd=tmp_path, code=2)
     assert done.stderr.startswith("towline: PAPER must be one of flying, ctmrts, got 'walking'")
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())

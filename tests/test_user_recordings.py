@@ -15,14 +15,8 @@ from . import user_recordings as user
 from .warm import towline
 
 
-def called(*arguments, cwd, code=0):
-    done = towline(*arguments, cwd=cwd)
-    assert done.returncode == code, done.stdout + done.stderr
-    return done.stdout
-
-
-def found(text):
-    told = json.loads(text)
+def found(done):
+    told = json.loads(done.stdout)
     return {one["name"]: (one["value"], one["sigma"]) for one in told["parameters"]}, told
 
 
@@ -30,7 +24,7 @@ def test_four_cables_with_a_motion_capture_of_another_clock(tmp_path):
     anchors, offsets = user.four_cables(tmp_path)
     robot = user.hanging_robot(tmp_path)
     files = (robot, "winches.csv", "--poses", "mocap.csv")
-    values, told = found(called("calibrate", *files, "--json", cwd=tmp_path))
+    values, told = found(towline("calibrate", *files, "--json", cwd=tmp_path))
     assert any("left out, with the time of the sample before: 1" in note for note in told["notes"])
     clock = next(note for note in told["notes"] if "clock of the poses is" in note)
     assert float(clock.split(" is ")[1].split(" s ahead")[0]) + told["clock"] == pytest.approx(0.041, abs=2e-4)
@@ -41,35 +35,34 @@ def test_four_cables_with_a_motion_capture_of_another_clock(tmp_path):
             assert sigma < 5e-3
         assert abs(values[f"cables[{i}].offset"][0] - offsets[i]) < 4 * values[f"cables[{i}].offset"][1] + 1e-4
     # Poses by the calibrated robot, from the readings alone, are those of a slow motion.
-    said = called("simulate", "hanging-calibrated.yaml", *files[1:], cwd=tmp_path)
+    said = towline("simulate", "hanging-calibrated.yaml", *files[1:], cwd=tmp_path).stdout
     assert "PASSED" in said
 
 
 def test_locked_winches_have_no_clock(tmp_path):
     user.locked(tmp_path)
     robot = user.hanging_robot(tmp_path)
-    told = json.loads(towline("calibrate", robot, "locked.csv", "--json", cwd=tmp_path).stdout)
+    told = json.loads(towline("calibrate", robot, "locked.csv", "--json", cwd=tmp_path, code=1).stdout)
     assert told["free"] == ["anchors", "offsets"]
-    values, told = found(called("calibrate", robot, "locked.csv", "--free", "offsets", "--json", cwd=tmp_path))
+    values, told = found(towline("calibrate", robot, "locked.csv", "--free", "offsets", "--json", cwd=tmp_path))
     for value, sigma in values.values():
         assert abs(value) < 4 * sigma + 1e-4
-    said = called("pose", robot, "--log", "locked.csv", cwd=tmp_path)
+    said = towline("pose", robot, "--log", "locked.csv", cwd=tmp_path).stdout
     assert "lengths do not determine the pose: poses are those at rest" in said
 
 
 def test_rests_with_an_ahrs_and_load_cells(tmp_path):
     robot, offsets = user.hanging_robot(tmp_path), np.array([0.06, 0.006, -0.02, -0.01])
     places = user.statics(tmp_path, offsets)
-    said = called("pose", robot, "--log", "statics.csv", cwd=tmp_path)
+    said = towline("pose", robot, "--log", "statics.csv", cwd=tmp_path).stdout
     assert "times as large as stated" in said  # because of the offsets
-    text = called("calibrate", robot, "statics.csv", "--free", "offsets", "--json", cwd=tmp_path)
-    values, told = found(text)
+    values, told = found(towline("calibrate", robot, "statics.csv", "--free", "offsets", "--json", cwd=tmp_path))
     assert any("taken to be good to 0.5 deg" in note for note in told["notes"])
     for i in range(4):
         value, sigma = values[f"cables[{i}].offset"]
         assert abs(value - offsets[i]) < 4 * sigma
         assert sigma < 6e-3
-    said = called("pose", "hanging-calibrated.yaml", "--log", "statics.csv", cwd=tmp_path)
+    said = towline("pose", "hanging-calibrated.yaml", "--log", "statics.csv", cwd=tmp_path).stdout
     assert "times as large as stated" not in said
     poses = np.loadtxt(tmp_path / "statics-poses.csv", delimiter=",", skiprows=1)
     errors = np.linalg.norm(poses[:, :3] - places, axis=1)
@@ -78,12 +71,12 @@ def test_rests_with_an_ahrs_and_load_cells(tmp_path):
 
 def test_a_planar_robot_with_a_drum_scale_and_positions_alone(tmp_path):
     robot, anchors = user.planar(tmp_path)
-    said = called("log", "planar.csv", "--robot", robot, cwd=tmp_path)
+    said = towline("log", "planar.csv", "--robot", robot, cwd=tmp_path).stdout
     assert "ee_x [m], ee_z [m]" in said
-    assert "(--robot)" in called("log", "planar.csv", cwd=tmp_path, code=1)
+    assert "(--robot)" in towline("log", "planar.csv", cwd=tmp_path, code=1).stdout
     assert "clock" in usual(load(robot), read_measurements(tmp_path / "planar.csv", robot=robot))
     free = "anchors,offsets,scales,clock"
-    values, told = found(called("calibrate", robot, "planar.csv", "--free", free, "--json", cwd=tmp_path))
+    values, told = found(towline("calibrate", robot, "planar.csv", "--free", free, "--json", cwd=tmp_path))
     assert told["clock"] == pytest.approx(-0.034, abs=5e-4)
     assert told["noise"] < 3e-4
     for i in range(4):
@@ -91,7 +84,7 @@ def test_a_planar_robot_with_a_drum_scale_and_positions_alone(tmp_path):
         for k, axis in ((0, "x"), (2, "z")):
             value, sigma = values[f"cables[{i}].anchor.{axis}"]
             assert abs(value - anchors[i, k]) < 4 * sigma + 1e-3
-    wrong = called("pose", robot, "--log", "planar.csv", cwd=tmp_path, code=1)
+    wrong = towline("pose", robot, "--log", "planar.csv", cwd=tmp_path, code=1).stdout
     assert "no pose fits the lengths of any sample" in wrong
 
 
@@ -112,7 +105,7 @@ def test_missing_readings_and_a_table_of_two_sensors(tmp_path):
     rows[17][2] = ""
     rows[40][1:5] = ["nan"] * 4
     (tmp_path / "gaps.csv").write_text("\n".join([head, *(",".join(row) for row in rows)]))
-    said = called("calibrate", robot, "gaps.csv", "--free", "offsets,scales,clock", cwd=tmp_path)
+    said = towline("calibrate", robot, "gaps.csv", "--free", "offsets,scales,clock", cwd=tmp_path).stdout
     assert "left out, without all lengths or tensions: 2" in said
     joined = []
     for row in rows:
@@ -136,7 +129,7 @@ def test_headers_of_motion_capture_and_units_below_names(tmp_path):
     )
     rows = [[k, 0.01 * k, 0, 0, 0.6, 0.8, 1 + 0.1 * k, 2, 3, 9, 9, 9] for k in range(200)]
     (tmp_path / "take.csv").write_text(text + "\n".join(",".join(map(str, row)) for row in rows) + "\n")
-    said = called("log", "take.csv", cwd=tmp_path, code=1)  # it has no lengths
+    said = towline("log", "take.csv", cwd=tmp_path, code=1).stdout  # it has no lengths
     assert "Rigid Body/platform/Position/X [m]" in said
     assert "Rigid Body/platform/Rotation/W [1]" in said
     assert "100 Hz" in said
@@ -145,8 +138,7 @@ def test_headers_of_motion_capture_and_units_below_names(tmp_path):
     np.testing.assert_allclose(log.lengths, [[1.5, 1.6], [1.51, 1.59]])
     np.testing.assert_allclose(log.times, [0, 0.1])
     (tmp_path / "bad.csv").write_text(text + "0,0.0,0,0,0.6,0.8,1,2,3,9,9,9\n1,0.01,much,0,0.6,0.8,1,2,3,9,9,9\n")
-    wrong = towline("log", "bad.csv", cwd=tmp_path)
-    assert wrong.returncode == 2
+    wrong = towline("log", "bad.csv", cwd=tmp_path, code=2)
     assert "line 8, column Rigid Body/platform/Rotation/X must be a number, got 'much'" in wrong.stderr
 
 
@@ -165,7 +157,7 @@ def test_frames_of_an_ahrs(what, tmp_path):
     quaternions = turn.as_quat()[:, [3, 0, 1, 2]] if what == "w first" else turn.as_quat()
     header = [*head.split(",")[:4], "qx", "qy", "qz", "qw", *head.split(",")[7:]]
     user.write(tmp_path / "ahrs.csv", header, np.hstack([rows[:, :4], quaternions, rows[:, 7:]]))
-    said = called("pose", robot, "--log", "ahrs.csv", cwd=tmp_path)
+    said = towline("pose", robot, "--log", "ahrs.csv", cwd=tmp_path).stdout
     expected = {
         "sound": "",
         "north": "the world of the orientations looks turned by 70",
@@ -179,7 +171,7 @@ def test_frames_of_an_ahrs(what, tmp_path):
     if what != "north":
         return
     assert mistake(load(robot), read_measurements(tmp_path / "ahrs.csv", robot=robot)).severe
-    fixed, _ = found(called("calibrate", robot, "ahrs.csv", "--free", "offsets", "--fix", "--json", cwd=tmp_path))
+    fixed, _ = found(towline("calibrate", robot, "ahrs.csv", "--free", "offsets", "--fix", "--json", cwd=tmp_path))
     for i in range(4):
         value, sigma = fixed[f"cables[{i}].offset"]
         assert abs(value - offsets[i]) < 4 * sigma + 5e-3

@@ -27,10 +27,11 @@ LONGEST = 120  # [s]
 _codes = []  # of the process that a fork has become, once it has ended
 
 
-def towline(*arguments, cwd=None):
-    """Run the installed command; nothing that it does may show a traceback."""
+def towline(*arguments, cwd=None, code=0):
+    """Run the installed command; it must end with `code`, and nothing that it does may show a traceback."""
     done = run(TOWLINE, *arguments, cwd=cwd, env={**os.environ, "COLUMNS": "120", "NO_COLOR": "1"})
     assert "Traceback" not in done.stderr + done.stdout
+    assert done.returncode == code, done.stderr + done.stdout
     return done
 
 
