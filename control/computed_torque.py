@@ -85,8 +85,8 @@ class ComputedTorque(Controller):
         command is corrected until the sensors report the desired tensions, inside the limits of tensions and rates.
         With 0 only the observer compensates, in a third of a second; with 20 it takes a tenth of a second.
     tension_lag, rotor_lag
-        Known time constants with which winches and actuators of flying carriers follow commands [s]. Commands lead by
-        them, within limits and rates, until 5 ms of the first and 15 ms of the second are left.
+        Known time constants with which winches and actuators of flying carriers follow commands [s]. Commands are
+        sent ahead of time, within limits and rates, so that only 5 ms of the first and 15 ms of the second remain.
     sensors
         Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The bandwidths that are
         not given are then the largest that they permit (control/bandwidths.py), at most twice the defaults above.

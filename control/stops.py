@@ -25,9 +25,9 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     the result is the stop with the smallest missing wrench, with its certificate. The time to compute it depends on
     how long the robot takes to stop, not on the plan.
 
-    Carriers that fly, each with one cable of fixed length, leave their path: each is where the force of its cable,
-    which changes as little as possible, points to (`statics.team_stops`). Carriers that fly with several cables of
-    fixed length, which begin at one point of each and give every wrench, keep the path of that point.
+    Carriers that fly, each with one cable of fixed length, leave their path: each moves to where the force of its
+    cable points, and that force changes as little as possible (`statics.team_stops`). Carriers that fly with several
+    cables of fixed length, which begin at one point of each and give every wrench, keep the path of that point.
 
     Parameters
     ----------

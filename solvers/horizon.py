@@ -45,7 +45,7 @@ class Residuals(NamedTuple):
     stationarity :
         Gradient of the Lagrangian.
     dynamics :
-        Of the dynamics.
+        Error of the dynamics.
     complementarity :
         Products of multipliers and distances to bounds.
     soft :

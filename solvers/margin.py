@@ -53,7 +53,7 @@ def capacity_margin(problem: TensionProblem) -> Margin:
 
     If the set is flat (rank of the cables with a choice below n) it has no inside among all wrenches. Then a wrench in
     the set, within `TensionProblem.tolerance`, has the margin measured inside the flat, among the wrenches that the
-    robot can give at all; one beside the flat is outside, with a negative value.
+    robot can give at all; a wrench that is not in it is outside, with a negative value.
 
     Parameters
     ----------

@@ -43,5 +43,5 @@ def unnamed(paper, places):
 def misplaced(paper, verdicts):
     """Claims that the page of errata does not have in the section of their verdict; if any, run `make errata`."""
     sections = [part.partition("\n") for part in (ERRATA / f"{paper}.md").read_text().split("\n## ")]
-    places = {name: [title for title, _, text in sections if f"| {name} |" in text] for name in verdicts}
+    places = {name: [title for title, _, text in sections if f"(`{name}`):" in text] for name in verdicts}
     return {name: places[name] for name, verdict in verdicts.items() if places[name] != SECTIONS[verdict]}

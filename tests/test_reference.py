@@ -9,11 +9,12 @@ import pytest
 import typer
 from PIL import Image
 
-from towline import Robot, Task, available, load, plan, simulate
+from towline import Robot, Task, available, design, load, plan, simulate
 from towline.cli.main import COMMANDS, app
 from towline.control.command import ANSWERS
 from towline.ocp import MotionStatus
 from towline.ocp.sweeps.row import FAILED
+from towline.simulation.flights import report as report_of_runs
 from towline.solvers import Status
 from towline.studies.accounts.claim import Verdict
 
@@ -121,7 +122,7 @@ def test_every_status_word_is_explained():
 
 
 def test_every_row_of_reports_is_explained():
-    """Rows of a plan that is feasible, of one that is not, of a robust one, and of simulations."""
+    """Rows of plans that are feasible and not, of simulations, one and many, and of designs, possible and not."""
     page = {part.partition("\n")[0]: part for part in (REFERENCE / "reports.md").read_text().split("\n## ")}
     robot, team = load("wang-flying"), load("multi-quadrotor-3")
     rest = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.5}
@@ -132,10 +133,23 @@ def test_every_row_of_reports_is_explained():
     plans = [plan(who, task) for who, task in motions]
     assert [found.status for found in plans] == ["feasible", "infeasible", "feasible", "feasible"]
     runs = [simulate(robot, plans[0], duration=0.1), simulate(robot, plans[0], duration=0.1, events=["cut 1 at 0.02"])]
+    runs.append(simulate(robot, plans[0], duration=0.1, mismatch={"mass": [0.9, 1.1]}, tolerance=1e-9))
+    many = simulate(robot, plans[0], duration=0.1, mismatch={"mass": [0.9, 1.1]}, tolerance=1e-9, runs=2)
+    free = [{"part": "t_max", "range": {"min": 20, "max": 500}, "equal": True}]
+    lift = {"name": "lift", "path": {"kind": "line", "start": [0, 0, 2.4], "end": [0, 0, 2.6]}, "duration": 2}
+    near, far = ([{"poses": [[x, 0, 2.5, 0, 0, 0]]}] for x in (0, 9))
+    designs = [design("ipanema-2", free, near, time_limit=0.2, tasks=[lift]), design("ipanema-2", free, far)]
+    designs.append(design("ipanema-2", free, near, time_limit=0.2, margin=1e4))
+    assert [found.status for found in designs[:2]] == ["feasible", "infeasible"]
     names = {carrier.name for who in (robot, team) for carrier in who.carriers} | {""}
-    for results, section in ((plans, "Plans"), (runs, "Simulations")):
+    reports = [result._report() for result in runs] + [report_of_runs(many)]
+    for results, section in (
+        ([found._report() for found in plans], "Plans"),
+        (reports, "Simulations"),
+        ([found._report() for found in designs], "Designs"),
+    ):
         for result in results:
-            parts = [part for part in result._report().parts if hasattr(part, "facts")]
+            parts = [part for part in result.parts if hasattr(part, "facts")]
             rows = {name for part in parts for name, _ in part.facts} - names
             assert rows
             assert not [name for name in rows if f"`{name}`" not in page[section]]

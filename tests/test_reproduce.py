@@ -136,7 +136,8 @@ def test_an_account_is_written_from_the_same_claims(tmp_path):
     assert "a \\| b" in report
     assert "(figures/plot.png)" in report
     assert "good" not in errata
-    assert "| bad | Eq. 2 | a \\| b <script> | – | c d |" in errata
+    entry = "- **Eq. 2** (`bad`): a | b &lt;script>\n\n    Computed: c d.\n\n    &lt;b>not&lt;/b> printed"
+    assert entry in errata
     assert "text recognised from its pages" in errata
     assert "text recognised from its pages" in page
     assert "<script>" not in page
@@ -151,8 +152,8 @@ def test_a_repair_is_no_claim_of_the_paper(tmp_path):
     account = example("small", Two=lambda: Chapter([other]))
     assert account.summary() == ("2 claims: 1 reproduced, 1 not determined; 1 repaired, which are not in the paper")
     errata = text.errata(account)
-    assert "| other |" in errata.split("## What is possible instead")[1]
-    assert "the paper states" not in errata.split("## What is possible instead")[1]
+    assert "(`other`): Not in the paper: x." in errata.split("## What is possible instead")[1]
+    assert "By the paper" not in errata.split("## What is possible instead")[1]
     assert "| by the paper |" in text.report(account)
 
 
@@ -338,7 +339,7 @@ def test_the_command_reproduces_the_paper(tmp_path):
     assert page.count("data:image/svg+xml") == len(drawn)
     assert not re.search(r'(src|href)="(?!data:|#claim-|#chapter-|#errata)', page)
     errata = (tmp_path / "out" / "flying-errata.md").read_text()
-    assert all((f"| {name} |" in errata) == (by_name[name]["verdict"] != "reproduced") for name in names)
+    assert all((f"(`{name}`):" in errata) == (by_name[name]["verdict"] != "reproduced") for name in names)
     assert study.PAPER.source in errata
 
 

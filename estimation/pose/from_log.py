@@ -52,11 +52,11 @@ class LogPoses(Displayed):
     times
         Times of the poses on the clock of the lengths [s], (N,), or None.
     squares
-        Sum of squared residuals of each sample, in standard deviations, (N,), if there are others than of lengths.
+        Sum of all squared residuals of each sample, in standard deviations, (N,); None if lengths alone were measured.
     more
-        Number of the others in a sample.
+        Number of the residuals in a sample besides those of the lengths.
     excess
-        Factor by which the others exceed their standard deviations.
+        Factor by which these other residuals exceed their standard deviations.
     misread
         Description of an error of the measured orientations, which is corrected; or None.
     """

@@ -1,5 +1,6 @@
 """An account as Markdown: the report, and the errata from the same claims."""
 
+import re
 from collections.abc import Sequence
 
 from .account import Account
@@ -8,6 +9,7 @@ from .claim import Claim, Verdict, value_text
 FIGURES = "figures"  # the folder beside the report
 BY_THE_PAPER = "by the paper"  # head of what it prints, or of what follows from that
 MEANING = "“By the paper” is a number that it prints, or the one that follows from what it prints."
+COMPARED = re.compile(r"(?P<statement>.*\S) \((?P<quantity>.*)\)\.", re.DOTALL)  # what the numbers of a claim are
 READ = (
     "The paper was read as text recognised from its pages (OCR): a single wrong symbol may be an error of the "
     "recognition, not of the authors."
@@ -36,7 +38,8 @@ def errata(account: Account) -> str:
     lines = [
         f"# Errata of {account.paper.source}",
         "",
-        f"Each line is a claim of the report, and its verdict was computed. {MEANING} {READ}",
+        "Each entry is a claim of the paper, the reason why it is not reproduced, and the numbers that were compared. "
+        f"{MEANING} {READ}",
     ]
     titles = {
         Verdict.DIFFERS: "What is printed, and what holds",
@@ -45,12 +48,24 @@ def errata(account: Account) -> str:
         Verdict.REPAIRED: "What is possible instead",
     }
     for verdict, title in titles.items():
-        rows = [_row(claim) for claim in account.errata if claim.verdict is verdict]
-        statement = "instead" if verdict is Verdict.REPAIRED else "the paper states"
-        if rows:
-            heads = ("claim", "where", statement, BY_THE_PAPER, "computed", "why")
-            lines += ["", f"## {title}", "", *_table(heads, rows)]
+        entries = [_entry(claim) for claim in account.errata if claim.verdict is verdict]
+        lines += ["", f"## {title}", *entries] if entries else []
     return "\n".join([*lines, ""])
+
+
+def _entry(claim: Claim) -> str:
+    """Return the place and the name of a claim with what it states, the two numbers, and why: one paragraph each."""
+    found = COMPARED.fullmatch(claim.statement)
+    statement, quantity = (f"{found['statement']}.", found["quantity"]) if found else (claim.statement, "")
+    numbers = [
+        f"{head}: {value_text(value, claim.unit)}."
+        for head, value in ((BY_THE_PAPER.capitalize(), claim.printed), ("Computed", claim.computed))
+        if value is not None
+    ]
+    about = [f"*Compared: {quantity}.*"] if quantity else []
+    parts = [f"- **{claim.place}** (`{claim.id}`): {statement}", " ".join([*about, *numbers]), claim.why]
+    safe = [part.replace("<", "&lt;").replace("\n", " ") for part in parts]
+    return "\n" + "\n\n    ".join(safe)
 
 
 def _row(claim: Claim) -> tuple[str, ...]:

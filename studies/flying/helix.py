@@ -125,9 +125,9 @@ def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndar
         f"{tensions.min():.1f} N",
         shortfall <= 0 and not excluded,
         otherwise=Verdict.IMPOSSIBLE if excluded else Verdict.NOT_DETERMINED,
-        why=f"With any pairing, cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
-        f"{pull.needed:.2f} N is needed. With crossed pairs, tensions are short by {shortfall:.2f} N at "
-        f"{TIMES[row]:.1f} s, along a verified direction."
+        why=f"With any pairing, the cables would have to pull inward with at least {pull.least:.1f} N to carry the "
+        f"weight, but the motion needs only {pull.needed:.2f} N. With crossed pairs, tensions are short by "
+        f"{shortfall:.2f} N at {TIMES[row]:.1f} s, along a verified direction."
         if excluded
         else "With crossed pairs no tensions give the wrench, which excludes no other pairing.",
     )

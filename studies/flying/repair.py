@@ -48,11 +48,11 @@ def _hovering(planned: Plan) -> Claim:
         cables = ", ".join(str(index + 1) for index in proof.binding)
         why = (
             f"At {proof.time:.2f} s tensions inside {robot.t_min.min():g} N to {robot.t_max.max():g} N are short by "
-            f"{proof.shortfall:.2f} N along a verified direction; the limits of cables {cables} bind. No wind is in it."
+            f"{proof.shortfall:.2f} N along a verified direction; the limits of cables {cables} bind, without wind."
         )
     why += (
-        f" With any other pairing, cables that carry the weight pull inward with at least {pull.least:.1f} N, where "
-        f"{pull.needed:.2f} N is needed."
+        f" With any other pairing, the cables would have to pull inward with at least {pull.least:.1f} N to carry the "
+        f"weight, but the motion needs only {pull.needed:.2f} N."
         if excluded
         else " That excludes crossed pairs alone."
     )
