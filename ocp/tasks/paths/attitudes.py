@@ -13,7 +13,6 @@ from functools import cache
 
 import casadi as ca
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from ....models.batch import call
 from ....models.rotation import angles_of, inverse_rate_matrix, rate_matrix_derivative, rotation
@@ -32,7 +31,7 @@ class Attitudes:
 
     def __init__(self, angles: np.ndarray):
         self._angles = angles
-        self._quaternions = Rotation.from_euler("ZYX", angles[:, ::-1]).as_quat(scalar_first=True)
+        self._quaternions = _quaternions(angles)
         self._axes, self._turns = _turns(self._quaternions[:-1], self._quaternions[1:])
         self._padded = np.vstack([self._axes, np.zeros(3)]), np.append(self._turns, 0.0)  # of none after the last
 
@@ -109,3 +108,11 @@ def _turns(before: np.ndarray, after: np.ndarray) -> tuple[np.ndarray, np.ndarra
     sine = np.linalg.norm(vector, axis=1)
     angle = 2 * np.arctan2(sine, back * real)
     return vector * (back / np.where(sine > 0, sine, 1.0))[:, None], np.where(angle > SAME, angle, 0.0)
+
+
+def _quaternions(angles: np.ndarray) -> np.ndarray:
+    """Return the unit quaternions (w, x, y, z) of Rz(yaw) Ry(pitch) Rx(roll), (n, 4)."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(angles / 2).T, np.sin(angles / 2).T
+    w, x = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    y, z = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+    return np.stack([w, x, y, z], axis=1)

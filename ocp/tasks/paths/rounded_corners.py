@@ -4,12 +4,10 @@ A corner is a Bezier curve of degree 5 whose first and last three control points
 curvature rises from zero and returns to it. Its size follows from how far it may miss the corner.
 """
 
-from math import pi
+from math import comb, pi
 from typing import NamedTuple
 
 import numpy as np
-
-from ..bernstein import basis
 
 STRAIGHT = 1e-9  # [rad]: a smaller turn is none
 TURNS_BACK = 0.95 * pi  # [rad]: at a sharper corner the motion stops
@@ -124,6 +122,7 @@ class RoundedCorners:
         """Return corners at a parameter from 0 to 1, (n,), and their derivatives by it, (n, 3) each."""
         control, results = self._control[corner], []
         for degree in (5, 4, 3):
-            results.append(np.einsum("nk,nkj->nj", basis(degree, share), control))
+            weights = [comb(degree, k) * share**k * (1 - share) ** (degree - k) for k in range(degree + 1)]
+            results.append(np.einsum("kn,nkj->nj", np.array(weights), control))
             control = degree * np.diff(control, axis=1)
         return results[0], results[1], results[2]
