@@ -4,6 +4,7 @@ All text passes `html.escape`; the figures are images, in which no script can ru
 """
 
 import base64
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import NamedTuple
 from . import style
 from .drawing import Drawing
 
+CODE = re.compile(r"`([^`]+)`")  # a command or a key, as in Markdown
 PAGE = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"))
 
 
@@ -117,8 +119,8 @@ def file(title: str, text: str) -> str:
 
 
 def _safe(text: str) -> str:
-    """Return text with mark-up escaped and the powers of units raised."""
-    return style.typeset(escape(text))
+    """Return text with mark-up escaped, the powers of units raised, and `commands` as code."""
+    return style.typeset(CODE.sub(r"<code>\1</code>", escape(text)))
 
 
 def _id(anchor: str) -> str:

@@ -377,7 +377,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             search.audit(closest)
             short = quantity(closest.slack, "N")
-            return _closest(search, f"the motion with the least missing wrench is short by {short} at its nodes")
+            return _closest(search, f"the search ended at a motion that is short by {short}")
         outcome = search.solve("nonlinear program", mesh, closest.deviation)
     return _closest(search, refine(search, outcome))
 

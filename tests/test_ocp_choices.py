@@ -152,7 +152,7 @@ def test_a_given_motion_without_tensions_that_rise_slowly_enough_has_a_reason():
     path = {"kind": "line", "start": [0, 0, 2], "end": [0.5, 0, 2.4]}
     failed = plan("cogiro", {"path": path, "duration": 1, "steps": 8, "limits": {"tension_rate": 5}})
     assert failed.status is MotionStatus.NOT_FOUND
-    assert failed.reason.startswith("the motion with the least missing wrench is short by")
+    assert failed.reason.startswith("the search ended at a motion that is short by")
     assert failed.reason in failed.report().splitlines()[0]
 
 

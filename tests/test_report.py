@@ -201,7 +201,7 @@ def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path)
         told = []
         for part in filter(None, order):
             if hasattr(part, "facts"):
-                told += [(name, typeset(fact)) for name, fact in part.facts]
+                told += [(name, typeset(fact).replace("`", "")) for name, fact in part.facts]  # code has a font instead
             else:
                 rows = [("", typeset("".join(row))) for row in part.rows]
                 told += [("".join(typeset(name) for name in part.columns), ""), *rows]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ...base.text import quantity
 from ...solvers import Certificate
 from ..audits.audit import Audit
 from ..audits.by_phase import distribution
@@ -232,7 +233,11 @@ def _excess(
     if beyond.max() <= limit.tolerance:
         return None
     row, which = np.unravel_index(beyond.argmax(), beyond.shape)
-    why = "" if not near[which] else f"the tube leaves it at most {room[which]:.3g} {limit.unit} more"
+    why = (
+        ""
+        if not near[which]
+        else f"inside the tube it changes by at most {quantity(room[which], limit.unit, digits=3)}"
+    )
     excess = Excess.of(limit, int(which), times[row], over[row, which], why)
     return float(beyond[row, which]) / limit.scale, excess
 
