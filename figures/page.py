@@ -129,10 +129,15 @@ def _id(anchor: str) -> str:
 
 def _facts(rows: Iterable[tuple[str, str]], anchor: str = "") -> str:
     lines = [
-        f'<tr{"" if name else " class=more"}><th scope="row">{_safe(name)}</th><td>{_safe(fact)}</td></tr>'
+        f'<tr{"" if name else " class=more"}><th scope="row">{_broken(name)}</th><td>{_safe(fact)}</td></tr>'
         for name, fact in rows
     ]
     return f"<table{_id(anchor)}>\n" + "\n".join(lines) + "\n</table>"
+
+
+def _broken(name: str) -> str:
+    """Return the name of a fact, which may break after a dot or an underscore: "limits.cable_speed"."""
+    return re.sub(r"(?<=\w)([._])(?=\w)", r"\1<wbr>", _safe(name))
 
 
 def _cell(head: str, cell: str | Link) -> str:

@@ -57,7 +57,7 @@ def _unless(
     span = max(spans, key=lambda span: span.load)
     needed = weight + gravity * span.load
     if most < needed * (1 - CERTAIN):
-        why = f"the weight of {of}, which they carry on average until t = {span.end:.3f} s"
+        why = f"the weight of {of}"
         yield Excess(limit, f"all {what} together", span.start, most, needed, "N", "at least", why)
 
 
