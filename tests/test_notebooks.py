@@ -33,7 +33,7 @@ def verdicts(notebook):
 
 def test_they_are_all_there():
     names = ["quickstart", "flying_cdpr", "ctmrts", "tension_distribution", "trajectory_planning", "qp_benchmark"]
-    names += ["multi_quadrotor", "closed_loop", "robot_as_built"]
+    names += ["multi_quadrotor", "closed_loop", "robot_as_built", "design"]
     wanted = [f"{index:02d}_{name}" for index, name in enumerate(names, start=1)]
     assert [path.stem for path in NOTEBOOKS] == wanted
 
