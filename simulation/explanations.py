@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import t as student
 
 from .replayed_robot import Parameters
 from .windows import Windows
@@ -150,8 +149,10 @@ class Matching:
 
     def explanations(self, first: Match, used: np.ndarray) -> list[tuple[Explanation, Match]]:
         """Return what each parameter alone explains, from a match on in windows `used`, that of most first."""
+        from scipy.special import stdtrit
+
         found, whole, count = [], first.cost[used].sum(), float(np.count_nonzero(first.left[used]))
-        certain = float(student.ppf(1 - DOUBT, max(int(used.sum()) - 1, 1)))
+        certain = float(stdtrit(max(int(used.sum()) - 1, 1), 1 - DOUBT))  # quantile of Student's t
         tensions = self.windows.recorded.tensions
         usual = self.windows.robot.force_scale if tensions is None else float(np.median(np.abs(tensions)))
         for name in applicable(self.windows):

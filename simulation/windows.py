@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from ..base.errors import InputError
@@ -201,6 +200,8 @@ class Windows:
         values = self._command
         self._signal: Any = lambda at: np.stack([np.interp(at, of.times, column) for column in values.T], axis=-1)
         if self.drive == "lengths" and self.measured_command and len(of.times) >= FEWEST:
+            from scipy.interpolate import CubicSpline
+
             self._signal = CubicSpline(of.times, smooth(of.times, values, self._neighbours))
         dynamics = dynamics_of(self.robot)
         lengths = np.asarray(dynamics.cable_lengths(self._platform[0], carriers))
