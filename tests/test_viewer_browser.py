@@ -1,13 +1,15 @@
 """The viewer and its page in headless Chromium: no errors, sliders and mouse move the platform, plans play.
 
-Screenshots are left in pytest's temporary folder.
+Opening a page takes seconds of a processor, so one stays open on a desk and one on a phone, and shows one subject after
+the other. Neither is resized then: viser's client may miss that while it replaces its panel. Screenshots are left in
+pytest's temporary folder.
 """
 
+import contextlib
 import re
 import threading
 from http.server import ThreadingHTTPServer
 from importlib.metadata import version
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -21,17 +23,23 @@ from towline.ocp import plan
 from towline.simulation import simulate
 from towline.solvers import solve
 from towline.statics.distribution import pose_problem
-from towline.viewer import read, save_page, serve
+from towline.viewer import read, save_page
 from towline.viewer.geometry import Geometry
 from towline.viewer.posing import opening_pose
+from towline.viewer.server import _viewing
 from towline.viewer.snapshot import at_rest
 from towline.workspace import StaticEquilibrium, sample, save
 
-from .chromium import PATIENCE, chromium, playwright
+from .chromium import chromium, playwright, watched
 from .viewer_pixels import Empty, cursor_column, dark_near, picture, pixels
 
 # Software draws each frame, and would draw as many as it can on all processors.
-SLOWLY = "{const next = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => next(f), 50)}"
+SLOWLY = "{const next = requestAnimationFrame; window.requestAnimationFrame = f => setTimeout(() => next(f), 100)}"
+DESK, PHONE = {"width": 1200, "height": 700}, {"width": 400, "height": 800}
+FITS = """() => {
+  const { width } = __viserMutable.canvas.style, box = document.querySelector("canvas").getBoundingClientRect();
+  return Math.abs(parseFloat(width) - box.width) < 1;
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -40,20 +48,74 @@ def browser():
         yield opened
 
 
+@contextlib.contextmanager
+def opened(browser, url, size):
+    """Open a page, which may ask this machine for something and no other; yield it, and what goes wrong in it."""
+    with watched(browser, "file:", "data:", "blob:", "http://127.0.0.1:", "ws://127.0.0.1:") as (page, wrong):
+        page.add_init_script(SLOWLY)
+        page.set_viewport_size(size)
+        page.goto(url)
+        yield page, wrong
+
+
+@contextlib.contextmanager
+def viewing(browser, name, size):
+    """Open a viewer; yield its page, and what shows another subject in it."""
+    with _viewing(read(name), "127.0.0.1", 0) as (url, live), opened(browser, url, size) as (page, wrong):
+        page.wait_for_selector(".towline-readout")
+        page.get_by_role("alert").get_by_role("button").click()  # the hint that this machine draws in software
+
+        def show(subject):
+            page.evaluate("window.before = document.querySelector('.towline-readout')")
+            live.replace(subject)
+            page.wait_for_function("!before.isConnected && document.querySelector('.towline-readout')")
+            return page
+
+        yield page, show, wrong
+
+
+@contextlib.contextmanager
+def resized(page, width, height):
+    """Give a page another size for a while."""
+    before = page.viewport_size
+    for size in ({"width": width, "height": height}, before):
+        page.wait_for_timeout(500)
+        page.set_viewport_size(size)
+        page.wait_for_function(FITS)
+        if size is not before:
+            yield
+
+
+@pytest.fixture(scope="module")
+def kept_on_a_desk(browser):
+    with viewing(browser, "planar-4", DESK) as kept:
+        yield kept
+
+
+@pytest.fixture(scope="module")
+def kept_on_a_phone(browser, tmp_path_factory):
+    """A phone that opens the page shows the robot at once."""
+    with viewing(browser, "cogiro", PHONE) as kept:
+        check_picture(kept[0], read("cogiro"), tmp_path_factory.mktemp("opened") / "phone.png")
+        yield kept
+
+
 @pytest.fixture
-def page(browser):
-    """A page that fails the test if anything is wrong in it, or if it asks another machine for something."""
-    opened = browser.new_page(viewport={"width": 640, "height": 480})
-    opened.add_init_script(SLOWLY)
-    wrong = []
-    opened.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-    opened.on("pageerror", lambda error: wrong.append(str(error)))
-    local = ("file:", "data:", "blob:", "http://127.0.0.1:", "ws://127.0.0.1:")
-    opened.on("request", lambda asked: None if asked.url.startswith(local) else wrong.append(asked.url))
-    opened.set_default_timeout(PATIENCE)
-    yield opened
-    opened.close()
-    assert wrong == []
+def shown(kept_on_a_desk):
+    """Show a subject; the test fails if anything is wrong in the page, or if it asks another machine for something."""
+    _, show, wrong = kept_on_a_desk
+    yield show
+    found, wrong[:] = wrong[:], []
+    assert found == []
+
+
+@pytest.fixture
+def shown_on_a_phone(kept_on_a_phone):
+    """Do so on a phone."""
+    _, show, wrong = kept_on_a_phone
+    yield show
+    found, wrong[:] = wrong[:], []
+    assert found == []
 
 
 @pytest.fixture(scope="module")
@@ -86,34 +148,24 @@ def shown_time(page):
     return float(re.search(r"t = ([\d.]+) s", page.locator(".towline-readout").inner_text())[1])
 
 
-def open_viewer(page, url, width, height):
-    """Open a viewer, and close its hint that this machine draws in software."""
-    page.set_viewport_size({"width": width, "height": height})
-    page.goto(url)
-    page.wait_for_selector(".towline-readout")
-    page.get_by_role("alert").get_by_role("button").click()
-
-
-def test_a_slider_moves_the_platform_and_its_tensions(page, tmp_path):
+def test_a_slider_moves_the_platform_and_its_tensions(shown, tmp_path):
     robot = load("wang-flying")
-    with serve(read("wang-flying"), port=0) as url:
-        page.goto(url)
-        page.wait_for_selector(".towline-readout")
-        at_home = solve(pose_problem(Dynamics(robot), robot.home)).tensions
-        np.testing.assert_allclose(tensions(page), at_home, atol=0.0051)
-        x = page.locator("input[type=text]").first  # of the first slider: the platform's x
-        x.fill("0.05")
-        x.press("Enter")
-        playwright.expect(page.locator(".towline-readout")).to_contain_text("(0.050, 0.000, -1.000")
-        moved = solve(pose_problem(Dynamics(robot), robot.home + np.array([0.05, 0, 0, 0, 0, 0]))).tensions
-        np.testing.assert_allclose(tensions(page), moved, atol=0.0051)
-        x.fill("0.5")
-        x.press("Enter")
-        playwright.expect(page.locator(".towline-readout")).to_contain_text("short by")
-        page.get_by_role("button", name="Home").click()
-        playwright.expect(page.locator(".towline-readout")).to_contain_text("optimal")
-        np.testing.assert_allclose(tensions(page), at_home, atol=0.0051)
-        page.screenshot(path=tmp_path / "robot.png")
+    page = shown(read("wang-flying"))
+    at_home = solve(pose_problem(Dynamics(robot), robot.home)).tensions
+    np.testing.assert_allclose(tensions(page), at_home, atol=0.0051)
+    x = page.locator("input[type=text]").first  # of the first slider: the platform's x
+    x.fill("0.05")
+    x.press("Enter")
+    playwright.expect(page.locator(".towline-readout")).to_contain_text("(0.050, 0.000, -1.000")
+    moved = solve(pose_problem(Dynamics(robot), robot.home + np.array([0.05, 0, 0, 0, 0, 0]))).tensions
+    np.testing.assert_allclose(tensions(page), moved, atol=0.0051)
+    x.fill("0.5")
+    x.press("Enter")
+    playwright.expect(page.locator(".towline-readout")).to_contain_text("short by")
+    page.get_by_role("button", name="Home").click()
+    playwright.expect(page.locator(".towline-readout")).to_contain_text("optimal")
+    np.testing.assert_allclose(tensions(page), at_home, atol=0.0051)
+    page.screenshot(path=tmp_path / "robot.png")
 
 
 LAID_OUT = """([height, least, below]) => {
@@ -123,29 +175,29 @@ LAID_OUT = """([height, least, below]) => {
 }"""
 
 
-def test_a_plan_plays_and_pauses(page, plan_file, tmp_path):
-    with serve(read(str(plan_file)), port=0) as url:
-        page.goto(url)
-        page.wait_for_selector(".towline-readout")
-        assert shown_time(page) == 0
-        page.get_by_role("button", name="Play").click()
-        page.wait_for_function("!document.querySelector('.towline-readout').innerText.includes('t = 0.00 s')")
-        page.get_by_role("button", name="Pause").click()
-        page.get_by_role("button", name="Play").wait_for()
-        stopped = shown_time(page)
-        assert 0 < stopped <= 4
-        saved = xr.load_dataset(plan_file).sel(time=stopped, method="nearest")
-        np.testing.assert_allclose(tensions(page), saved["tensions"], atol=0.0051)
-        page.screenshot(path=tmp_path / "plan.png")
-        for width, height, least in ((1600, 1000, 1000), (400, 800, 60)):  # on a phone in the panel, which scrolls
-            page.set_viewport_size({"width": width, "height": height})
-            page.wait_for_function(LAID_OUT, arg=[height, least, width > 1000])
+def test_a_plan_plays_and_pauses(shown, plan_file, tmp_path):
+    page = shown(read(str(plan_file)))
+    assert shown_time(page) == 0
+    page.get_by_role("button", name="Play").click()
+    page.wait_for_function("!document.querySelector('.towline-readout').innerText.includes('t = 0.00 s')")
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Play").wait_for()
+    stopped = shown_time(page)
+    assert 0 < stopped <= 4
+    saved = xr.load_dataset(plan_file).sel(time=stopped, method="nearest")
+    np.testing.assert_allclose(tensions(page), saved["tensions"], atol=0.0051)
+    page.screenshot(path=tmp_path / "plan.png")
+    with resized(page, 1600, 1000):
+        page.wait_for_function(LAID_OUT, arg=[1000, 1000, True])
 
 
-def test_a_picture_is_saved(page, tmp_path):
-    with serve(read("caroca-pulleys"), port=0) as url:
-        page.goto(url)
-        page.wait_for_selector(".towline-readout")
+def test_on_a_phone_the_time_line_is_in_the_panel_which_scrolls(shown_on_a_phone, plan_file):
+    shown_on_a_phone(read(str(plan_file))).wait_for_function(LAID_OUT, arg=[800, 60, False])
+
+
+def test_a_picture_is_saved(shown, tmp_path):
+    page = shown(read("caroca-pulleys"))
+    with resized(page, 640, 480):
         for _ in range(20):  # what appears fades in
             with page.expect_download() as download:
                 page.get_by_role("button", name="Save picture").click()
@@ -163,165 +215,169 @@ def test_a_picture_is_saved(page, tmp_path):
     assert (pixels.max(axis=2) < 100).sum() > 100
 
 
-def test_on_a_phone_the_panel_leaves_the_upper_half_free_and_folds(page, tmp_path):
-    page.set_viewport_size({"width": 400, "height": 800})
-    with serve(read("wang-ctmrts"), port=0) as url:
-        page.goto(url)
-        page.wait_for_selector(".towline-readout")
-        sheet = page.locator(".mantine-Paper-root:has(.towline-readout)").last
-        box = sheet.bounding_box()
-        assert box["y"] >= 0.54 * 800
-        assert box["width"] >= 390
-        page.get_by_text("wang-ctmrts", exact=True).first.click()
-        page.wait_for_timeout(1000)
-        assert sheet.bounding_box()["y"] > 700
-        page.screenshot(path=tmp_path / "phone.png")
+def test_on_a_phone_the_panel_leaves_the_upper_half_free_and_folds(shown_on_a_phone, tmp_path):
+    page = shown_on_a_phone(read("wang-ctmrts"))
+    sheet = page.locator(".mantine-Paper-root:has(.towline-readout)").last
+    box = sheet.bounding_box()
+    assert box["y"] >= 0.54 * 800
+    assert box["width"] >= 390
+    page.get_by_text("wang-ctmrts", exact=True).first.click()
+    page.wait_for_timeout(1000)
+    assert sheet.bounding_box()["y"] > 700
+    page.screenshot(path=tmp_path / "phone.png")
+    page.get_by_text("wang-ctmrts", exact=True).first.click()
+    page.wait_for_timeout(1000)
+    assert sheet.bounding_box() == box
 
 
-def test_the_page_opens_from_disk_and_plays(page, plan_file, tmp_path):
+def test_the_page_opens_from_disk_and_plays(browser, plan_file, tmp_path):
     file = save_page(read(str(plan_file)), tmp_path / "line.html")
-    page.goto(Path(file).as_uri())
-    clock = page.locator("input").first
-    playwright.expect(clock).not_to_have_value("0.0")
-    assert 0 < float(clock.input_value()) <= 4.1
-    assert "t_max = 60 N" in page.locator(".towline-legend").inner_text()
-    page.keyboard.press("Space")
-    page.wait_for_timeout(200)  # the table follows the clock, which has tenths
     saved = xr.load_dataset(plan_file)
-    listed = float(page.locator(".towline-time").inner_text().removeprefix("t = ").removesuffix(" s"))
-    assert 0 < listed <= 4
-    np.testing.assert_allclose(tensions(page), saved["tensions"].sel(time=listed, method="nearest"), atol=0.0051)
     drawn = shades(place(saved["tensions"][40].to_numpy(), saved["t_min"].to_numpy(), saved["t_max"].to_numpy()))
 
-    def cables_are_drawn():
+    def cables_are_drawn(page):
         shot = picture(page, tmp_path / "page.png")
         return (np.abs(shot - drawn[0].astype(int)).max(axis=2) < 16).sum() > 200
 
-    for _ in range(60):  # what appears fades in
-        if cables_are_drawn():
-            return
-        page.wait_for_timeout(250)
-    pytest.fail(f"nothing in the picture has the colour of the first cable, {drawn[0]}")
+    with opened(browser, file.as_uri(), {"width": 640, "height": 480}) as (page, wrong):
+        clock = page.locator("input").first
+        playwright.expect(clock).not_to_have_value("0.0")
+        assert 0 < float(clock.input_value()) <= 4.1
+        assert "t_max = 60 N" in page.locator(".towline-legend").inner_text()
+        page.keyboard.press("Space")
+        page.wait_for_timeout(500)  # the table follows the clock, which has tenths
+        listed = float(page.locator(".towline-time").inner_text().removeprefix("t = ").removesuffix(" s"))
+        assert 0 < listed <= 4
+        np.testing.assert_allclose(tensions(page), saved["tensions"].sel(time=listed, method="nearest"), atol=0.0051)
+        for _ in range(60):  # what appears fades in
+            if cables_are_drawn(page):
+                break
+            page.wait_for_timeout(250)
+        else:
+            pytest.fail(f"nothing in the picture has the colour of the first cable, {drawn[0]}")
+        assert wrong == []
 
 
-@pytest.mark.parametrize(
-    "name", ["cogiro", "wang-ctmrts", "multi-quadrotor-4", "fast", "line.nc", "flight.nc", "space.nc"]
-)
-def test_the_platform_is_in_the_picture_and_not_covered(page, folder, name, tmp_path):
-    """On a desk and on a phone: at every corner of the platform a click would reach the scene."""
-    subject = read(str(folder / name) if name.endswith(".nc") else name)
+def check_picture(page, subject, file):
+    """Check that at every corner of the platform a click would reach the scene, and that the whole robot is drawn."""
     robot = subject.robot
-    with serve(subject, port=0) as url:
-        open_viewer(page, url, 1200, 750)
-        pose = opening_pose(robot, Geometry(robot)) if subject.replay is None else subject.replay.at(0).pose
-        points = at_rest(Dynamics(robot), Geometry(robot), pose, robot.carrier_home).points
-        for width, height in ((1200, 750), (400, 800)):
-            page.set_viewport_size({"width": width, "height": height})
-            for _ in range(40):  # until the camera has turned, and the panel has moved
-                page.wait_for_timeout(250)
-                corners, anchors = (pixels(page, subject, ends) for ends in (points.attachments, points.anchors))
-                shot = picture(page, tmp_path / f"{width}.png")
-                drawn = dark_near(shot, anchors).mean() > 0.6  # names cover some
-                at = "([x, y]) => document.elementFromPoint(x, y)?.tagName"
-                hit = [page.evaluate(at, corner) for corner in corners.tolist()]
-                if drawn and set(hit) == {"CANVAS"}:
-                    break
-            assert drawn, f"the ends of the cables are elsewhere in {width} x {height}"
-            assert set(hit) == {"CANVAS"}
-            assert np.ptp(anchors, axis=0).max() > 100
+    pose = opening_pose(robot, Geometry(robot)) if subject.replay is None else subject.replay.at(0).pose
+    points = at_rest(Dynamics(robot), Geometry(robot), pose, robot.carrier_home).points
+    for _ in range(40):  # until the camera has turned, and the panel has moved
+        page.wait_for_timeout(250)
+        corners, anchors = (pixels(page, subject, ends) for ends in (points.attachments, points.anchors))
+        drawn = dark_near(picture(page, file), anchors).mean() > 0.6  # names cover some
+        at = "(corners) => corners.map(([x, y]) => document.elementFromPoint(x, y)?.tagName)"
+        hit = set(page.evaluate(at, corners.tolist()))
+        if drawn and hit == {"CANVAS"}:
+            break
+    assert drawn, f"the ends of the cables are elsewhere in {page.viewport_size}"
+    assert hit == {"CANVAS"}
+    assert np.ptp(anchors, axis=0).max() > 100
 
 
-def test_the_mouse_drags_the_platform_and_its_tensions_change(page, tmp_path):
+SUBJECTS = ["cogiro", "wang-ctmrts", "multi-quadrotor-4", "fast", "line.nc", "flight.nc", "space.nc"]
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_the_platform_is_in_the_picture_and_not_covered(shown, folder, name, tmp_path):
+    subject = read(str(folder / name) if name.endswith(".nc") else name)
+    check_picture(shown(subject), subject, tmp_path / "desk.png")
+
+
+@pytest.mark.parametrize("name", SUBJECTS)
+def test_on_a_phone_the_platform_is_in_the_picture_and_not_covered(shown_on_a_phone, folder, name, tmp_path):
+    subject = read(str(folder / name) if name.endswith(".nc") else name)
+    check_picture(shown_on_a_phone(subject), subject, tmp_path / "phone.png")
+
+
+def test_the_mouse_drags_the_platform_and_its_tensions_change(shown, tmp_path):
     subject = read("cogiro")
     robot = subject.robot
-    with serve(subject, port=0) as url:
-        open_viewer(page, url, 1200, 700)
-        before = tensions(page)
-        page.wait_for_timeout(1500)  # what appears fades in
-        reach = 0.13 * Geometry(robot).extent.size
-        ends = robot.home[:3] + np.array([[0, 0, 0.9 * reach], [0, 0, 0.9 * reach + 0.8]])
-        (x, y), (to_x, to_y) = pixels(page, subject, ends)
-        page.mouse.move(x, y)
-        page.wait_for_timeout(500)  # the handle notices the mouse when it draws
-        page.mouse.down()
-        page.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=4)
-        page.mouse.move(to_x, to_y, steps=4)
-        page.mouse.up()
-        playwright.expect(page.locator(".towline-readout")).not_to_contain_text("(0.000, 0.000, 2.000")
-        page.wait_for_timeout(1000)
-        pose = re.search(r"\(([-\d., ]+)\) m, rad", page.locator(".towline-readout").inner_text())[1]
-        moved = np.array([float(number) for number in pose.split(",")])
-        np.testing.assert_allclose(np.delete(moved - robot.home, 2), 0, atol=1e-9)
-        assert moved[2] == pytest.approx(robot.home[2] + 0.8, abs=0.1)
-        held = solve(pose_problem(Dynamics(robot), moved)).tensions
-        np.testing.assert_allclose(tensions(page), held, rtol=2e-3)  # the pose is shown in whole millimetres
-        assert np.abs(np.array(tensions(page)) - before).min() > 1
-        page.screenshot(path=tmp_path / "dragged.png")
+    page = shown(subject)
+    before = tensions(page)
+    page.wait_for_timeout(1500)  # what appears fades in
+    reach = 0.13 * Geometry(robot).extent.size
+    ends = robot.home[:3] + np.array([[0, 0, 0.9 * reach], [0, 0, 0.9 * reach + 0.8]])
+    (x, y), (to_x, to_y) = pixels(page, subject, ends)
+    page.mouse.move(x, y)
+    page.wait_for_timeout(500)  # the handle notices the mouse when it draws
+    page.mouse.down()
+    page.mouse.move((x + to_x) / 2, (y + to_y) / 2, steps=4)
+    page.mouse.move(to_x, to_y, steps=4)
+    page.mouse.up()
+    playwright.expect(page.locator(".towline-readout")).not_to_contain_text("(0.000, 0.000, 2.000")
+    page.wait_for_timeout(1000)
+    pose = re.search(r"\(([-\d., ]+)\) m, rad", page.locator(".towline-readout").inner_text())[1]
+    moved = np.array([float(number) for number in pose.split(",")])
+    np.testing.assert_allclose(np.delete(moved - robot.home, 2), 0, atol=1e-9)
+    assert moved[2] == pytest.approx(robot.home[2] + 0.8, abs=0.1)
+    held = solve(pose_problem(Dynamics(robot), moved)).tensions
+    np.testing.assert_allclose(tensions(page), held, rtol=2e-3)  # the pose is shown in whole millimetres
+    assert np.abs(np.array(tensions(page)) - before).min() > 1
+    page.screenshot(path=tmp_path / "dragged.png")
 
 
-def test_keys_step_and_play(page, folder):
-    with serve(read(str(folder / "line.nc")), port=0) as url:
-        open_viewer(page, url, 640, 480)
-        clock = page.locator(".towline-time")
-        for key, shown in (("l", 0.05), ("l", 0.1), ("j", 0.05), ("End", 4), ("l", 4), ("Home", 0), ("j", 0)):
-            page.keyboard.press(key)
-            playwright.expect(clock).to_have_text(f"t = {shown:.2f} s")
-        page.keyboard.press("k")
-        playwright.expect(clock).not_to_have_text("t = 0.00 s")
-        playwright.expect(page.get_by_role("button", name="Pause")).to_be_visible()
-        page.keyboard.press("k")
-        playwright.expect(page.get_by_role("button", name="Play")).to_be_visible()
-        stopped = shown_time(page)
-        page.wait_for_timeout(300)
-        assert shown_time(page) == stopped
+def test_keys_step_and_play(shown, folder):
+    page = shown(read(str(folder / "line.nc")))
+    clock = page.locator(".towline-time")
+    for key, at in (("l", 0.05), ("l", 0.1), ("j", 0.05), ("End", 4), ("l", 4), ("Home", 0), ("j", 0)):
+        page.keyboard.press(key)
+        playwright.expect(clock).to_have_text(f"t = {at:.2f} s")
+    page.keyboard.press("k")
+    playwright.expect(clock).not_to_have_text("t = 0.00 s")
+    playwright.expect(page.get_by_role("button", name="Pause")).to_be_visible()
+    page.keyboard.press("k")
+    playwright.expect(page.get_by_role("button", name="Play")).to_be_visible()
+    stopped = shown_time(page)
+    page.wait_for_timeout(300)
+    assert shown_time(page) == stopped
 
 
-def test_the_time_cursor_moves_scene_and_chart_together(page, folder, tmp_path):
+def test_the_time_cursor_moves_scene_and_chart_together(shown, folder, tmp_path):
     """By pixels: the platform is where the motion has it at the time of the line in the chart."""
     subject = read(str(folder / "circle.nc"))
     times = subject.replay.times
     ends = np.array([subject.replay.at(k, prove=False).points.attachments for k in range(len(times))])
-    with serve(subject, port=0) as url:
-        open_viewer(page, url, 1200, 700)
-        places = pixels(page, subject, ends.reshape(-1, 3)).reshape(*ends.shape[:2], 2)
-        now, columns = page.locator("input[type=text]").first, []
+    page = shown(subject)
+    places = pixels(page, subject, ends.reshape(-1, 3)).reshape(*ends.shape[:2], 2)
+    now, columns = page.locator("input[type=text]").first, []
 
-        def agree(index):
-            """Return whether of all instants this one fits the picture best."""
-            shot = picture(page, tmp_path / "circle.png")
-            share = dark_near(shot, places, 2).mean(axis=1)
-            best = np.flatnonzero(share == share.max())
-            if share.max() < 0.6 or np.abs(best - index).min() > 1:
-                return False
-            columns.append(cursor_column(page, shot))
-            return True
+    def agree(index):
+        """Return whether of all instants this one fits the picture best."""
+        shot = picture(page, tmp_path / "circle.png")
+        share = dark_near(shot, places, 2).mean(axis=1)
+        best = np.flatnonzero(share == share.max())
+        if share.max() < 0.6 or np.abs(best - index).min() > 1:
+            return False
+        columns.append(cursor_column(page, shot))
+        return True
 
-        instants = (0, 60, 120, 180)
-        for index in instants:
-            now.fill(f"{times[index]:.2f}")
-            now.press("Enter")
-            playwright.expect(page.locator(".towline-time")).to_have_text(f"t = {times[index]:.2f} s")
-            for _ in range(40):
-                if agree(index):
-                    break
-                page.wait_for_timeout(150)
-            else:
-                pytest.fail(f"the scene does not show t = {times[index]:.2f} s")
-        shares = (np.array(columns) - columns[0]) / (columns[-1] - columns[0])
-        np.testing.assert_allclose(shares, np.array(instants) / instants[-1], atol=0.02)
-        assert columns[-1] - columns[0] > 150
+    instants = (0, 60, 120, 180)
+    for index in instants:
+        now.fill(f"{times[index]:.2f}")
+        now.press("Enter")
+        playwright.expect(page.locator(".towline-time")).to_have_text(f"t = {times[index]:.2f} s")
+        for _ in range(40):
+            if agree(index):
+                break
+            page.wait_for_timeout(150)
+        else:
+            pytest.fail(f"the scene does not show t = {times[index]:.2f} s")
+    shares = (np.array(columns) - columns[0]) / (columns[-1] - columns[0])
+    np.testing.assert_allclose(shares, np.array(instants) / instants[-1], atol=0.02)
+    assert columns[-1] - columns[0] > 150
 
 
-def test_two_plans_are_compared(page, folder, tmp_path):
-    with serve(read(str(folder / "line.nc"), other=str(folder / "slow.nc")), port=0) as url:
-        open_viewer(page, url, 1200, 700)
-        page.keyboard.press("End")
-        playwright.expect(page.locator(".towline-time")).to_have_text("t = 4.00 s")
-        last = xr.load_dataset(folder / "slow.nc")["tensions"][-1]
-        beside = [float(text.removesuffix(" N")) for text in page.locator(".towline-other").all_inner_texts()]
-        np.testing.assert_allclose(beside, last, atol=0.0051)
-        playwright.expect(page.locator(".towline-readout")).to_contain_text("platforms 0.102 m apart")
-        page.screenshot(path=tmp_path / "compared.png")
+def test_two_plans_are_compared(shown, folder, tmp_path):
+    page = shown(read(str(folder / "line.nc"), other=str(folder / "slow.nc")))
+    page.keyboard.press("End")
+    playwright.expect(page.locator(".towline-time")).to_have_text("t = 4.00 s")
+    last = xr.load_dataset(folder / "slow.nc")["tensions"][-1]
+    beside = [float(text.removesuffix(" N")) for text in page.locator(".towline-other").all_inner_texts()]
+    np.testing.assert_allclose(beside, last, atol=0.0051)
+    playwright.expect(page.locator(".towline-readout")).to_contain_text("platforms 0.102 m apart")
+    page.screenshot(path=tmp_path / "compared.png")
 
 
 @pytest.fixture
@@ -334,22 +390,18 @@ def foreign_page():
     server.server_close()
 
 
-def test_a_page_of_another_site_cannot_open_the_socket(browser, foreign_page):
+def test_a_page_of_another_site_cannot_open_the_socket(browser, shown, foreign_page):
     """The same words in the page of the viewer itself open it."""
-    with serve(read("planar-4"), port=0) as url:
-        socket = f"ws://{urlsplit(url).netloc}"
-        script = f"""() => new Promise((done) => {{
-            const socket = new WebSocket("{socket}", "viser-v{version("viser")}");
-            socket.onopen = () => done("open");
-            socket.onerror = () => done("refused");
-        }})"""
-        told = {}
-        for name, address in (("own", url), ("other", foreign_page)):
-            page, messages = browser.new_page(), []
-            page.on("console", lambda message, to=messages: to.append(message.text))
-            page.goto(address)
-            told[name] = page.evaluate(script), " ".join(messages)
-            page.close()
-        assert told["own"][0] == "open"
-        assert told["other"][0] == "refused"
-        assert "403" in told["other"][1]
+    own = shown(read("planar-4"))
+    script = f"""() => new Promise((done) => {{
+        const socket = new WebSocket("ws://{urlsplit(own.url).netloc}", "viser-v{version("viser")}");
+        socket.onopen = () => {{ socket.close(); done("open"); }};
+        socket.onerror = () => done("refused");
+    }})"""
+    assert own.evaluate(script) == "open"
+    other, messages = browser.new_page(), []
+    other.on("console", lambda message: messages.append(message.text))
+    other.goto(foreign_page)
+    assert other.evaluate(script) == "refused"
+    assert "403" in " ".join(messages)
+    other.close()

@@ -232,6 +232,28 @@ def test_on_a_phone_the_whole_robot_is_above_the_panel(name):
     assert np.ptp(pixels, axis=0).max() > 100
 
 
+def test_a_phone_that_is_turned_while_robots_are_switched_shows_the_robot_in_the_middle():
+    """The camera is pointed above the panel of the upright screen, the only one that was known."""
+    extent = Geometry(load("planar-4")).extent
+    with serve(read("cogiro"), port=0) as url:
+        wire = Wire(url, width=400, height=800)
+        settle(wire)
+        wire.set("planar-4", label="robot")
+        below = looked_at(wire)
+        assert below[2] < extent.centre[2] - 0.05 * extent.size
+        wire.send(**CAMERA | {"look_at": below}, image_width=800, image_height=400)
+        np.testing.assert_allclose(looked_at(wire), extent.centre, atol=1e-9)
+        wire.close()
+
+
+def looked_at(wire):
+    """Return what a camera is pointed at last."""
+    found = []
+    while wire.read(0.5):
+        found += [one for one in wire.messages if one["type"] == "SetCameraLookAtMessage" and not one["initial"]]
+    return found[-1]["look_at"]
+
+
 def test_a_workspace_is_cut_along_each_axis(tmp_path):
     robot = load("planar-4")
     low, high = robot.home_anchors.min(axis=0), robot.home_anchors.max(axis=0)

@@ -35,6 +35,8 @@ def pixels(page, subject, points, free=None):
 
 
 def picture(page, file=None):
+    """Return the pixels of a page, and let viser draw again: a busy machine may stop while something still fades in."""
+    page.evaluate("__viserMutable.requestRender()")
     return np.asarray(Image.open(io.BytesIO(page.screenshot(path=file))).convert("RGB")).astype(int)
 
 

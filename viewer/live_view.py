@@ -24,7 +24,7 @@ class Live:
     """Scene and panel of a subject on a viser server, until `close`."""
 
     def __init__(self, server: viser.ViserServer, subject: Subject):
-        self._server, self._busy, self._first = server, threading.Lock(), subject
+        self._server, self._busy, self._first = server, threading.RLock(), subject
         self._robots = tuple(dict.fromkeys([*available(), subject.robot.name]))
         self._show(subject)
         server.on_client_connect(lambda client: self._stage.mind(client))
@@ -39,14 +39,18 @@ class Live:
         """Show a robot of the library, or the one that the view began with, instead."""
         with self._busy:
             if robot != self._subject.robot.name and robot in self._robots:
-                self._panel.close()
-                self._stage.leave()
-                self._server.gui.reset()
-                self._server.scene.reset()
-                self._show(self._first if robot == self._first.robot.name else read(robot))
-                for client in self._server.get_clients().values():
-                    self._stage.frame(client.camera, client.camera.image_width, client.camera.image_height)
-                    self._stage.mind(client)
+                self.replace(self._first if robot == self._first.robot.name else read(robot))
+
+    def replace(self, subject: Subject) -> None:
+        """Show another subject instead, and point all cameras at it."""
+        with self._busy:
+            self._panel.close()
+            self._stage.leave()
+            self._server.gui.reset()
+            self._server.scene.reset()
+            self._show(subject)
+            for client in self._server.get_clients().values():
+                self._stage.mind(client, frame=True)
 
     def follow(self, query: str) -> None:
         """Show the robot and the pose of a link, in a thread of its own; what is no link of ours is ignored."""

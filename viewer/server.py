@@ -57,6 +57,13 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     """
     required("subject", subject, Subject)
     _check_address(host, port)
+    with _viewing(subject, host, port) as (address, _):
+        yield address
+
+
+@contextlib.contextmanager
+def _viewing(subject: Subject, host: str, port: int) -> Iterator[tuple[str, Live]]:
+    """Serve a subject until the block ends; yield the address, and the view, which can show another subject."""
     # Quiet about connections that break off and messages that are none.
     links: list[Live] = []  # the view, once it is there
 
@@ -71,7 +78,7 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     ):
         links.append(live)
         # An address of IPv6 has colons of its own.
-        yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}"
+        yield f"http://{f'[{host}]' if ':' in host else host}:{server.get_port()}", live
 
 
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:

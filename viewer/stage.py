@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -50,7 +51,8 @@ class Stage:
     """
 
     def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
-        self._scene, self._left = server.scene, False
+        # viser calls what minds cameras from many threads.
+        self._scene, self._left, self._turning = server.scene, False, threading.RLock()
         self._robot = subject.robot
         extent = subject.replay.extent if subject.replay else geometry.extent
         if subject.other is not None:
@@ -163,19 +165,25 @@ class Stage:
 
     def leave(self) -> None:
         """Let cameras be, because the scene is that of another stage from now on."""
-        self._left = True
+        with self._turning:
+            self._left = True
 
-    def mind(self, client: viser.ClientHandle) -> None:
+    def mind(self, client: viser.ClientHandle, frame: bool = False) -> None:
         """Fit the camera to portrait screens, now and whenever a screen is turned.
 
         The initial camera may reach a browser after this one, and a user can return to it. A camera that a user has
-        pointed elsewhere stays.
+        pointed elsewhere stays. With `frame`, it is pointed at the robot first.
         """
         camera = client.camera
         framed, aims = (WIDE, 1.0), deque([self.extent.centre], AIMS)
 
-        def fit() -> None:
+        def point(shape: tuple[float, float]) -> None:
             nonlocal framed
+            framed = shape
+            self.frame(camera, *shape)
+            aims.append(np.array(camera.look_at))
+
+        def fit() -> None:
             if self._left:
                 return
             shape, looked_at = (float(camera.image_width), float(camera.image_height)), camera.look_at
@@ -184,12 +192,16 @@ class Stage:
             initial = np.abs(looked_at - self.extent.centre).max() < 1e-3 * self._size
             upright, was_upright = shape[0] < shape[1], framed[0] < framed[1]
             if untouched and ((upright and initial) or (shape != framed and (upright or was_upright))):
-                framed = shape
-                self.frame(camera, *shape)
-                aims.append(np.array(camera.look_at))
+                point(shape)
 
-        fit()
-        camera.on_update(lambda _: fit())
+        def turn(first: bool = False) -> None:
+            with self._turning:
+                if first:
+                    point((float(camera.image_width), float(camera.image_height)))
+                fit()
+
+        turn(frame)
+        camera.on_update(lambda _: turn())
 
     def _draw_surroundings(self, subject: Subject) -> None:
         scene, cell = self._scene, self.extent.cell
