@@ -17,8 +17,9 @@ STUCK, CUT = 1.0, 2.0  # values of CONDITION; 0: the winch works
 LENGTHS, RATES, FORCES, TENSIONS = 0, 1, 2, 3
 
 # A command: whether there is air, its velocity, force and moment on the platform, a number for each cable, and a block
-# for each carrier, of the commands of its actuators and of its reference (pose, velocity, acceleration).
-AIR, WIND, WRENCH, COMMANDS, CARRIER, REFERENCE_POSE = 0, 1, 4, 10, 24, 6
+# for each carrier, of the commands of its actuators, force and moment on it, and its reference (pose, velocity,
+# acceleration).
+AIR, WIND, WRENCH, COMMANDS, CARRIER, CARRIER_WRENCH, REFERENCE_POSE = 0, 1, 4, 10, 30, 6, 12
 
 SUDDEN = 100.0  # [m/s^2, rad/s^2] that a polynomial would need beyond those of its reference: the carrier jumps to it
 SHORTEST = 1e-3  # [m] of cable that a winch leaves out

@@ -61,6 +61,7 @@ def command_rows(
     row[..., layout.COMMANDS : layout.COMMANDS + m] = cables
     carriers = np.zeros((*batch, count, layout.CARRIER))
     carriers[..., :actuators] = actuation
+    carriers[..., layout.CARRIER_WRENCH : layout.REFERENCE_POSE] = of_carriers["carrier_wrench"]
     for order, name in enumerate(("pose", "velocity", "acceleration")):
         at = layout.REFERENCE_POSE + 6 * order
         carriers[..., at : at + 6] = of_carriers[f"carrier_{name}"]

@@ -206,6 +206,7 @@ class Plant:
         carrier_acceleration: Any = None,
         wind: Any = None,
         wrench: Any = None,
+        carrier_wrench: Any = None,
     ) -> np.ndarray:
         """Pack the commands for a step into rows, (..., k).
 
@@ -225,6 +226,8 @@ class Plant:
             Velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag.
         wrench
             Disturbance on the platform: force [N] and moment about the CoM [N m] in {G}, (..., 6).
+        carrier_wrench
+            The same on the carriers, (..., c, 6), such as wind on quadrotors. It moves those that have mass.
 
         Raises
         ------
@@ -244,6 +247,7 @@ class Plant:
         derivative = np.full(home.shape, 0.0 if carrier_pose is None else np.nan)  # which `complete` replaces
         of_carriers = {
             "actuation": given_or("actuation", actuation, np.zeros((count, actuators))),
+            "carrier_wrench": given_or("carrier_wrench", carrier_wrench, np.zeros(home.shape)),
             "carrier_pose": given_or("carrier_pose", carrier_pose, home),
             "carrier_velocity": given_or("carrier_velocity", carrier_velocity, derivative),
             "carrier_acceleration": given_or("carrier_acceleration", carrier_acceleration, derivative),

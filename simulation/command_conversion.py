@@ -45,6 +45,7 @@ class Orders:
         rows, carriers = self._rows[:, 0], blocks[:, 0]
         # Views of the parts of all rows.
         self._wrenches, self._constant = rows[:, layout.WRENCH : layout.COMMANDS], conditions.disturbance
+        self._on_carriers = carriers[..., layout.CARRIER_WRENCH : first]
         self._cables = rows[:, layout.COMMANDS : layout.COMMANDS + m]
         self._poses, self._velocities = carriers[..., first : first + 6], carriers[..., first + 6 : first + 12]
         self._accelerations = carriers[..., first + 12 : first + 18]
@@ -59,9 +60,10 @@ class Orders:
             ends = moved_on((pose, velocity, acceleration), self._period)
             self._missed[:-1] = motion[1:] - np.stack(ends, axis=1)
 
-    def push(self, wrench: np.ndarray) -> None:
-        """Add a wrench, (N, 6) [N, N m], to the constant one on the platform, until the next call."""
-        np.add(self._constant, wrench, out=self._wrenches)
+    def push(self, wrenches: np.ndarray) -> None:
+        """Add wrenches on platform and carriers, (N, 1 + c, 6) [N, N m], to the constant one, until the next call."""
+        np.add(self._constant, wrenches[:, 0], out=self._wrenches)
+        self._on_carriers[:] = wrenches[:, 1:]
 
     def rows(self, k: int, command: Command, lengths: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Return the rows of period `k`, (N, 1 or 2, k); lengths and rates are (N, 2, m), states (N, n), as it begins.

@@ -151,11 +151,11 @@ def fly(
 
 
 def _wrench(begun: Sequence[tuple[float, Event]], time: float, period: float, motions: np.ndarray) -> np.ndarray:
-    """Return what events exert on the platform on average in the period from `time` on, (N, 6).
+    """Return what events exert on platform and carriers on average in the period from `time` on, (N, 1 + c, 6).
 
     Each has begun with the period after its time, and lasts as long as it should, so that its impulse is right.
     """
-    total = np.zeros((len(motions), 6))
+    total = np.zeros((*motions.shape[:2], 6))
     for begins, event in begun:
         share = min((begins + event.until - event.at - time) / period, 1.0)
         if share > ROUNDING and (exerted := event.wrench(time, motions)) is not None:
@@ -232,13 +232,16 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
         )
 
 
-def check_wrench(event: Event, wrench: Any, shape: tuple[int, int], time: float) -> np.ndarray:
-    """Return the wrench of an event as an array for all runs, of `shape` (N, 6).
+def check_wrench(event: Event, wrench: Any, shape: tuple[int, ...], time: float) -> np.ndarray:
+    """Return the wrenches of an event on platform and carriers of all runs, of `shape` (N, 1 + c, 6).
 
-    Raises `InputError` if it has another shape, or numbers that are not finite.
+    Those of one run or for the platform alone are extended. Raises `InputError` if they have another shape, or numbers
+    that are not finite.
     """
     try:
-        values = np.broadcast_to(np.asarray(wrench, dtype=float), shape)
+        given = np.asarray(wrench, dtype=float)
+        values = np.zeros(shape)
+        values[:, 0 if given.ndim < 3 else slice(None)] = given
     except (TypeError, ValueError):
         values = np.full(shape, np.nan)
     if not np.isfinite(values).all():

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline, make_smoothing_spline
+from scipy.spatial.transform import Rotation
 
 from towline import Dynamics, Robot, load, simulate
 from towline.control.command import HOLD
@@ -279,3 +280,25 @@ def _of(robot, name, part):
     home = {"platform": robot.home, "carrier": robot.carrier_home[0]} if name == "pose" else {}
     yield "", ("time", "coordinate"), part + home.get("platform", 0.0)
     yield "carrier_", ("time", "carrier", "coordinate"), (part + home.get("carrier", 0.0))[:, None]
+
+
+def test_wrenches_on_carriers_are_their_momentum():
+    """Three quadrotors that fall with their load: cables pull at both ends, so what acts from outside remains."""
+    robot, dt = load("multi-quadrotor-3"), 0.2
+    plant, wrenches = Plant(robot, drive="lengths"), np.zeros((3, 6))
+    wrenches[1] = [3.0, -2.0, 1.0, 0.02, 0.01, -0.03]
+    command = plant.command(robot.fixed_lengths, carrier_wrench=wrenches)
+    start = plant.start()
+    first, last = (plant.read(state) for state in (start, plant.run(start, command[None], dt).states[-1]))
+    masses = np.array([robot.platform.mass, *(carrier.mass for carrier in robot.carriers)])
+    gained = [np.vstack([now.velocity[None], now.carrier_velocity])[:, :3] for now in (first, last)]
+    outside = masses.sum() * np.array(robot.gravity) + wrenches[1, :3]
+    np.testing.assert_allclose(masses @ (gained[1] - gained[0]), dt * outside, rtol=1e-9)
+    # A cable at the CoM gives no moment, so a carrier turns by M / J t^2 / 2.
+    moment = np.array([0.0, 0.0, 0.01])
+    alone = plant.command(robot.fixed_lengths, carrier_wrench=np.vstack([np.zeros((2, 6)), [0, 0, 0, *moment]]))
+    after = plant.read(plant.run(start, alone[None], dt).states[-1]).carrier_pose[2, 3:]
+    R, turned = (Rotation.from_euler("xyz", angles) for angles in (robot.carriers[2].home[3:], after))
+    J = R.as_matrix() @ np.diag(robot.carriers[2].inertia[:3]) @ R.as_matrix().T
+    expected = np.linalg.solve(J, moment) * dt**2 / 2
+    np.testing.assert_allclose((turned * R.inv()).as_rotvec(), expected, atol=1e-3 * np.abs(expected).max())

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from towline import InputError, load, plan, simulate
-from towline.control import OpenLoop, references
+from towline.control import ComputedTorque, OpenLoop, references
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall
 
@@ -63,6 +63,22 @@ def test_a_push_without_an_end_is_a_constant_disturbance(robot):
     np.testing.assert_array_equal(pushed.record.motions, disturbed.record.motions)
     both = simulate(robot, robot.home, duration=0.2, disturbance=[10, 0, -5, 0, 0, 0], events=["push 0 0 0 1 2 0 at 0"])
     np.testing.assert_array_equal(both.record.motions, disturbed.record.motions)
+
+
+def test_a_push_on_a_carrier_is_what_its_observer_estimates():
+    team = load("multi-quadrotor-4")
+    controller = ComputedTorque(team)
+    run = simulate(
+        team, team.home, controller, duration=0.8, events=["push quad2 1.5 -1 0.5 at 0.1", "push 0 0 0 at 0"]
+    )
+    estimates = controller.disturbance_of_carriers[0]
+    np.testing.assert_allclose(estimates[1], [1.5, -1.0, 0.5], atol=0.05)
+    np.testing.assert_allclose(np.delete(estimates, 1, axis=0), 0.0, atol=0.05)
+    assert run.to_dict()["events"][1]["what"] == "a push of 1.871 N on quad2"
+    both = simulate(
+        team, team.home, ComputedTorque(team), duration=0.8, runs=2, events=["push quad2 1.5 -1 0.5 at 0.1"]
+    )
+    np.testing.assert_allclose(both["error_max"], run.error.max(), rtol=1e-9)
 
 
 def test_it_ends(robot):
@@ -213,6 +229,7 @@ def test_a_file_of_events_names_no_other(robot, tmp_path):
 @pytest.mark.parametrize(
     ("event", "message"),
     [
+        ("push quad1 1 2 3 at 0", "events[0] must name a carrier of 'cogiro' that flies (it has none), got 'quad1'"),
         ("push 1 at 0", "events[0]: force must be 3 numbers, got [1.0]"),
         ("push 1 2 x at 0", "events[0]: force[2] must be a number, got 'x'"),
         ("push 1 2 nan at 0", "events[0]: force[2] must be a finite number, got nan"),

@@ -35,12 +35,17 @@ static void load_bodies(plant *p, const motion *now) {
         if (!is_free(p, b)) {
             continue;
         }
+        const double *wrench = b > 0 ? p->on_carriers[b - 1].wrench : p->on_platform->wrench;
+        memcpy(on->force, wrench, sizeof on->force);
+        memcpy(on->moment, wrench + 3, sizeof on->moment);
         if (b > 0) {
-            turn(on->R, p->thrust[b - 1], on->force);
-            turn(on->R, p->thrust[b - 1] + 3, on->moment);
-        } else {
-            memcpy(on->force, p->on_platform->wrench, sizeof on->force);
-            memcpy(on->moment, p->on_platform->wrench + 3, sizeof on->moment);
+            double force[3], moment[3];
+            turn(on->R, p->thrust[b - 1], force);
+            turn(on->R, p->thrust[b - 1] + 3, moment);
+            for (int i = 0; i < 3; i++) {
+                on->force[i] += force[i];
+                on->moment[i] += moment[i];
+            }
         }
         for (int i = 0; i < 3; i++) {
             on->force[i] += robot->body[b].mass[i] * robot->gravity[i];

@@ -26,6 +26,7 @@ static void begin_command(plant *p, motion *now, const double *row, const double
     const ptrdiff_t of_carriers = TOWLINE_PLATFORM_COMMANDS + p->cables;
     const carrier_command *carriers = (const carrier_command *)(row + of_carriers);
     p->on_platform = (const platform_command *)row;
+    p->on_carriers = carriers;
     memcpy(p->commanded, row + TOWLINE_PLATFORM_COMMANDS, (size_t)p->cables * sizeof p->commanded[0]);
     set_thrusts(p, carriers);
     set_paths(p, now, carriers, after ? (const carrier_command *)(after + of_carriers) : NULL, period);

@@ -7,8 +7,8 @@
  * their rates, the lengths last commanded, and the conditions.
  *
  * A command is a row too: whether there is air, its velocity in {G} (3), force and moment about the CoM on the platform
- * (6), a number for each cable, and 24 for each carrier: commands of its actuators (6), and pose, velocity and
- * acceleration of its reference (6 each) as the command begins.
+ * (6), a number for each cable, and 30 for each carrier: commands of its actuators (6), force and moment about the CoM
+ * on it (6), and pose, velocity and acceleration of its reference (6 each) as the command begins.
  */
 #ifndef TOWLINE_PLANT_H
 #define TOWLINE_PLANT_H
@@ -22,7 +22,8 @@ enum {
     TOWLINE_BODY_NUMBERS = 13,
     TOWLINE_CABLE_BLOCKS = 4,
     TOWLINE_PLATFORM_COMMANDS = 10,
-    TOWLINE_CARRIER_COMMANDS = 24
+    TOWLINE_CARRIER_REFERENCE = 12, /* where it begins among the commands of a carrier */
+    TOWLINE_CARRIER_COMMANDS = 30
 };
 
 /* What the cables are commanded. */

@@ -27,7 +27,7 @@ typedef struct {
 } platform_command;
 
 typedef struct {
-    double actuation[TOWLINE_MOST_ACTUATORS], pose[6], velocity[6], acceleration[6];
+    double actuation[TOWLINE_MOST_ACTUATORS], wrench[6], pose[6], velocity[6], acceleration[6];
 } carrier_command;
 
 /* How the reference of a carrier moves during a command: a polynomial of time for each coordinate of its pose. */
@@ -98,6 +98,7 @@ typedef struct {
     double attachment[CABLES][3]; /* from the CoM, in the platform's axes */
     /* of the command */
     const platform_command *on_platform;
+    const carrier_command *on_carriers;
     double commanded[CABLES];
     double thrust[CARRIERS][6];  /* force and moment of a carrier's actuators, in its axes */
     carrier_path path[CARRIERS]; /* of those that are imposed or lagged */

@@ -103,6 +103,9 @@ class Event(Part, ABC):
     def wrench(self, time: float, motions: np.ndarray) -> np.ndarray | None:
         """Return force [N] and moment about the CoM [N m] on the platform in {G}, (6,) or (N, 6), for one period.
 
+        With three dimensions, (N, 1 + c, 6), they act on the platform and on the carriers, whose motion they change
+        if these have mass.
+
         Parameters
         ----------
         time

@@ -5,17 +5,19 @@ from math import inf
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 from typing_extensions import override
 
+from ...base.errors import InputError
+from ...base.inputs import shown
 from ...base.text import quantity
 from ...models.part import NonNegative, Positive, Vector3
 from ...models.robot import Robot
-from .event import Event, Seconds, number_in
+from .event import Event, Running, Seconds, number_in
 
 
 class Lasting(Event, ABC):
-    """An event that acts on the platform for some time."""
+    """An event that acts for some time."""
 
     duration: Seconds | None = Field(default=None, description="how long it acts [s]; default: until the end")
 
@@ -27,19 +29,42 @@ class Lasting(Event, ABC):
 
 
 class Push(Lasting):
-    """A force and a moment on the platform, from one time to another."""
+    """A force and a moment on the platform, or on a carrier that flies, from one time to another."""
 
     kind: Literal["push"] = "push"
-    short: ClassVar[str] = "push FX FY FZ [MX MY MZ]"
+    short: ClassVar[str] = "push [CARRIER] FX FY FZ [MX MY MZ]"
+    carrier: str | None = Field(default=None, description="name of the carrier on which it acts; default: the platform")
     force: Vector3 = Field(default=(0.0, 0.0, 0.0), description="force in {G} [N]")
     moment: Vector3 = Field(default=(0.0, 0.0, 0.0), description="moment about the CoM in {G} [N m]")
+    _body: int = PrivateAttr(default=0)  # on which it acts
 
     @override
     @classmethod
     def in_words(cls, words: list[str]) -> dict[str, Any]:
-        """Return force and moment from their numbers."""
+        """Return the carrier, if the first word is no number, and force and moment from the numbers."""
         numbers = [number_in(word) for word in words]
-        return {"force": numbers[:3]} | ({"moment": numbers[3:]} if len(numbers) > 3 else {})
+        which = {"carrier": numbers.pop(0)} if numbers and isinstance(numbers[0], str) else {}
+        return {**which, "force": numbers[:3]} | ({"moment": numbers[3:]} if len(numbers) > 3 else {})
+
+    @override
+    def check(self, robot: Robot) -> None:
+        """Check that the robot has this carrier, and that forces move it.
+
+        Raises
+        ------
+        InputError
+            If it has not, or they do not.
+        """
+        flying = [carrier.name for carrier in robot.carriers if carrier.body is not None]
+        if self.carrier is not None and self.carrier not in flying:
+            names = ", ".join(flying) or "it has none"
+            raise InputError(f"must name a carrier of {robot.name!r} that flies ({names}), got {shown(self.carrier)}")
+
+    @override
+    def begin(self, running: Running) -> None:
+        """Find the carrier among those of the robot."""
+        names = [carrier.name for carrier in running.plant.robot.carriers]
+        self._body = 0 if self.carrier is None else 1 + names.index(self.carrier)
 
     @override
     def describe(self, robot: Robot) -> str:
@@ -47,12 +72,18 @@ class Push(Lasting):
         sizes = quantity(float(np.linalg.norm(self.force)), "N"), quantity(float(np.linalg.norm(self.moment)), "N m")
         parts = [size for size, part in zip(sizes, (self.force, self.moment), strict=True) if any(part)]
         lasting = "" if self.duration is None else f" for {quantity(self.duration, 's')}"
-        return f"a push of {' and '.join(parts) or '0 N'}{lasting}"
+        place = "" if self.carrier is None else f" on {self.carrier}"
+        return f"a push of {' and '.join(parts) or '0 N'}{place}{lasting}"
 
     @override
     def wrench(self, time: float, motions: np.ndarray) -> np.ndarray:
-        """Return force [N] and moment [N m], (6,), the same at each time [s]."""
-        return np.array([*self.force, *self.moment])
+        """Return force [N] and moment [N m], the same at each time [s]: (6,), or (1, 1 + c, 6) on a carrier."""
+        push = np.array([*self.force, *self.moment])
+        if self.carrier is None:
+            return push
+        result = np.zeros((1, motions.shape[1], 6))
+        result[:, self._body] = push
+        return result
 
 
 class Wall(Lasting):

@@ -140,7 +140,7 @@ static int order_carrier(const towline_unit *unit, int carrier, double step, dou
     const int most = towline_most_actuators(&unit->robot);
     const double *order = unit->ordered + 18 * carrier, *jerk = unit->ordered_jerks + 6 * carrier;
     memcpy(begin, unit->actuation + most * carrier, (size_t)most * sizeof *begin);
-    begin += TOWLINE_MOST_ACTUATORS, end += TOWLINE_MOST_ACTUATORS;
+    begin += TOWLINE_CARRIER_REFERENCE, end += TOWLINE_CARRIER_REFERENCE;
     memcpy(begin, order, 18 * sizeof *begin);
     for (int k = 0; k < 6; k++) {
         const double v = order[6 + k], a = order[12 + k], j = jerk[k];
