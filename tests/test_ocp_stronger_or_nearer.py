@@ -169,6 +169,13 @@ def test_an_end_inside_a_region_has_a_clear_one_near_by(which, tube):
     assert plan("cogiro", task | {"path": {"kind": "line", **ends, which: place}}).feasible
 
 
+def test_no_end_below_the_floor_is_suggested():
+    everywhere = {"kind": "box", "name": "hall", "min": [-9, -9, 0], "max": [9, 9, 6], "cables": None}
+    task = {"path": {"kind": "line", "start": [-3, 0, 2], "end": [3, 0, 2]}, "duration": 6}
+    found = plan("cogiro", task | {"limits": {"keep_out": [everywhere]}})
+    assert "another" not in found.report()
+
+
 def test_numbers_in_another_unit_come_first_and_nothing_else_is_tried():
     found = plan(
         "ipanema-2", {"path": {"kind": "line", "start": [0, 0, 2500], "end": [1000, 500, 2500]}, "duration": 4}

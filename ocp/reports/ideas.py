@@ -101,12 +101,18 @@ def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> np.nda
 
 
 def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Return by how much limits are kept at rest, (n,), by a robot moved by (n, 3) [m] with its flying carriers."""
+    """Return by how much limits are kept at rest, (n,), by a robot moved by (n, 3) [m] with its flying carriers.
+
+    Where no anchor is below z = 0, that is the floor.
+    """
     platform = np.tile(pose, (len(moved), 1))
     every = np.tile(carriers, (len(moved), 1, 1))
     platform[:, :3] += moved
     every[:, space.loose, :3] += moved[:, None]
-    return kept(platform, every).slack
+    found = kept(platform, every)
+    lowest = float(kept.scenario.robot.home_anchors[:, 2].min())
+    below = found.points[..., 2].min(axis=1) < 0
+    return np.where(below & (lowest >= 0), -np.inf, found.slack)
 
 
 def _strength(plan: PlanData) -> list[Fact]:
