@@ -4,12 +4,9 @@ import time
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
-from scipy.ndimage import gaussian_filter1d
 
 from towline.models import load
 from towline.ocp import plan
-from towline.ocp.nlp.cubic_spline import smoothed, spline_derivatives
 from towline.ocp.nlp.formation import clear_formation
 from towline.ocp.nlp.guess import initial_guess
 from towline.ocp.tasks.lay_out import lay_out
@@ -78,23 +75,6 @@ def test_the_formation_draws_together_and_keeps_clear():
     assert apart.min() >= APART - off
     inside = np.abs(pose[:, 0]) < HALF_WALL
     assert inside.sum() > 20  # it does go through
-
-
-@pytest.mark.parametrize("count", [4, 5, 41])
-@pytest.mark.parametrize("ends", ["clamped", "not-a-knot"])
-def test_splines_through_guesses_are_those_of_scipy(count, ends):
-    rng = np.random.default_rng(count)
-    nodes, values = np.cumsum(rng.uniform(0.1, 1.0, count)), rng.normal(size=(count, 3))
-    curve = CubicSpline(nodes, values, bc_type=ends)
-    for own, order in zip(spline_derivatives(nodes, values, ends == "clamped"), (1, 2), strict=True):
-        expected = curve(nodes, order)
-        np.testing.assert_allclose(own, expected, atol=1e-12 * np.abs(expected).max())
-
-
-def test_smoothing_is_that_of_scipy():
-    values = np.random.default_rng(0).normal(size=(121, 4))
-    expected = gaussian_filter1d(values, 2.0, axis=0, mode="nearest")
-    np.testing.assert_allclose(smoothed(values, 2.0), expected, atol=1e-12)
 
 
 def test_nothing_in_the_way_leaves_the_formation_as_it_is():

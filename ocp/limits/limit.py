@@ -120,10 +120,10 @@ class Limit(ABC):
         values
             (k, 1).
         shrink
-            Part of `scale` by which the bounds move inwards; none of an equation, and none of a convex limit of poses.
-            The values are the same ones, whatever it is.
+            Part of `scale` by which the bounds move inwards, if the limit `tightens`. The values are the same ones,
+            whatever it is.
         """
-        reserve = 0.0 if self.is_equation or (self.is_convex and self.order == 0) else shrink * self.scale
+        reserve = shrink * self.scale if self.tightens else 0.0
         return Rows(values / self.scale, (self.low + reserve) / self.scale, (self.high - reserve) / self.scale)
 
     def over(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -163,6 +163,11 @@ class Limit(ABC):
         return self.hull is not None and self.soft is None
 
     @property
+    def tightens(self) -> bool:
+        """Return whether a program can have tighter bounds: neither of an equation nor of a convex limit of poses."""
+        return not (self.is_equation or (self.is_convex and self.order == 0))
+
+    @property
     def order(self) -> int:
         """Return the derivative of the pose that a convex limit bounds."""
         return 0 if self.hull is None else self.hull.order
@@ -200,7 +205,7 @@ class Magnitude(Limit):
     @override
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
         if self.is_convex:
-            most = 1.0 if self.order == 0 else 1.0 - shrink
+            most = 1.0 - shrink if self.tightens else 1.0
             return Rows(ca.sumsqr(values) / self.high**2, -np.inf, most**2)
         rounding = ROUNDING * self.high
         size = ca.sqrt(ca.sumsqr(values) + rounding**2)
@@ -218,6 +223,11 @@ class Angle(Limit):
 
     def __init__(self, most: float):
         self.high = most
+
+    @property
+    @override
+    def tightens(self) -> bool:
+        return not self.is_convex
 
     @property
     def _least(self) -> float:

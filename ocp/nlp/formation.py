@@ -18,7 +18,6 @@ from ...base.display import Displayed
 from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import Motion
 from ..tasks.scenario import POSITION, Scenario
-from .cubic_spline import smoothed
 
 DISTANCES = ("keep_out", "cable_clearance", "cable_platform_clearance", "carrier_separation", "platform_box")
 PLACES = 120  # along the path; the first time every second
@@ -67,7 +66,9 @@ def clear_formation(scenario: Scenario) -> Formation | None:
     shape = np.stack([np.interp(finer, shares, column) for column in shape.T], axis=1)
     for attempt in range(1, 1 + REFINEMENTS):
         shape = _best(scenario, references, _tried(shape, span, attempt), span)
-    return Formation(scenario, finer, smoothed(shape, PLACES / 60))
+    from scipy.ndimage import gaussian_filter1d  # loads for longer than a plan takes that does not need it
+
+    return Formation(scenario, finer, gaussian_filter1d(shape, PLACES / 60, axis=0, mode="nearest"))
 
 
 @dataclass(frozen=True)

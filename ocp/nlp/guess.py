@@ -8,7 +8,6 @@ import numpy as np
 from ..tasks.deviation import Deviation
 from ..tasks.ends import fixed_values
 from ..tasks.scenario import POSITION, Scenario
-from .cubic_spline import spline_derivatives
 from .formation import clear_formation
 
 ATTITUDES_MEET = 3  # rounds: where the cables leave a quadrotor depends on how it tilts, a little
@@ -79,11 +78,13 @@ def _in_formation(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], node
 
 def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
     """Return cubic splines through q (n, count) at `nodes`, at rest at the ends where the task requires it."""
+    from scipy.interpolate import CubicSpline  # loads for longer than a plan takes that does not need it
+
     v, a = np.zeros_like(q), np.zeros_like(q)
     resting = {column for _, column, order, _ in fixed_values(scenario) if order == 1}
-    for clamped in (True, False):
-        columns = [column for column in range(q.shape[1]) if (column in resting) == clamped]
-        v[:, columns], a[:, columns] = spline_derivatives(nodes, q[:, columns], clamped)
+    for column in range(q.shape[1]):
+        curve = CubicSpline(nodes, q[:, column], bc_type="clamped" if column in resting else "not-a-knot")
+        v[:, column], a[:, column] = curve(nodes, 1), curve(nodes, 2)
     return Deviation(nodes, q, v, a, np.zeros((len(nodes), scenario.robot.m)))
 
 

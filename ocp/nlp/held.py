@@ -34,6 +34,7 @@ def held_spans(scenario: Scenario, shrink_of: Callable[[Limit], float]) -> dict[
     Fixed ends that are inside a limit by twice the share by which it is reduced do not count.
     """
     function, limits, spans = scenario.limits.function, scenario.limits, dict[Limit, Spans]()
+    fixed = _fixed(scenario)
     platform, carriers = at_ends(scenario)
     values = limits.along(platform, carriers, None, scenario.off_path(_both_ends(scenario), platform, carriers))
     patterns = (ca.DM(function.jac_sparsity(0, i), 1.0) for i in range(function.n_in()))
@@ -49,7 +50,7 @@ def held_spans(scenario: Scenario, shrink_of: Callable[[Limit], float]) -> dict[
         its = limit.over(_both_ends(scenario), its)
         slack = np.minimum(its - limit.low, limit.high - its).min(axis=1)
         near = slack <= 2 * shrink_of(limit) * limit.scale
-        spans[limit] = _held(scenario, needed, with_tensions, near | with_tensions | isinstance(limit, Angle))
+        spans[limit] = _held(scenario, fixed, needed, with_tensions, near | with_tensions | isinstance(limit, Angle))
     return spans
 
 
@@ -65,7 +66,15 @@ def held_wrench(scenario: Scenario, reserve: float) -> Spans:
     low, high = scenario.bounds_at(times)
     inside = solve_batch(A, w, low + 2 * reserve, high - 2 * reserve, low + 2 * reserve).feasible
     needed = [(*owner, order) for owner in scenario.owners() for order in range(3)]
-    return _held(scenario, needed, chooses=True, near=~inside)
+    return _held(scenario, _fixed(scenario), needed, chooses=True, near=~inside)
+
+
+def _fixed(scenario: Scenario) -> dict[int, set[tuple[int, int]]]:
+    """Return columns and orders of the derivatives that the task fixes at the start (0) and at the end (-1)."""
+    fixed: dict[int, set[tuple[int, int]]] = {0: set(), -1: set()}
+    for value in fixed_values(scenario):
+        fixed[value.end].add((value.column, value.order))
+    return fixed
 
 
 def _both_ends(scenario: Scenario) -> np.ndarray:
@@ -97,21 +106,23 @@ def _of_planner(scenario: Scenario, owner: int | None, order: int, coordinate: i
     return {(owner, coordinate, order)}
 
 
-def _held(scenario: Scenario, needed: Iterable[_Coordinate], chooses: bool, near: np.ndarray) -> Spans:
+def _held(
+    scenario: Scenario,
+    fixed: dict[int, set[tuple[int, int]]],
+    needed: Iterable[_Coordinate],
+    chooses: bool,
+    near: np.ndarray,
+) -> Spans:
     """Return when all coordinates that are `needed` are fixed, for a limit that `chooses` by tensions too, or not.
 
-    `near` is which of both ends count.
+    `near` is which of both ends count, `fixed` what the task fixes there.
     """
     columns = {owner: column for column, owner in enumerate(scenario.owners())}
     free = {(columns[owner, i], order) for owner, i, order in needed if (owner, i) in columns}
     timed = scenario.duration_range is not None and any(order for *_, order in needed)
     if not (free or chooses or timed):
         return EVERYWHERE
-    spans = [
-        (float(share), float(share))
-        for end, share in ((0, 0.0), (-1, 1.0))
-        if near[end] and free <= {(fixed.column, fixed.order) for fixed in fixed_values(scenario) if fixed.end == end}
-    ]
+    spans = [(float(share), float(share)) for end, share in ((0, 0.0), (-1, 1.0)) if near[end] and free <= fixed[end]]
     of_platform = {column for (owner, _), column in columns.items() if owner is None}
     if {column for column, _ in free} <= of_platform:
         lasts = scenario.duration

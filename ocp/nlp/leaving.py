@@ -11,12 +11,12 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from ..limits import Body
+from ..limits import Body, Limit
 from ..limits.limits import motions as whole_motions
 from ..tasks.ends import fixed_values
 from ..tasks.scenario import Scenario
 from .derivatives import Differentiable
-from .held import at_ends, held_spans
+from .held import Spans, at_ends, held_spans
 from .layout import Layout
 from .part import function_of
 from .rows import Row, in_world, motions, reference_symbols
@@ -39,7 +39,7 @@ def leaving(scenario: Scenario, layout: Layout, references: np.ndarray) -> list[
     """
     if all(limit.is_convex or limit.is_equation for limit in scenario.limits):
         return []  # they hold between the nodes anyway
-    ends, last = [], references.shape[1] - 1
+    ends, last, held = [], references.shape[1] - 1, held_spans(scenario, lambda _: ON_IT)
     for end, point, forwards in ((0, 0, 1.0), (-1, last, -1.0)):
         fixed = [value.column for value in fixed_values(scenario) if (value.end, value.order) == (end, 2)]
         free = [column for column in range(layout.n) if column not in fixed]
@@ -48,7 +48,7 @@ def leaving(scenario: Scenario, layout: Layout, references: np.ndarray) -> list[
         platform, *carriers = motions(scenario, layout, x, reference)
         bodies = [ca.vertcat(*body) for body in (in_world(scenario, platform, carriers), *carriers)]
         values, rows = [], list[Row]()
-        for name, slope in _slopes_outwards(scenario, end):
+        for name, slope in _slopes_outwards(scenario, end, held):
             value = forwards * slope(*bodies)
             if ca.jacobian(value, x)[:, layout.a][:, free].nnz():
                 values.append(value)
@@ -59,13 +59,15 @@ def leaving(scenario: Scenario, layout: Layout, references: np.ndarray) -> list[
     return ends
 
 
-def _slopes_outwards(scenario: Scenario, end: int) -> Iterator[tuple[str, ca.Function]]:
+def _slopes_outwards(scenario: Scenario, end: int, held: dict[Limit, Spans]) -> Iterator[tuple[str, ca.Function]]:
     """Yield the names of the limits of speed that are on a bound at an end, and how fast they leave it.
 
-    Functions are of the motions of platform and carriers, (18, 1) each.
+    Functions are of the motions of platform and carriers, (18, 1) each. `held` is when the task fixes what each limit
+    bounds.
     """
     limits, share = scenario.limits, 0.0 if end == 0 else 1.0
-    held = held_spans(scenario, lambda _: ON_IT)
+    if not any((share, share) in spans for spans in held.values()):
+        return
     there = [motion[end] for motion in whole_motions(*at_ends(scenario))]
     bodies = [Body.symbols() for _ in there]
     others = [ca.SX.sym("t", scenario.robot.m), ca.SX.sym("off_path", 6)]

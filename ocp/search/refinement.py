@@ -1,6 +1,7 @@
 """Solve a program again as long as the audit of its solution reports violations: `refine`."""
 
 from dataclasses import replace
+from itertools import product
 from typing import TypeAlias
 
 import numpy as np
@@ -11,7 +12,7 @@ from ..nlp.solver import Outcome
 from ..tasks.scenario import Scenario
 from .search import Search, ended
 
-REFINEMENTS = 4  # each with twice the nodes and a little more distance from the limits
+REFINEMENTS = 4  # each with twice the nodes, or four times as many, and a little more distance from the limits
 MOST_STEPS = 1600
 RESERVE = 1e-3  # of the weight, from the tension limits
 LARGEST_RESERVE = 0.03  # of the weight: more would make what is possible impossible
@@ -29,8 +30,8 @@ Shares: TypeAlias = tuple[tuple[str, str, float], ...]
 def refine(search: Search, outcome: Outcome) -> str:
     """Audit a solution, and solve again as long as the audit reports violations; return why it ends.
 
-    Limits that are exceeded a little between the nodes are tightened by that on the same mesh, a few times. Else the
-    mesh gets finer each time.
+    Limits that are exceeded a little between the nodes are tightened by that on the same mesh, a few times. Else, and
+    where equations are missed, which cannot be tightened, the mesh gets finer each time.
     """
     scenario, mesh = search.scenario, Mesh(search.scenario.task.steps)
     audit = search.audit(outcome)
@@ -49,7 +50,8 @@ def refine(search: Search, outcome: Outcome) -> str:
         if outcome.success:  # else not again what had no solution
             halved = tuple((name, about, share / 2) for name, about, share in mesh.further)
             further = _tightened(scenario, audit, halved)
-        mesh = Mesh(min(2 * mesh.steps, MOST_STEPS), reserve * scenario.robot.force_scale, shrink, further)
+        steps = min(_times_finer(scenario, audit) * mesh.steps, MOST_STEPS)
+        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
         outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
         audit = search.audit(outcome)
     steps = mesh.steps
@@ -76,6 +78,17 @@ def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh)
     return outcome, audit, mesh
 
 
+def _times_finer(scenario: Scenario, audit: Audit) -> int:
+    """Return how many times as many steps are next: four where half the step would still miss an equation."""
+    missed = [
+        limit.scale * limit.share_beyond(excess.value) / limit.tolerance
+        for excess, limit in product(audit.excess, scenario.limits)
+        if limit.is_equation and limit.name == excess.limit and limit.is_about(excess.about)
+    ]
+    halved = 2.0 ** (scenario.scheme.degree + 1)  # times less is missed between nodes half as far apart
+    return 4 if max(missed, default=0.0) > halved else 2
+
+
 def _beyond(scenario: Scenario, audit: Audit) -> float:
     """Return the largest share of a limit by which an audit reports it exceeded; inf if less of a limit is no help.
 
@@ -94,11 +107,14 @@ def _missed(audit: Audit) -> float:
 
 
 def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float = 1.0) -> Shares:
-    """Return the share by which each limit is reduced: as `before`, and by `factor` times what the audit reports."""
+    """Return the share by which each limit is reduced: as `before`, and by `factor` times what the audit reports.
+
+    Limits that cannot be reduced are left out.
+    """
     shares = {(name, about): share for name, about, share in before}
     for excess in audit.excess:
         for limit in scenario.limits:
-            if limit.name == excess.limit and limit.is_about(excess.about):
+            if limit.name == excess.limit and limit.is_about(excess.about) and limit.tightens:
                 share = shares.get((excess.limit, excess.about), 0.0) + factor * limit.share_beyond(excess.value)
                 shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
     return tuple((*key, share) for key, share in shares.items())
