@@ -66,18 +66,23 @@ def _clear_ends(scenario: Scenario) -> list[Fact]:
     limits_alone = AtRest(scenario, space.size, balance=False)(platform, carriers)
     facts = []
     for end, (slack, worst) in enumerate(zip(limits_alone.slack, limits_alone.worst, strict=True)):
-        limit = scenario.limits.all[worst].name if slack < 0 and worst >= 0 else ""
-        if limit in IN_THE_WAY and (place := _nearest(scenario, kept, space, end)) is not None:
+        limit = scenario.limits.all[worst]
+        if slack >= 0 or limit.name not in IN_THE_WAY:
+            continue
+        place, straight = _nearest(scenario, kept, space, end)
+        # A place beside an obstacle that only cables cross helps if the line from there is clear of it.
+        if place is not None and (straight or not limit.labels[0].startswith("cable ")):
             away = quantity(float(np.linalg.norm(place - platform[end, :3])), "m")
             where = f"({quantity_row(place + 0.0)}) m, {away} away, is clear of everything (checked at rest)"
             facts.append((f"another {ENDS[end]}", where))
     return facts
 
 
-def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> np.ndarray | None:
+def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> tuple[np.ndarray | None, bool]:
     """Return the position nearest to an end, along an axis of {G}, at which the robot can rest; None if none is found.
 
-    For a line that the platform follows, the nearest from which that line is clear is preferred.
+    For a line that the platform follows, the nearest from which that line is clear is preferred. Also return whether
+    it is, or whether the planner can leave the line.
     """
     (from_, loose), axes = space.references, [axis for axis in POSITION if scenario.robot.dof_mask[axis]]
     points = np.vstack([scenario.robot.home_anchors, from_[:, :3]])
@@ -96,8 +101,8 @@ def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> np.nda
         other = from_[1 - end, :3]
         lines = ((place, place + share * (other - place) - from_[end, :3]) for place in places)
         straight = [place for place, line in lines if (_slack(kept, space, from_[end], loose[end], line) >= 0).all()]
-        places = straight or places
-    return next(iter(places), None)
+        return next(iter(straight or places), None), bool(straight)
+    return next(iter(places), None), True
 
 
 def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, moved: np.ndarray) -> np.ndarray:
