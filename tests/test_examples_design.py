@@ -27,7 +27,8 @@ def test_a_better_robot_is_found(command, monkeypatch):
     """From the robot's own layout until the audits agree: the result does not depend on the machine's speed."""
     monkeypatch.setattr(searching, "_STARTING", 0.0)
     for module in (run, searching):
-        monkeypatch.setattr(module, "AUDITED", 20_000)  # of a larger audit, test_design.py has a test
+        monkeypatch.setattr(module, "AUDITED", 10_000)  # of larger audits, test_design.py has tests
+        monkeypatch.setattr(module, "ROOM_AUDITED", 2000)
     monkeypatch.chdir(FOLDER)
     _, _, given, file = shlex.split(command)
     assert Path(file).read_text().startswith(f"# {command}\n")
