@@ -188,7 +188,7 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         )
     if not estimate.consistent and robot.m > robot.dof_mask.sum():
         off = int(np.argmax(estimate.suspects()))
-        typer.echo(f"The most likely wrong length is that of cable {off + 1}.")
+        typer.echo(f"The most likely wrong length is that of cables[{off}].")
     for other in others:
         held = "" if other.taut else ", which cables cannot hold at rest"
         typer.echo(f"Also fits: ({quantity_row(np.round(other.pose, 6))}) [m, rad]{held}")

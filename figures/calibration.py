@@ -81,7 +81,7 @@ def _of_cables(ax: Axes, values: np.ndarray, times: np.ndarray | None) -> None:
             markersize=2.0,
             markeredgewidth=0.0,
             color=style.colour(cable),
-            label=f"cable {cable + 1}",
+            label=f"cables[{cable}]",
             rasterized=True,
         )
     rms = 1e3 * float(np.sqrt(np.nanmean(values**2)))
@@ -125,7 +125,7 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> Fig
         ax.set_xlim(-reach, reach)
         ax.set_ylim(-reach, reach)
         ax.set_aspect("equal", adjustable="box")
-        ax.set_title(f"anchor {cable + 1}", fontsize=style.NOTE)
+        ax.set_title(f"cables[{cable}].anchor", fontsize=style.NOTE)
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(style.few_ticks())
     style.legend_below(canvas, canvas.axes[0])
@@ -141,14 +141,14 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
     from matplotlib.ticker import LogLocator, NullFormatter
 
     canvas = style.figure(height=3.0)
-    ax = style.axes(canvas, "cable", "standard deviation [mm]")
+    ax = style.axes(canvas, "index of the cable in the file", "standard deviation [mm]")
     every = np.concatenate([np.asarray(values, dtype=float) for values in sigmas.values()])
     finite = 1e3 * every[np.isfinite(every) & (every > 0)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.1, 10.0)
     beyond, opened = 4.0 * high, bool(np.isinf(every).any())
     shifts = np.linspace(-0.32, 0.32, len(sigmas)) if len(sigmas) > 1 else np.zeros(1)
     for index, ((kind, values), shift) in enumerate(zip(sigmas.items(), shifts, strict=True)):
-        at = np.arange(1, len(values) + 1) + shift
+        at = np.arange(len(values)) + shift
         known = np.isfinite(values)
         style_of: dict[str, Any] = {"color": style.colour(index), "linestyle": "none", "marker": style.marker(index)}
         ax.plot(at[known], 1e3 * values[known], markersize=4, label=kind, **style_of)
@@ -163,6 +163,6 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
     if opened:
         style.limit_line(ax, beyond / 1.6, "above this line: not determined", above=True)
     cables = max(len(values) for values in sigmas.values())
-    ax.set_xticks(range(1, cables + 1))
+    ax.set_xticks(range(cables))
     style.legend_below(canvas, ax)
     return canvas

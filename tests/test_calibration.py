@@ -440,8 +440,8 @@ def test_wrong_readings_and_slips_are_found(known):
     kept = calibrate("cogiro", wrong, outliers=False)
     assert kept.residual_after > 3 * result.residual_after
     report = result.report()
-    assert "winch 6 slipped: from sample 120" in report
-    assert "cable 4 at sample 17" in report
+    assert "cables[5] slipped on its winch: from sample 120" in report
+    assert "cables[3] at sample 17" in report
 
 
 @pytest.mark.parametrize("seed", [5, 6, 9])

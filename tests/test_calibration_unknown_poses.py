@@ -135,3 +135,31 @@ def test_the_winch_that_slipped_is_named():
         (found,) = calibrate(robot, Measurements(readings), prior=PRIOR).slips
         assert (found.cable, found.sample) == (cable, sample)
         assert found.size == pytest.approx(size, abs=2e-3)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.05])
+def test_noise_of_unmeasured_pitch_tells_nothing_of_anchors(turn):
+    """A planar platform that does not turn leaves open how its attachments are turned, whatever its pitch seems to be.
+
+    Errors would be four times as large as their standard deviations, and larger than those of the file.
+    """
+    robot = shrunk("planar-4", 0.12)
+    squares, errors, t = [], [], 0.1 * np.arange(150)
+    for seed in range(5):
+        draw = np.random.default_rng(seed)
+        built, room = moved_anchors(robot, draw, 0.01), np.ptp(robot.home_anchors, axis=0)
+        swing = np.column_stack([0.3 * np.sin(1.1 * t), 0 * t, 0.3 * np.sin(1.37 * t + 0.4)])
+        poses = robot.home + np.zeros((len(t), 6))
+        poses[:, :3] += swing * room
+        poses[:, 4] += turn * np.sin(0.9 * t)
+        readings = Dynamics(built).cable_lengths(poses) + draw.normal(0, NOISE, (len(t), 4))
+        result = calibrate(robot, Measurements(readings, poses[:, :3]), outliers=False)
+        assert result.converged
+        known = [one for one in result.parameters if not one.name.endswith("anchor.y")]
+        true = np.hstack([built.anchors[:, [0, 2]], np.zeros((4, 1))]).ravel()
+        error = np.array([one.value for one in known]) - true
+        squares.append(np.mean((error / [one.sigma for one in known]) ** 2))
+        errors.append(error)
+        assert np.isfinite([one.sigma for one in known]).all() == (turn > 0)
+    assert np.mean(squares) < 1.5
+    assert np.sqrt(np.mean(np.square(errors))) < 0.006

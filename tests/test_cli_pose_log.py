@@ -83,7 +83,7 @@ def test_wrong_samples_are_named(robot, tmp_path):
     table[100:200, 2] += 0.05 / 0.052
     write(tmp_path / "slip.csv", times, table)
     done = towline("pose", robot, "--log", "slip.csv", cwd=tmp_path, code=1)
-    assert "samples 100 to 199 (from 2 s): no pose fits; most likely the length of cable 3 is wrong" in done.stdout
+    assert "samples 100 to 199 (from 2 s): no pose fits; most likely the length of cables[2] is wrong" in done.stdout
 
 
 @pytest.mark.parametrize(

@@ -34,8 +34,10 @@ from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .carrier_motion import CarrierMotion
 from .geometry import runs
-from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, prior_sigmas
+from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows, prior_sigmas
 from .sightings import sightings
+
+STILL = 1e-4  # [m] along directions that are kept
 
 
 class State(NamedTuple):
@@ -60,8 +62,8 @@ class State(NamedTuple):
 class Residuals(NamedTuple):
     """Differences over their standard deviations.
 
-    Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,), balance of forces (N, 6),
-    directions (N, 3 m).
+    Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,) and kept directions (d,),
+    balance of forces (N, 6), directions (N, 3 m).
     """
 
     readings: np.ndarray
@@ -127,6 +129,7 @@ class Model(Displayed):
     interpolates: bool = False  # True if poses between measured ones are known, as with a track
     # measured poses of the carriers over time; default: those of the measurements, without a clock offset
     carriers: CarrierMotion | None = None
+    kept: np.ndarray | None = None  # further rows (d, P) of `kept_rows`; default: none
 
     @property
     def robot(self) -> Robot:
@@ -160,6 +163,20 @@ class Model(Displayed):
     def prior_sigmas(self) -> np.ndarray:
         """Return the standard deviations of the parameters about those of the file, (P,); inf: none."""
         return prior_sigmas(self.parameters, self.prior)
+
+    @cached_property
+    def kept_rows(self) -> np.ndarray:
+        """Return all rows (d, P) whose products with the change from the file are zero.
+
+        Where cables stay in a plane, ends move normal to it without effect, to first order. Noise would move them far.
+        """
+        parameters, given = self.parameters, self.measurements
+        rows = normal_rows(parameters)
+        if given.carrier_poses is not None or given.directions is not None:
+            rows = rows[:0]
+        rows = rows if self.kept is None else np.vstack([rows, self.kept])
+        used = np.isfinite(self.prior_sigmas) | ~parameters.varies
+        return rows[~(rows[:, used] != 0).any(axis=1)]
 
     @cached_property
     def _forces(self) -> Balance:
@@ -286,7 +303,9 @@ class Model(Displayed):
             forces = self.balanced.at(parameters, state.x, placed, self.ahead, self.noise, derive)
         weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
         in_balance = np.zeros((len(position), 6)) if forces is None else forces.residuals * weighs[:, None]
-        by_prior = (state.x - parameters.first) / self.prior_sigmas
+        change = state.x - parameters.first
+        by_prior = change / self.prior_sigmas
+        by_prior = np.concatenate([by_prior, self.kept_rows @ change / STILL])
         seen = sightings(parameters, state.x, (position, rotation), run, at, self.measurements, carried, derive)
         seen_residuals = np.zeros((len(position), 0)) if seen is None else seen.residuals * inside[:, None]
         residuals = Residuals(readings, poses, by_prior, in_balance, seen_residuals)

@@ -21,7 +21,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from .curvature import curvature
-from .model import Derivatives, Model, Residuals, State
+from .model import STILL, Derivatives, Model, Residuals, State
 from .parameters import OF_CABLE
 from .products import inner
 
@@ -106,7 +106,9 @@ class NormalEquations(Displayed):
             flat = H.reshape(e.size, -1) if len(b) else np.zeros((e.size, 0))
             S, b = S + inner(flat, flat), b + inner(flat, e.reshape(-1, 1))[:, 0]
         S[np.diag_indices(len(b))] += 1 / sigma**2
-        b += residuals.parameters[varies] / sigma
+        b += residuals.parameters[: len(varies)][varies] / sigma
+        kept = model.kept_rows[:, varies] / scale[varies] / STILL
+        S, b = S + kept.T @ kept, b + kept.T @ residuals.parameters[len(varies) :]
         own = np.diag(S).copy()
         if damping is not None:
             S[np.diag_indices(len(b))] += damping.parameters

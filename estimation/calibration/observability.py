@@ -18,6 +18,8 @@ from .model import State
 from .parameters import OF_CABLE, OF_ROBOT, WORDS, Parameters
 
 INSIDE = 0.999  # of a generator's length that must lie in the open directions
+NOISE = 0.75  # share of a direction's information that seems to be noise of unknown poses: the rest decides nothing
+MOST_NOISE = 0.9  # share of a direction's information that seems to be noise of unknown poses; more is not certain
 SAME = 1e-6  # of a direction's length, left after others are taken away: it is one of theirs
 OPEN = 1e-4  # of the square of a parameter's unit vector that lies in open directions: it is not determined
 NOTABLE = 0.3  # of the largest change along a direction: such parameters name it
@@ -29,31 +31,48 @@ AXES = "xyz"
 class Observability(Displayed):
     """Observable and unobservable directions of the parameters."""
 
-    covariance: np.ndarray  # covariance of the free parameters, in metres, (p, p); zero along unobservable directions
-    # standard deviations of the directions [m], (p,), inf along unobservable ones; the directions are the columns of
-    # `directions`, (p, p)
-    sigmas: np.ndarray
-    directions: np.ndarray
+    # pseudo-inverse of the normal matrix of the free parameters, in metres, (p, p); zero along unobservable directions
+    inverse: np.ndarray
+    covariance: np.ndarray  # their covariance, (p, p), like `inverse`, and larger where unknown poses have noise
+    information: np.ndarray  # pseudo-inverse of the covariance, (p, p) [1/m^2]
+    noise: np.ndarray  # directions of which little more than the noise of unknown poses tells, orthonormal, (p, d)
+    rank: int  # number of observable directions
     determined: np.ndarray  # True for parameters without a part in an unobservable direction, (p,)
     open: tuple[str, ...]  # names of the unobservable directions
 
 
 def observability(
-    S: np.ndarray, parameters: Parameters, state: State, scale: np.ndarray, length: float
+    S: np.ndarray,
+    B: np.ndarray,
+    parameters: Parameters,
+    state: State,
+    scale: np.ndarray,
+    length: float,
+    kept: np.ndarray,
 ) -> Observability:
     """Return the observability of normal equations.
 
     - `S`: matrix of the free parameters, in metres, (p, p) [1/m^2].
+    - `B`: part of it that comes from the noise of unknown poses, `seeming_information`.
     - `scale`: factors that convert parameters to lengths, (P,).
     - `length`: length of the cables [m].
+    - `kept`: rows of all parameters along which the file's values were kept, (d, P).
     """
+    held = np.linalg.qr((kept / scale)[:, parameters.varies].T)[0]
+    across = np.eye(len(S)) - held @ held.T
+    S, B = across @ S @ across, across @ B @ across
     values, vectors = np.linalg.eigh(S)
     fixed = values > unobservable_below(values, length)
-    V, N = vectors[:, fixed], vectors[:, ~fixed]
-    sigmas = np.full(len(values), np.inf)
-    sigmas[fixed] = 1 / np.sqrt(values[fixed])
+    N, V, roots = vectors[:, ~fixed], vectors[:, fixed], np.sqrt(values[fixed])
+    shares, turn = np.linalg.eigh((V / roots).T @ B @ (V / roots))
+    left = 1 - np.minimum(shares, MOST_NOISE)
+    inverse, covariance = (V / values[fixed]) @ V.T, ((V / roots) @ turn / left**2) @ ((V / roots) @ turn).T
+    information = ((V * roots) @ turn * left**2) @ ((V * roots) @ turn).T
+    true, axes = np.linalg.eigh(S - B)
+    seeming = ((S @ axes) * axes).sum(axis=0)
+    noise = axes[:, (seeming > unobservable_below(values, length)) & (true < (1 - NOISE) * seeming)]
     names = _names(N, parameters, state, scale)
-    return Observability((V / values[fixed]) @ V.T, sigmas, vectors, (N**2).sum(axis=1) < OPEN, names)
+    return Observability(inverse, covariance, information, noise, V.shape[1], (N**2).sum(axis=1) < OPEN, names)
 
 
 def _names(N: np.ndarray, parameters: Parameters, state: State, scale: np.ndarray) -> tuple[str, ...]:

@@ -36,6 +36,7 @@ WORDS = (
 )
 UNITS = (*("m",) * 7, "1", "m", "1/m", "1/N", "1", "N", "1")
 STIFFEST = 1e-12  # [1/N]; less compliance is none
+IN_PLANE = 1e-9  # [m] out of it
 LARGEST_PRIOR = 1e3
 SMALLEST_PRIOR = 1e-9
 
@@ -178,3 +179,21 @@ def prior_sigmas(parameters: Parameters, prior: Mapping[str, float]) -> np.ndarr
     for group, columns in ROBOT_COLUMNS.items():
         others[list(columns)] = prior.get(group, np.inf)
     return np.concatenate([table.ravel(), others])
+
+
+def normal_rows(parameters: Parameters) -> np.ndarray:
+    """Return unit rows (d, count) of ends of cables that stay in a plane, along its normal; none with pulleys."""
+    robot, rows = parameters.robot, []
+    turned, _ = parameters.carriers
+    apart = robot.home_anchors - robot.home_attachments
+    for axis, unit in enumerate(np.eye(3)):
+        across = [axis, *(3 + other for other in range(3) if other != axis)]
+        if robot.dof_mask[across].any():
+            continue
+        of_platform = points.rotations(robot.home[None, 3:])[0].T @ unit
+        for i in np.flatnonzero((np.abs(apart[:, axis]) < IN_PLANE) & (robot.pulley_radii == 0)):
+            for first, end in ((0, turned[i].T @ unit), (3, of_platform)):
+                row = np.zeros(parameters.count)
+                parameters.table(row)[i, first : first + 3] = end
+                rows.append(row)
+    return np.array(rows).reshape(-1, parameters.count)

@@ -149,14 +149,13 @@ def _one(one: Parameter) -> tuple[str, str, str, str]:
 
 def _of_exceptions(result: CalibrationData) -> list[str]:
     lines = [
-        f"winch {slip.cable + 1} slipped: from sample {slip.sample} on its cable is {_mm(abs(slip.size))} "
+        f"cables[{slip.cable}] slipped on its winch: from sample {slip.sample} on it is {_mm(abs(slip.size))} "
         f"{'longer' if slip.size > 0 else 'shorter'} than its reading (+- {_mm(slip.sigma)})"
         for slip in result.slips
     ]
     wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
     lines += [
-        f"left out: cable {one.cable + 1} at sample {one.sample}, off by {_mm(one.error)}"
-        for one in wrong[:MOST_LISTED]
+        f"left out: cables[{one.cable}] at sample {one.sample}, off by {_mm(one.error)}" for one in wrong[:MOST_LISTED]
     ]
     if len(wrong) > MOST_LISTED:
         lines.append(f"and {len(wrong) - MOST_LISTED} more readings left out")

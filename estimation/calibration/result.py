@@ -17,7 +17,6 @@ from ...models.part import LARGEST
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .cross_validation import HeldOut, compare, poses_fitted
-from .normal_equations import metric, state_equations
 from .outliers import Outlier, Slip
 from .parameters import OF_ROBOT
 from .plausibility import Mistake
@@ -151,12 +150,11 @@ class CalibrationData(Displayed):
 
     @cached_property
     def information(self) -> np.ndarray:
-        """Return the normal matrix, priors included, with parameters as lengths, (p, p) [1/m^2].
+        """Return the information about the parameters, priors included, with parameters as lengths, (p, p) [1/m^2].
 
-        It is scaled down by the factors `noise` and `alike` that scale the covariance up.
+        It is the pseudo-inverse of the covariance, factors `noise` and `alike` included.
         """
-        model = self._solved.model
-        return state_equations(model, self._solved.fit.state, metric(model)).S / self._inflation
+        return self._solved.observability.information / self._inflation
 
     @property
     def _inflation(self) -> float:

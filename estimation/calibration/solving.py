@@ -15,10 +15,11 @@ from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
 from .model import Model, State
-from .normal_equations import metric, state_equations
-from .observability import Observability, observability
+from .normal_equations import metric
+from .observability import Observability
 from .outliers import LEAST_THRESHOLD, Outlier, Slip, alike, find_outliers, find_slips, find_unbalanced
 from .parameters import IN_BALANCE, OF_ROBOT, Parameters
+from .pose_noise import observed
 from .sightings import sighted
 from .starts import LARGEST_SHARE, fit_from, level_poses
 
@@ -68,7 +69,8 @@ def solve(
     length = length_of(robot)
     state = begin_with_clock(model, length) if "clock" in groups else model.begin()
     model = replace(model, ahead=float(state.x[model.parameters.clock]))
-    result, fitted = fit_from(model, state, length, outliers)
+    result, used = fit_from(model, state, length, outliers)
+    model, fitted = replace(model, kept=used.kept), used.weights
     model, result = _weighed(model, result, length, False)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
@@ -99,8 +101,7 @@ def solve(
         model = replace(model, weights=weights)
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
-    S = state_equations(model, result.state, scale := metric(model)).S
-    seen = observability(S, model.parameters, result.state, scale, length)
+    seen = observed(model, result.state, length)
     return Solved(model, result, tuple(wrong.values()), tuple(slips), seen)
 
 
@@ -110,14 +111,16 @@ def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Mo
     Unknown poses, which the slip has moved, are found again.
     """
     parameters = replace(model.parameters, slips=(*model.parameters.slips, (slip.cable, slip.sample)))
-    model = replace(model, parameters=parameters)
+    kept = None if model.kept is None else np.pad(model.kept, ((0, 0), (0, 1)))
+    model = replace(model, parameters=parameters, kept=kept)
     state = result.state._replace(x=np.append(result.state.x, slip.size))
     near = fit(model, state, length), model.weights
     if not np.isinf(model.pose_sigmas).any():
         return model, *near
     begin = model.begin()
     begin.x[model.parameters.clock + OF_ROBOT :] = state.x[model.parameters.clock + OF_ROBOT :]
-    return model, *min(near, fit_from(model, begin, length, True), key=lambda one: _surprise(*one))
+    again, used = fit_from(model, begin, length, True)
+    return model, *min(near, (again, used.weights), key=lambda one: _surprise(*one))
 
 
 def _surprise(result: Fit, weights: np.ndarray) -> float:
@@ -232,7 +235,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     used = int((model.weights * model.inside(state) > 0).sum())
     sigmas = model.pose_sigmas[model.poses_vary]
     priors = np.isfinite(model.prior_sigmas[model.parameters.varies])
-    found = int(np.isfinite(solved.observability.sigmas).sum())
+    found = solved.observability.rank
     if model.balanced:
         rests = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
         used += model.balanced.freedoms * int(rests.sum())
@@ -241,7 +244,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     if redundancy <= 0:
         return np.nan, 1.0, redundancy
     excess = float(np.sqrt(solved.fit.cost / redundancy))
-    return excess, alike(model, state, solved.observability.covariance, found, excess), redundancy
+    return excess, alike(model, state, solved.observability.inverse, found, excess), redundancy
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:

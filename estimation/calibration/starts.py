@@ -21,6 +21,7 @@ from ..pose.search import level_platform
 from .fit import Fit, fit
 from .model import Model, State
 from .outliers import find_outliers
+from .pose_noise import steadied
 
 SHORTEST = 1e-3  # [m]; readings without their offsets may be negative
 UPRIGHT = 0.2  # [rad], standard deviation of the orientation about home
@@ -38,16 +39,17 @@ LARGEST_SHARE = 0.1  # of readings that may be left out; more are no exceptions
 
 def fit_from(
     model: Model, state: State, length: float, outliers: bool = False, enough: float = 0.0
-) -> tuple[Fit, np.ndarray]:
+) -> tuple[Fit, Model]:
     """Minimise the sum of squares, from level poses if none were measured; `length` is the length of the cables [m].
 
-    It returns the fit and the weights (m, N) of its readings. With `outliers`, readings that look wrong in the first
-    fit are excluded, because parameters and poses that adapt to them would hide them. `enough` is that of `fit`.
+    It returns the fit, and the model with its weights of readings and the directions that it keeps. With `outliers`,
+    readings that look wrong in the first fit are excluded, because parameters and poses that adapt to them would hide
+    them. `enough` is that of `fit`.
 
     The state has initial parameters, and the poses of `model.begin()`.
     """
     if not np.isinf(model.pose_sigmas).any():
-        return fit(model, state, length, enough=enough), model.weights
+        return fit(model, state, length, enough=enough), model
     state = _by_forces(model, state, length)
     rough, begin = _rough(model, state, length)
     state = fit(rough, begin, length, enough=ENOUGH).state
@@ -61,14 +63,14 @@ def fit_from(
         rough = replace(rough, weights=weights)
         state = fit(rough, state, length, enough=ENOUGH).state
     clean = replace(model, weights=rough.weights)
-    state = _elsewhere(clean, state) or state
+    clean, state = steadied(clean, _elsewhere(clean, state) or state, length)
     result = fit(clean, state, length, enough=enough)
     for _ in range(MOST_SEARCHES):
         other = _elsewhere(clean, result.state)
         if other is None:
             break
         result = fit(clean, other, length, enough=enough)
-    return result, clean.weights
+    return result, clean
 
 
 def level_poses(robot: Robot, lengths: np.ndarray, offsets: bool, carriers: np.ndarray | None = None) -> np.ndarray:

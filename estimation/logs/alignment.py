@@ -39,7 +39,7 @@ class Clock(NamedTuple):
         ppm = 1e6 * (self.rate - 1)
         drift = f", {quantity(abs(ppm), 'ppm', 3)} {'fast' if ppm > 0 else 'slow'}" if ppm else ""
         ahead = "ahead" if self.offset >= 0 else "behind"
-        return f"the clock of the poses is {quantity(abs(self.offset), 's', 8)} {ahead}{drift}"
+        return f"the clock of the poses is {abs(self.offset):.6f} s {ahead}{drift}"
 
 
 def align(

@@ -49,7 +49,7 @@ PATTERNS = {
         r"/?[pt]?[_ ]?([xyz])",
         rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ][pt]?([xyz])",
     ),
-    "quaternion": (rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",),
+    "quaternion": (rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])", r"/?r([xyzw])"),
     "angles": (rf"{_BEFORE}(roll|pitch|yaw)",),
     "thrusts": (rf"{_BEFORE}thrusts?(?:[./_ ](?:data|value))*[_ ]?\[?(\d*)\]?(?:[./_ ](?:data|value))*",),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes

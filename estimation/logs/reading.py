@@ -16,6 +16,7 @@ from .alignment import Clock
 from .cable_directions import in_world, vectors
 from .carrier_poses import carriers_at, tensions_by_thrust
 from .clocks import clock_of_poses
+from .frozen import frozen
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, read_map
 from .measurements import Measurements
 from .opening import recordings
@@ -225,6 +226,11 @@ def measurements_of(
     begin = float(times[0]) if times is not None and times[0] > COUNTED else 0.0
     if position is not None and orientation is not None:
         orientation = at_times(position.times, orientation, found.orientation[0])
+    if position is not None and (lost := frozen(position.values)).any():
+        notes.append(
+            f"{quantity(int(lost.sum()))} positions are left out, which repeat the one before until the platform jumps"
+        )
+        position = Samples(position.times, np.where(lost[:, None], np.nan, position.values))
     pose = position or orientation
     source = (found.position or found.orientation or (main,))[0]
     together, clock = source.topic is main.topic, None

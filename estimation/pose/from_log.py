@@ -135,8 +135,8 @@ class LogPoses(Displayed):
         for one in self.wrong[:MOST_NAMED]:
             which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
             at = "" if self.times is None else f" (from {quantity(float(self.times[one.first]), 's', 6)})"
-            names = " or ".join(str(cable + 1) for cable in one.cables)
-            yield f"{which}{at}: no pose fits; most likely the length of cable {names} is wrong"
+            names = " or ".join(f"cables[{cable}]" for cable in one.cables)
+            yield f"{which}{at}: no pose fits; most likely the length of {names} is wrong"
         if len(self.wrong) > MOST_NAMED:
             yield f"and {quantity(len(self.wrong) - MOST_NAMED)} more"
 
