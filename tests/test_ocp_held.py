@@ -180,3 +180,35 @@ def test_only_the_end_that_meets_a_limit_is_held():
     }
     spans = held_spans(lay_out(load("cogiro"), read_task(task)), lambda _: SHRINK)
     assert [its for limit, its in spans.items() if limit.name == "platform_speed"] == [((0.0, 0.0),)]
+
+
+def test_a_start_at_the_largest_speed_turns_no_faster_between_the_nodes():
+    """Three cables determine the tensions: as fast as possible they jump from one limit to the other.
+
+    On each finer mesh the parabola of an interval went beyond both limits, by as much as on a coarse one.
+    """
+    robot = load("point-mass-3")
+    start, end = [-0.3, 0, 1], [0.3, 0.1, 1.2]
+    task = {
+        "path": {"kind": "line", "start": start, "end": end},
+        "duration": {"min": 0.2, "max": 20},
+        "objective": {"time": 0.2, "jerk": 1000},
+        "tube": {"position": "free"},
+        "initial": {"pose": [*start, 0, 0, 0], "velocity": [0, 0, 0.3, 0, 0, 0]},
+        "limits": {"platform_speed": 0.3},
+        "scheme": "hermite",
+        "steps": 20,
+    }
+    found = plan(robot, task)
+    assert found.feasible, found.reason
+    times = np.linspace(0.0, found.duration, 50_001)
+    platform, _ = found.scenario.motion(times, found.deviation)
+    assert np.linalg.norm(platform.velocity[:, :3], axis=1).max() < 0.3 * (1 + 1e-5)
+    force = robot.platform.mass * (platform.acceleration[:, :3] - np.array(robot.gravity))
+    along = robot.home_anchors - platform.pose[:, None, :3] - robot.attachments
+    units = along / np.linalg.norm(along, axis=2, keepdims=True)
+    tensions = np.linalg.solve(units.swapaxes(1, 2), force[..., None])[..., 0]
+    assert (tensions > robot.t_min - 1e-3).all()
+    assert (tensions < robot.t_max + 1e-3).all()
+    # The way at the largest speed is a lower bound; what the turns at both ends take is little.
+    assert found.duration < 1.06 * np.linalg.norm(np.subtract(end, start)) / 0.3

@@ -8,6 +8,7 @@ from typing import NamedTuple, TypeAlias
 import casadi as ca
 import numpy as np
 
+from ..audits.excess import TENSIONS
 from ..limits import Rate
 from ..tasks import bernstein
 from ..tasks.bernstein import Values
@@ -101,6 +102,13 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         return _total(scenario, h, motion, [of_body @ column[layout.a] for column in columns], jerk)
 
     constraints += _hull_rows(scenario, points_of)
+    if TENSIONS in mesh.between:
+        constraints.append(_tension_rows(scenario, layout, columns))
+    if speeds := [limit for limit in scenario.limits if limit.name in mesh.between]:
+        offset = [spread(scenario, None) @ column[layout.a] for column in columns]
+        jerks = [spread(scenario, None) @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
+        inner = _total(scenario, h, [point[0] for point in moving()], offset, jerks).speed[1:-1]
+        constraints += [bounded(limit, point[:3], None) for limit in speeds for point in inner]
     unknowns, known = {"x": x, "x_end": x_end}, {"p": parameters, "p_end": parameters_end, "grid": numbers}
     of_limits = _way_rows(scenario, mesh, layout, columns, whole)
     return part_of("interval", unknowns, known, cost, constraints, scenario.limits, of_limits)
@@ -209,6 +217,18 @@ def _way_rows(
         yield scenario.limits.all.index(limit), (values, rows)
 
 
+def _tension_rows(scenario: Scenario, layout: Layout, columns: list[ca.SX]) -> Constraints:
+    """Return values and rows of the middle Bernstein points of the parabolas through the tensions at the points.
+
+    With their limits there, an acceleration that changes from one node to the next does not swing beyond what tensions
+    permit: between the points it would by up to an eighth, in intervals of any length.
+    """
+    first, middle, last = (column[layout.tensions] for column in columns)
+    scale = scenario.robot.force_scale
+    rows = [Row(TENSIONS, low / scale, high / scale) for low, high in zip(*scenario.bounds(), strict=True)]
+    return [2 * middle - (first + last) / 2], rows
+
+
 def _hull_rows(scenario: Scenario, points_of: Callable[[int | None], Points]) -> Iterator[Constraints]:
     """Yield values and rows of the hard convex limits at Bernstein points: so they hold between the nodes too."""
     for limit in scenario.limits:
@@ -229,7 +249,7 @@ def _hull_rows(scenario: Scenario, points_of: Callable[[int | None], Points]) ->
 def _total(
     scenario: Scenario, h: ca.SX | float, motion: list[list[ca.SX]], offset: list[ca.SX], jerk: list[ca.SX] | None
 ) -> Points:
-    """Return the points of a carrier's whole motion, its reference taken as a polynomial of the same degree."""
+    """Return the points of a body's whole motion, its reference taken as a polynomial of the same degree."""
     pose, velocity, total = zip(*motion, strict=True)
     slopes = None
     if jerk is not None:

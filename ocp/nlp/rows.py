@@ -51,7 +51,15 @@ class Mesh(Displayed):
     shrink: float = 0.0
     # Name of a limit, what it is about, and the share by which it is reduced beside, as an audit missed it.
     further: tuple[tuple[str, str, float], ...] = ()
+    # Names of limits that rows between the points keep too, since an audit missed them there: of the platform's speed,
+    # and of tensions.
+    between: tuple[str, ...] = ()
     elastic: bool = False  # whether A t = w + s with a high cost on the slack s, so that there is always a solution
+
+    @property
+    def rows(self) -> tuple[object, ...]:
+        """Return what of the mesh a program's rows depend on, besides their bounds."""
+        return self.steps, self.elastic, self.between
 
     def shrink_of(self, limit: Limit) -> float:
         """Return the share by which a limit is reduced."""

@@ -7,6 +7,8 @@ from typing import TypeAlias
 import numpy as np
 
 from ..audits.audit import Audit
+from ..audits.excess import TENSIONS
+from ..limits.platform import PlatformSpeed
 from ..nlp.rows import Mesh
 from ..nlp.solver import Outcome
 from ..tasks.scenario import Scenario
@@ -50,14 +52,27 @@ def refine(search: Search, outcome: Outcome) -> str:
         if outcome.success:  # else not again what had no solution
             halved = tuple((name, about, share / 2) for name, about, share in mesh.further)
             further = _tightened(scenario, audit, halved)
+        between = tuple(sorted({*mesh.between, *_missed_between(scenario, audit)}))
         steps = min(_times_finer(scenario, audit) * mesh.steps, MOST_STEPS)
-        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further)
+        mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further, between)
         outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
         audit = search.audit(outcome)
     steps = mesh.steps
     if outcome.success:
         return f"the audit reports violations up to the finest mesh, {steps} steps"
     return f"nonlinear program of {steps} steps: {ended(outcome.message)}"
+
+
+def _missed_between(scenario: Scenario, audit: Audit) -> set[str]:
+    """Return what an audit reports that rows between the nodes keep: the platform's speed in {G}, and tensions.
+
+    A motion that turns at its largest speed, as after a start with it, would turn faster on each finer mesh. A fast one
+    changes from the largest to the least tension in one interval, however short.
+    """
+    names = {limit.name for limit in scenario.limits if isinstance(limit, PlatformSpeed) and limit.soft is None}
+    names = set[str]() if scenario.relative else names & {excess.limit for excess in audit.excess}
+    parabolas = len(scenario.scheme.inner) == 1 and not scenario.phases.all and scenario.wind_set is None
+    return names | ({TENSIONS} if parabolas and _missed(audit) else set())
 
 
 def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh) -> tuple[Outcome, Audit, Mesh]:

@@ -248,9 +248,9 @@ class Search:
         return self._build(scenario, mesh, Near.along(scenario, shares, motion, reach))
 
     def _build(self, scenario: Scenario, mesh: Mesh, near: Near | None) -> Program:
-        """Build a program from the stages of an earlier one of the same scenario and as many steps, if there is one."""
+        """Build a program from the stages of an earlier one of the scenario with the same rows, if there is one."""
         for its, of_mesh, stages in self._stages:
-            if its is scenario and (of_mesh.steps, of_mesh.elastic) == (mesh.steps, mesh.elastic):
+            if its is scenario and of_mesh.rows == mesh.rows:
                 return build(scenario, mesh, near, stages=stages)
         self._stages.append((scenario, mesh, Stages.of(scenario, mesh)))
         return build(scenario, mesh, near, stages=self._stages[-1][2])
