@@ -18,9 +18,16 @@ def test_a_random_task_ends_in_a_plan_or_a_proof(seed):
     assert attempt("ordinary", seed).result in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
 
 
-@pytest.mark.parametrize("family", [family for family in FAMILIES if family not in ("ordinary", "team", "window")])
+@pytest.mark.parametrize(
+    "family", [family for family in FAMILIES if family not in ("ordinary", "team", "window", "beams")]
+)
 def test_a_task_of_each_family_ends_in_a_plan_or_a_proof(family):
     assert attempt(family, 0).result in (MotionStatus.FEASIBLE, MotionStatus.INFEASIBLE)
+
+
+def test_the_direct_motion_through_a_narrow_hole_is_where_the_program_starts():
+    """It passes by 8 mm; a formation that wanted 50 mm went round the wall, and through it between two samples."""
+    assert attempt("window", 8108).result == MotionStatus.FEASIBLE
 
 
 def test_the_check_can_see():
@@ -40,13 +47,13 @@ def test_the_check_can_see():
 
 def test_a_load_is_made_lighter_only_where_the_platform_can_rest_without_one(monkeypatch):
     """The robot of seed 880032 cannot rest where it would lift: no load is light enough."""
-    tried, can_rest = [], random_families._can_rest
+    tried, can_rest = [], random_families.can_rest
 
     def counted(*arguments):
         tried.append(arguments)
         assert len(tried) < 1000
         return can_rest(*arguments)
 
-    monkeypatch.setattr(random_families, "_can_rest", counted)
+    monkeypatch.setattr(random_families, "can_rest", counted)
     _, task = random_task("phases", 880032)
     assert len(task.phases) == 5

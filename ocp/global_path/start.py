@@ -16,18 +16,23 @@ GLOBAL_SHARE = 0.2  # of the time limit
 def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
     """Return a motion past what the usual guess collides with, or the best guess, and whether it collides at all.
 
+    None is the usual guess where no formation is better.
+
     With `balance` a configuration without tensions at rest is a collision.
     """
     scenario = search.scenario
     if scenario.count == 0 or not is_open(scenario):
         return None, False
     with search.stage("global path") as stage:
-        exceeded = guess_exceeds(scenario, partial(usual_guess, scenario), balance)
-        if not exceeded:
-            return None, False
+        usual = partial(usual_guess, scenario)
+        exceeded = guess_exceeds(scenario, usual, balance)
         nodes = np.linspace(0.0, scenario.duration, scenario.task.steps + 1)
         formation = formation_guess(scenario) if search.seconds_left > 0 else None
-        if formation is not None and not guess_exceeds(scenario, formation, balance):
+        clear = formation is not None and not guess_exceeds(scenario, formation, balance)
+        if not exceeded:
+            # A formation keeps more distance, but not between the places at which it was chosen.
+            return None if formation is None else (formation if clear else usual)(nodes), False
+        if formation is not None and clear:
             stage.message = f"the direct motion exceeds {exceeded}: a shifted formation keeps all limits"
             return formation(nodes), True
         seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)

@@ -8,6 +8,12 @@
     moving     the motion begins while platform and carriers move
     fast       as fast as the cables permit, up to 10 m/s, past places of all shapes, from or to a limit exactly
     phases     a load is picked up, lifted, carried, lowered and put down; a fifth is four times the platform's weight
+    bodies     a platform with a body leads past posts
+    feed       work along lines at a steady speed
+    zones      as fast as possible past balls in which the platform is slow
+    cycles     periodic motions through points
+    least      as fast as possible, under limits of winches and of the platform
+    beams      two or three quadrotors carry a beam past a post or through a gate
 
 Where a family needs places at which the platform can rest, they are chosen so that tensions exist there with the
 carriers at home. Nothing else makes a task feasible: some are not.
@@ -21,11 +27,13 @@ from typing import Any
 import numpy as np
 
 from towline.models import Dynamics, Robot, load
+from towline.models.files import as_robot
 from towline.ocp import Task
-from towline.solvers import solve
-from towline.statics.distribution import wrench_problem
 
-from .recheck import cable_distance, point_distance, rotation
+from . import random_work
+from .random_places import can_rest, extent, free_base, past_boxes, resting_place
+from .recheck import cable_distance, point_distance
+from .saved_motion import rotation
 
 __all__ = ["FAMILIES", "ROBOTS", "random_task"]
 
@@ -36,10 +44,10 @@ TEAMS = ("multi-quadrotor-3", "multi-quadrotor-4")
 TEAM_STEPS = 50
 
 
-def random_task(family: str, seed: int) -> tuple[str, Task]:
-    """Return a robot's name and a task for it, of a family of `FAMILIES`."""
-    name, task = FAMILIES[family](np.random.default_rng(seed), seed)
-    return name, Task.model_validate({"name": f"{family}-{seed}", **task})
+def random_task(family: str, seed: int) -> tuple[Robot, Task]:
+    """Return a robot and a task for it, of a family of `FAMILIES`."""
+    robot, task = FAMILIES[family](np.random.default_rng(seed), seed)
+    return as_robot(robot), Task.model_validate({"name": f"{family}-{seed}", **task})
 
 
 def _ordinary(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
@@ -50,7 +58,7 @@ def _ordinary(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]
     """
     name = ROBOTS[seed % len(ROBOTS)]
     robot = load(name)
-    size = _size(robot)
+    size = extent(robot)
     fixed = seed % 5 == 0
     path = _path(rng, robot, 0.25 * size, anywhere=fixed)
     task: dict[str, Any] = {"path": path, "steps": 40}
@@ -62,7 +70,7 @@ def _ordinary(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]
         task["base"] = _fixed_base(rng, robot)
         return name, task
     task["margin"] = float(rng.choice([0.0, 0.05]))
-    task["base"] = _base(rng, robot)
+    task["base"] = free_base(rng, robot)
     if stretches and rng.random() < 0.3:
         task["duration"] = {"min": 0.5 * duration, "max": 3.0 * duration}
         task["objective"] = {"time": 1.0}
@@ -78,7 +86,7 @@ def _path(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool) 
     home = robot.home
 
     def near() -> np.ndarray:
-        return _place(rng, robot, reach, anywhere)
+        return resting_place(rng, robot, reach, anywhere)
 
     kind = rng.choice(["line", "waypoints", "circle"])
     if kind == "circle" and robot.dof_mask[:2].all():
@@ -96,34 +104,6 @@ def _path(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool) 
     return {"kind": "line", "start": near().tolist(), "end": near().tolist()}
 
 
-def _place(rng: np.random.Generator, robot: Robot, reach: float, anywhere: bool = False) -> np.ndarray:
-    """Return a pose about the platform's home at which it can rest, (6,), unless it may be `anywhere`."""
-    dynamics, pose = Dynamics(robot), robot.home.copy()
-    for attempt in range(100):
-        pose = robot.home.copy()
-        pose[:3] += rng.uniform(-reach, reach, 3) * 0.97**attempt * robot.dof_mask[:3]
-        pose[3:] += rng.uniform(-0.05, 0.05, 3) * robot.dof_mask[3:]
-        if anywhere or _can_rest(dynamics, pose, np.zeros(6)):
-            break
-    return pose
-
-
-def _size(robot: Robot) -> float:
-    """Return the extent of the robot, between half a metre and three [m]."""
-    anchors = robot.anchors + robot.carrier_home[robot.carrier_of_cable, :3]
-    return float(np.clip(np.ptp(anchors, axis=0).max(), 0.5, 3.0))
-
-
-def _can_rest(dynamics: Dynamics, pose: np.ndarray, rest: np.ndarray, load: dict[str, Any] | None = None) -> bool:
-    robot = dynamics.robot
-    A, w = dynamics.wrench_matrix(pose), dynamics.required_wrench(pose, rest, rest)
-    if load is not None:
-        weight = -load["mass"] * np.array(robot.gravity)
-        w = w + np.r_[weight, np.cross(np.array(load["com"]) - robot.platform.com, weight)]  # the platform is level
-    spare = 0.05 * (robot.t_max - robot.t_min)
-    return solve(wrench_problem(dynamics.robot, A, w, robot.t_min + 0.1, robot.t_max - spare)).feasible
-
-
 def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
     """Return carriers at rest at home, or one carrier that moves along a given path."""
     carrier = robot.carriers[0]
@@ -135,24 +115,16 @@ def _fixed_base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
     return {"kind": "given", "paths": {carrier.name: path}}
 
 
-def _base(rng: np.random.Generator, robot: Robot) -> dict[str, Any]:
-    """Return free carriers where the robot has some that can move: always for quadrotors, mostly for others."""
-    held, movable = (any(values) for values in zip(*((c.efforts, c.moves) for c in robot.carriers), strict=True))
-    if held or (movable and rng.random() < 0.8):
-        return {"kind": "free", "ends": str(rng.choice(["free", "rest"]))}
-    return {"kind": "hold"}
-
-
 def _lift(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     """Return a task that lifts, moves and lowers the platform."""
     name = OF_SPACE[seed % len(OF_SPACE)]
     robot = load(name)
-    size = _size(robot)
-    start, end = _place(rng, robot, 0.25 * size), _place(rng, robot, 0.25 * size)
+    size = extent(robot)
+    start, end = resting_place(rng, robot, 0.25 * size), resting_place(rng, robot, 0.25 * size)
     end[2], up = start[2], [0, 0, rng.uniform(0.02, 0.2) * size, 0, 0, 0]
     points = [start, start + up, end + up, end]
     path: dict[str, Any] = {"kind": "waypoints", "points": [point.tolist() for point in points]}
-    task = {"path": path, "duration": float(rng.uniform(3.0, 8.0)), "steps": 60, "base": _base(rng, robot)}
+    task = {"path": path, "duration": float(rng.uniform(3.0, 8.0)), "steps": 60, "base": free_base(rng, robot)}
     if rng.random() < 0.3:
         path["dwell"] = [0.0, 0.3, 0.3, 0.0]
     if rng.random() < 0.5:
@@ -164,21 +136,26 @@ def _rack(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     """Return a task from place to place past a box that stands between them."""
     name = OF_SPACE[seed % len(OF_SPACE)]
     robot = load(name)
-    size = _size(robot)
+    size = extent(robot)
 
     def places(start: np.ndarray, end: np.ndarray) -> list[dict[str, Any]]:
         half, middle = 0.05 * size, 0.5 * (start + end)[:3]
         low, high = middle - [half, 3 * half, size], middle + np.array([half, 3 * half, half])
         return [{"kind": "box", "name": "rack", "min": low.tolist(), "max": high.tolist()}]
 
-    return name, _past(rng, robot, places, _distances(rng))
+    return name, past_boxes(rng, robot, places, _distances(rng))
+
+
+def _distances(rng: np.random.Generator) -> dict[str, Any]:
+    """Return how far platform and cables stay from a place."""
+    return {"platform": float(rng.choice([0.0, 0.05])), "cables": None if rng.random() < 0.7 else 0.01}
 
 
 def _window(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     """Return a task through a hole in a wall; the platform alone keeps clear of it, since the cables cannot."""
     name = OF_SPACE[seed % len(OF_SPACE)]
     robot = load(name)
-    size = _size(robot)
+    size = extent(robot)
     off = rng.uniform(-0.1, 0.1, 3) * size
     half = 0.5 * float(np.ptp(robot.attachments, axis=0).max()) + 0.1 * size
     far, thick = 3 * size, 0.02 * size
@@ -201,43 +178,7 @@ def _window(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
             walls.append({"kind": "box", "name": side, "min": low.tolist(), "max": high.tolist()})
         return walls
 
-    return name, _past(rng, robot, places, {"cables": None, "carriers": None})
-
-
-def _distances(rng: np.random.Generator) -> dict[str, Any]:
-    """Return how far platform and cables stay from a place."""
-    return {"platform": float(rng.choice([0.0, 0.05])), "cables": None if rng.random() < 0.7 else 0.01}
-
-
-def _past(
-    rng: np.random.Generator,
-    robot: Robot,
-    places: Callable[[np.ndarray, np.ndarray], list[dict[str, Any]]],
-    distances: dict[str, Any],
-) -> dict[str, Any]:
-    """Return a task from place to place on any path past boxes that leave the platform at both ends clear."""
-    reach = 0.3 * _size(robot)
-    start = end = robot.home
-    boxes: list[dict[str, Any]] = []
-    for _ in range(30):
-        start = _place(rng, robot, reach)
-        others = [_place(rng, robot, reach) for _ in range(20)]
-        end = max(others, key=lambda pose: float(np.linalg.norm((pose - start)[:2])))
-        boxes = places(start, end)
-        if min(_outside(robot, pose, box) for pose in (start, end) for box in boxes) > 0.1 * reach:
-            break
-    path = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
-    tube = {"position": "free", "attitude": float(rng.choice([0.0, 0.2]))}
-    limits = {"keep_out": [{**box, **distances} for box in boxes]}
-    task = {"path": path, "duration": float(rng.uniform(4.0, 8.0)), "tube": tube, "limits": limits}
-    return task | {"steps": 60, "base": _base(rng, robot)}
-
-
-def _outside(robot: Robot, pose: np.ndarray, box: dict[str, Any]) -> float:
-    """Return how far the platform is outside a box [m]; it is nearly level."""
-    points = pose[:3] + np.vstack([robot.attachments, robot.platform.com])
-    beyond = np.maximum(np.array(box["min"]) - points, points - np.array(box["max"]))
-    return float(beyond.max(axis=1).min())
+    return name, past_boxes(rng, robot, places, {"cables": None, "carriers": None})
 
 
 def _team(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
@@ -269,8 +210,8 @@ def _fast(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     team = any(carrier.efforts for carrier in robot.carriers)
     extent = 4.0 if team else float(np.ptp(robot.home_anchors, axis=0)[:2].max())
     reach = 0.3 * extent
-    start = robot.home.copy() if team else _place(rng, robot, reach)
-    ends = [_place(rng, robot, reach) for _ in range(10)]
+    start = robot.home.copy() if team else resting_place(rng, robot, reach)
+    ends = [resting_place(rng, robot, reach) for _ in range(10)]
     end = max(ends, key=lambda pose: float(np.linalg.norm((pose - start)[:3])))
     if team:
         end = start + np.r_[2.0, rng.uniform(-1, 1), rng.uniform(0, 0.5), 0, 0, 0]
@@ -302,7 +243,7 @@ def _fast(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
         "duration": {"min": 0.2, "max": 20.0},
         "objective": {"time": 0.2, "jerk": 1e3},
         "tube": {"position": "free", "attitude": float(rng.choice([0.0, 0.2]))},
-        "base": _base(rng, robot),
+        "base": free_base(rng, robot),
         "limits": limits,
         "scheme": str(rng.choice(["linear", "linear", "hermite", "hermite", "linear"])),
         "steps": 40,
@@ -343,16 +284,12 @@ def _from_a_limit(
     return {}
 
 
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)
-
-
 def _moving(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     """Return a task that begins while the platform moves."""
     name = OF_SPACE[seed % len(OF_SPACE)]
     robot = load(name)
-    size = _size(robot)
-    start, end = _place(rng, robot, 0.2 * size), _place(rng, robot, 0.2 * size)
+    size = extent(robot)
+    start, end = resting_place(rng, robot, 0.2 * size), resting_place(rng, robot, 0.2 * size)
     velocity = np.r_[rng.uniform(-0.1, 0.1, 3) * size, 0, 0, 0]
     measured = start + np.r_[rng.uniform(-0.01, 0.01, 3) * size, 0, 0, 0]
     return name, {
@@ -360,7 +297,7 @@ def _moving(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
         "duration": float(rng.uniform(3.0, 6.0)),
         "tube": {"position": "free"},
         "steps": 40,
-        "base": _base(rng, robot),
+        "base": free_base(rng, robot),
         "initial": {"pose": measured.tolist(), "velocity": velocity.tolist()},
     }
 
@@ -369,17 +306,17 @@ def _phases(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
     """Return a task that picks a load up, carries it and puts it down, which may be too heavy."""
     name = OF_SPACE[seed % len(OF_SPACE)]
     robot = load(name)
-    size = _size(robot)
-    start, end = _place(rng, robot, 0.2 * size), _place(rng, robot, 0.2 * size)
+    size = extent(robot)
+    start, end = resting_place(rng, robot, 0.2 * size), resting_place(rng, robot, 0.2 * size)
     start[3:] = end[3:] = robot.home[3:]
     end[2], up = start[2], np.array([0, 0, rng.uniform(0.05, 0.2) * size, 0, 0, 0])
     body = {"mass": robot.platform.mass, "com": [0.0, 0.0, -float(rng.uniform(0.0, 0.2)) * size]}
     heavy, dynamics = seed % 5 == 0, Dynamics(robot)
 
-    def can_rest(load: dict[str, Any] | None) -> bool:
-        return all(_can_rest(dynamics, at, np.zeros(6), load) for at in (start, end, end + up))
+    def bears(load: dict[str, Any] | None) -> bool:
+        return all(can_rest(dynamics, at, np.zeros(6), load) for at in (start, end, end + up))
 
-    while not heavy and not can_rest(body) and can_rest(None):
+    while not heavy and not bears(body) and bears(None):
         body["mass"] *= 0.7
     body["mass"] *= 4.0 if heavy else float(rng.uniform(0.2, 0.8))
 
@@ -395,13 +332,17 @@ def _phases(rng: np.random.Generator, seed: int) -> tuple[str, dict[str, Any]]:
         move("lower", end + up, end),
         {"name": "set-down", "duration": 0.5, "ground": {}, "load": body},
     ]
-    task: dict[str, Any] = {"phases": phases, "steps": 60, "base": _base(rng, robot)}
+    task: dict[str, Any] = {"phases": phases, "steps": 60, "base": free_base(rng, robot)}
     if not heavy and rng.random() < 0.5:
         task["tube"] = {"position": 0.02 * size}
     return name, task
 
 
-Family = Callable[[np.random.Generator, int], tuple[str, dict[str, Any]]]
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+Family = Callable[[np.random.Generator, int], tuple[str | Robot, dict[str, Any]]]
 
 FAMILIES: dict[str, Family] = {
     "ordinary": _ordinary,
@@ -412,4 +353,10 @@ FAMILIES: dict[str, Family] = {
     "fast": _fast,
     "moving": _moving,
     "phases": _phases,
+    "bodies": random_work.bodies,
+    "feed": random_work.feed,
+    "zones": random_work.zones,
+    "cycles": random_work.cycles,
+    "least": random_work.least,
+    "beams": random_work.beams,
 }

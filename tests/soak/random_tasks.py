@@ -19,7 +19,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from towline.base.errors import TowlineError
-from towline.models import load
 from towline.ocp import MotionStatus, Plan, plan
 from towline.statics.distribution import wrench_problem
 
@@ -75,15 +74,15 @@ def _summary(outcomes: list[Outcome]) -> str:
 
 def attempt(family: str, seed: int) -> Outcome:
     """Plan a task and check what the plan claims."""
-    name, task = random_task(family, seed)
+    robot, task = random_task(family, seed)
     start, reason = time.process_time(), ""
     try:
-        planned = plan(load(name), task.model_copy(update={"output_rate": AUDIT_RATE}))
+        planned = plan(robot, task.model_copy(update={"output_rate": AUDIT_RATE}))
         seconds = time.process_time() - start
         result, reason = wrong(planned) or planned.status.value, planned.reason
     except TowlineError as error:
         result, seconds = f"wrong: {error}", time.process_time() - start
-    return Outcome(family, seed, name, result, reason, seconds)
+    return Outcome(family, seed, robot.name, result, reason, seconds)
 
 
 def wrong(planned: Plan) -> str:
@@ -111,9 +110,12 @@ def wrong(planned: Plan) -> str:
         if certificate is None or certificate.time is None:
             return "wrong: infeasible, but nothing proves it"
         row = int(np.argmin(np.abs(audit.times - certificate.time)))
-        pose, carriers = audit.motion.pose[row], audit.carriers.pose[row]
-        A = planned.scenario.dynamics.wrench_matrix(pose, carriers)
-        motions = [part[row] for part in (*audit.motion, *audit.carriers)]
+        platform, carriers = audit.motion, audit.carriers
+        if not planned.scenario.task.phases:  # the worst time may lie between two instants
+            platform, carriers = planned.scenario.motion(np.array([certificate.time]), planned.deviation)
+            row = 0
+        motions = [part[row] for part in (*platform, *carriers)]
+        A = planned.scenario.dynamics.wrench_matrix(motions[0], motions[3])
         wind = certificate.wind or planned.scenario.wind
         w = planned.scenario.dynamics.required_wrench(*motions, wind=wind)
         load, known, ground = _carried(planned)

@@ -1,8 +1,7 @@
 """Recheck a saved plan by code that shares nothing with the planner: own geometry and dynamics in NumPy.
 
-The motion between the saved instants is the polynomial of degree 5 that has their positions, velocities and
-accelerations: with 1000 instants a second it is the planned one but for some 1e-12 m. Distances are sampled where
-they are small, each time twenty times as densely, down to a step of 0.1 us; all else at twenty times the saved rate.
+Distances are sampled where they are small, each time twenty times as densely, down to a step of 0.1 us; all else at
+twenty times the saved rate.
 Tensions are looked for at instants that are not saved, by SciPy's bounded least squares.
 """
 
@@ -16,7 +15,10 @@ from ruamel.yaml import YAML
 
 from towline.models import Robot
 
-__all__ = ["cable_distance", "least_along", "point_distance", "rechecked", "rotation"]
+from .recheck_work import body_distances, work
+from .saved_motion import SavedMotion, rotation
+
+__all__ = ["cable_distance", "least_along", "point_distance", "rechecked"]
 
 TOUCHING = 2e-6  # [m]: the planner's 1e-6, and the same again by which its distances are rounded
 SHARE = 2e-6  # of a bound, for the same reason
@@ -24,7 +26,6 @@ FINER = 20
 LEVELS = 3
 MOST_SPANS = 3000  # of each level: those with the smallest distances
 LOOKS = 100  # instants at which tensions are looked for
-SMOOTH = 0.02  # of the largest acceleration: more from one instant to the next is a jump, and not interpolated
 GOLDEN = (np.sqrt(5) - 1) / 2
 NARROWED = 45  # times by the golden section: to 4e-10 of a cable
 
@@ -44,7 +45,7 @@ def rechecked(dataset: Any, tolerance: float) -> list[str]:
     yaml = YAML(typ="safe")
     robot = Robot.model_validate(yaml.load(dataset.attrs["robot"]))
     task = yaml.load(dataset.attrs["task"])
-    motion = _Motion(robot, dataset)
+    motion = SavedMotion(robot, dataset)
     wrong = list(_consistent(dataset))
     limits = task.get("limits") or {}
     for place in limits.get("keep_out") or ():
@@ -52,20 +53,10 @@ def rechecked(dataset: Any, tolerance: float) -> list[str]:
     wrong += _apart(motion, limits)
     wrong += _bounded(motion, robot, task, limits)
     wrong += _ends(motion, task)
+    wrong += work(motion, robot, task)
     if not task.get("phases") and not isinstance(task.get("wind"), dict):
         wrong += _tensions(motion, robot, task, dataset, tolerance)
     return wrong
-
-
-def rotation(angles: np.ndarray) -> np.ndarray:
-    """Return Rz(yaw) Ry(pitch) Rx(roll) of angles (..., 3), (..., 3, 3)."""
-    (cr, cp, cy), (sr, sp, sy) = np.moveaxis(np.cos(angles), -1, 0), np.moveaxis(np.sin(angles), -1, 0)
-    rows = [
-        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-        [-sp, cp * sr, cp * cr],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def point_distance(place: Mapping[str, Any], p: np.ndarray) -> np.ndarray:
@@ -100,56 +91,6 @@ def least_along(distance: Callable[[np.ndarray], np.ndarray], p: np.ndarray, q: 
     return best
 
 
-class _Motion:
-    """The motion at any time, and the points of the robot on it."""
-
-    def __init__(self, robot: Robot, dataset: Any):
-        self.robot, self.times = robot, dataset["time"].values
-        self._platform = [dataset[name].values for name in ("pose", "velocity", "acceleration")]
-        self._carriers = [dataset[f"carrier_{name}"].values for name in ("pose", "velocity", "acceleration")]
-
-    def platform(self, times: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield pose, velocity and acceleration, (n, 6) each."""
-        return _quintic(self.times, self._platform, times)
-
-    def carriers(self, times: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the same of all carriers, (n, c, 6) each."""
-        return _quintic(self.times, self._carriers, times)
-
-    def on_platform(self, times: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return points (k, 3) of the platform in {G}, (n, k, 3)."""
-        pose = next(self.platform(times))
-        return pose[:, None, :3] + points @ rotation(pose[:, 3:]).swapaxes(1, 2)
-
-    def attachments(self, times: np.ndarray) -> np.ndarray:
-        """Return the attachments in {G}, (n, m, 3)."""
-        return self.on_platform(times, self.robot.attachments)
-
-    def anchors(self, times: np.ndarray) -> np.ndarray:
-        """Return the anchors in {G}, (n, m, 3)."""
-        pose, owner = next(self.carriers(times)), self.robot.carrier_of_cable
-        return pose[:, owner, :3] + np.einsum("nmij,mj->nmi", rotation(pose[..., 3:])[:, owner], self.robot.anchors)
-
-    def cables(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return both ends of all cables."""
-        return self.attachments(times), self.anchors(times)
-
-
-def _quintic(saved: np.ndarray, motion: list[np.ndarray], times: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield position, velocity and acceleration at `times` of the polynomials of degree 5 between saved instants."""
-    i = np.clip(np.searchsorted(saved, times, side="right") - 1, 0, len(saved) - 2)
-    wide = (-1, *[1] * (motion[0].ndim - 1))
-    h, s = (saved[i + 1] - saved[i]).reshape(wide), ((times - saved[i]) / (saved[i + 1] - saved[i])).reshape(wide)
-    x, v, a = (part[i] for part in motion)
-    x_end, v_end, a_end = (part[i + 1] for part in motion)
-    c1, c2 = h * v, h**2 * a / 2
-    d, e, f = x_end - x - c1 - c2, h * v_end - c1 - 2 * c2, h**2 * a_end - 2 * c2
-    c3, c4, c5 = 10 * d - 4 * e + f / 2, -15 * d + 7 * e - f, 6 * d - 3 * e + f / 2
-    yield x + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
-    yield (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / h
-    yield (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / h**2
-
-
 def _consistent(dataset: Any) -> Iterator[str]:
     """Yield whether saved positions and velocities are not those of one motion, by the trapezoid rule."""
     h = np.diff(dataset["time"].values)
@@ -164,7 +105,7 @@ def _consistent(dataset: Any) -> Iterator[str]:
                 yield f"the saved {body}motion is not that of its derivatives"
 
 
-def _near(motion: _Motion, place: Mapping[str, Any]) -> list[str]:
+def _near(motion: SavedMotion, place: Mapping[str, Any]) -> list[str]:
     """Return what comes too near to a place."""
     riding, wrong = place.get("frame") == "platform", []
     robot, name = motion.robot, place.get("name", "obstacle")
@@ -175,7 +116,7 @@ def _near(motion: _Motion, place: Mapping[str, Any]) -> list[str]:
         pose = next(motion.platform(times))
         return (points - pose[:, None, :3]) @ rotation(pose[:, 3:])
 
-    def of_platform(times: np.ndarray) -> np.ndarray:
+    def of_points(times: np.ndarray) -> np.ndarray:
         return point_distance(place, motion.on_platform(times, np.vstack([robot.attachments, robot.platform.com])))
 
     def of_carriers(times: np.ndarray) -> np.ndarray:
@@ -185,6 +126,8 @@ def _near(motion: _Motion, place: Mapping[str, Any]) -> list[str]:
         return cable_distance(place, *(own(times, ends) for ends in motion.cables(times)))
 
     moving = [i for i, carrier in enumerate(robot.carriers) if carrier.moves]
+    body = robot.platform.body
+    of_platform = of_points if body is None else body_distances(body.model_dump(), place, motion)
     kinds = [("platform", of_platform)] * (not riding) + [("carriers", of_carriers)] * bool(moving)
     for about, distances in (*kinds, ("cables", of_cables)):
         least = place.get(about, "radius" if about == "carriers" else 0.0)
@@ -194,7 +137,7 @@ def _near(motion: _Motion, place: Mapping[str, Any]) -> list[str]:
     return wrong
 
 
-def _apart(motion: _Motion, limits: Mapping[str, Any]) -> list[str]:
+def _apart(motion: SavedMotion, limits: Mapping[str, Any]) -> list[str]:
     """Return which carriers and cables come too near to each other."""
     robot, wrong = motion.robot, []
     if (least := limits.get("carrier_separation")) is not None:
@@ -226,7 +169,7 @@ def _apart(motion: _Motion, limits: Mapping[str, Any]) -> list[str]:
     return wrong
 
 
-def _kept(motion: _Motion, distances: Points, least: float | np.ndarray, about: str) -> list[str]:
+def _kept(motion: SavedMotion, distances: Points, least: float | np.ndarray, about: str) -> list[str]:
     """Return the text of distances (n, k) of which one is below its least, one or (k,) [m], sampled where near it."""
     start, end = motion.times[:-1], motion.times[1:]
     values = distances(motion.times) - least
@@ -251,9 +194,9 @@ def _kept(motion: _Motion, distances: Points, least: float | np.ndarray, about: 
     return []
 
 
-def _bounded(motion: _Motion, robot: Robot, task: Mapping[str, Any], limits: Mapping[str, Any]) -> list[str]:
+def _bounded(motion: SavedMotion, robot: Robot, task: Mapping[str, Any], limits: Mapping[str, Any]) -> list[str]:
     """Return speeds, accelerations, lengths and places that are beyond their bounds."""
-    fine = np.linspace(motion.times[0], motion.times[-1], FINER * (len(motion.times) - 1) + 1)
+    fine = motion.looks(FINER)
     pose, velocity, acceleration = motion.platform(fine)
     wrong = []
 
@@ -294,7 +237,7 @@ def _bounded(motion: _Motion, robot: Robot, task: Mapping[str, Any], limits: Map
     return wrong
 
 
-def _ends(motion: _Motion, task: Mapping[str, Any]) -> list[str]:
+def _ends(motion: SavedMotion, task: Mapping[str, Any]) -> list[str]:
     """Return whether a line does not start and end where it must."""
     path, given = task.get("path") or {}, task.get("initial")
     if path.get("kind") != "line" or (path.get("frame") or "world") != "world":
@@ -306,7 +249,7 @@ def _ends(motion: _Motion, task: Mapping[str, Any]) -> list[str]:
     return ["an end of the line is missed"] if rests and not task.get("final") and max(far) > 1e-6 else []
 
 
-def _wrenches(motion: _Motion, robot: Robot, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _wrenches(motion: SavedMotion, robot: Robot, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return directions of the cables (n, m, 3), wrench matrices and required wrenches by Newton and Euler."""
     pose, velocity, acceleration = motion.platform(times)
     R, com = rotation(pose[:, 3:]), np.array(robot.platform.com)
@@ -339,7 +282,7 @@ def _spin(angles: np.ndarray, rates: np.ndarray, second: np.ndarray) -> tuple[np
     return spin, turning
 
 
-def _tensions(motion: _Motion, robot: Robot, task: Mapping[str, Any], dataset: Any, tolerance: float) -> list[str]:
+def _tensions(motion: SavedMotion, robot: Robot, task: Mapping[str, Any], dataset: Any, tolerance: float) -> list[str]:
     """Return whether saved tensions are none, or none exist between the saved instants."""
     from scipy.optimize import lsq_linear
 
@@ -364,21 +307,37 @@ def _tensions(motion: _Motion, robot: Robot, task: Mapping[str, Any], dataset: A
     rng = np.random.default_rng(0)
     room = np.minimum(tensions - low, high - tensions).min(axis=1)
     rows = np.unique(np.concatenate([np.argsort(room[:-1])[: LOOKS // 2], rng.integers(0, len(times) - 1, LOOKS // 2)]))
-    change = np.abs(np.diff(dataset["acceleration"].values[..., :3], axis=0)).max(axis=1)
-    rows = rows[change[rows] <= SMOOTH * np.abs(dataset["acceleration"].values[..., :3]).max()]  # not where it jumps
+    rows = rows[motion.smooth[rows]]
     at = times[rows] + rng.uniform(0.2, 0.8, len(rows)) * (times[rows + 1] - times[rows])
-    _, A, w = _wrenches(motion, robot, at)
+    u, A, w = _wrenches(motion, robot, at)
+    across, needed = _across(motion, robot, at, u)
+    rows, values = np.concatenate([scale[:, None] * A, across], axis=1), np.concatenate([scale * w, needed], axis=1)
     spare = np.where(low < high, low, low - 1e-12), np.where(low < high, high, high + 1e-12)
-    found = np.array(
-        [lsq_linear((scale * a.T).T, scale * b, spare, "bvls", tol=1e-14).x for a, b in zip(A, w, strict=True)]
-    )
+    found = np.array([lsq_linear(a, b, spare, "bvls", tol=1e-14).x for a, b in zip(rows, values, strict=True)])
     if missing(at, found).max() > allowed:
         when = at[missing(at, found).argmax()]
         wrong.append(f"no tensions within {missing(at, found).max():.3g} N of the wrench at t = {when:.6f} s")
     return wrong + (_efforts(motion, robot, at, found) if robot.m <= len(robot.platform.dof) else [])
 
 
-def _efforts(motion: _Motion, robot: Robot, times: np.ndarray, tensions: np.ndarray) -> list[str]:
+def _across(motion: SavedMotion, robot: Robot, times: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows (n, 2 k, m) of tensions, and the forces (n, 2 k) that they must be, across the thrust of quadrotors.
+
+    Where cables pull a beam apart, the wrench alone leaves open by how much.
+    """
+    pose, _, acceleration = motion.carriers(times)
+    rows, needed = [np.zeros((len(times), 0, robot.m))], [np.zeros((len(times), 0))]
+    for i, carrier in enumerate(robot.carriers):
+        if carrier.body is not None:
+            turned = rotation(pose[:, i, 3:])[..., :2]
+            pull = np.einsum("nij,nki->njk", turned, u) * (robot.carrier_of_cable == i)
+            rows.append(pull)
+            force = carrier.body.mass * (np.array(robot.gravity) - acceleration[:, i, :3])
+            needed.append(np.einsum("nij,ni->nj", turned, force))
+    return np.concatenate(rows, axis=1), np.concatenate(needed, axis=1)
+
+
+def _efforts(motion: SavedMotion, robot: Robot, times: np.ndarray, tensions: np.ndarray) -> list[str]:
     """Return whether a quadrotor needs another thrust than it has, or a force across it."""
     u, _, _ = _wrenches(motion, robot, times)
     pose, _, acceleration = motion.carriers(times)
