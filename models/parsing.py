@@ -178,7 +178,7 @@ def _type_in(place: tuple[Any, ...]) -> int | None:
 def _without_branches(details: list[Any]) -> list[Any]:
     """Return pydantic's complaints with one for each choice of types instead of one for each type.
 
-    It names the types in the place. A mapping is meant for the type that takes one, and so is a list; of a plain value
+    It names the types in the place. A mapping is meant for a type that takes one, and so is a list; of a plain value
     all types report what they accept.
     """
     details = [detail | {"msg": _plainly(detail["msg"])} for detail in details]
@@ -196,6 +196,12 @@ def _without_branches(details: list[Any]) -> list[Any]:
         taking = [one for one in branches if one["type"] not in ("float_type", "literal_error", "tuple_type")]
         listed = [one for one in branches if str(one["loc"][at]).startswith("tuple[") and one["type"] != "tuple_type"]
         if isinstance(first["input"], dict) and taking:
+            types = sorted({one["loc"][at] for one in taking})
+            if len(types) > 1:  # the mapping is meant for the one that it fits best, whose name stays in the place
+                best = min(([one for one in taking if one["loc"][at] == its] for its in types), key=len)
+                name = re.findall(r"\w+", best[0]["loc"][at])[-1]  # of function-after[check(), Name]
+                result += [one | {"loc": (*one["loc"][:at], name, *one["loc"][at + 1 :])} for one in best]
+                continue
             result += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in taking]
         elif listed:
             result += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in listed]
@@ -305,11 +311,15 @@ def _step(node: dict[str, Any], part: int | str, schema: dict[str, Any]) -> dict
 def _walk(location: tuple[int | str, ...], schema: dict[str, Any]) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """Return the dotted name of a place in the data, the schema of the object that holds it, and its own.
 
-    Pydantic puts a union's tag into the place (carriers, 0, prescribed, home); a user's file has no such level.
+    Pydantic puts a union's tag into the place (carriers, 0, prescribed, home), or the name of a type (wind, WindBox,
+    min); a user's file has no such level.
     """
-    field = ""
+    field, types = "", schema.get("$defs", {})
     node, holder = schema, schema
     for part in location:
+        if part in types:
+            node = types[part]
+            continue
         if part not in node.get("discriminator", {}).get("mapping", {}):
             holder = node
             field += f"[{part}]" if isinstance(part, int) else f".{part}" if field else str(part)

@@ -9,7 +9,7 @@ from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
-from towline.ocp.tasks.wind_set import WindBox, decisive_winds_at, inner_winds
+from towline.ocp.tasks.wind_set import WindBox, WindDisc, decisive_winds_at, possible_winds_at
 from towline.solvers import TensionProblem, certify
 
 GRAVITY = 9.81
@@ -53,6 +53,24 @@ def test_every_force_of_a_box_is_in_the_hull_of_the_decisive_ones(aero):
         assert in_hull(dynamics.aerodynamic_wrench(pose, velocity, samples)[:, :3], corners)
 
 
+@pytest.mark.parametrize("aero", [{}, {"lift": 0.9}, {"lift": 0}, {"form": "printed"}])
+@pytest.mark.parametrize("speed", [0.0, 1.0, 7.0])
+def test_every_force_of_a_disc_is_in_the_hull_of_the_decisive_ones(aero, speed):
+    robot, rng, disc = flying(**aero), np.random.default_rng(4), WindDisc(speed=5)
+    dynamics, pose = Dynamics(robot), np.zeros(6)
+    angle = rng.uniform(0, 2 * np.pi)
+    velocity = np.array([speed * np.cos(angle), speed * np.sin(angle), 0.5, 0, 0, 0])
+    winds = np.vstack(decisive_winds_at(disc, robot, pose[None], velocity[None]))
+    radius, angles = 5 * np.sqrt(rng.random(60)), rng.uniform(0, 2 * np.pi, 60)
+    radius[::2] = 5
+    samples = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros(60)], axis=1)
+    force = dynamics.aerodynamic_wrench(pose, velocity, samples)[:, :3]
+    assert in_hull(force, dynamics.aerodynamic_wrench(pose, velocity, winds)[:, :3])
+    possible = np.vstack(possible_winds_at(disc, robot, pose[None], velocity[None]))
+    for those in (possible, disc.inner(200), *([winds] if speed == 0 else [])):
+        assert np.linalg.norm(those, axis=1).max() <= 5 * (1 + 1e-12)
+
+
 def test_the_corners_of_a_box_alone_are_not_enough_with_lift():
     """Between opposite winds the lift has its least: so the calm counts too."""
     robot = flying(lift=0.9)
@@ -64,7 +82,7 @@ def test_the_corners_of_a_box_alone_are_not_enough_with_lift():
 
 def test_inner_winds_fill_the_box():
     box = WindBox(min=(-1, 2, 0), max=(3, 4, 0))
-    winds = inner_winds(box, 4000)
+    winds = box.inner(4000)
     assert ((winds >= box.min) & (winds <= box.max)).all()
     counts, *_ = np.histogram2d(*winds[np.arange(1, 4001) % 4 != 0, :2].T, bins=10)
     assert counts.min() > 0.6 * counts.mean()
@@ -147,6 +165,43 @@ def test_a_rest_leaves_exactly_as_much_as_the_box_needs(share, feasible):
             assert found.audit.certificate.wind == pytest.approx([min(wind["min"][0], 0), wind["max"][1], 0])
 
 
+@pytest.mark.parametrize(("share", "feasible"), [(0.999, True), (1.001, False)])
+def test_a_rest_leaves_exactly_as_much_as_the_disc_needs(share, feasible):
+    """The same load in wind from any side: at rest the forces fill |X| + |Y| <= F, and along an axis they do most.
+
+    Between two axes, X = Y = F / 2, the inner tension of four cables lets the slackest lose half as much.
+    """
+    u_x, u_z, t_min = 0.5 / np.sqrt(1.5), 1 / np.sqrt(1.5), 3.0
+    speed = share * np.sqrt(u_x * (2 * GRAVITY / u_z - 4 * t_min) / (0.5 * 1.29 * 0.8 * 0.5))
+    task = {"path": {"kind": "rest", "pose": [0, 0, 0]}, "duration": 0.5, "wind": {"speed": speed}}
+    found = plan(hanging(t_min), task)
+    assert found.status is (MotionStatus.FEASIBLE if feasible else MotionStatus.INFEASIBLE)
+    if not feasible:
+        assert sorted(np.abs(found.certificate.wind)) == pytest.approx([0, 0, speed])
+
+
+def test_a_moving_platform_is_called_infeasible_only_in_a_wind_of_the_disc():
+    """Those that enclose the disc are faster while the platform moves; they alone prove nothing."""
+    line = {"kind": "line", "start": [-0.1, 0, 0], "end": [0.1, 0.1, 0]}
+    statuses = {}
+    for speed in np.linspace(3.0, 5.0, 21):
+        found = plan(hanging(1.0), {"path": line, "duration": 0.8, "wind": {"speed": float(speed)}})
+        statuses[found.status] = statuses.get(found.status, 0) + 1
+        if found.status is MotionStatus.INFEASIBLE:
+            assert np.linalg.norm(found.certificate.wind) <= speed * (1 + 1e-12)
+        if found.status is MotionStatus.NOT_FOUND:
+            assert found.certificate is None
+            assert "that enclose those of the disc" in found.report().splitlines()[0]
+        if found.feasible:
+            rng, audit = np.random.default_rng(0), found.audit
+            for _ in range(20):
+                angle, row = rng.uniform(0, 2 * np.pi), int(rng.integers(len(audit.times)))
+                wind = speed * np.array([np.cos(angle), np.sin(angle), 0])
+                assert feasible_in(found.scenario.robot, audit.motion, audit.carriers, wind, row)
+    assert min(statuses[MotionStatus.FEASIBLE], statuses[MotionStatus.INFEASIBLE]) > 5
+    assert statuses.get(MotionStatus.NOT_FOUND, 0) < 10, statuses
+
+
 def test_a_free_motion_is_planned_so_that_every_wind_is_held():
     """At random instants, in winds of the box, a linear program finds tensions; without the box it does not."""
     robot = load("wang-flying")
@@ -163,6 +218,20 @@ def test_a_free_motion_is_planned_so_that_every_wind_is_held():
         assert feasible_in(robot, all_winds.audit.motion, all_winds.audit.carriers, wind, row)
         missed += not feasible_in(robot, calm.audit.motion, calm.audit.carriers, wind, row)
     assert missed > 10
+
+
+def test_a_free_motion_is_planned_so_that_wind_from_any_side_is_held():
+    """At random instants, in winds of the disc, a linear program finds tensions."""
+    robot = load("wang-flying")
+    task = {"path": {**CIRCLE, "radius": 0.5}, "base": FREE, "steps": 30, "wind": {"speed": 9}}
+    found = plan(robot, task)
+    assert found.feasible, found.report()
+    assert "any horizontal one up to 9 m/s" in found.report()
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        row, angle = int(rng.integers(len(found.audit.times))), rng.uniform(0, 2 * np.pi)
+        wind = 9 * np.array([np.cos(angle), np.sin(angle), 0])
+        assert feasible_in(robot, found.audit.motion, found.audit.carriers, wind, row)
 
 
 def test_a_box_that_nothing_holds_is_told_with_the_closest_motion():
@@ -211,6 +280,9 @@ def test_margins_count_in_every_wind():
         ({"min": [1, 0, 0], "max": [0, 0, 0]}, "wind.min must be at most max, 0 m/s along x, got 1 m/s"),
         ({"min": [1, 0, 0]}, "wind.max is missing"),
         ({"min": [1, 0, 0], "max": [1, 0, 0], "mx": [1, 0, 0]}, "is not a known key, did you mean 'max'"),
+        ({"speed": 0}, "wind.speed must be greater than 0, got 0"),
+        ({"sped": 5}, "wind.sped is not a known key, did you mean 'speed'"),
+        ({"speed": 5, "min": [0, 0, 0]}, "wind.min is not a known key"),
         ([1, 0], "wind must be 3 numbers, got [1, 0]"),
         ([1, 0, "fast"], "wind[2] must be a number"),
         (3, "wind must be"),

@@ -64,7 +64,7 @@ def worst_certificate(scenario: Scenario, time: float, platform: Motion, carrier
         extended, limits, _ = _extended(scenario, phase, A[None], w, np.zeros((1, robot.m)))
         found = certify(wrench_problem(robot, extended[0], w[0], *limits))
         if found is not None:
-            about = None if scenario.wind_box is None else wind
+            about = None if scenario.wind_set is None else wind
             proofs.append(replace(_of_cables(found, robot.m), wind=about, load=scenario.load_of(time, extreme)))
     return max(proofs, key=lambda proof: proof.shortfall, default=None)
 

@@ -62,8 +62,8 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     distribute = distribution(scenario, times, A)
     # Near the plan's own tensions a redundant robot keeps the planned distribution.
     result = distribute(w, taken_up(scenario, times) if deviation is None else deviation.tensions_at(times))
-    if (box := scenario.wind_box) is not None:
-        result = in_all_winds(distribute, box, motion, w, result)
+    if (winds := scenario.wind_set) is not None:
+        result = in_all_winds(distribute, winds, motion, w, result)
     result = with_all_loads(distribute, times, motion, carriers, result)
     certificate = result.certificate
     if certificate is not None and result.row is not None:

@@ -2,7 +2,7 @@
 
 The violation is the distance, in newtons (moments over `Robot.length`), from the wrench that the motion
 requires to those that the cables can give inside their limits less the task's margin. For a box of winds it is the
-largest such distance of the winds that decide (`wind_set`), and if that is none, of winds inside the box too.
+largest such distance of the winds that decide (`wind_set`), and if that is none, of winds inside their set too.
 """
 
 from contextlib import suppress
@@ -15,7 +15,7 @@ from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
 from ...statics.distribution import wrench_problem
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
-from ..tasks.wind_set import WindBox, as_wind, decisive_winds_at, inner_winds
+from ..tasks.wind_set import WindBox, WindSet, as_wind, decisive_winds_at, possible_winds_at
 
 TOLERANCE = 1e-6  # [N]
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
@@ -144,33 +144,38 @@ def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
 
 
 def in_all_winds(
-    distribute: Distribution, box: WindBox, motion: Motion, w: np.ndarray, middle: AuditedTensions
+    distribute: Distribution, every: WindSet, motion: Motion, w: np.ndarray, middle: AuditedTensions
 ) -> AuditedTensions:
-    """Return the result of the worst wind of a box at each instant, whose certificate has its wind.
+    """Return the result of the worst wind of a set at each instant, whose certificate has its wind.
 
-    `middle` is the result of the planned tensions for w (n, 6), the wrench in the box's middle. At no wind is the
-    wrench farther from the available ones than at those that decide: if these pass, others in the box are tried only to
-    check that.
+    `middle` is the result of the planned tensions for w (n, 6), the wrench in the set's middle. At no wind is the
+    wrench farther from the available ones than at those that decide: if these pass, others are tried only to check
+    that. A certificate is one of a wind of the set, which those that decide need not be.
     """
     scenario = distribute.scenario
-    without_air = w + scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, np.array(box.middle))
+    without_air = w + scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, np.array(every.middle))
     planned, n = np.nan_to_num(middle.tensions), len(motion.pose)
-    worst = middle._replace(certificate=middle.certificate and replace(middle.certificate, wind=box.middle))
+    worst = middle._replace(certificate=middle.certificate and replace(middle.certificate, wind=every.middle))
 
-    def include(winds: np.ndarray) -> None:
+    def include(winds: np.ndarray, proves: bool = True) -> None:
         nonlocal worst
         push = scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, winds)
         result = distribute(without_air - push, planned)
-        if result.certificate is not None and result.row is not None and _shortfall(result) > _shortfall(worst):
-            proof = replace(result.certificate, wind=as_wind(winds[result.row]))
+        found = result.certificate if proves else None
+        if found is not None and result.row is not None and found.shortfall > _shortfall(worst):
+            proof = replace(found, wind=as_wind(winds[result.row]))
             worst = worst._replace(certificate=proof, row=result.row)
         violation, beyond = np.maximum(worst.violation, result.violation), max(worst.beyond, result.beyond)
         worst = worst._replace(violation=violation, beyond=beyond)
 
-    for winds in decisive_winds_at(box, scenario.robot, motion.pose, motion.velocity):
-        include(winds)
+    exact = isinstance(every, WindBox)
+    for winds in decisive_winds_at(every, scenario.robot, motion.pose, motion.velocity):
+        include(winds, proves=exact)
     if worst.violation.max() <= distribute.tolerance:
-        for winds in inner_winds(box, INNER_WINDS * n).reshape(n, INNER_WINDS, 3).swapaxes(0, 1):
+        for winds in every.inner(INNER_WINDS * n).reshape(n, INNER_WINDS, 3).swapaxes(0, 1):
+            include(winds)
+    elif not exact:
+        for winds in possible_winds_at(every, scenario.robot, motion.pose, motion.velocity):
             include(winds)
     return worst
 

@@ -90,16 +90,17 @@ def _in_frame(scenario: Scenario, wrench: ca.SX, carriers: list[list[ca.SX]]) ->
 
 def _decisive(scenario: Scenario, load: ca.SX, platform: list[ca.SX]) -> list[ca.SX]:
     """Return by how much less wrench the cables must give in {G} in each decisive wind, or with each extreme load."""
-    box, robot, (pose, velocity, _) = scenario.wind_box, scenario.robot, platform
-    if box is None and not scenario.phases.extremes:
+    winds, robot, (pose, velocity, _) = scenario.wind_set, scenario.robot, platform
+    if winds is None and not scenario.phases.extremes:
         return []
-    if box is None:
+    if winds is None:
         loads = [load[:10], *ca.vertsplit(load[-10 * scenario.phases.extremes :], 10)]
         given, *others = [scenario.dynamics.carried_wrench(*platform, load=each) for each in loads]
         return [given - other for other in others]
-    middle = aerodynamic_wrench(robot, pose, velocity, ca.DM(box.middle))
+    middle = aerodynamic_wrench(robot, pose, velocity, ca.DM(winds.middle))
     return [
-        aerodynamic_wrench(robot, pose, velocity, wind) - middle for wind in decisive_winds(box, robot, pose, velocity)
+        aerodynamic_wrench(robot, pose, velocity, wind) - middle
+        for wind in decisive_winds(winds, robot, pose, velocity)
     ]
 
 

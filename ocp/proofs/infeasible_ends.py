@@ -260,7 +260,7 @@ def _without_tensions(
             if found is None or max(float(result.violation[0]), result.beyond) <= distribute.tolerance:
                 continue
             if worst is None or found.shortfall > worst.shortfall:
-                at = None if scenario.wind_box is None else wind
+                at = None if scenario.wind_set is None else wind
                 time = float(times[row])
                 worst = replace(found, time=time, wind=at, load=scenario.load_of(time, extreme))
     return worst

@@ -15,7 +15,7 @@ from ..result import PlanData
 from ..tasks.paths import LinePath
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.task_limits import OF_BODY
-from ..tasks.wind_set import WindBox
+from ..tasks.wind_set import WindBox, WindDisc
 from ..warnings.outside_frame import LEAVES
 from ..warnings.slipped_units import TOO_LARGE
 
@@ -137,7 +137,7 @@ def _times(excess: Excess) -> str:
 def _wind(plan: PlanData) -> list[Fact]:
     """Return the force of a task's wind on the platform at rest, in proportion to its weight."""
     wind, scenario = plan.scenario.task.wind, plan.scenario
-    if wind is None or isinstance(wind, WindBox) or not any(wind):
+    if wind is None or isinstance(wind, WindBox | WindDisc) or not any(wind):
         return []
     home, still = scenario.robot.home, np.zeros(6)
     force = float(np.linalg.norm(scenario.dynamics.aerodynamic_wrench(home, still, wind=np.array(wind))[:3]))

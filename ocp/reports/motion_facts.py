@@ -8,7 +8,7 @@ from ...models.part import Vector3
 from ..result import PlanData
 from ..tasks.paths import FeedPath, PathBase, TimedPath
 from ..tasks.task import Task
-from ..tasks.wind_set import WindBox
+from ..tasks.wind_set import WindBox, WindDisc
 
 LOADS = "any within their tolerances; the tensions shown are those with the loads as given"
 
@@ -78,7 +78,9 @@ def wind(velocity: Vector3) -> str:
 
 
 def _task_wind(task: Task) -> str:
-    """Return the task's wind, or its box and the wind of the planned tensions."""
+    """Return the task's wind, or its set of winds and the wind of the planned tensions."""
+    if isinstance(task.wind, WindDisc):
+        return f"any horizontal one up to {quantity(task.wind.speed, 'm/s')}; the tensions shown are those in still air"
     if isinstance(task.wind, WindBox):
         box = task.wind
         return f"any from {wind(box.min)} to {wind(box.max)}; the tensions shown are those in {wind(box.middle)}"

@@ -158,7 +158,7 @@ def _of_the_motion(plan: PlanData) -> str:
         return f"shortest duration {quantity(plan.duration, 's', 6)}"
     if plan.feasible:
         # The planned tensions are those of one wind and load; with the others they exist, with the required margin.
-        where = ", in any of its winds" if plan.scenario.wind_box is not None else ""
+        where = ", in any of its winds" if plan.scenario.wind_set is not None else ""
         where = ", with any of its loads" if plan.scenario.phases.extremes else where
         margin = plan.scenario.hard_margin if where else plan.margin
         if margin is None or margin < WORTH_A_NUMBER:

@@ -12,7 +12,7 @@ from ...models.motion_file import dimensions, motion_variables, over
 from ...models.parsing import to_yaml
 from ..result import PlanData
 from ..tasks.task_limits import AnyKeepOut, Block, ConvexMesh, Sphere
-from ..tasks.wind_set import WindBox
+from ..tasks.wind_set import WindBox, WindDisc
 
 ROUND = np.linspace(0.0, 2 * np.pi, 41)
 
@@ -53,7 +53,7 @@ def trajectory(plan: PlanData) -> Contents:
     }
     if plan.law is not None and not plan.feasible:
         attributes["no_reference"] = "one of time_along without a feasible time law"
-    if task.wind is not None and not isinstance(task.wind, WindBox):
+    if task.wind is not None and not isinstance(task.wind, WindBox | WindDisc):
         attributes["wind"] = np.array(task.wind)  # [m/s] in G
     coordinates |= dimensions(robot, audit.times[rows])
     return Contents(variables, coordinates, attributes)

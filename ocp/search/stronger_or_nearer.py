@@ -18,7 +18,7 @@ from ..tasks.lay_out import lay_out
 from ..tasks.paths import LinePath
 from ..tasks.scenario import AUDIT_RATE, MOST_SAMPLES, Scenario
 from ..tasks.status import MotionStatus
-from ..tasks.wind_set import WindBox
+from ..tasks.wind_set import WindBox, WindDisc
 from .relaxations import LONGER, near_motion, rounded, slower
 from .search import Search
 
@@ -52,7 +52,12 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     tasks in phases, boxes of winds and uncertain robots.
     """
     task = scenario.task
-    if task.phases is not None or isinstance(task.wind, WindBox) or task.robust is not None or scenario.carrier_free:
+    if (
+        task.phases is not None
+        or isinstance(task.wind, WindBox | WindDisc)
+        or task.robust is not None
+        or scenario.carrier_free
+    ):
         return []
     others = [excess for excess in audit.excess if excess.limit != TENSIONS]
     factors = [slower(excess) for excess in others]
@@ -95,7 +100,7 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
 def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the strongest wind from the same direction that is feasible."""
     wind = scenario.task.wind
-    if wind is None or isinstance(wind, WindBox) or not any(wind):
+    if wind is None or isinstance(wind, WindBox | WindDisc) or not any(wind):
         return []
     velocity = np.array(wind)
     speed = float(np.linalg.norm(velocity))

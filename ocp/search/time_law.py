@@ -25,7 +25,7 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
     task = scenario.task
     if not all(isinstance(path, RestPath) for path in scenario.carrier_paths.values()):
         return None, "not computed: carriers have time laws of their own"
-    if scenario.wind_box is not None:
+    if scenario.wind_set is not None:
         return None, "not computed: in moving air the drag is not proportional to the square of the speed"
     path = task.path
     own = path.natural_duration is not None or getattr(path, "timing", "") == "uniform"

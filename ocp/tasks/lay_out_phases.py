@@ -12,7 +12,7 @@ from .resting import support_forces
 from .scenario import AUDIT_RATE, Scenario
 from .scheme import SCHEMES
 from .task import Task
-from .wind_set import WindBox
+from .wind_set import WindBox, WindDisc
 
 LEAST_STEPS = 4  # of a phase
 LEAST_INSTANTS = 10  # of the audit, in a phase
@@ -70,7 +70,7 @@ def _check_ground(robot: Robot, task: Task, where: str) -> None:
         raise InputError(f"{where}: phases.ground must be left out for robot {robot.name!r}, which has no gravity")
     if task.path.frame != "world":
         raise InputError(f"{where}: phases.path.frame must be 'world' on the ground, got {task.path.frame!r}")
-    if isinstance(task.wind, WindBox):
+    if isinstance(task.wind, WindBox | WindDisc):
         raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with a phase on the ground, got a box")
 
 
@@ -83,7 +83,7 @@ def _check_tolerances(task: Task, where: str) -> None:
         ground = any(other.ground is not None for other in task.phases or ())
         for other, what in (
             (ground, "phases on the ground"),
-            (isinstance(task.wind, WindBox), "a range of winds"),
+            (isinstance(task.wind, WindBox | WindDisc), "a range of winds"),
             (task.robust, "robust"),
         ):
             if other:

@@ -26,7 +26,7 @@ from .paths import AnyPath, Motion, RestPath, TimedPath, WaypointPath
 from .phases import LaidPhase, Phases
 from .scheme import SCHEMES, Scheme
 from .task import Task
-from .wind_set import WindBox, as_wind, choices, decisive_winds_at
+from .wind_set import WindBox, WindDisc, WindSet, as_wind, possible_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]: the audit looks at every millisecond
@@ -91,29 +91,30 @@ class Scenario(Displayed):
 
     @property
     def wind(self) -> Vector3 | None:
-        """Return the wind of the planned tensions in {G} [m/s], of a box its middle, or None without air."""
-        return self.task.wind.middle if isinstance(self.task.wind, WindBox) else self.task.wind
+        """Return the wind of the planned tensions in {G} [m/s], of several the middle, or None without air."""
+        wind = self.task.wind
+        return wind.middle if isinstance(wind, WindBox | WindDisc) else wind
 
     @property
-    def wind_box(self) -> WindBox | None:
-        """Return the box of winds in which tensions must exist; None if the task has one wind or none."""
-        return self.task.wind if isinstance(self.task.wind, WindBox) else None
+    def wind_set(self) -> WindSet | None:
+        """Return the winds in which tensions must exist; None if the task has one wind or none."""
+        return self.task.wind if isinstance(self.task.wind, WindBox | WindDisc) else None
 
     def cases_at(self, pose: np.ndarray, velocity: np.ndarray) -> list[tuple[Vector3 | None, int | None]]:
         """Return the winds and the extreme loads with which tensions must exist at a motion (6,) in {G}.
 
-        For a box of winds, these are the ones that decide. A wind of None means no air, a load of None the given load.
+        Of several winds, these are the worst. A wind of None means no air, a load of None the given load.
         """
-        if self.wind_box is None:
+        if self.wind_set is None:
             return [(self.wind, load) for load in (None, *range(self.phases.extremes))]
-        winds = decisive_winds_at(self.wind_box, self.robot, pose[None], velocity[None])
+        winds = possible_winds_at(self.wind_set, self.robot, pose[None], velocity[None])
         return [(as_wind(values[0]), None) for values in winds]
 
     @property
     def decisive(self) -> int:
-        """Return how many winds of the box, or extreme loads, decide whether tensions exist with all."""
-        aero, box = self.robot.platform.aero, self.wind_box
-        return self.phases.extremes if aero is None or box is None else len(choices(box, aero))
+        """Return how many winds, or extreme loads, decide whether tensions exist with all."""
+        aero, winds = self.robot.platform.aero, self.wind_set
+        return self.phases.extremes if aero is None or winds is None else winds.count(aero)
 
     def lasting(self, seconds: float) -> Scenario:
         """Return the scenario with another duration [s]."""

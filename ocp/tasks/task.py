@@ -23,7 +23,7 @@ from .paths import AnyPath
 from .phase import Phase, path_of
 from .scheme import SchemeName
 from .task_limits import TaskLimits
-from .wind_set import WindBox
+from .wind_set import WindBox, WindDisc
 
 FREE_TURN = 1.2  # [rad], from the path's angles, short of where Euler angles lose their meaning
 
@@ -197,11 +197,11 @@ class Task(Part):
         "instant of the plan [s]; checked every 0.02 s, or at 200 instants of plans of more than 4 s; default: not "
         "checked",
     )
-    wind: Vector3 | WindBox | None = Field(
+    wind: Vector3 | WindBox | WindDisc | None = Field(
         default=None,
-        description="wind on the platform, constant, in {G} [m/s], or a range {min, max}: tensions exist for every "
-        "wind velocity in the range, and the planned tensions refer to its middle; default: no aerodynamic "
-        "forces; [0, 0, 0] is still air, with drag on a moving platform",
+        description="wind on the platform, constant, in {G} [m/s], or many: a range {min, max}, or {speed} for every "
+        "horizontal wind up to a speed. Tensions exist for each of them, and the planned tensions refer to the range's "
+        "middle, or still air; default: no aerodynamic forces; [0, 0, 0] is still air, with drag on a moving platform",
     )
     limits: TaskLimits = TaskLimits()
     steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")

@@ -19,7 +19,7 @@ from .paths import WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, Scenario
 from .task import FreeBase, Task
 from .task_limits import OF_CARRIERS
-from .wind_set import WindBox
+from .wind_set import WindBox, WindDisc
 
 ENDING = ("waypoints", "samples", "feed", "sequence", "return")  # kinds of paths that end at a time of their own
 TOLERANCE = 1e-9  # [m, rad, and per second], of exact waypoints and starts on their path
@@ -85,7 +85,7 @@ def _check_wind(robot: Robot, task: Task, where: str) -> None:
     """Refuse wind for a robot without `aero`, and a box of winds if the motion depends on the tensions."""
     if task.wind is not None and robot.platform.aero is None:
         raise InputError(f"{where}: wind must be left out for a robot without platform.aero, such as {robot.name!r}")
-    if not isinstance(task.wind, WindBox):
+    if not isinstance(task.wind, WindBox | WindDisc):
         return
     for carrier in robot.carriers:
         if carrier.efforts:
@@ -107,7 +107,7 @@ def _check_robust(robot: Robot, task: Task, where: str) -> None:
             f"{where}: robust must be left out for a robot with fewer cables than degrees of freedom, because its "
             f"motion depends on its geometry, got {task.robust:g} for {robot.name!r}"
         )
-    if isinstance(task.wind, WindBox):
+    if isinstance(task.wind, WindBox | WindDisc):
         raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with robust, got a box")
     for phase in task.phases or ():
         if phase.ground is not None:

@@ -28,7 +28,7 @@ from ..tasks.paths import CirclePath
 from ..tasks.status import MotionStatus
 from ..tasks.task import FreeBase, GivenBase, Task, read_task
 from ..tasks.task_checks import check_margin
-from ..tasks.wind_set import WindBox
+from ..tasks.wind_set import WindBox, WindDisc
 from .fastest_law import FastestLaw
 from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits
@@ -121,7 +121,7 @@ def _check(robot: Robot, task: Task) -> None:
         raise InputError(f"{where}: limits.soft must be left out to time a path, whose limits are all hard")
     if task.robust is not None:
         raise InputError(f"{where}: robust must be left out to time a path, got {task.robust:g}; plan the task instead")
-    if isinstance(task.wind, WindBox) or (task.wind is not None and any(task.wind)):
+    if isinstance(task.wind, WindBox | WindDisc) or (task.wind is not None and any(task.wind)):
         raise InputError(f"{where}: wind must be [0, 0, 0], still air, or left out to time a path")
     if task.wind is not None and robot.platform.aero is None:
         raise InputError(f"{where}: wind must be left out, since robot {robot.name!r} has no platform.aero")
