@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from towline.models import load
 from towline.ocp import MotionStatus, plan
 
 from .soak import random_families
@@ -30,10 +29,14 @@ def test_the_direct_motion_through_a_narrow_hole_is_where_the_program_starts():
     assert attempt("window", 8108).result == MotionStatus.FEASIBLE
 
 
+def test_a_cycle_passes_its_first_point_also_about_its_fastest_law():
+    """With another reference than the waypoints the start was not fixed: it missed the first point by 1 mm."""
+    assert attempt("cycles", 8112).result == MotionStatus.FEASIBLE
+
+
 def test_the_check_can_see():
     """A plan with a tension beyond its limit, or tensions of another motion, is found out."""
-    name, task = random_task("ordinary", 2)
-    found = plan(load(name), task)
+    found = plan(*random_task("ordinary", 2))
     assert found.feasible
     assert wrong(found) == ""
     audit = found.audit

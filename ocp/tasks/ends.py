@@ -53,9 +53,9 @@ def fixed_values(scenario: Scenario) -> Iterator[FixedValue]:
         orders += [1] * (word in ("exact", "rest"))
         orders += [2] * (word == "rest" and at_rest_without_acceleration(scenario.robot, owner, coordinate))
         through = word == "periodic" and owner is None and task.tube.waypoints == "exact"
-        if through and isinstance(scenario.path, WaypointPath):  # the first point; the last one is the same
-            off = scenario.path.missed(scenario.duration)[0, coordinate]
-            yield FixedValue(0, column, 0, float(off))
+        if through and isinstance(task.path, WaypointPath):  # the first point; the last one is the same
+            off = task.path.points[0][coordinate] - platform.pose[0, coordinate]
+            yield FixedValue(0, column, 0, remainder(off, 2 * np.pi) if coordinate not in POSITION else float(off))
         for end, state in ((0, task.initial), (-1, task.final)):
             given = [] if state is None else list(state.of(owner))
             for order, value in given:
