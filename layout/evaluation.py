@@ -336,7 +336,9 @@ class Evaluation:
         points = [part for layout in layouts for part in parts(layout, m)[:2]]
         i, j = self.pairs.T
         apart = [np.linalg.norm(part[i] - part[j], axis=1) > 1e-9 for part in points]
-        return ~(apart[0] & apart[1]) & ~(apart[2] & apart[3])
+        carrier = self.variables.robot.carrier_of_cable  # in whose frame an anchor is
+        elsewhere = carrier[i] != carrier[j]
+        return ~((apart[0] | elsewhere) & apart[1]) & ~((apart[2] | elsewhere) & apart[3])
 
 
 def _smallest(values: np.ndarray, most: int, below: float) -> np.ndarray:

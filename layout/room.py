@@ -33,7 +33,7 @@ class Room(NamedTuple):
     def with_spare(self, share: float) -> "Room":
         """Return stricter bounds: distances and a frequency that are larger by a share, lengths a little inside."""
         return Room(
-            self.clearance * (1.0 + share),
+            self.clearance + share * max(self.clearance, _LEAST_SPARE) if self.clearance > 0.0 else 0.0,
             self.shortest * (1.0 + _SPARE),
             self.longest * (1.0 - _SPARE),
             tuple(each._replace(least=each.least + share * max(each.least, _LEAST_SPARE)) for each in self.regions),

@@ -1,6 +1,7 @@
 """Designs that keep cables away from bodies and the floor, and stiff: judged from the found robot's file alone."""
 
-from itertools import product
+from itertools import combinations, product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from towline.solvers import capacity_margin
 
 from .stiff_robots import elastic, frequencies
 
+ROOT = Path(__file__).parent.parent
 BOX = {"min": [-1.5, -1.0, 2.0], "max": [1.5, 1.0, 3.0]}
 BODY = {"kind": "box", "min": [-0.5, -0.1, 0.3], "max": [0.5, 0.1, 0.7]}
 LAMP = {"kind": "sphere", "name": "lamp", "centre": [3.2, -2.7, 4.2], "radius": 0.2, "cables": 0.1}
@@ -103,6 +105,21 @@ def test_cables_keep_away_from_bodies_and_the_floor(tmp_path):
     steep = design(before, **wanted(before) | asked | {"keep_out": [{**SHELF, "cables": 3.0}]}, time_limit=0.1)
     assert steep.status == "not-found"
     assert "distance of cables from shelf of 3 m" in steep.report()
+
+
+def test_cables_of_different_carriers_are_apart_whatever_their_anchors_are():
+    """Each drone's cables start at the origin of its own frame: the distances between drones count all the same."""
+    robot = load(ROOT / "examples" / "design" / "beam-drones.yaml")
+    box = {"min": robot.attachments.min(axis=0).tolist(), "max": robot.attachments.max(axis=0).tolist()}
+    found = design(robot, [{"part": "attachment", "box": box}], [{"poses": [robot.home.tolist()]}], time_limit=0.2)
+    t, least = np.linspace(0.0, 1.0, 201)[:, None], np.inf
+    starts, ends = (points[0] for points in Dynamics(found.robot).points(robot.home[None]))
+    for i, j in combinations(range(robot.m), 2):
+        if robot.carrier_of_cable[i] != robot.carrier_of_cable[j]:
+            one, other = (starts[k] + t * (ends[k] - starts[k]) for k in (i, j))
+            least = min(least, np.linalg.norm(one[:, None] - other, axis=2).min())
+    assert found.clearance == pytest.approx(least, abs=0.03)
+    assert found.clearance == pytest.approx(found.judgement.clearance, abs=1e-9)
 
 
 def test_slopes_of_the_room_are_those_of_differences():
