@@ -141,7 +141,7 @@ def table(found: dict[str, dict[str, list[float]]]) -> list[str]:
             rows.append(
                 (name, contender, *(f"{x:.1f}" for x in (median, min(each), max(each))), f"{median / ours:.2f}")
             )
-    return table_of("robot | contender | median N | worst | best | of towline's", rows, words=2)
+    return table_of("robot | contender | median [N] | worst [N] | best [N] | ratio to towline", rows, words=2)
 
 
 def main() -> None:

@@ -72,8 +72,8 @@ def plan(
             metavar="KEY=VALUES",
             help="Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
             "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
-            "robot.platform.mass. 'robot=cogiro,my.yaml' and 'task=a.yaml,b.yaml' vary the whole. Repeat the option to "
-            "plan all combinations. Writes one table instead of one plan: "
+            "robot.platform.mass. 'robot=cogiro,my.yaml' and 'task=a.yaml,b.yaml' vary the whole robot or task. "
+            "Repeat the option to plan all combinations. Writes one table instead of one plan: "
             "--out names its NetCDF file, and a CSV file of the same name is written too (default: "
             "ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility, cost and margin. The exit code is 1 if "
             "no plan is feasible.",

@@ -115,8 +115,9 @@ def simulate(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default: PLAN-simulation.nc in this "
-            "folder, with --runs PLAN-runs.nc, of a recording LOG-replay.nc. An existing file is overwritten."
+            help="NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default, in this folder: "
+            "PLAN-simulation.nc, PLAN-runs.nc with --runs, or LOG-replay.nc for a recording. An existing file is "
+            "overwritten."
         ),
     ] = None,
     figures: Annotated[

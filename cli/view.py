@@ -30,7 +30,10 @@ def view(
     ] = None,
     html: Annotated[
         Path | None,
-        typer.Option("--html", help="HTML file to write instead; it needs no server, and that of a robot no extra."),
+        typer.Option(
+            "--html",
+            help="HTML file to write instead. It needs no server; the page of a robot does not need the extra either.",
+        ),
     ] = None,
     robot: Annotated[
         str | None, typer.Option("--robot", help="Robot file of a workspace whose robot is not in the library.")

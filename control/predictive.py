@@ -91,7 +91,7 @@ class Predictive(ComputedTorque):
     observer
         Bandwidth of the estimates of disturbances [rad/s], 0: none. Default: 60, but 20 if carriers correct errors.
     rate, place, attitude, patience, tension_loop, tension_lag, rotor_lag, sensors
-        See `ComputedTorque`; defaults are not exceeded.
+        See `ComputedTorque`. The sensors never make a bandwidth larger than its default.
 
     Attributes
     ----------

@@ -30,7 +30,7 @@ class Grown(NamedTuple):
 
     found: Found
     requirements: Requirements
-    size: float  # of the boxes, in those of the file
+    size: float  # of the boxes: a factor of the edges of those in the file
     size_before: float  # of the largest boxes in which the robot's own layout meets the requirements
 
 

@@ -47,11 +47,12 @@ class Margin(NamedTuple):
 def capacity_margin(problem: TensionProblem) -> Margin:
     """Return the capacity margin of a wrench, its gradient and the direction of least reserve.
 
-    Outside, minus the value is the distance from w to the set: the certificate's shortfall (but for status singular,
-    where the certificate counts the part outside the range of A alone). Inside, every facet is checked: all subsets
-    of rank - 1 of the cables with a choice, 56 for m = 8 and 792 for m = 12 with six equations.
+    Outside, minus the value is the distance from w to the set: the certificate's shortfall (except if the problem is
+    singular: the certificate then counts only the part outside the range of A). Inside, every facet is checked: all
+    subsets of rank - 1 cables, 56 for m = 8 and 792 for m = 12 with six equations. Cables with t_min = t_max are left
+    out.
 
-    If the set is flat (rank of the cables with a choice below n) it has no inside among all wrenches. Then a wrench in
+    If the set is flat (the rank of the other cables is below n) it has no inside among all wrenches. Then a wrench in
     the set, within `TensionProblem.tolerance`, has the margin measured inside the flat, among the wrenches that the
     robot can give at all; a wrench that is not in it is outside, with a negative value.
 

@@ -21,7 +21,7 @@ from .problem import Array, TensionProblem
 
 
 class StandardForm(NamedTuple):
-    """A problem in orthonormal rows; k cables with a choice, rank r.
+    """A problem in orthonormal rows, for the k cables whose limits differ; its rank is r.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class StandardForm(NamedTuple):
     unit :
         Newtons per unit of s, (k,): smaller for larger weights.
     moving :
-        Indices of the cables with a choice, (k,).
+        Indices of the cables whose limits differ, (k,).
     sigma :
         Wrench error in newtons per unit of each row of Q s - b, up to one common factor, (r,).
     """

@@ -89,7 +89,7 @@ def stiffest(
     carrier_pose: ArrayLike | None = None,
     w: ArrayLike | None = None,
 ) -> StiffestTensions:
-    """Compute the tensions inside their limits that give w with the largest lowest natural frequency.
+    """Compute the tensions inside their limits that give w and maximise the lowest natural frequency.
 
     The frequency is that of small motions with fixed unstrained lengths, see `natural_frequencies`.
 

@@ -153,7 +153,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
 
 
 def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """Return measurements without their probable input errors, and these, one line each.
+    """Return measurements without their probable input errors, and a line about each error.
 
     Raises
     ------

@@ -37,7 +37,8 @@ def calibrate(
         Parameters to estimate, some of anchors, attachments, offsets (of the lengths), scales (of the lengths), radii
         (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is ahead of the
         clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan (friction as the
-        logarithm of a ratio of tensions), friction (as a force) and gains (of the tensions, as of motor currents).
+        logarithm of a ratio of tensions), friction (as a force) and gains (newtons per unit of
+        the tensions, if these are motor currents).
         Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the
         smallest set whose cross-validation error is close to the best (`select`), which may be empty.
     prior

@@ -66,7 +66,7 @@ class MotionEstimate(NamedTuple):
 
 
 class PoseFilter(Displayed):
-    """Estimate pose and velocity of a platform from lengths, poses, inertia and tensions, in any combination.
+    """Estimate pose and velocity of a platform from any of lengths, poses, an inertial sensor and tensions.
 
     The first update must have lengths or a pose. A search starts again if most lengths are wrong.
 

@@ -176,7 +176,7 @@ class LogPoses(Displayed):
 
 
 def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = SIGMA, begin: float = 0.0) -> LogPoses:
-    """Estimate the pose of the platform at each sample of a log, from its readings by the encoders of the file.
+    """Estimate the pose of the platform at each sample of a log; the file's encoders convert readings to lengths.
 
     Parameters
     ----------

@@ -195,8 +195,9 @@ class Limit(ABC):
 class Magnitude(Limit):
     """A limit of the length of a vector: `values` are its components, `high` bounds their root sum square.
 
-    At the nodes of a program the root is rounded at zero, where a motion rests and a norm has a corner, and the bound
-    by the same. On Bernstein points the square is limited, which has no corner.
+    A norm has a corner at zero, where a motion rests. At the nodes of a program the root is therefore taken of the sum
+    plus a small square, which is added to the square of the bound as well. On Bernstein points the square is limited,
+    which has no corner.
     """
 
     def __init__(self, most: float):

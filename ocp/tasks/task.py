@@ -138,9 +138,7 @@ class Objective(Part):
         default=None, description="duration that adds 1 to the cost, not squared [s]; default: no cost"
     )
     margin: Positive | None = Field(
-        default=None,
-        description="smallest distance of any tension from its limits that reduces the cost by 1, not squared [N]; "
-        "default: no reward",
+        default=None, description="tension margin that lowers the cost by 1, not squared [N]; default: no reward"
     )
     own: SkipJsonSchema[tuple[Cost, ...]] = Field(
         default=(), exclude=True, description="costs of your own, in Python alone (docs/adding-a-cost.md)"

@@ -20,8 +20,8 @@ class LinePath(PathBase):
     timing: Literal["smooth", "smoother", "uniform"] | None = Field(
         default=None,
         description="smooth: from rest to rest, acceleration and jerk zero there; smoother: the next two derivatives "
-        "zero too; uniform: constant speed; default: smoother where quadrotors can rest at the ends only with it (an "
-        "exact path of a platform under fewer than six cables), else smooth",
+        "zero too; uniform: constant speed; default: smoother if quadrotors could otherwise not rest at the ends "
+        "(an exact path of a platform under fewer than six cables), else smooth",
     )
 
     @override

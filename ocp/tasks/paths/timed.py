@@ -40,7 +40,7 @@ class TimedPath(PathBase):
     s: tuple[Finite, ...] = Field(min_length=2, description="grid of s, increasing from 0 to 1")
     speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
     dwell: tuple[NonNegative, ...] | None = Field(
-        default=None, description="duration of the stop at each s [s]; zero where the speed is not; default: no stop"
+        default=None, description="duration of the stop at each s [s]; 0 wherever the speed is not 0; default: no stop"
     )
     smoothing: Positive | None = Field(
         default=None,
