@@ -159,7 +159,7 @@ class Prices(Part):
 
     cable: NonNegative = Field(
         default=0.0,
-        description="price of a metre of cable; each cable has its longest length at the required positions",
+        description="price of a metre of cable; the length of a cable is its largest one at the required positions",
     )
     t_max: NonNegative = Field(default=0.0, description="price of a newton of the t_max of one cable")
 
@@ -207,17 +207,17 @@ class Requirements(Part):
     )
     cable_length: PositiveRange | None = Field(
         default=None,
-        description="shortest and longest length of every cable at the required positions, as the winches have [m]; "
+        description="shortest and longest length that the winches can give a cable, at the required positions [m]; "
         "default: no limit",
     )
     maximise: Literal["margin", "natural_frequency", "volume"] = Field(
         default="margin",
-        description="objective: the smallest capacity margin; or, with the smallest margin `margin`, the lowest "
+        description="objective: the smallest capacity margin; or, with at least the margin `margin`, the lowest "
         "natural frequency, or the volume of the required boxes, which grow about their centres",
     )
     minimise: Literal["t_max", "cost"] | None = Field(
         default=None,
-        description="objective instead, with the smallest margin `margin`: the mean t_max of the cables, which must be "
+        description="objective instead, with at least the margin `margin`: the mean t_max of the cables, which must be "
         "free, or the cost of cables and winches",
     )
     prices: Prices | None = Field(default=None, description="for minimise: cost, the prices of cables and winches")

@@ -194,7 +194,8 @@ class Simulation(SimulationData, Filmed, Reported):
         """Return what led to the result, in order of time, and how the robot differed from its file."""
         happened, lacking = occurrences(self), np.flatnonzero(self.record.answered[: self._recorded] == SOFT)
         if lacking.size:
-            happened.append(Occurrence(float(self.times[lacking[0]]), "soft", "tensions lacked some of the wrench"))
+            words = "tensions gave less than the required wrench"
+            happened.append(Occurrence(float(self.times[lacking[0]]), "soft", words))
         text = sentence(sorted(happened, key=lambda event: event.at))
         return "; ".join(filter(None, [text, (differs := self._differs()) and f"differs from its file by {differs}"]))
 

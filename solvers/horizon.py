@@ -157,8 +157,9 @@ class Horizon(Displayed):
     def relative_to(self, states: Array, controls: Array) -> None:
         """Write the same problem in differences from a reference.
 
-        Start, dynamics, bounds and soft rows change, and the states and controls that a solve may begin with; costs are
-        those of differences already. Small differences are no longer lost in the rounding of large numbers.
+        Start, dynamics, bounds and soft rows change, and so do the states and controls with which a solve may begin.
+        The costs do not change, so write them for differences. Small differences are then not lost in the rounding of
+        large numbers.
 
         Parameters
         ----------
@@ -208,7 +209,7 @@ class Horizon(Displayed):
 
     @property
     def iterations(self) -> int:
-        """Return how many Newton matrices the last solution took, without the one of a cold start."""
+        """Return the number of Newton matrices of the last solution, not counting that of a cold start."""
         return self._count
 
     @property

@@ -2,7 +2,7 @@
 
     T(t) = A^-1 (M ddX + F + D_B - W_e - A dT)       dT = dT_C + dT_K
 
-T is the steady traction that the motors give, dT what the vibration adds at the end of the cable; the platform feels
+T is the steady tension that the motors give, dT what the vibration adds at the end of the cable; the platform feels
 F = T + dT. The cable's part is in `element_chain`, the platform's in `Dynamics.relative`.
 
 Source: paper F, section V, steps 1 to 8, where step 7 prints T' for dT; Eqs. 8 to 23 and 38.
@@ -37,7 +37,7 @@ class DrivingForce(Displayed):
     lengths
         Distances from anchor to attachment without vibration [m], (N, m).
     T
-        Steady traction that the motors give [N], (N, m). It may be outside the limits or below zero.
+        Steady tension that the motors give [N], (N, m). It may be outside the limits or below zero.
     dT_C, dT_K
         Increments by damping and by elasticity [N], (N, m).
     residual
@@ -86,7 +86,7 @@ def driving_force(
     pretension: Any = 0.0,
     winding: Literal["paid out", "printed"] = "paid out",
 ) -> DrivingForce:
-    """Compute the steady traction and the vibration increments of each cable at each instant.
+    """Compute the steady tension and the vibration increments of each cable at each instant.
 
     With more than six cables T is the least-norm solution. Where A is singular, or the cables are fewer than the
     coordinates, T solves the equations in the least-squares sense (moments over `Robot.length`), least norm again, and
@@ -110,8 +110,8 @@ def driving_force(
     wind
         Velocity of the air in {G} [m/s], (N, 3) or (3,); default: no air.
     pretension
-        Tension of each cable before the vibration, by which the slack switch decides [N], broadcast to (N, m). 0 is the
-        paper's rule, by which dT_K is never negative; `inf` keeps every cable taut.
+        Tension of each cable before the vibration [N], broadcast to (N, m): an element is slack if the vibration takes
+        more than this. 0 is the paper's rule, by which dT_K is never negative; `inf` keeps every cable taut.
     winding
         "paid out": the winch pays out what the steady motion takes, so that this adds nothing to dT_K. "printed": the
         paper's Eq. 13 to the letter, where each element is lengthened by (l(t + dt) - l(t)) / n in every step (the

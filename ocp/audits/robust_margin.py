@@ -24,7 +24,7 @@ class RobustMargin(Displayed):
     tightened
         Reduction of the limits in the program, (m,) [N].
     violation
-        Violation of the limits, reduced by the task's margin, with the spread, (n, m) [N]; 0: inside.
+        Violation of the limits by tensions and their spread, (n, m) [N]; 0: at least the task's margin inside.
     """
 
     share: float

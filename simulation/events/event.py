@@ -32,7 +32,7 @@ Seconds = Annotated[float, BeforeValidator(number_in), Field(ge=0, le=LONGEST, a
 
 @dataclass
 class Running(Displayed):
-    """A simulation that runs, as events change it.
+    """A running simulation, which events may change.
 
     Attributes
     ----------

@@ -14,10 +14,10 @@ class AnalyticCentre(Method):
     """Analytic centre of the feasible tensions.
 
     Existence: wherever the problem is feasible and the feasible tensions are bounded; failed if they are unbounded.
-    With w on the very boundary it is the centre of the cables that have a choice. Cables without any limit have no
-    influence. A smooth function of A (of constant rank), w and the limits; t_ref and weights play no part. Like
-    "centroid" without its geometry: any m - rank costs the same, about ten Newton steps, few from the last solution
-    (`start`). Outside the feasible set: a certificate.
+    With w on the very boundary it is the centre for the cables whose tensions w does not determine. Cables without any
+    limit have no influence. A smooth function of A (of constant rank), w and the limits; t_ref and weights play no
+    part. Like "centroid" without its geometry: any m - rank costs the same, about ten Newton steps, few from the last
+    solution (`start`). Outside the feasible set: a certificate.
     """
 
     name = "analytic-centre"

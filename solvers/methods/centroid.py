@@ -13,12 +13,12 @@ _MOST = 5
 class Centroid(Method):
     """Barycentric distribution: the centroid of the feasible polygon.
 
-    Of the interval for m - rank = 1, of the polytope for 3 to 5. Existence: wherever the problem is feasible and the
-    feasible tensions are bounded; failed if they are unbounded (a missing limit), and at once if m - rank > 5.
-    Continuous, also where the feasible tensions lose their interior (w on the very boundary). Far from the limits: the
-    safest choice against slack, at the price of high tensions. Cost: pairs of lines for a polygon; Qhull and a linear
-    program, 2 ms to 10 ms, beyond. Outside the feasible set: a certificate. The centroid is that of the tensions
-    themselves whatever t_ref and weights.
+    For m - rank = 1 it is the middle of an interval, for 3 to 5 the centroid of a polytope. Existence: wherever the
+    problem is feasible and the feasible tensions are bounded; failed if they are unbounded (a missing limit), and at
+    once if m - rank > 5. Continuous, also where the feasible tensions lose their interior (w on the very boundary). Far
+    from the limits: the safest choice against slack, at the price of high tensions. Cost: pairs of lines for a polygon;
+    Qhull and a linear program, 2 ms to 10 ms, beyond. Outside the feasible set: a certificate. The centroid does not
+    depend on t_ref and weights.
     """
 
     name = "centroid"

@@ -27,7 +27,10 @@ class ClosedForm(Method):
     """
 
     name = "closed-form"
-    guarantee = "one matrix product, smooth in w; may leave the limits though the problem is feasible: then failed"
+    guarantee = (
+        "one matrix product, smooth in w; failed if the tensions leave the limits, which may happen though the problem "
+        "is feasible"
+    )
     source = (
         "A. Pott, T. Bruckmann, L. Mikelsons, 'Closed-form force distribution for parallel wire robots', "
         "Computational Kinematics 2009"

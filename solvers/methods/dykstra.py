@@ -36,7 +36,7 @@ class Dykstra(Method):
     Existence: wherever the problem is feasible, in the limit. Converges to the same unique tensions as "active-set",
     hence continuous; it ends once the cables at their limits are known, but it may stand still for long before. Stops
     when those cables fulfil the optimality conditions, when the two projections agree to 1e-11 of the size of the
-    tensions, when they prove that there is nothing, or after `max_iter`: then the status is inaccurate and `residual`
+    tensions, when they prove that no tensions exist, or after `max_iter`: then the status is inaccurate and `residual`
     reports how far it came. Cost: two matrix products an iteration, tens to thousands of iterations. Outside the
     feasible set: a certificate.
     """

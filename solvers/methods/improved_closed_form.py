@@ -19,9 +19,7 @@ class ImprovedClosedForm(Method):
     """
 
     name = "improved-closed-form"
-    guarantee = (
-        "at most m - rank + 1 pseudo-inverses; finds most but not all feasible distributions: failed on the others"
-    )
+    guarantee = "at most m - rank + 1 pseudo-inverses; solves most feasible problems, and fails on the others"
     source = (
         "A. Pott, 'An improved force distribution algorithm for over-constrained cable-driven parallel robots', "
         "Computational Kinematics (CK 2013), 2014"

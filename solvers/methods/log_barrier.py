@@ -20,12 +20,12 @@ from .numerics.barrier_newton import barrier_point
 class LogBarrier(Method):
     """Continuously differentiable distribution, strictly inside the limits.
 
-    Existence: wherever the problem is feasible; with w on the very boundary only the cables that have a choice stay off
-    their limits. The tensions are a smooth function of A (of constant rank), w, t_ref and the limits: no kink where a
-    cable comes to its limit, which is what a controller that differentiates tensions needs. The price is a distance of
-    about mu / (pull of the cost) to the optimum of "active-set"; smaller `barrier`, sharper bends. Cost: about ten
-    Newton steps from the middle of the limits, one to six from the last solution (`start`). Outside the feasible set: a
-    certificate.
+    Existence: wherever the problem is feasible; with w on the very boundary only the cables whose tensions w does not
+    determine stay off their limits. The tensions are a smooth function of A (of constant rank), w, t_ref and the
+    limits: no kink where a cable comes to its limit, which is what a controller that differentiates tensions needs. The
+    price is a distance of about mu / (gradient of the cost) to the optimum of "active-set"; with a smaller `barrier`
+    the bends are sharper. Cost: about ten Newton steps from the middle of the limits, one to six from the last solution
+    (`start`). Outside the feasible set: a certificate.
     """
 
     name = "log-barrier"

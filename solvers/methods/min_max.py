@@ -9,7 +9,7 @@ from .numerics.linear_program import nearest, optimise
 
 
 class MinMax(Method):
-    """Least largest tension.
+    """Minimise the largest tension.
 
     Existence: wherever the problem is feasible and the largest tension cannot fall for ever. Unique, by the distance to
     t_ref; continuous in w for a fixed wrench matrix, may jump as cables turn. Cables with equal limits do not count.
@@ -17,7 +17,7 @@ class MinMax(Method):
     """
 
     name = "min-max"
-    guarantee = "the least largest tension, of these the nearest to t_ref; may jump as cables turn"
+    guarantee = "minimises the largest tension, of these the nearest to t_ref; may jump as cables turn"
     source = "the infinity norm of C. Gosselin, M. Grenier, Meccanica 46(1), 2011, as a linear program"
     exact = True
 

@@ -63,7 +63,7 @@ class GivenLambda(Method):
     """Pseudo-inverse solution plus N lambda, whatever t_ref and weights: no optimum, so it is not judged as one."""
 
     name = MinNorm.name
-    guarantee = "A^+ w + N lambda_; failed where these tensions leave the limits though others would not"
+    guarantee = "A^+ w + N lambda_; failed if these tensions leave the limits, even where others do not"
     source = MinNorm.source
     exact = False
     options = MinNorm.options

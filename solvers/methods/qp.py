@@ -130,7 +130,7 @@ class Daqp(Method):
 class ActiveSet(Daqp):
     """Weighted least squares to t_ref inside the limits, by a dual active-set method in the null space.
 
-    `solve` runs the C core, `towline.core`. Where that is not sure, and for problems larger than those it has room for,
+    `solve` runs the C core, `towline.core`. If its result is uncertain, or the problem is too large for it,
     the daqp package proposes and `solve` judges, as with the other methods: some 0.2 ms a call.
     """
 

@@ -28,11 +28,11 @@ class SoftWrench(Method):
 
     Existence: always. Without `rho`: where w is available the tensions are those of "active-set" and the status is
     optimal; elsewhere their wrench is the available one nearest to w (moments divided by the problem's length), the
-    status is inaccurate, `residual` is the distance and the certificate is there. Lipschitz in w everywhere, across the
-    boundary too: a projection is, and so is least squares inside limits. With `rho` the wrench gives way before the
-    limits force it to, by about the cost's gradient / rho: smoother, and the status is inaccurate nearly everywhere,
-    with a certificate only where w is out of reach. Lipschitz in w, and in the wrench matrix too. Cost: two active-set
-    solves, one with `rho`.
+    status is inaccurate, `residual` is the distance and the certificate is there. Lipschitz in w everywhere, also
+    across the boundary, because projections and least squares inside limits are. With `rho` the wrench gives way before
+    the limits force it to, by about the cost's gradient / rho: smoother, and the status is inaccurate nearly
+    everywhere, with a certificate only where w is out of reach. Lipschitz in w, and in the wrench matrix too. Cost: two
+    active-set solves, one with `rho`.
     """
 
     name = "soft-wrench"
