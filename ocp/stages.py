@@ -39,7 +39,7 @@ from .tasks.status import MotionStatus
 from .tasks.wind_set import WindDisc
 
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
-UNPROVEN = "no tensions exist in some of the winds that enclose those of the disc, while the platform moves"
+UNPROVEN = "while the platform moves, no tensions exist in some of the faster winds with which a wind speed is planned"
 
 
 def climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation] | None) -> Plan:

@@ -197,9 +197,10 @@ class Task(Part):
     )
     wind: Vector3 | WindBox | WindDisc | None = Field(
         default=None,
-        description="wind on the platform, constant, in {G} [m/s], or many: a range {min, max}, or {speed} for every "
-        "horizontal wind up to a speed. Tensions exist for each of them, and the planned tensions refer to the range's "
-        "middle, or still air; default: no aerodynamic forces; [0, 0, 0] is still air, with drag on a moving platform",
+        description="wind on the platform in {G} [m/s]: one velocity; or a range {min, max}, or {speed} for every "
+        "horizontal wind up to a speed. Tensions then exist in each of these winds, and the planned tensions are those "
+        "in the middle of the range, or in still air; default: no aerodynamic forces; [0, 0, 0] is still air, with "
+        "drag on a moving platform",
     )
     limits: TaskLimits = TaskLimits()
     steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")
