@@ -437,7 +437,7 @@ def test_wrong_input_is_one_line():
         plant.step(start, command * np.nan, 1e-3)
     with pytest.raises(InputError, match=r"cables must be lengths >= 0.001 m, got 0 m"):
         plant.command(np.zeros(6))
-    with pytest.raises(InputError, match=r"commands must have the shape \(\.\.\., K, 40\)"):
+    with pytest.raises(InputError, match=r"commands must have the shape \(\.\.\., K, 46\)"):
         plant.run(start, np.zeros((3, 4)), 1e-3)
     with pytest.raises(InputError, match="state must"):
         plant.step(start[:-1], command, 1e-3)

@@ -71,11 +71,13 @@ class Mesh(Displayed):
         if not (self.shrink or self.further):
             return {}
         held = held_spans(scenario, self.shrink_of)
-        return {limit: Tightening(*self._inwards(limit), held.get(limit, ())) for limit in limits}
+        places = dict(zip(scenario.limits, scenario.limits.places, strict=True))
+        counts = {limit: places[limit].stop - places[limit].start for limit in limits}
+        return {limit: Tightening(*self._inwards(limit, counts[limit]), held.get(limit, ())) for limit in limits}
 
-    def _inwards(self, limit: Limit) -> tuple[float, float]:
-        """Return by how much the bounds of a limit's rows move inwards."""
-        nothing = ca.SX.zeros(len(limit.labels))
+    def _inwards(self, limit: Limit, count: int) -> tuple[float, float]:
+        """Return by how much the bounds of the rows of a limit of so many values move inwards."""
+        nothing = ca.SX.zeros(count)
         _, low, high = limit.rows(nothing)
         _, lowest, highest = limit.rows(nothing, self.shrink_of(limit))
         return (lowest - low if np.isfinite(low) else 0.0), (high - highest if np.isfinite(high) else 0.0)

@@ -26,6 +26,7 @@ FINER = 20
 LEVELS = 3
 MOST_SPANS = 3000  # of each level: those with the smallest distances
 LOOKS = 100  # instants at which tensions are looked for
+BESIDE = 1e-3  # weight of forces across a thrust beside the wrench: they choose among the tensions that balance it
 GOLDEN = (np.sqrt(5) - 1) / 2
 NARROWED = 45  # times by the golden section: to 4e-10 of a cable
 
@@ -311,7 +312,8 @@ def _tensions(motion: SavedMotion, robot: Robot, task: Mapping[str, Any], datase
     at = times[rows] + rng.uniform(0.2, 0.8, len(rows)) * (times[rows + 1] - times[rows])
     u, A, w = _wrenches(motion, robot, at)
     across, needed = _across(motion, robot, at, u)
-    rows, values = np.concatenate([scale[:, None] * A, across], axis=1), np.concatenate([scale * w, needed], axis=1)
+    rows = np.concatenate([scale[:, None] * A, BESIDE * across], axis=1)
+    values = np.concatenate([scale * w, BESIDE * needed], axis=1)
     spare = np.where(low < high, low, low - 1e-12), np.where(low < high, high, high + 1e-12)
     found = np.array([lsq_linear(a, b, spare, "bvls", tol=1e-14).x for a, b in zip(rows, values, strict=True)])
     if missing(at, found).max() > allowed:
