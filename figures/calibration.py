@@ -125,7 +125,7 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> Fig
         ax.set_xlim(-reach, reach)
         ax.set_ylim(-reach, reach)
         ax.set_aspect("equal", adjustable="box")
-        ax.set_title(f"cables[{cable}].anchor", fontsize=style.NOTE)
+        ax.set_title(f"cables[{cable}]", fontsize=style.NOTE)
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(style.few_ticks())
     style.legend_below(canvas, canvas.axes[0])
