@@ -36,10 +36,10 @@ def _sentence(text: str) -> str:
 
 
 def check_unused(options: Mapping[str, object], without: str, many: str) -> None:
-    """Raise InputError if an option is given, by its value, that is of `many` things and needs the option `without`."""
+    """Raise InputError if an option is given, by its value, that is for `many` things and needs `without`."""
     for name, given in options.items():
         if given:
-            raise InputError(f"{name} must be left out without {without}: it is an option of many {many}")
+            raise InputError(f"{name} must be left out without {without}: it is an option for many {many}")
 
 
 def checkpoint_of(checkpoint: Path | None, resume: Path | None) -> Path | None:

@@ -176,7 +176,7 @@ def simulate(
     check_animation(animate, speed, fps)
     if runs is None:
         many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
-        check_unused(many, "--runs", "flights")
+        check_unused(many, "--runs", "runs")
     of_log = {"--replay": replay, "--poses": poses, "--fields": fields, "--drive": drive, "--fit": fit}
     of_log |= {"--delay": delay, "--window": window != WINDOW}
     from ..estimation.logs.opening import is_recording
@@ -261,7 +261,7 @@ def _once(
 ) -> bool:
     """Simulate once, save, draw and print; return whether the run passed."""
     figures, form = drawn
-    with watching(f"flying {plan}", quiet=as_json) as watch:
+    with watching(f"simulating {plan}", quiet=as_json) as watch:
         flight = run()
         written = {"file": flight.save(target)}
         if report is not None:
@@ -290,8 +290,8 @@ def _often(
     from ..simulation.flights import report, save, summary
 
     figures, form = drawn
-    with counting(f"flying {plan}", "passed", quiet=as_json) as show:
-        flights = run(execution=replace(where, progress=resumable(show, where.checkpoint, "flights")))
+    with counting(f"simulating {plan}", "passed", quiet=as_json) as show:
+        flights = run(execution=replace(where, progress=resumable(show, where.checkpoint, "runs")))
     add_to_message("")
     file = save(flights, target)
     pictures = []

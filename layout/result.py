@@ -175,7 +175,7 @@ class Design(Reported, Displayed):
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
             wanted += room_of(self.before, self.requirements).describe()
             wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
-            facts.append(("wanted", f"{' and a '.join(wanted)}; this does not prove that no layout has it"))
+            facts.append(("wanted", f"{' and a '.join(wanted)}; the search does not prove that no layout has them"))
         why = [] if self.reasons is None else self._why(self.reasons)
         files = [("The robot's file", to_yaml(self.robot))]
         parts += [Section("", [*facts, *self._state()]), *why]
@@ -196,7 +196,10 @@ class Design(Reported, Displayed):
             cables = ", ".join(str(cable + 1) for cable in certificate.at_max)
             idea = ("stronger cables", f"a higher t_max of cables {cables}, a smaller wrench, or larger boxes")
         else:
-            idea = ("another pose", "or boxes of anchors farther along the direction; stronger cables do not help")
+            idea = (
+                "another pose",
+                "or anchors whose boxes lie farther along the direction; stronger cables do not help",
+            )
         return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
 
     def _drawings(self) -> list[Drawing]:

@@ -44,7 +44,7 @@ class Room(NamedTuple):
     def describe(self) -> list[str]:
         """Return each bound as a text."""
         found = [f"clearance of {quantity(self.clearance, 'm')}"] * (self.clearance > 0.0)
-        found += [f"cables of {quantity_range((self.shortest, self.longest), 'm')}"] * self.limits_lengths
+        found += [f"cable length of {quantity_range((self.shortest, self.longest), 'm')}"] * self.limits_lengths
         found += [f"distance of cables from {each.name} of {quantity(each.least, 'm')}" for each in self.regions]
         found += [f"height of cables of {quantity(self.lowest, 'm')}"] * (self.lowest > -np.inf)
         return found + [f"natural frequency of {quantity(self.frequency, 'Hz')}"] * (self.frequency > 0.0)

@@ -121,7 +121,7 @@ class Replay(Drawn, Reported, Displayed):
         if self.fitted is None:
             return "no fit was asked for"
         same = to_yaml(self.robot) == to_yaml(self.windows.recorded.robot)
-        return "no parameter of the robot's file makes validation windows better" if same else None
+        return "no parameter of the robot's file reduces the residuals of validation windows" if same else None
 
     def save_robot(self, file: str | os.PathLike[str]) -> Path:
         """Write the fitted robot as a robot file atomically.
@@ -229,8 +229,12 @@ class Replay(Drawn, Reported, Displayed):
                 for name, value in self.fitted._asdict().items()
                 if value != getattr(first, name)
             ]
-            change = f"validation windows {before:.3g} times their noise, {after:.3g} after the fit"
-            facts["fit"] = f"{', '.join(values)}; {change}" if values else "no parameter improves validation windows"
+            change = f"residuals of validation windows {before:.3g} times their noise, {after:.3g} times after the fit"
+            facts["fit"] = (
+                f"{', '.join(values)}; {change}"
+                if values
+                else "no parameter reduces the residuals of validation windows"
+            )
         return list(facts.items())
 
     def _residual_table(self) -> Table:

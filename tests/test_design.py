@@ -603,4 +603,4 @@ def test_cables_are_as_long_as_the_winches_permit():
         robot, [anchors], [{"poses": [[0, 0, 2.5, 0, 0, 0]]}], cable_length={"min": 8, "max": 9}, time_limit=0.2
     )
     assert far.status == "not-found"
-    assert "cables of 8 to 9 m" in far.report()
+    assert "and a cable length of 8 to 9 m" in far.report()
