@@ -151,7 +151,10 @@ def simulate(
     delay: Annotated[
         float, typer.Option(help="With a recording: known delay of the robot behind its recorded commands [s].")
     ] = 0.0,
-    window: Annotated[float, typer.Option(help="With a recording: duration of a window [s].")] = WINDOW,
+    window: Annotated[
+        float,
+        typer.Option(help="With a recording: duration of a window, a part replayed from its recorded state [s]."),
+    ] = WINDOW,
     fit: Annotated[
         Path | None,
         typer.Option(

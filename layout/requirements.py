@@ -180,8 +180,8 @@ class Requirements(Part):
     )
     tasks: Annotated[tuple[Task, ...], Field(max_length=20)] = Field(
         default=(),
-        description="tasks, with the keys of task files, of which a plan on the found robot must be feasible; default: "
-        "none",
+        description="tasks, with the keys of task files, for each of which the resulting robot must have a feasible "
+        "plan; default: none",
     )
     margin: Positive = Field(
         default=LEAST_MARGIN,

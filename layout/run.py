@@ -52,8 +52,8 @@ def design(
     require
         Poses and wrenches: `Requirement`, or mappings with its keys.
     maximise
-        Objective: "margin", "natural_frequency" or "volume", of the boxes. With the option minimise="t_max" or
-        "cost" instead: the smallest mean t_max or cost with at least the option `margin`.
+        Objective: "margin", "natural_frequency" or "volume" (of the boxes). With the option minimise="t_max" or
+        "cost", the mean t_max or the cost is minimised instead, and the option `margin` is the smallest accepted one.
     requirements
         Instead of all of these: `Requirements`, a mapping, or the path of a file.
     progress

@@ -52,12 +52,12 @@ class Platform(Part):
     dof: tuple[Coordinate, ...] = Field(
         default=COORDINATES,
         min_length=1,
-        description="coordinates that can move; a point mass has x, y, z. The cables balance only these rows",
+        description="coordinates that can move; a point mass has x, y, z. The cables balance the wrench only in these",
     )
     body: AnyBody | None = Field(
         default=None,
-        description="convex body in the platform frame that plans keep out of regions, above the floor and in the "
-        "room; default: the CoM and the attachments",
+        description="convex body in the platform frame, which plans keep above the floor, in the room and out of "
+        "regions; default: the CoM and the attachments",
     )
     aero: Aero | None = Field(default=None, description="aerodynamic data of the platform; required for wind")
 

@@ -46,8 +46,8 @@ class Load(Part):
     )
     body: AnyBody | None = Field(
         default=None,
-        description="convex body in the platform frame that the plan keeps out of regions, above the floor and in the "
-        "room while the load is carried; default: none",
+        description="convex body in the platform frame, which the plan keeps above the floor, in the room and out of "
+        "regions while the load is carried; default: none",
     )
 
     @property

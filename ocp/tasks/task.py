@@ -199,8 +199,8 @@ class Task(Part):
         default=None,
         description="wind on the platform in {G} [m/s]: one velocity; or a range {min, max}, or {speed} for every "
         "horizontal wind up to a speed. Tensions then exist in each of these winds, and the planned tensions are those "
-        "in the middle of the range, or in still air; default: no aerodynamic forces; [0, 0, 0] is still air, with "
-        "drag on a moving platform",
+        "in the middle of the range, for {speed} in still air; default: no aerodynamic forces; [0, 0, 0] is still air, "
+        "with drag on a moving platform",
     )
     limits: TaskLimits = TaskLimits()
     steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")

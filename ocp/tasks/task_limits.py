@@ -39,9 +39,9 @@ class KeepOut(Part):
 
     The platform is its body, or without one its CoM and its attachments, a cable is the line between its ends, and a
     moving carrier its origin. The default clearance of a carrier is the radius of its body, so that the rotors of a
-    quadrotor do not touch the region; a number replaces the radius. A region in the frame of the platform moves with it
-    and keeps the platform's body clear of cables and carriers, by the limits cable_platform_clearance and
-    carrier_platform_clearance. Cables end at their attachments, so such a body must not contain these.
+    quadrotor do not touch the region; a number replaces the radius. A region in the frame of the platform moves with
+    it, and cables and carriers keep out of it; for the platform's own body, the limits cable_platform_clearance and
+    carrier_platform_clearance do the same. Cables end at their attachments, so such a region must not contain these.
     """
 
     name: str = Field(default="obstacle", min_length=1, max_length=60, description="name for reports and figures")
