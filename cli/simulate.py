@@ -152,8 +152,7 @@ def simulate(
         float, typer.Option(help="With a recording: known delay of the robot behind its recorded commands [s].")
     ] = 0.0,
     window: Annotated[
-        float,
-        typer.Option(help="With a recording: duration of a window, a part replayed from its recorded state [s]."),
+        float, typer.Option(help="With a recording: duration of a window, a part replayed from its recorded state [s].")
     ] = WINDOW,
     fit: Annotated[
         Path | None,
