@@ -581,8 +581,12 @@ def test_slopes_of_lengths_are_those_of_differences(name):
     np.testing.assert_allclose(np.array(changes).T[alone] / (2 * step), found.by_variables[order][alone], atol=2e-8)
 
 
-def test_cables_are_as_long_as_the_winches_permit():
-    """The longest are at corners of the box, by distances of points alone."""
+def test_cables_are_as_long_as_the_winches_permit(monkeypatch):
+    """The longest are at corners of the box, by distances of points alone.
+
+    The search starts from the robot's own layout and goes on until audits agree, so the machine's speed does not matter.
+    """
+    monkeypatch.setattr(searching, "_STARTING", 0.0)
     robot = load("ipanema-2")
     low, high = BOXES["ipanema-2"]
     corners = np.array(list(product(*np.transpose([low, high]))))
@@ -594,7 +598,7 @@ def test_cables_are_as_long_as_the_winches_permit():
     anchors = {"part": "anchor", "box": {"min": [-4, -3, 1], "max": [4, 3, 5]}}
     found = design(
         robot, [anchors], [{"box": {"min": low, "max": high}, "grid": [3, 3, 2]}],
-        cable_length={"min": 0.2, "max": longest}, time_limit=1.0,
+        cable_length={"min": 0.2, "max": longest}, time_limit=60.0,
     )  # fmt: skip
     assert found.feasible, found.report()
     assert 0.97 * longest < reach(found.robot) <= longest
