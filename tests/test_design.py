@@ -584,7 +584,7 @@ def test_slopes_of_lengths_are_those_of_differences(name):
 def test_cables_are_as_long_as_the_winches_permit(monkeypatch):
     """The longest are at corners of the box, by distances of points alone.
 
-    The search starts from the robot's own layout and goes on until audits agree, so the machine's speed does not matter.
+    The search starts from the robot's own layout and goes on until audits agree, whatever the machine's speed.
     """
     monkeypatch.setattr(searching, "_STARTING", 0.0)
     robot = load("ipanema-2")
