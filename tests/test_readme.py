@@ -23,7 +23,8 @@ import towline
 from towline import Requirements, Robot, Task
 from towline.cli.main import app
 from towline.estimation.logs.mapping import LogMap
-from towline.models.parsing import parse_yaml
+from towline.models import carriers
+from towline.models.parsing import json_schema, parse_yaml
 
 ROOT = Path(__file__).parent.parent
 PAGES = {str(path.relative_to(ROOT)): path.read_text() for path in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]}
@@ -89,10 +90,12 @@ def run_page(page, folder, monkeypatch):
     """Run the blocks of a page in a folder; return the names that its Python defined."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("CFLAGS", "-O0")  # of exported units: it changes no bit
+    monkeypatch.setattr(carriers, "_KINDS", dict(carriers._KINDS))  # other tests know nothing of a page's own carrier
     namespace = {"__name__": "example"}
     for block in blocks(page):
         if block.reason is None:
             run(block, namespace)
+    json_schema.cache_clear()
     return namespace
 
 
