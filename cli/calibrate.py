@@ -42,7 +42,7 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="NAME=SIGMA,...",
-            help="Standard deviations of the file's values, in their units, as "
+            help="Standard deviations of the file's values, in their units, such as "
             "'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.",
         ),
     ] = None,
@@ -51,8 +51,8 @@ def calibrate(
         typer.Option(
             metavar="SIGMA|NAME=SIGMA,...",
             help="Standard deviation of the lengths [m], or of lengths [m], position [m], rotation [rad], tensions "
-            "(relative) and directions [rad], as 'lengths=0.001,tensions=0.05'; default: the log's, or 1 mm, exact "
-            "poses, 2 % and 0.02 rad.",
+            "(relative) and directions [rad], such as 'lengths=0.001,tensions=0.05'; default: the log's, or 1 mm, "
+            "exact poses, 2 % and 0.02 rad.",
         ),
     ] = None,
     outliers: Annotated[

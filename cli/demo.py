@@ -33,7 +33,9 @@ def demo(
         typer.echo("\nThe same circle with a quadrotor that may move, with acceleration up to 3 m/s^2:\n")
         typer.echo(result.free.report())
         print_written([*result.pictures, *result.files])
-        typer.echo(f"\nThis plan, flown in wind of {flying_circle.WIND} m/s with gusts of {flying_circle.GUSTS} m/s:\n")
+        typer.echo(
+            f"\nThis plan, simulated in wind of {flying_circle.WIND} m/s with gusts of {flying_circle.GUSTS} m/s:\n"
+        )
     with watching("simulating the circle in wind", quiet=as_json):
         flight, flown = flying_circle.fly(folder, result.free, form)
     passed = result.as_expected and flight.passed

@@ -11,6 +11,7 @@ import difflib
 import os
 import select
 import sys
+import warnings
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -113,6 +114,7 @@ def _options(
 
 def main() -> None:
     """Run the command line; an error is one line on standard error."""
+    warnings.showwarning = _warn
     try:
         code = typer.main.get_command(app).main(prog_name="towline", standalone_mode=False)
         sys.stdout.flush()
@@ -125,6 +127,11 @@ def main() -> None:
     if requested():
         end()
     sys.exit(code)
+
+
+def _warn(message: Warning | str, *_: object, **__: object) -> None:
+    """Print a warning as one line, without the place in the code at which Python would show it."""
+    typer.echo(f"towline: warning: {message}", err=True)
 
 
 def _report(error: BaseException) -> int:

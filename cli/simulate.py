@@ -68,7 +68,7 @@ def simulate(
     ] = None,
     gusts: Annotated[
         float,
-        typer.Option(metavar="SIGMA", help="With --wind: intensity of turbulence (Dryden) around that velocity [m/s]."),
+        typer.Option(metavar="SIGMA", help="With --wind: intensity of Dryden turbulence, added to the wind [m/s]."),
     ] = 0.0,
     noise: Annotated[
         Path | None,

@@ -32,7 +32,8 @@ def view(
         Path | None,
         typer.Option(
             "--html",
-            help="HTML file to write instead. It needs no server; the page of a robot does not need the extra either.",
+            help="HTML file to write instead of serving a page. It needs no server; the page of a robot does not need "
+            "the extra either.",
         ),
     ] = None,
     robot: Annotated[

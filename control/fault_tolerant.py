@@ -66,11 +66,11 @@ class Rest(NamedTuple):
 class FaultTolerant(Controller):
     """Control a team of flying carriers with `Predictive`, also after one of them has lost its thrust.
 
-    A carrier is lost if a force along gravity of 0.6 of its weight is not explained by its thrust, its weight and its
-    cables. Its cables are then released (`Command.released`), and the others take 1 s to reach a formation in which
-    they carry the platform at the planned position. Formations and controllers are computed at construction for the
-    loss of each carrier, see `statics.formation`. If there is none, a warning gives the missing wrench, and nothing
-    changes when that carrier is lost.
+    A carrier is treated as lost if a force along gravity of 0.6 of its weight is not explained by its thrust, its
+    weight and its cables. Its cables are then released (`Command.released`), and the others take 1 s to reach a
+    formation in which they carry the platform at the planned position. Formations and controllers are computed at
+    construction for the loss of each carrier, see `statics.formation`. If there is none, a warning gives the missing
+    wrench, and nothing changes when that carrier is lost.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def _without(robot: Robot, index: int, options: dict[str, Any]) -> Rest | None:
     found = formation(Robot.model_validate(data), home, robot.carrier_home[carriers], lengths[cables])
     if not found.exists:
         lacks = f"{quantity_row(found.missing[:3], 'N')} and {quantity_row(found.missing[3:], 'N m')}"
-        warn(f"{robot.name} cannot rest without {name}: it would lack {lacks} about the CoM", stacklevel=3)
+        warn(f"{robot.name} cannot rest without {name}: the missing wrench is {lacks} about the CoM", stacklevel=3)
         return None
     data["platform"]["home"] = found.pose.tolist()
     for carrier, pose in zip(data["carriers"], found.carrier_pose.tolist(), strict=True):

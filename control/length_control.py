@@ -27,7 +27,7 @@ CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]
 class LengthControl(Controller):
     r"""Command unstrained lengths: those of the plan, ahead of the winches, and a correction by the measured pose.
 
-        L0 = l(x) / (1 + t / EA) + J (P e + I \int e dt)
+        L0 = l(x) / (1 + t / EA) + J (P e + I * integral of e)
 
     with the planned pose x and tensions t at the time when the winches will have followed, the Jacobian J of the
     lengths, and the error e of the measured pose. The tensions of a robot with more cables than degrees of freedom
@@ -47,8 +47,9 @@ class LengthControl(Controller):
         their corrections with as much lead.
     proportional, integral
         P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 4 and 10 if
-        it is current, 0.3 and 2 up to 20 ms, less beyond. A pose that is late without a time of its measurement needs
-        gains for that age: with others the oscillations of the platform on its cables grow.
+        it is current, 0.3 and 2 up to 20 ms, less beyond. For a late pose
+        without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the platform
+        on its cables grow.
     most
         Largest correction of a length [m]; default: 5 % of the robot's length. There the integral stops, and the
         status is "hold".

@@ -26,8 +26,9 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     how long the robot takes to stop, not on the plan.
 
     Carriers that fly, each with one cable of fixed length, leave their path: each moves to where the force of its
-    cable points, and that force changes as little as possible (`statics.team_stops`). Carriers that fly with several
-    cables of fixed length, which begin at one point of each and give every wrench, keep the path of that point.
+    cable points, and that force changes as little as possible (`statics.team_stops`). If each flying carrier has
+    several cables of fixed length that begin at one point of it, and all cables together give every wrench, that point
+    stays on its path.
 
     Parameters
     ----------

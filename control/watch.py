@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 BOUND = 0.1  # of the usual acceleration: the mean that is not predicted and permitted
-UNSTABLE = "small errors at home grow with predictions, whose model omits that carriers turn before they accelerate"
+UNSTABLE = (
+    "small errors at home grow under predictive control, whose model omits that carriers turn before they accelerate"
+)
 LATE = "carriers turn so late that their attitude loop is nearly unstable"
 LOUD = "noise of the measured rates requires more than the tension limits permit: lower bandwidth and observer"
 WINDOW = 0.05  # [s], in which a motion is compared

@@ -61,8 +61,8 @@ class Design(Reported, Displayed):
     plans
         A plan of each task of the requirements; empty if the margin or the clearance is not as required.
     size, size_before
-        With maximise: volume, the boxes in which `robot` and `before` meet the requirements, as a factor of the edges
-        of the given boxes: a size of 2 is 8 times the volume. `requirements` then has the larger boxes.
+        With maximise: volume, the factor by which all edges of the given boxes can be multiplied so that `robot`, or
+        `before`, still meets the requirements: 2 is 8 times the volume. `requirements` then has the larger boxes.
     """
 
     robot: Robot

@@ -24,7 +24,7 @@ class Conditions(Displayed):
         Velocity of the air in {G} [m/s], (3,), or a function of times (K,) [s] and a seed that returns (K, 3); default:
         no air, and so no drag.
     gusts
-        Intensity of Dryden turbulence about a constant wind [m/s].
+        Intensity of Dryden turbulence, which is added to a constant wind [m/s].
     noise
         Sensor noise, a `Noise` or a mapping (default: none).
     events

@@ -76,7 +76,7 @@ class Replay(Drawn, Reported, Displayed):
         return _by_kind(self.matching)
 
     def rms(self) -> dict[str, float]:
-        """Return the root mean square of each kind of residual, of one number, without outlying windows."""
+        """Return the root mean square of each kind of residual, per component, without outlying windows."""
         return self._rms(self.residuals)
 
     def _rms(self, parts: Mapping[str, np.ndarray]) -> dict[str, float]:

@@ -213,7 +213,7 @@ class Simulation(SimulationData, Filmed, Reported):
         at = self.handed_over
         assert at is not None
         if at == 0:
-            return "computed torque from the start: predictions are unstable at home"
+            return "computed torque from the start: predictive control would be unstable at home"
         missed = self.record.unexplained[round(at / self.period)]
         return (
             f"computed torque from t = {at:.3f} s on: {quantity(missed, 'm/s^2')} of the platform's acceleration "
@@ -245,11 +245,11 @@ def occurrences(flight: SimulationData) -> list[Occurrence]:
         found.append(Occurrence(at, "fault", f"cable {cable + 1} was released"))
     if flight.slack.any():
         row, cable = np.argwhere(flight.slack)[0]
-        found.append(Occurrence(float(flight.times[row]), "slack", f"the first cable to slacken was {cable + 1}"))
+        found.append(Occurrence(float(flight.times[row]), "slack", f"cable {cable + 1} was the first to go slack"))
     if (above := flight.above > 0).any():
         row, cable = np.argwhere(above)[0]
         found.append(
-            Occurrence(float(flight.times[row]), "tension", f"cable {cable + 1} was the first above its t_max")
+            Occurrence(float(flight.times[row]), "tension", f"cable {cable + 1} was the first to exceed its t_max")
         )
     if (beyond := ~(flight.error <= flight.tolerance)).any():
         within = quantity(1e3 * flight.tolerance, "mm")

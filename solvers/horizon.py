@@ -38,7 +38,7 @@ class Multipliers(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """Errors of the conditions of optimality, relative to the largest of its terms (`docs/horizon.md`).
+    """Errors of the optimality conditions, each relative to its largest term (`docs/horizon.md`).
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ OPTIONS |= {"ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": ITERATI
 
 
 class Formation(NamedTuple):
-    """A rest of a robot with flying carriers."""
+    """An equilibrium of a robot with flying carriers."""
 
     # poses of the platform, (6,), and of the carriers, (c, 6), in {G} [m, rad]
     pose: np.ndarray

@@ -354,3 +354,16 @@ def test_help_starts_at_once():
         subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     )
     assert not loaded & {"casadi", "xarray", "matplotlib", "scipy", "qpsolvers", "osqp", "viser", "pandas"}
+
+
+def test_a_warning_is_one_line_without_the_code_that_gave_it(tmp_path):
+    """Two of three quadrotors with one cable each cannot hold a rigid load: for each that may be lost, one line."""
+    task = tmp_path / "rest.yaml"
+    task.write_text("{name: rest, path: {kind: rest, pose: [0, 0, 0]}, duration: 1, base: {kind: hold}}")
+    assert run("plan", "multi-quadrotor-3", task, cwd=tmp_path).returncode == 0
+    controller = ("--controller", "fault-tolerant", "--duration", "0.01")
+    done = run("simulate", "multi-quadrotor-3", "multi-quadrotor-3-rest.nc", *controller, cwd=tmp_path)
+    assert done.returncode == 0
+    lines = done.stderr.splitlines()
+    starts = [f"towline: warning: multi-quadrotor-3 cannot rest without quad{k}: the missing wrench" for k in (1, 2, 3)]
+    assert [line.startswith(start) for line, start in zip(lines, starts, strict=True)] == [True] * 3

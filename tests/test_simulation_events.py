@@ -37,7 +37,7 @@ def test_the_first_slack_cable_is_named():
     assert first["slack"] == {
         "at_s": flight.times[row],
         "kind": "slack",
-        "what": f"the first cable to slacken was {cable + 1}",
+        "what": f"cable {cable + 1} was the first to go slack",
     }
     assert first["fault"]["what"] == "the actuators of quad1 were lost"
 

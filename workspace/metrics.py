@@ -188,7 +188,9 @@ METRICS: dict[str, Metric] = {
     "dexterity": Metric(
         "1", "reciprocal of the condition number", lambda robot, places: 1.0 / _condition_number(robot, places)
     ),
-    "tension_factor": Metric("1", "largest ratio of smallest to largest tension without a wrench", _tension_factor),
+    "tension_factor": Metric(
+        "1", "largest ratio of smallest to largest tension among those that give no wrench", _tension_factor
+    ),
     "payload": Metric("kg", "largest additional mass at the CoM at rest", _payload),
     "acceleration": Metric("m/s^2", "largest acceleration from rest in every direction", _acceleration),
     "cable_distance": Metric("m", "smallest distance between two cables", _cable_distance),

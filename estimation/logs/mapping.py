@@ -74,7 +74,7 @@ class LogMap(Part):
     thrusts: str | list[str] = Key([], description="thrust of each flying carrier, as `lengths`")
     directions: str | list[str] = Key([], description="x, y, z of each cable's unit vector, or azimuth and elevation")
     directions_in: Literal["world", "carrier", "platform"] | None = Key(
-        None, description="frame of `directions`; default: found by the robot's file"
+        None, description="frame of `directions`; default: found by comparison with the robot's file"
     )
     carriers: dict[str, str] = Key({}, description="topic or beginning of the names of each moving carrier's fields")
 

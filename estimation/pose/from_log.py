@@ -83,7 +83,7 @@ class LogPoses(Displayed):
 
     @property
     def fits(self) -> np.ndarray:
-        """Return which samples a pose fits, (N,) of bool; without redundant cables, which descents converged."""
+        """Return which samples a pose fits, (N,) of bool; without redundant cables, which searches converged."""
         return np.asarray(self.estimate.converged & (~(self.cost > self.largest) | self.estimate.by_gravity))
 
     @cached_property

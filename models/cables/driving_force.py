@@ -102,9 +102,9 @@ def driving_force(
         (dx_B, dTheta): small displacement of the platform frame's origin [m] and small turn [rad], in {G}, (N, 6).
         Each row is what one time step adds to the steady pose, as the paper has it: dT_C divides it by `time_step`.
     time_step
-        Dt [s].
+        Time step dt of the paper [s].
     elements
-        N of the paper: elements of each cable.
+        Number of elements of each cable, n of the paper.
     base
         Pose, velocity and acceleration of {A} in {G}, (N, 6) each; default: at home and at rest.
     wind

@@ -113,7 +113,7 @@ class ElementChain(Displayed):
         return csr_array(kron(axial, np.outer(self.direction, self.direction)))
 
     def K_l(self, taut: Any = None) -> csr_array:
-        """Return the stiffness to the elements' own lengthening de [N/m], sparse, (3(n + 1), n); `taut` as in `K_n`."""
+        """Return the stiffness to the additional elongations de [N/m], sparse, (3(n + 1), n); `taut` as in `K_n`."""
         from scipy.sparse import csr_array, diags_array, kron
 
         return csr_array(kron(self._steps().T @ diags_array(self._stiffnesses(taut)), self.direction[:, None]))
@@ -126,14 +126,14 @@ class ElementChain(Displayed):
         displacements
             Of the nodes [m], (n + 1, 3).
         winding
-            De [m]: by how much each element is lengthened beside that, its share of what the winch did not pay out.
+            de [m]: additional elongation of each element, its share of the cable that the winch did not pay out.
         """
         # An element that would have to push loses what it had.
         carried = np.maximum(self._element_stiffness * self.elongations(displacements, winding), -self.pretension)
         return -np.diff(carried, prepend=0.0, append=0.0)[:, None] * self.direction
 
     def end_increment(self, end: Any, winding: float = 0.0) -> float:
-        """Return dT_K [N], the increment at the attachment if it moves by `end` (3,) [m]; positive pulls more."""
+        """Return dT_K [N], the increment at the attachment if it moves by `end` (3,) [m]; positive: it pulls more."""
         return float(self.node_forces(self.displacements(end), winding)[-1] @ self.direction)
 
     @property

@@ -39,13 +39,13 @@ class Exit(NamedTuple):
     Attributes
     ----------
     points
-        C, where each cable leaves its sheave [m], (3, m).
+        Points C at which the cables leave their sheaves [m], (3, m).
     directions
-        U, the unit vector in which each pulls at its attachment, (3, m).
+        Unit vectors u along which the cables pull at their attachments, (3, m).
     lengths
-        L, from the anchor over the sheave to the attachment [m], (m, 1).
+        Lengths l from the anchors over the sheaves to the attachments [m], (m, 1).
     wraps
-        Theta, the angle of the sheave that it touches [rad], (m, 1), from 0 to 2 pi; 0 for a point anchor.
+        Wrap angles theta of the cables on their sheaves [rad], (m, 1), from 0 to 2 pi; 0 for a point anchor.
     """
 
     points: Matrix
@@ -60,13 +60,13 @@ def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -
     Parameters
     ----------
     anchor
-        A, where each cable comes up the swivel axis [m], (3, m).
+        Points A at which the cables come up the swivel axes [m], (3, m).
     axis
-        K, in the sense in which the cable comes up, of unit length, (3, m).
+        Swivel axes k, unit vectors in the direction in which the cables come up, (3, m).
     radius
-        R of each sheave [m], numbers, (m,); zero: a point anchor, whose axis has no effect.
+        Radii r of the sheaves [m], numbers, (m,); zero: a point anchor, whose axis has no effect.
     attachment
-        B [m], (3, m).
+        Attachments B [m], (3, m).
 
     Raises
     ------

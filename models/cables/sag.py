@@ -46,7 +46,7 @@ class SaggingCable(Displayed):
     across
         Horizontal unit vector from start to end, (..., 3); zero for a cable in a vertical line.
     H, V_m
-        Horizontal tension and, amid the cable, vertical component of the tension towards the end [N], (...).
+        Horizontal tension, and vertical component of the tension towards the end at mid-cable [N], (...).
     start_force, end_force
         Forces of the cable on the bodies that hold its ends [N], (..., 3). Their sum is its weight.
     start_tension, end_tension
@@ -118,7 +118,7 @@ def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up:
     stiffness
         E A [N]; `inf`: it does not stretch, and then must be longer than the distance of its ends.
     weight
-        Per unstrained length w = rho g [N/m], above zero (`elastic` has the cable without weight).
+        Weight per unstrained length, w = rho g [N/m], above zero (`elastic`: a cable without weight).
     up
         Against gravity, (3,), of any length.
 

@@ -33,7 +33,7 @@ class Distance(Limit):
 
     @abstractmethod
     def apart(self, pair: Pair) -> ca.SX:
-        """Return the distance of two bodies [m]; outside of each other it is the least of their points."""
+        """Return the distance of two bodies [m]; unless they overlap, it is the smallest between their points."""
 
     @override
     def values(self, state: State) -> ca.SX:

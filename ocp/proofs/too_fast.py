@@ -54,7 +54,7 @@ def _mean_rate(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray) 
     pair, which = np.unravel_index(rate.argmax(), rate.shape)
     if rate[pair, which] > limit.high + limit.tolerance:
         begin, end = float(times[first[pair]]), float(times[last[pair]])
-        why = f"the smallest possible mean speed until t = {end:.3f} s"
+        why = f"the smallest possible mean speed from then to t = {end:.3f} s"
         yield Excess(limit.name, limit.labels[which], begin, float(rate[pair, which]), limit.high, limit.unit, why=why)
 
 
@@ -70,6 +70,6 @@ def _acceleration(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarra
         least = bent / (times[steps] - times[0]) ** 2
         if least.max() > worst:
             worst, at = float(least.max()), float(times[here][least.argmax()])
-            why = f"least from t = {at - times[steps]:.3f} s to t = {at + times[steps]:.3f} s"
+            why = f"the smallest possible from t = {at - times[steps]:.3f} s to t = {at + times[steps]:.3f} s"
     if worst > limit.high + limit.tolerance:
         yield Excess(limit.name, limit.labels[0], at, float(worst), limit.high, limit.unit, why=why)

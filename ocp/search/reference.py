@@ -89,7 +89,7 @@ def _better(search: Search) -> tuple[_Candidate | None, float]:
         if best is None or best.optimum.objective > before:
             return None, before
         if isinstance(best.path, TimedPath):
-            stage.message = f"the fastest law, smoothed over {quantity(best.path.smoothing or 0.0, 's', 3)}"
+            stage.message = f"the fastest time law, smoothed over {quantity(best.path.smoothing or 0.0, 's', 3)}"
         else:
             times = best.path.stations(best.optimum.duration).times[1:-1]
             stage.message = f"points passed at {quantity_row(times, 's', 3)}"

@@ -131,7 +131,7 @@ class Search:
                 # From the guess again: a solution through a region would come out of it on any side.
                 outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf, more if added < ROUNDS else None)
             how = ended(outcome.message)
-            stage.message = f"{how} {'in' if how == 'solved' else 'after'} {outcome.iterations} iterations"
+            stage.message = f"{how} {'in' if how == 'solved' else 'after'} {_iterations(outcome.iterations)}"
             if mesh.elastic:
                 stage.message += f", short by {quantity(outcome.slack, 'N')}"
         return outcome
@@ -161,7 +161,7 @@ class Search:
             self.solve_s += time.perf_counter() - built
             solver.prepare(None, near=True)  # for the next one
             self.build_s += built - start
-            stage.message = f"{ended(outcome.message)} in {outcome.iterations} iterations"
+            stage.message = f"{ended(outcome.message)} in {_iterations(outcome.iterations)}"
         return outcome
 
     def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:
@@ -189,7 +189,7 @@ class Search:
                 outcome = linear.solve(motion, self._iteration, self.seconds_left)
                 self.solve_s += time.perf_counter() - start
                 iterations += outcome.iterations
-                stage.message = f"{ended(outcome.message)} after {iterations} iterations in pass {passed + 1}"
+                stage.message = f"{ended(outcome.message)} after {_iterations(iterations)} in pass {passed + 1}"
                 if not outcome.success:
                     break
                 start = time.perf_counter()
@@ -313,6 +313,10 @@ class Search:
 def ended(message: str) -> str:
     """Return how a run of the solver ended, from its message."""
     return ENDS.get(message, f"stopped ({message})")
+
+
+def _iterations(count: int) -> str:
+    return f"{count} iteration{'s' * (count != 1)}"
 
 
 def describe(audited: Audit) -> str:

@@ -38,6 +38,6 @@ def fastest(scenario: Scenario) -> tuple[Plan | None, str]:
     except (InputError, SolverError) as error:
         return None, f"not computed: {str(error).removeprefix('time_along: ')}"
     if found.feasible:
-        return found, f"the fastest law takes {quantity(found.duration, 's', 6)}"
+        return found, f"the fastest time law takes {quantity(found.duration, 's', 6)}"
     at = 0.0 if found.law is None else found.law.at or 0.0
     return found, f"{found.status.value} at {quantity(100 * at, '%', 3)} of the path"

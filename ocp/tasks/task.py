@@ -105,7 +105,7 @@ class FreeBase(Part):
         default=None,
         description="free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
         "cables or fixed lengths it is free); periodic: the end equals the start; exact: start and end as in "
-        "`around`; default: rest or periodic if `tube.ends` is that, given or by default, else free",
+        "`around`; default: as `tube.ends` if that is rest or periodic, else free",
     )
 
 

@@ -91,7 +91,7 @@ AnyKeepOut = Annotated[Sphere | Capsule | Block | ConvexMesh, Field(discriminato
 
 
 class SpeedZone(Part):
-    """A ball in which the platform is slow."""
+    """A ball in which the speed of the platform is limited."""
 
     name: str = Field(default="zone", min_length=1, max_length=60, description="name for reports and figures")
     centre: Vector3 = Field(description="centre in {G} [m]")

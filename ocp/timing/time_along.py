@@ -56,10 +56,11 @@ def time_along(
     and dwells; the dwell times are part of the duration. Circles end after the task's duration at their own rate, or
     after one turn; any other duration is ignored. Carriers rest or follow given paths with the same parameter s.
 
-    The task's limits in `KNOWN_LIMITS` apply, and the robot file's limits of moving mobile carriers. The tension
-    limits, reduced by the task's margin, are the facets of the available wrench set. TOPP-RA computes the time law (H.
-    Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE T-RO
-    34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there. The extra `timing` installs it.
+    The task's limits on speeds and accelerations of platform, cables and carriers apply, and the robot file's limits of
+    moving mobile carriers. The tension limits, reduced by the task's margin, are the facets of the available wrench
+    set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based
+    on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there.
+    The extra `timing` installs it.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def time_along(
     task
         A `Task`, a mapping with its keys, or the path of a YAML file, as for `plan`.
     grid
-        Initial number of intervals, from 10 to `MOST_INTERVALS`; the audit may double it.
+        Initial number of intervals, from 10 to 6400; the audit may double it.
 
     Returns
     -------

@@ -27,7 +27,7 @@ AT_ONCE = 4096
 
 
 class EquilibriumPosture(Condition):
-    """An attitude exists at the position at which tensions inside the limits hold the platform at rest.
+    """At the given position, tensions inside the limits hold the platform at rest in some attitude.
 
     The attitude of the configuration is ignored. Newton's method searches for one attitude, starting from level. If the
     search fails, the condition is false, which proves nothing. With the drive fixed-length the position is

@@ -52,7 +52,7 @@ class ExistsPlacement(Condition):
             )
         if robot.drive == "fixed-length" and len(set(robot.carrier_of_cable)) < robot.m:
             raise InputError(
-                "exists-placement must have a robot with one cable of fixed length a carrier, got "
+                "exists-placement must have a robot with one cable of fixed length per carrier, got "
                 f"{robot.name!r} with several"
             )
         held = np.zeros(len(places), dtype=bool)

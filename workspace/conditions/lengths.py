@@ -35,7 +35,7 @@ class Lengths(Condition):
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         for name, value in (("min", self.min), ("max", self.max)):
             if isinstance(value, tuple) and len(value) != robot.m:
-                raise InputError(f"lengths.{name} must have one number or {robot.m}, one a cable, got {len(value)}")
+                raise InputError(f"lengths.{name} must have one number or {robot.m}, one per cable, got {len(value)}")
         lengths = dynamics_of(robot).cable_lengths(places.pose, places.carriers)
         most = np.inf if self.max is None else self.max
         return np.all((lengths >= self.min) & (lengths <= most), axis=1)

@@ -80,7 +80,7 @@ class PathBase(Part):
         return np.zeros((0, 2))
 
     def jumps(self) -> np.ndarray:
-        """Return the times at which a time law of its own may change its acceleration at once, (n,) [s]."""
+        """Return the times at which a time law of its own may change its acceleration abruptly, (n,) [s]."""
         return np.zeros(0)
 
     def stations(self, duration: float) -> Stations:

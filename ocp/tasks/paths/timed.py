@@ -44,7 +44,7 @@ class TimedPath(PathBase):
     )
     smoothing: Positive | None = Field(
         default=None,
-        description="time over which the law is averaged, so that the acceleration does not jump and is zero at "
+        description="time over which the time law is averaged, so that the acceleration does not jump and is zero at "
         "rest [s]; the motion then has the duration of the task; default: no smoothing",
     )
 

@@ -56,7 +56,7 @@ class WaypointPath(PathBase):
     )
     order: Literal["given", "free"] = Field(
         default="given",
-        description="free: between the first and the last point, the order of the shortest path, of up to 12 points",
+        description="free: the points between the first and the last, at most 12, in the order of the shortest path",
     )
     times: tuple[Finite, ...] | None = Field(
         default=None,
@@ -121,9 +121,12 @@ class WaypointPath(PathBase):
         """Put points and dwell into the order of the shortest path."""
         for name in ("times", "shares"):
             if getattr(self, name) is not None:
-                raise ValueError(f"order must be given with {name}")
+                raise ValueError(f"order must be 'given' with {name}")
         if len(self.points) > MOST + 2:
-            raise ValueError(f"order must be given for more than {MOST} points between two, got {len(self.points) - 2}")
+            raise ValueError(
+                f"order must be 'given' for more than {MOST} points between the first and the last, "
+                f"got {len(self.points) - 2}"
+            )
         order = shortest_order(np.array(self.points))
         object.__setattr__(self, "points", tuple(self.points[index] for index in order))
         if self.dwell is not None and len(self.dwell) == len(order):
