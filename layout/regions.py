@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
+from ..models.batch import BLOCK, in_blocks
 from ..models.body import skeleton
 from ..ocp.limits.clearance import cable_outside
-from ..ocp.limits.limits import BLOCK, in_blocks
 from ..workspace.conditions.interference import segment_distance
 
 
@@ -22,7 +22,7 @@ class Region(NamedTuple):
 
     def distances(self, ends: np.ndarray, anchors: np.ndarray) -> np.ndarray:
         """Return the distances of cables with ends (n, 3) in the frame of the region, (n,) [m]; negative inside."""
-        return in_blocks(_distance(self.shape, False), [ends, anchors])[:, 0]
+        return in_blocks(_distance(self.shape, False), [ends, anchors])[0][:, 0]
 
     def spaces(self, ends: np.ndarray, anchors: np.ndarray) -> np.ndarray:
         """Return by how much cables keep the distance, (n,) [m]: exactly if negative, otherwise at least."""
@@ -36,7 +36,7 @@ class Region(NamedTuple):
 
     def slopes(self, ends: np.ndarray, anchors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives of distances by both ends, (n, 3) each."""
-        found = in_blocks(_distance(self.shape, True), [ends, anchors])
+        (found,) = in_blocks(_distance(self.shape, True), [ends, anchors])
         return found[:, :3], found[:, 3:]
 
 

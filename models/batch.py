@@ -1,6 +1,7 @@
 """Call a CasADi Function with NumPy arrays that have leading batch dimensions, or with symbols.
 
-Arrays go through `Function.map`. What is called for every step of a loop is in the numeric core, see `mechanics`.
+Arrays are evaluated in place, many rows at a time. What is called for every step of a loop is in the numeric core, see
+`mechanics`.
 """
 
 import math
@@ -14,6 +15,7 @@ from ..base.inputs import FLOAT, check_dimensions, float64, leading, shown
 from ..core import finite
 
 SYMBOLIC = (ca.SX, ca.MX)
+BLOCK = 64  # rows: to make a map of all costs more than to evaluate it
 
 
 def is_symbolic(value: Any) -> bool:
@@ -83,22 +85,52 @@ def _evaluated(function: ca.Function, arguments: dict[str, Any]) -> dict[str, np
     outputs = {name: function.size_out(name) for name in function.name_out()}
     if not count:
         return {name: np.empty(batch + _core(size)) for name, size in outputs.items()}
-    beside = [ca.DM(_beside(arrays[name], batch, size)) for name, size in sizes.items()]
+    rows = [_columns(arrays[name], batch, size, function.sparsity_in(name)) for name, size in sizes.items()]
+    size = min(count, BLOCK)
     try:
-        values = function.map(count).call(beside)
+        values = in_blocks(function.map(size) if size > 1 else function, rows, size)
     except RuntimeError:
         raise SolverError(f"{function.name()}: CasADi could not evaluate it") from None
-    return {
-        name: value.full().reshape(rows, count, columns).swapaxes(0, 1).reshape(batch + _core((rows, columns)))
-        for (name, (rows, columns)), value in zip(outputs.items(), values, strict=True)
-    }
+    return {name: _matrices(function, name, its, batch) for name, its in zip(outputs, values, strict=True)}
 
 
-def _beside(array: np.ndarray, batch: tuple[int, ...], size: tuple[int, int]) -> np.ndarray:
-    """Return (..., *core) as the matrices of all rows of a batch beside each other, (r, count c)."""
-    rows, columns = size
+def in_blocks(block: ca.Function, arguments: list[np.ndarray], size: int = BLOCK) -> list[np.ndarray]:
+    """Return the outputs of a function of one row that is mapped to `size` of them, (n, k) each.
+
+    `arguments` are (n, k) each. k are the elements of one row's matrix that are not zero by structure, column by
+    column. Raises `RuntimeError` if the evaluation fails.
+    """
+    n = len(arguments[0])
+    whole = [np.concatenate([each, np.repeat(each[-1:], -n % size, axis=0)]) for each in arguments]
+    values = [np.empty((n + -n % size, block.nnz_out(i) // size)) for i in range(block.n_out())]
+    buffer, evaluate = block.buffer()  # in place: as DM the arguments would take longer than all that is computed
+    for start in range(0, n, size):
+        rows = slice(start, start + size)
+        for i, each in enumerate(whole):
+            buffer.set_arg(i, each[rows].data)  # pyrefly: ignore[missing-argument]
+        for i, each in enumerate(values):
+            buffer.set_res(i, each[rows].data)  # pyrefly: ignore[missing-argument]
+        evaluate()
+        if buffer.ret():
+            raise RuntimeError
+    return [each[:n] for each in values]
+
+
+def _columns(array: np.ndarray, batch: tuple[int, ...], size: tuple[int, int], places: ca.Sparsity) -> np.ndarray:
+    """Return (..., *core) as the elements of each row of a batch at `places`, column by column, (n, k)."""
     every = np.broadcast_to(array, batch + _core(size)).reshape(math.prod(batch), *size)
-    return every.swapaxes(0, 1).reshape(rows, math.prod(batch) * columns)
+    columns = every.swapaxes(1, 2).reshape(len(every), size[0] * size[1])
+    return columns if places.is_dense() else columns[:, places.find()]
+
+
+def _matrices(function: ca.Function, name: str, values: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
+    """Return an output (..., *core) from its elements that are not zero by structure, (n, k)."""
+    places, (rows, columns) = function.sparsity_out(name), function.size_out(name)
+    every = values
+    if not places.is_dense():
+        every = np.zeros((len(values), columns * rows))
+        every[:, places.find()] = values
+    return every.reshape(len(values), columns, rows).swapaxes(1, 2).reshape(batch + _core((rows, columns)))
 
 
 def _core(size: tuple[int, int]) -> tuple[int, ...]:

@@ -12,9 +12,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from ...models.batch import in_blocks
 from ...models.points import placed
 from ..limits.distance import Distance
-from ..limits.limits import Motion, Separating, in_blocks, motions
+from ..limits.limits import Motion, Separating, motions
 from .curvature import is_jump, leaves
 from .excess import Excess
 from .instants import Instants
@@ -157,13 +158,13 @@ def _from_plane(separating: Separating, here: _Ends, there: _Ends) -> np.ndarray
 
 def _ends(separating: Separating, times: np.ndarray, points: np.ndarray) -> _Ends:
     """Return distances and planes of pairs of bodies by their points (k, s, 3)."""
-    planes = in_blocks(separating.plane, [points.reshape(len(points), -1)]) if len(points) else np.zeros((0, 4))
+    planes = in_blocks(separating.plane, [points.reshape(len(points), -1)])[0] if len(points) else np.zeros((0, 4))
     return _Ends(times, points, planes[:, 0], planes[:, 1:])
 
 
 def _points(separating: Separating, platform: Motion, carriers: Motion) -> np.ndarray:
     """Return the points of all pairs along a motion, (n, pairs, s, 3)."""
-    values = in_blocks(separating.points, motions(platform, carriers))
+    (values,) = in_blocks(separating.points, motions(platform, carriers))
     return values.reshape(len(values), separating.pairs, -1, 3)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...models import Robot
-from ..limits.limits import BLOCK, Motion, in_blocks, motions, of_motions
+from ...models.batch import BLOCK, in_blocks
+from ..limits.limits import Motion, motions, of_motions
 from ..limits.state import Body
 from .cost import Cost, CostState, RateCost
 from .terms import Jerk
@@ -80,6 +81,6 @@ class Costs(Displayed):
         whole = np.full((len(times), 1), times[-1]), np.full((len(times), 1), margin)
         function = self.function
         both = ca.Function("both", function.sx_in(), [ca.densify(ca.vertcat(*function(*function.sx_in())))])
-        values = in_blocks(both.map(BLOCK), [*motions(platform, carriers), *still, tensions, *whole])
+        (values,) = in_blocks(both.map(BLOCK), [*motions(platform, carriers), *still, tensions, *whole])
         rates = np.diff(values[:, 1:], axis=0) / np.diff(times)[:, None]
         return float(values[:, 0].mean() + (rates**2).sum(axis=1).mean())

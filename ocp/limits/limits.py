@@ -14,13 +14,12 @@ import numpy as np
 from ...base.display import Displayed
 from ...base.errors import InputError
 from ...models import Robot
+from ...models.batch import BLOCK, in_blocks
 from .distance import Distance, Pair
 from .limit import Limit
 from .state import Body, State
 
 Motion: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]  # pose, velocity, acceleration
-
-BLOCK = 64  # instants: to make a map of all costs more than to evaluate it
 
 
 class Separating(NamedTuple):
@@ -40,21 +39,6 @@ def motions(platform: Motion, carriers: Motion) -> list[np.ndarray]:
     """Return the motions (n, 18) of platform and each carrier: pose, velocity, acceleration side by side."""
     bodies = [platform, *zip(*(np.moveaxis(part, 1, 0) for part in carriers), strict=True)]
     return [np.hstack(body) for body in bodies]
-
-
-def in_blocks(block: ca.Function, arguments: list[np.ndarray]) -> np.ndarray:
-    """Return the values (n, k) of a function of one instant, mapped to `BLOCK` of them, for arguments (n, .) each."""
-    n = len(arguments[0])
-    whole = [np.concatenate([each, np.repeat(each[-1:], -n % BLOCK, axis=0)]) for each in arguments]
-    values = np.empty((len(whole[0]), block.size1_out(0)))
-    buffer, evaluate = block.buffer()  # in place: as DM the arguments would take longer than all that is computed
-    for start in range(0, len(values), BLOCK):
-        rows = slice(start, start + BLOCK)
-        for i, each in enumerate(whole):
-            buffer.set_arg(i, each[rows].data)  # pyrefly: ignore[missing-argument]
-        buffer.set_res(0, values[rows].data)  # pyrefly: ignore[missing-argument]
-        evaluate()
-    return values[:n]
 
 
 def of_motions(name: str, bodies: Sequence[Body], others: Sequence[ca.SX], values: Sequence[ca.SX]) -> ca.Function:
@@ -201,7 +185,7 @@ class Limits(Displayed):
         arguments = motions(platform, carriers)
         arguments.append(np.zeros((n, self.robot.m)) if tensions is None else tensions)
         arguments.append(np.zeros((n, 6)) if off_path is None else off_path)
-        values = in_blocks(self._of_block, arguments)
+        (values,) = in_blocks(self._of_block, arguments)
         return [values[:, place] for place in self.places]
 
     @cached_property

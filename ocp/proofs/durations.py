@@ -6,7 +6,8 @@ If all paths stretch, velocities go with 1/T and accelerations with 1/T^2, so at
 
 with c that of rest and c + d that of the duration T_0: the dynamics are linear in accelerations and quadratic in
 velocities. The X for which tensions inside their limits exist are then an interval, whose ends two linear programs in
-(t, X) give; a duration must lie in the intervals of all points.
+(t, X) give; a duration must lie in the intervals of all points. Most points do not restrict the interval of those
+before, which tensions at its ends show.
 """
 
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.text import quantity
+from ...solvers import solve_batch
 from ..audits.tensions import INDEPENDENT
 from ..tasks.scenario import Scenario
 
@@ -72,31 +74,47 @@ def durations(scenario: Scenario) -> Durations | None:
     c = at_rest[:, rows] * scale / robot.force_scale
     d = dynamics.required_wrench(*platform, *carriers)[:, rows] * scale / robot.force_scale - c
     bounds = [bound / robot.force_scale for bound in scenario.bounds()]
-    least, most, decisive = 0.0, FASTEST, 0
-    for k in range(PLACES):
-        interval = _interval(A[k], c[k], d[k], bounds, least, most)
+    least, most, decisive, k = 0.0, FASTEST, 0, 0
+    while True:
+        # Where tensions exist at both ends, they do in between: the set of all (t, X) is convex.
+        here = [solve_batch(A[k:], c[k:] + d[k:] * X, *bounds).feasible for X in (least, most)]
+        restricted = np.flatnonzero(~np.logical_and(*here))
+        if not restricted.size:
+            break
+        first = restricted[0]
+        k += int(first)
+        interval = _interval(A[k], c[k], d[k], bounds, (least, most), (here[0][first], here[1][first]))
         if interval is None:
             return Durations(np.inf, 0.0, float(shares[k]))
         decisive = k if interval[1] < most else decisive
         least, most = interval
+        k += 1
     shortest = scenario.duration / np.sqrt(most)
     longest = np.inf if least <= SLACK else scenario.duration / np.sqrt(least)
     return Durations(float(shortest), float(longest), float(shares[decisive]))
 
 
 def _interval(
-    A: np.ndarray, c: np.ndarray, d: np.ndarray, bounds: list[np.ndarray], least: float, most: float
+    A: np.ndarray,
+    c: np.ndarray,
+    d: np.ndarray,
+    bounds: list[np.ndarray],
+    within: tuple[float, float],
+    possible: tuple[bool, bool],
 ) -> tuple[float, float] | None:
-    """Return the least and largest X from `least` to `most` with A t = c + d X, t inside its bounds; or None."""
+    """Return the least and largest X of an interval with A t = c + d X, t inside its bounds; None if there is none.
+
+    `possible` says which ends of the interval are such X themselves.
+    """
     from scipy.optimize import linprog
 
-    ends = []
-    for sign in (1.0, -1.0):
-        cost = np.append(np.zeros(A.shape[1]), sign)
-        box = [*zip(*bounds, strict=True), (least, most)]
+    ends = list(within)
+    for i in np.flatnonzero(np.logical_not(possible)):
+        cost = np.append(np.zeros(A.shape[1]), (1.0, -1.0)[i])
+        box = [*zip(*bounds, strict=True), within]
         result = linprog(cost, A_eq=np.column_stack([A, -d]), b_eq=c, bounds=box, method="highs")
         if result.status == 2:  # infeasible
             return None
-        # Any other message of HiGHS proves nothing.
-        ends.append(float(result.x[-1]) if result.success else (least if sign > 0 else most))
+        if result.success:  # any other message of HiGHS proves nothing
+            ends[i] = float(result.x[-1])
     return ends[0], ends[1]
