@@ -176,6 +176,19 @@ def test_no_end_below_the_floor_is_suggested():
     assert "another" not in found.report()
 
 
+def test_carriers_that_the_task_holds_may_be_moved_where_tensions_are_missing():
+    circle = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.5, "rate": 0.6}
+    found = plan("wang-flying", {"path": circle})
+    assert found.status == "infeasible"
+    assert "`base: {kind: free}`" in advice(found, "moving carriers")
+    assert plan("wang-flying", {"path": circle, "base": {"kind": "free", "ends": "periodic"}}).feasible
+
+
+def test_carriers_on_the_ground_are_not_to_be_moved():
+    task = {"path": {"kind": "line", "start": [0, 0, 2], "end": [9, 0, 2]}, "duration": 5}
+    assert "moving carriers" not in plan("cogiro", task).report()
+
+
 def test_numbers_in_another_unit_come_first_and_nothing_else_is_tried():
     found = plan(
         "ipanema-2", {"path": {"kind": "line", "start": [0, 0, 2500], "end": [1000, 500, 2500]}, "duration": 4}

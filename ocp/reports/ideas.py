@@ -30,7 +30,7 @@ def ideas(plan: PlanData) -> list[Fact]:
     """Return what may help, the most likely first; empty for a feasible plan, or if nothing is known to."""
     if plan.feasible:
         return []
-    found = [*_obstacles(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
+    found = [*_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform, stronger cables or lower t_min"
     nothing = [("no single change", f"is known that makes it feasible: no duration, limit, {tried}")]
     return found or (nothing if plan.certificate is not None and not units(plan) else [])
@@ -118,6 +118,15 @@ def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, m
     lowest = float(kept.scenario.robot.home_anchors[:, 2].min())
     below = found.points[..., 2].min(axis=1) < 0
     return np.where(below & (lowest >= 0), -np.inf, found.slack)
+
+
+def _carriers(plan: PlanData) -> list[Fact]:
+    """Return that the planner may move the carriers, where tensions are missing while the task holds them."""
+    robot, base = plan.scenario.robot, plan.scenario.task.base
+    held = base.kind == "hold" and any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers)
+    if plan.certificate is None or not held:
+        return []
+    return [("moving carriers", "`base: {kind: free}`: the planner then chooses how the carriers move")]
 
 
 def _strength(plan: PlanData) -> list[Fact]:

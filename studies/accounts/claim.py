@@ -32,16 +32,16 @@ class Verdict(StrEnum):
     """The computed result is the printed one."""
 
     DIFFERS = "differs"
-    """The computed result is another, or the paper contradicts itself."""
+    """The computed result differs, or the paper contradicts itself."""
 
     IMPOSSIBLE = "impossible"
-    """No choice of what the paper does not state gives the printed result."""
+    """No choice of the quantities that the paper does not specify gives the printed result."""
 
     NOT_DETERMINED = "not determined"
     """The paper does not print what is needed to decide."""
 
     REPAIRED = "repaired"
-    """No statement of the paper: something else, possible in the place of what the paper states and is impossible."""
+    """Not in the paper: a feasible alternative to an impossible claim."""
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ def _positive(flights: dict[Drive, dict[int, Simulation]]) -> Claim:
         all(T.min() > 0 and T.max() < limit for T in tensions.values()),
         printed=f"0 N to {limit:g} N",
         limit=limit,
-        others="they do too" if others > 0 else "some cables pull nothing at times, for the others can carry the load",
+        others="they do too" if others > 0 else "some cables are slack at times, because the others can carry the load",
     )
 
 
@@ -74,7 +74,7 @@ def _drawing(drive: Drive, flight: Simulation) -> Drawing:
     lines = {f"cable {index + 1}": tensions[:, index] for index in range(flight.robot.m)}
     panels = [Panel("error [mm]", {"": 1e3 * flight.error[SHOWN]}), Panel("tension [N]", lines)]
     return Drawing(
-        f"Three robots tow 10 kg in a flight of {SECONDS:g} s, drive {drive}: distance of the load from its "
+        f"Three robots tow 10 kg in a simulation of {SECONDS:g} s, drive {drive}: distance of the load from its "
         "plan, tensions",
         curves(flight.times[SHOWN], "time [s]", panels),
     )

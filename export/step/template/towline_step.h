@@ -10,14 +10,14 @@
  * units: m, kg, s, N, rad. A pose is (x, y, z, roll, pitch, yaw) in the world frame {G}, with R = Rz(yaw) Ry(pitch) Rx(roll);
  * velocities and accelerations are its time derivatives.
  *
- * Iterations, at most. With m cables and n degrees of freedom, m - n of up to two: each limit is taken once, and each
- * one cut by those before it, m and m (m - 1) / 2. Else, where the rank is lower, and for a soft answer, whose problem
- * has 6 columns more: a dual active-set method, ended after 10 (columns) + 20 outer iterations; an inner one more is
- * needed for each limit that leaves its set, which has entered before.
+ * Upper bounds of iterations. With m cables and n degrees of freedom, m - n at most two, each limit is processed once
+ * (outer) and intersected with those before it (inner): m and m (m - 1) / 2. With more cables, where the rank is lower,
+ * and for a soft solution, whose problem has 6 more columns, a dual active-set method stops after 10 (columns) + 20
+ * outer iterations. Each limit that leaves its set has entered it before, and takes one more inner iteration.
  *
 @iterations@
  *
- * Floating-point operations; +, -, *, / and square roots count one each, moves and comparisons none. Those of the
+ * Floating-point operations: +, -, *, / and square roots count one each, moves and comparisons none. Those of the
  * mechanics are counted in the code; the others are bounds from the lengths of its loops:
  *
 @operations@
