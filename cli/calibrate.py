@@ -85,7 +85,8 @@ def calibrate(
     not converge, or validation samples fit worse than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
-    from ..estimation.calibration import corrected
+    from ..estimation.calibration.correction import mended
+    from ..estimation.calibration.solving import usual
     from ..estimation.logs import read_log
     from ..figures.style import FORMATS
     from ..models import load
@@ -104,8 +105,10 @@ def calibrate(
     read = read_log(log, stated, poses, loaded, fields)
     measurements = read.measurements
     if fix:
-        measurements, texts = corrected(loaded, measurements)
+        loaded, measurements, texts, counted = mended(loaded, measurements)
         read.notes.extend(f"corrected: {text}" for text in texts)
+        if counted and names is None:
+            names = [*usual(loaded, measurements), "scales"]
     if not as_json:
         for note in read.notes:
             typer.echo(f"  {note}")

@@ -145,7 +145,8 @@ def _of_log(
         typer.echo(f"{robot.name}: {quantity(data['samples'])} poses, residuals of {size} (rms)")
         for i, name in enumerate(SIX.split()):
             middle = float(np.median(sigmas[:, i])) * (1e3 if i < 3 else 180 / np.pi)
-            typer.echo(f"  median sigma of {name}: {quantity(middle, 'mm' if i < 3 else 'deg', 3)}")
+            size = quantity(middle, "mm" if i < 3 else "deg", 3) if np.isfinite(middle) else "undetermined"
+            typer.echo(f"  median sigma of {name}: {size}")
         for line in (*read.notes, *found.lines()):
             typer.echo(f"  {line}")
         print_written(files)

@@ -103,8 +103,11 @@ class Replay(Drawn, Reported, Displayed):
 
     @property
     def named(self) -> list[str]:
-        """Return the parameter that explains most, and others that the recording does not distinguish from it."""
-        return tied(self.found)
+        """Return the parameter that explains most, and others that the recording does not distinguish from it.
+
+        With an input error of the log there is none.
+        """
+        return [] if self.windows.recorded.doubt else tied(self.found)
 
     @property
     def robot(self) -> Robot:
@@ -118,6 +121,8 @@ class Replay(Drawn, Reported, Displayed):
     @property
     def refused(self) -> str | None:
         """Return why `save_robot` writes nothing, in one line, or None."""
+        if self.windows.recorded.doubt:
+            return self.windows.recorded.doubt
         if self.fitted is None:
             return "no fit was asked for"
         same = to_yaml(self.robot) == to_yaml(self.windows.recorded.robot)
@@ -185,11 +190,12 @@ class Replay(Drawn, Reported, Displayed):
 
     def _report(self) -> Report:
         robot, times = self.windows.recorded.robot, self.windows.recorded.times
+        explanations = [] if self.windows.recorded.doubt else [self._explanation_table()]
         return Report(
             about=f"{robot.name}, replay of {quantity(float(times[-1] - times[0]), 's')}",
             status="passed" if self.passed else "failed",
             summary=self._summary(),
-            parts=[Section("", self._facts()), self._residual_table(), self._explanation_table(), *self.windows.notes],
+            parts=[Section("", self._facts()), self._residual_table(), *explanations, *self.windows.notes],
             drawings=self._drawings,
             files=[("The robot's file", to_yaml(robot))],
         )
@@ -202,6 +208,8 @@ class Replay(Drawn, Reported, Displayed):
         text = "; ".join(
             f"{name} residual {_of(name, rms[name])} rms, noise {_of(name, noise[name])}" for name in shown
         )
+        if self.windows.recorded.doubt:
+            return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
             best = self.found[0]
             text += f"; {' or '.join(self.named)} explains {_share(best)}: {_value(best.name, best.value)}"
@@ -309,7 +317,7 @@ def replay(
     matching = Matching(windows, windows.usual._replace(delay=late))
     found = matching.explanations(matching.first, matching.kept)
     explained = None
-    if found[0][0].named:
+    if found[0][0].named and not windows.recorded.doubt:
         again = copy(windows)  # whose starts suit what explains most
         again.start, again.noise = np.zeros_like(windows.start), dict(windows.noise)
         explained = _by_kind(Matching(again, found[0][1].parameters))

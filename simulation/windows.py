@@ -51,7 +51,7 @@ class Windows:
 
     def __init__(self, recorded: Recorded, drive: str | None, window: float):
         robot, self.recorded, self.window, times = recorded.robot, recorded, window, recorded.times
-        self.notes = [*recorded.notes, *([recorded.doubt] if recorded.doubt else [])]
+        self.notes = list(recorded.notes)
         self._flown = np.flatnonzero(np.isfinite(recorded.thrusts).all(axis=0))
         self._choose(drive)
         self.commanded = robot.fixed_lengths is None or len(self._flown) > 0

@@ -3,10 +3,11 @@
 from ..logs.measurements import Measurements, Sigma
 from ..logs.reading import read_measurements
 from .calibration import Calibration
+from .correction import corrected
 from .cross_validation import Compared, HeldOut
 from .design import next_poses
 from .outliers import Outlier, Slip
-from .plausibility import Mistake, corrected, mistake
+from .plausibility import Mistake, mistake
 from .result import Parameter
 from .run import calibrate
 

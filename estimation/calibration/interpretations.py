@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...models import points
+from ..logs.north_east_down import FROM_FRD, FROM_NED
 
 FACTORS = {
     1e-3: "millimetres read as metres",
@@ -46,6 +47,9 @@ def interpretations(turns: bool) -> list[Interpretation]:
     for order in ((1, 0, 2), (2, 1, 0), (0, 2, 1)):
         named = " and ".join("xyz"[i] for i in range(3) if order[i] != i)
         result.append(Interpretation(f"{named} of the positions look exchanged", lambda x, order=order: x[:, order]))
+    for axis, turn in FROM_NED.items():
+        text = f"the positions look like north, east, down, with x of {{G}} to the {axis}"
+        result.append(Interpretation(text, lambda x, turn=turn: x @ turn.T))
     if not turns:
         return result
     conventions: dict[str, Turned] = {
@@ -64,7 +68,22 @@ def interpretations(turns: bool) -> list[Interpretation]:
             conventions[f"the angles look like {text} about {', '.join(axes)} of {{G}}, one after the other"] = (
                 lambda R, angles, axes=axes, columns=columns: _euler(angles[:, columns], axes)
             )
-    return result + [Interpretation(text, turned=turned) for text, turned in conventions.items()]
+    result += [Interpretation(text, turned=turned) for text, turned in conventions.items()]
+    for axis, turn in FROM_NED.items():
+        text = f"in a frame of north, east, down and a body's of forward, right, down, with x of {{G}} to the {axis}"
+        result += [
+            Interpretation(
+                f"the poses look measured {text}",
+                lambda x, turn=turn: x @ turn.T,
+                lambda R, _, turn=turn: turn @ R @ FROM_FRD,
+            ),
+            Interpretation(
+                f"the angles look like degrees read as radians, {text}",
+                lambda x, turn=turn: x @ turn.T,
+                lambda _, angles, turn=turn: turn @ points.rotations(np.radians(angles)) @ FROM_FRD,
+            ),
+        ]
+    return result
 
 
 def _times(factor: float | np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

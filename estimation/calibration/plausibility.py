@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.errors import InputError
 from ...base.text import quantity
 from ...models import points
 from ...models.files import as_robot
@@ -40,7 +39,6 @@ FEWEST = 12, 24  # samples of which anchors, and attachments, are taken into acc
 LARGEST = 10.0  # times the cables' mean length, of a change of readings
 MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
 DISPLACED = 3.0  # times smaller differences, by a frame near the file's
-MOST_MISTAKES = 3
 FAR = 3.0  # times the noise, of differences that are not explained yet
 PLAUSIBLE = 0.03  # of a cable's length, by which its ends may be displaced
 OTHER_FACTOR = 0.1  # from 1 and the usual ones
@@ -57,11 +55,14 @@ class Mistake(NamedTuple):
         Measurements without it, or None if several errors are equally probable.
     severe
         True if a calibration would be wrong, False if it would only mean another frame than the file's.
+    factors
+        Factors of the readings in `corrected`, (m,) or one for all cables.
     """
 
     text: str
     corrected: Measurements | None
     severe: bool = True
+    factors: np.ndarray | float = 1.0
 
 
 class _Log(NamedTuple):
@@ -145,31 +146,10 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
             return Mistake(_better(str(frames), as_given, size), _corrected(given, *moved, None, order, 1.0))
     if named:
         whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
-        corrected = (
-            None if best.several else _corrected(given, *whole.at(best.way), best.columns, best.signs * best.way.factor)
-        )
-        return Mistake(_better(best.text, as_given, best.size), corrected)
+        factors = best.signs * best.way.factor
+        corrected = None if best.several else _corrected(given, *whole.at(best.way), best.columns, factors)
+        return Mistake(_better(best.text, as_given, best.size), corrected, factors=factors)
     return None if far or not framed else _displaced(log, given, noise)
-
-
-def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
-    """Return measurements without their probable input errors, and a line about each error.
-
-    Raises
-    ------
-    InputError
-        If the measurements have another number of cables, or several errors are equally probable.
-    """
-    robot, texts = as_robot(robot), list[str]()
-    for _ in range(MOST_MISTAKES):
-        found = mistake(robot, measurements)
-        if found is None:
-            break
-        if found.corrected is None:
-            raise InputError(f"measurements must have one probable error to be corrected, got several: {found.text}")
-        texts.append(found.text)
-        measurements = found.corrected
-    return measurements, texts
 
 
 def _better(text: str, before: float, after: float) -> str:
@@ -298,7 +278,8 @@ def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mista
         f"{robot.name} is about {quantity(length, 'm', digits=3)} long"
     )
     position, rotation, _ = measured_poses(robot, given)
-    return Mistake(text, _corrected(given, position, rotation, given.carrier_poses, np.arange(robot.m), 1e-3))
+    corrected = _corrected(given, position, rotation, given.carrier_poses, np.arange(robot.m), 1e-3)
+    return Mistake(text, corrected, factors=1e-3)
 
 
 def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:

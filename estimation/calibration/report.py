@@ -27,11 +27,8 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
         f"residual of the lengths {residual}",
         *([] if result.refused is None else [f"{warning}{result.refused}"]),
         *([f"CHECK THE LOG: {result.mistake.text}"] if result.mistake and not result.mistake.severe else []),
-        *_of_held_out(result),
-        *_of_noise(result),
-        *_of_parameters(result),
-        *_of_exceptions(result),
-        *_of_open(result),
+        *([*_of_held_out(result), *_of_noise(result), *_of_parameters(result)] if result.means_something else []),
+        *([*_of_exceptions(result), *_of_open(result)] if result.doubt is None else []),
     ]
     return Report(
         about,
@@ -73,8 +70,6 @@ def _mm(length: float) -> str:
 
 
 def _of_held_out(result: CalibrationData) -> list[str]:
-    if result.doubt is not None:
-        return []
     held_out = result.held_out
     if not np.isfinite(held_out.after):
         return ["no cross-validation: half of the samples are too few, or their fit did not converge"]

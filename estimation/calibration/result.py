@@ -20,10 +20,11 @@ from .cross_validation import HeldOut, compare, poses_fitted
 from .outliers import Outlier, Slip
 from .parameters import OF_ROBOT
 from .plausibility import Mistake
-from .solving import Solved, covariance_of, inflation_of, lengths_of, noise_of
+from .solving import Solved, covariance_of, inflation_of, is_still, length_of, lengths_of, noise_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior
+FARTHEST = 0.5  # of the cables' length, by which an anchor or an attachment may be displaced
 
 
 class Parameter(NamedTuple):
@@ -80,8 +81,8 @@ class CalibrationData(Displayed):
     def refused(self) -> str | None:
         """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
 
-        The log probably has an input error, the fit did not converge, or validation samples fit worse than with the
-        file's robot.
+        The log probably has an input error, the fit did not converge, an end of a cable would move by more than half
+        of the cables' length, or validation samples fit worse than with the file's robot.
         """
         if self.doubt is not None:
             return self.doubt
@@ -89,11 +90,29 @@ class CalibrationData(Displayed):
             return f"the fit did not converge in {self._solved.fit.steps} steps"
         if not self.free:
             return "the file predicts validation samples as well as any parameters would: there is nothing to change"
+        if self.undetermined is not None:
+            return self.undetermined
         held_out = self.held_out
         if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
             before, after = (quantity(1e3 * error, "mm", digits=3) for error in (held_out.before, held_out.after))
             return f"validation samples fit worse than with the file's robot: {after}, {before} with the file"
         return None
+
+    @cached_property
+    def undetermined(self) -> str | None:
+        """Return which end of a cable would move farther than any real one, in one line, or None."""
+        ends = (one for one in self.parameters if ".a" in one.name)
+        far, length = max(ends, key=lambda one: abs(one.correction), default=None), length_of(self.file)
+        if far is None or abs(far.correction) <= FARTHEST * length:
+            return None
+        by, of = (quantity(size, "m", digits=3) for size in (abs(far.correction), length))
+        hint = "; the readings hardly change: try --free offsets" if is_still(self.measurements) else ""
+        return f"the log does not determine {far.name}: it would move by {by}, and cables are {of} long{hint}"
+
+    @property
+    def means_something(self) -> bool:
+        """Return whether the parameters can be right: without an input error, determined and converged."""
+        return self.doubt is None and self.converged and self.undetermined is None
 
     @property
     def confirms_file(self) -> bool:

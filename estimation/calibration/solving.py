@@ -47,9 +47,14 @@ class Solved(NamedTuple):
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
     """Return the default free parameters, with the clock offset if a motion was measured."""
     groups = ("anchors", "offsets", "clock")
-    still = float(measurements.lengths.std(axis=0).max()) < WINDING * measurements.sigma.lengths
-    known = measurements.times is not None and not still and is_enough(robot, measurements, ("clock",))
+    moves = measurements.times is not None and not is_still(measurements)
+    known = moves and is_enough(robot, measurements, ("clock",))
     return groups if known and moves_smoothly(robot, measurements) else groups[:-1]
+
+
+def is_still(measurements: Measurements) -> bool:
+    """Return whether the readings hardly change, as those of locked winches."""
+    return float(measurements.lengths.std(axis=0).max()) < WINDING * measurements.sigma.lengths
 
 
 def is_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...]) -> bool:

@@ -30,6 +30,11 @@ def filled(times: np.ndarray | None, samples: Samples, field: Field) -> np.ndarr
 def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarray:
     """Return thrusts (N, c) [N], nan of carriers that they could not hold up, or that fly without any load."""
     result, gravity = thrusts.copy(), float(np.linalg.norm(robot.gravity))
+    # In hover all thrusts together hold all weights, which gives the unit of those from 0 to 1.
+    own_weights = gravity * sum(getattr(carrier, "mass", 0.0) for carrier in robot.carriers if carrier.actuators)
+    measured = thrusts[:, np.isfinite(thrusts).any(axis=0)]
+    together = float(np.nanmedian(measured, axis=0).sum()) if measured.size else 0.0
+    unit = f"{(own_weights + robot.weight) / together:.3g}" if together > 0 else "20"
     for index, carrier in enumerate(robot.carriers):
         if not carrier.actuators or not np.isfinite(thrusts[:, index]).any():
             continue
@@ -38,7 +43,7 @@ def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarra
             result[:, index] = np.nan
             notes.append(
                 f"thrusts of {carrier.name} are not used: they are {quantity(usual, 'N', 3)} (median) for a weight of "
-                f"{quantity(own, 'N', 3)}; a map may state their unit, as in 'thrusts: thrust_* [20 N]'"
+                f"{quantity(own, 'N', 3)}; a map may state their unit, as in 'thrusts: thrust_* [{unit} N]'"
             )
     return result
 

@@ -15,6 +15,8 @@ from .mapping import Field, LogMap
 from .recording import Recording, Samples, check_rising
 
 MOST_ALIGNED = 200_000  # poses
+FAR_APART = 0.1  # [s] between clocks in one file; calibration and replay find smaller offsets themselves
+SURELY, LIKE = 10.0, 0.8  # standard deviations of such an offset, and the correlation of speeds
 
 
 def clock_of_poses(
@@ -35,10 +37,29 @@ def clock_of_poses(
         check_rising(one)
     shared = min(times[-1], pose_times[-1]) - max(times[0], pose_times[0])
     if source.recording is first.recording and shared >= 0.5 * min(np.ptp(times), np.ptp(pose_times)):
-        return None
+        return None if robot is None else _far_apart(lengths, position, quaternions, robot, given, from_)
     if robot is None:
         raise InputError("robot must be given to align the clocks of lengths and poses, got None")
     return _aligned(lengths, position, quaternions, robot, given, [one for one in from_ if one is source.recording])
+
+
+def _far_apart(
+    lengths: Samples,
+    position: Samples,
+    quaternions: np.ndarray | None,
+    robot: Robot,
+    given: LogMap | None,
+    from_: Sequence[Recording],
+) -> Clock | None:
+    """Return the clock of poses that another computer stamped, None unless it is clearly far from the lengths'."""
+    try:
+        clock = _aligned(lengths, position, quaternions, robot, given, from_)
+    except InputError:
+        return None
+    assert lengths.times is not None
+    middle = 0.5 * float(lengths.times[0] + lengths.times[-1])
+    ahead = clock.offset + (clock.rate - 1) * middle
+    return clock if abs(ahead) > max(FAR_APART, SURELY * clock.sigma) and clock.likeness > LIKE else None
 
 
 def _aligned(

@@ -10,7 +10,7 @@ from ...base.text import quantity
 from ...figures.report import Part, Report, Section, Table
 from ...models.robot import Robot
 from .mapping import Fields, LogMap, carrier_fields, command_fields, fields_of, free_axes
-from .names import UNITS, epoch_unit
+from .names import UNITS, time_unit
 from .recording import GAP, Recording, Topic, plain
 
 MOST_NAMED = 8  # fields of a topic
@@ -57,10 +57,15 @@ def _topic(topic: Topic, found: Fields) -> dict[str, Any]:
     times, clock = topic.times, next((one for one in found.time if one.topic is topic), None)
     if times is None and clock is not None:
         values = topic.read([clock.name]).values[:, 0]
-        times = values * UNITS["time"][clock.unit or epoch_unit(float(np.nanmax(np.abs(values), initial=0.0)))]
+        times = values * UNITS["time"][clock.unit or time_unit(values)]
     apart = np.array([]) if times is None else np.diff(times)
     median = float(np.median(apart)) if apart.size else 0.0
     wide = apart[apart > GAP * median] if median > 0 else apart[:0]
+    empty: dict[str, int] = {}
+    if topic.times is None:  # a table, which is in memory
+        for name in ROLES:
+            names = [one.name for one in getattr(found, name) if one.topic is topic]
+            empty[name] = int(np.isnan(topic.read(names).values).any(axis=1).sum()) if names else 0
     return {
         "topic": topic.name,
         "type": topic.kind,
@@ -69,6 +74,7 @@ def _topic(topic: Topic, found: Fields) -> dict[str, Any]:
         "duration": float(times[-1] - times[0]) if times is not None and len(times) else None,
         "gaps": len(wide),
         "longest_gap": float(wide.max(initial=0.0)),
+        "empty": {name: count for name, count in empty.items() if count},
         "fields": {plain(name): unit for name, unit in topic.fields.items()},
     }
 
@@ -104,7 +110,12 @@ def report(data: dict[str, Any]) -> Report:
             for topic in one["topics"]
         ]
         columns = ("topic", "type", "samples", "rate", "duration", "gaps")
-        parts += [Table(f"{one['file']}: {one['kind']}", columns, rows, (2, 3, 4)), *one["notes"]]
+        empty = [
+            f"lines without {name}: {quantity(count)}"
+            for topic in one["topics"]
+            for name, count in topic["empty"].items()
+        ]
+        parts += [Table(f"{one['file']}: {one['kind']}", columns, rows, (2, 3, 4)), *empty, *one["notes"]]
         parts.append(Section("Fields", [(topic["topic"] or "columns", _names(topic)) for topic in one["topics"]]))
     if data["problem"]:
         parts.append(data["problem"])

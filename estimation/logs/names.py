@@ -3,6 +3,8 @@
 import re
 from typing import NamedTuple
 
+import numpy as np
+
 from ...base.csv_columns import ANGLES, LENGTHS, TIMES
 
 FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3, "kgf": 9.80665}
@@ -35,7 +37,7 @@ PATTERNS = {
     "lengths": (
         rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|encoders?|enc){_NUMBER}{_AFTER}",
         rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)\[(\d+)\]",
-        r".*/position\[[^\]]*?(\d+)\]",
+        r".*/position\[[^\]]*?(\d+)(?:[_ ][^\]0-9]+)?\]",  # also of winch_1_joint
         r".*/joints\[[^\]]*?(\d+)\]\.position",
     ),
     "tensions": (
@@ -49,7 +51,11 @@ PATTERNS = {
         r"/?[pt]?[_ ]?([xyz])",
         rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ][pt]?([xyz])",
     ),
-    "quaternion": (rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])", r"/?r([xyzw])"),
+    "quaternion": (
+        rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",
+        r"/?r([xyzw])",
+        rf"{_BEFORE}q\[([0-3])\]",  # w, x, y, z, in logs of PX4
+    ),
     "angles": (rf"{_BEFORE}(roll|pitch|yaw)",),
     "thrusts": (rf"{_BEFORE}thrusts?(?:[./_ ](?:data|value))*[_ ]?\[?(\d*)\]?(?:[./_ ](?:data|value))*",),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
@@ -57,17 +63,19 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:{_DIRECTION}|q)[_ ./]?\[?(\d+)\]?{_VECTOR}",
         rf"{_BEFORE}{_CABLE}[_ ./](?:{_DIRECTION}|q){_VECTOR}",
         rf"{_BEFORE}{_DIRECTION}[_ ]{_CABLE}{_VECTOR}",
-        rf"{_BEFORE}(?:(?:cable|rope|wire|tether)[_ ]?)?{_DIRECTION}(\b){_VECTOR}",  # of the only cable of a carrier
+        rf"{_BEFORE}(?:(?:cable|rope|wire|tether)[_ ]?)?{_DIRECTION}(){_VECTOR}",  # of the only cable of a carrier
     ),
     "azimuths": (
         r".*(?:cable|rope|wire|tether|winch)[_ ]?(\d+)[./_ ](azimuth|elevation|swivel)",
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
     "time": (
-        rf"%?(t|(?:ros[_ ]?)?times?|time \(seconds\)|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds)",
+        rf"%?(t|(?:ros[_ ]?)?times?|time_?us|time \(seconds\)|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds)",
         r"(elapsed(?:[_ ]time)?)",
     ),
 }
+LARGEST_COUNTED = {"ns": 1e17, "us": 1e14, "ms": 1e11}  # from 1970
+LEAST_COUNTED, SLOWEST = 100.0, 1.0  # step of times that are no seconds; time between samples [s]
 # What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
 _COMMAND = re.compile(
     r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?)(?=[./_ \[]|\d|$)"
@@ -104,6 +112,9 @@ def role(name: str) -> Role | None:
                     for first, last in reversed(match.regs[1:]):
                         group = f"{group[:first]}#{group[last:]}"
                     parts = sorted(match.groups(), key=lambda part: not (part.isdigit() or not part))
+                    if which == "quaternion" and parts[0].isdigit():
+                        parts = ["wxyz"[int(parts[0])]]
+                    unit = "us" if which == "time" and text.endswith("us") else unit
                     return Role(which, " ".join(parts), group, unit)
     return None
 
@@ -114,6 +125,16 @@ def measured_name(name: str) -> str | None:
     return found if count else None
 
 
-def epoch_unit(largest: float) -> str:
-    """Return the unit of a time without one, by its size if it counts from 1970, otherwise seconds."""
-    return next((unit for unit, least in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)) if largest > least), "s")
+def time_unit(times: np.ndarray) -> str:
+    """Return the unit of times (N,) without one: by their size if they count from 1970, whole numbers by their steps.
+
+    A recording has a sample per second or more; otherwise times are in seconds.
+    """
+    known = times[np.isfinite(times)]
+    largest = float(np.abs(known).max(initial=0.0))
+    if largest > LARGEST_COUNTED["ms"]:
+        return next(unit for unit, least in LARGEST_COUNTED.items() if largest > least)
+    step = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+    if step < LEAST_COUNTED or (known % 1).any():
+        return "s"
+    return next((unit for unit in ("ms", "us") if step * TIMES[unit] <= SLOWEST), "ns")

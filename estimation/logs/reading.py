@@ -18,15 +18,15 @@ from .carrier_poses import carriers_at, tensions_by_thrust
 from .clocks import clock_of_poses
 from .frozen import frozen
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, read_map
-from .measurements import Measurements
+from .measurements import Measurements, changed
+from .north_east_down import FROM_FRD, FROM_NED, from_ned, ned_frame, note_of
 from .opening import recordings
 from .pose_track import PoseTrack
-from .recording import Recording, Samples
+from .recording import COUNTED, Recording, Samples
 from .streams import Reader, at_times, interpolated
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
-COUNTED = 1e8  # [s]: times beyond count from 1970, and are read from the first one
 AHRS = np.radians(0.5)  # sigma of orientations that no motion capture measured
 
 
@@ -47,6 +47,8 @@ class Log(NamedTuple):
         The files.
     clock
         Clock of the poses, if it is another one than that of the lengths.
+    ned
+        Axis of x of {G}, if poses in a frame of north, east, down were converted.
     """
 
     measurements: Measurements
@@ -55,6 +57,7 @@ class Log(NamedTuple):
     begin: float = 0.0
     recordings: Sequence[Recording] = ()
     clock: Clock | None = None
+    ned: str | None = None
 
 
 def read_measurements(
@@ -151,11 +154,16 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     if not kept.all():
         read.notes.append(f"{quantity(int((~kept).sum()))} samples without poses of carriers are left out")
     tensions = None
+    axis = ned_frame(robot, measured.poses, poses)
+    if axis is not None and measured.poses is not None:
+        poses[:, there] = from_ned(poses[:, there], axis)
+        measured = changed(measured, poses=from_ned(measured.poses, axis))
+        read.notes.append(note_of(axis))
     if measured.tensions is None:
         tensions = tensions_by_thrust(robot, poses[kept], thrusts[kept], times if times is None else times[kept])
     if tensions is not None:
         read.notes.append("tensions are computed from thrusts, weights and accelerations of the carriers")
-    return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions))
+    return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions), ned=axis)
 
 
 def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Log:
@@ -174,6 +182,14 @@ def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Lo
         part = at_times(times, Samples(samples.times, part.reshape(len(part), -1)), found[0]).values
         part = part.reshape(len(part), m, -1)
         recorded[name] = np.pad(part, ((0, 0), (0, 0), (0, 1)), constant_values=np.nan) if flat else part
+    if read.ned is not None:  # directions in the same frame, or in those of the bodies
+        frames = {"in north, east, down": FROM_NED[read.ned], "in forward, right, down": FROM_FRD}
+        whole = [
+            (f"{name} {frame}".strip(), part @ turn.T)
+            for name, part in recorded.items()
+            for frame, turn in frames.items()
+        ]
+        recorded |= {name: part for name, part in whole if np.isfinite(part).any()}
     world, note = next(iter(recorded.values())), None
     if robot is not None:
         world, note = in_world(robot, measured, recorded, None if given is None else given.directions_in)
@@ -198,7 +214,8 @@ def _fields(
     if not found.lengths and not (robot is not None and robot.fixed_lengths is not None and seen):
         names = [topic.full(name) for one in all_ for topic in one.topics.values() for name in topic.fields]
         listed = ", ".join(names[:12]) + (" ..." if len(names) > 12 else "")
-        raise InputError(f"must have columns l0, l1, ... of lengths, got {listed or 'none'}")
+        hint = "; a map (--fields) may name them" if names else ""
+        raise InputError(f"must have columns l0, l1, ... of lengths, got {listed or 'none'}{hint}")
     return found
 
 

@@ -16,6 +16,7 @@ from ..pose.from_log import poses_from_log
 from .carrier_poses import carriers_at, filled
 from .encoders import lengths_of
 from .mapping import Field, command_fields, read_map
+from .north_east_down import from_ned, ned_frame, note_of
 from .reading import Log, Paths, read_log
 from .streams import Reader
 
@@ -96,8 +97,15 @@ def read_recorded(
         doubt = None
         if lengths is not None and not any(carrier.moves for carrier in known.carriers):
             wrong = mistake(known, measured)
-            doubt = f"the log probably has an input error: {wrong.text}" if wrong and wrong.severe else None
+            hint = "; `towline calibrate --fix` corrects it" if wrong and wrong.corrected else ""
+            doubt = f"the log probably has an input error: {wrong.text}{hint}" if wrong and wrong.severe else None
         carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
+        axis = read.ned or ned_frame(known, pose, carrier_pose)
+        if axis is not None:
+            pose = pose if read.ned else from_ned(pose, axis)
+            moving = [i for i, carrier in enumerate(known.carriers) if carrier.moves]
+            carrier_pose[:, moving] = from_ned(carrier_pose[:, moving], axis)
+            notes += [] if read.ned else [note_of(axis)]
         return Recorded(
             robot=known,
             times=times,

@@ -10,6 +10,7 @@ from ...base.errors import InputError
 from ...base.inputs import printable
 
 GAP = 5.0  # median times between samples
+COUNTED = 1e8  # [s]: times beyond count from 1970, and are read from the first one
 
 
 class Samples(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import quantity
 from .mapping import Field, Fields
-from .names import UNITS, epoch_unit
+from .names import UNITS, time_unit
 from .recording import GAP, Samples, check_rising
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
@@ -50,7 +50,7 @@ class Reader:
             clock = self._times.get(key)
             if clock is not None and one.topic.times is None:
                 column = values[:, self._of[key].index(clock.name)]
-                unit = clock.unit or epoch_unit(float(np.nanmax(np.abs(column), initial=0.0)))
+                unit = clock.unit or time_unit(column)
                 times = clock.factor * UNITS["time"][unit] * column
                 again = np.diff(times, prepend=np.nan) == 0
                 if 0 < again.mean() <= MOST_REPEATED:

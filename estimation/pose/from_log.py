@@ -21,6 +21,7 @@ from ...models.part import COORDINATES
 from ...models.robot import Robot
 from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, carriers_of, check_measurements
+from ..logs.recording import COUNTED
 from ..logs.smoothing import FEWEST, Parabolas, within
 from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
@@ -134,11 +135,17 @@ class LogPoses(Displayed):
             yield f"lengths do not determine the pose: poses are those at rest{moves}"
         for one in self.wrong[:MOST_NAMED]:
             which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
-            at = "" if self.times is None else f" (from {quantity(float(self.times[one.first]), 's', 6)})"
+            at = "" if self.times is None else f" (from {self._time(one.first)})"
             names = " or ".join(f"cables[{cable}]" for cable in one.cables)
             yield f"{which}{at}: no pose fits; most likely the length of {names} is wrong"
         if len(self.wrong) > MOST_NAMED:
             yield f"and {quantity(len(self.wrong) - MOST_NAMED)} more"
+
+    def _time(self, sample: int) -> str:
+        assert self.times is not None
+        counted = float(self.times[0]) > COUNTED
+        time = quantity(float(self.times[sample] - counted * self.times[0]), "s", 6)
+        return f"{time} after the first sample" if counted else time
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save as CSV atomically, and return the path.

@@ -1,0 +1,48 @@
+"""Poses in a frame of north, east, down, as drones record them, and their conversion to {G}, where z is up."""
+
+import numpy as np
+
+from ...models import points
+from ...models.robot import Robot
+
+# Rotations from north, east, down to {G}, by the axis of x of {G}; and from forward, right, down to x, y, z of a body.
+FROM_NED = {"east": np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), "north": np.diag([1.0, -1, -1])}
+FROM_FRD = np.diag([1.0, -1, -1])
+
+
+def ned_frame(robot: Robot, poses: np.ndarray | None, carriers: np.ndarray) -> str | None:
+    """Return the axis of x of {G} by which poses in a frame of north, east, down are those of a team, or None.
+
+    Cables cannot push, so a load cannot be above all carriers that move. Which axis it is follows from the home poses.
+
+    - `poses`: of the platform, (N, 6) [m, rad], nan where not measured.
+    - `carriers`: of the carriers, (N, c, 6).
+    """
+    moving = [i for i in sorted(set(robot.carrier_of_cable)) if robot.carriers[i].moves]
+    if poses is None or not moving or len(moving) < len(set(robot.carrier_of_cable)):
+        return None
+    away = carriers[:, moving, :3] - poses[:, None, :3]
+    away = away[np.isfinite(away).all(axis=(1, 2))]
+    gravity = np.array(robot.gravity)
+    if not len(away) or not gravity.any() or (np.median(away @ gravity, axis=0) <= 0).any():
+        return None
+    at_home = robot.carrier_home[moving, :3] - robot.home[:3]
+    middle = np.median(away, axis=0)
+    return min(FROM_NED, key=lambda axis: float(np.linalg.norm(middle @ FROM_NED[axis].T - at_home)))
+
+
+def from_ned(poses: np.ndarray, axis: str) -> np.ndarray:
+    """Return poses (..., 6) [m, rad] in {G}, of poses in a frame of north, east, down; nan where not measured."""
+    result, turn = poses.copy(), FROM_NED[axis]
+    result[..., :3] = poses[..., :3] @ turn.T
+    known = np.isfinite(poses[..., 3:]).all(axis=-1)
+    result[known, 3:] = points.angles(turn @ points.rotations(poses[known, 3:]) @ FROM_FRD)
+    return result
+
+
+def note_of(axis: str) -> str:
+    """Return the remark on converted poses."""
+    return (
+        "the load would be above its carriers, so the poses are read as north, east, down, and forward, right, down of "
+        f"the bodies, with x of {{G}} to the {axis}"
+    )

@@ -1,0 +1,153 @@
+"""Recordings of drum angles, of drones in north, east, down, and of locked winches, through the command line."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from towline import load, read_measurements
+from towline.estimation.calibration.correction import mended
+from towline.estimation.logs.names import role, time_unit
+
+from . import user_recordings as user
+from .warm import towline
+
+RADIUS = np.array([0.05, 0.051, 0.049, 0.0495])  # [m] of the drums, about
+TO_NED = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
+FULL = 31.0  # [N] of thrust, recorded as 1
+
+
+def drum_angles(folder):
+    """Four cables and a motion capture, in one table, with angles of drums for lengths; the offsets."""
+    _, offsets = user.four_cables(folder)
+    robot = user.hanging_robot(folder)
+    read = read_measurements(folder / "winches.csv", poses=folder / "mocap.csv", robot=robot)
+    q = Rotation.from_euler("xyz", read.poses[:, 3:]).as_quat()
+    header = ["t", *(f"l{i}" for i in range(4)), "x", "y", "z", "qx", "qy", "qz", "qw"]
+    rows = np.column_stack([read.times, read.lengths / RADIUS, read.poses[:, :3], q])
+    user.write(folder / "angles.csv", header, rows)
+    return robot, offsets
+
+
+def test_angles_of_drums_become_encoders(tmp_path):
+    robot, _ = drum_angles(tmp_path)
+    done = towline("calibrate", robot, "angles.csv", cwd=tmp_path, code=1)
+    assert "such as a drum's angles" in done.stderr
+    assert "Parameters" not in done.stdout  # which mean nothing
+    told = json.loads(towline("calibrate", robot, "angles.csv", "--fix", "--json", cwd=tmp_path).stdout)
+    assert "scales" in told["free"]
+    assert told["residual_after"] < 1.5e-3
+    scales = [cable.encoder.scale for cable in load(tmp_path / "hanging-calibrated.yaml").cables]
+    np.testing.assert_allclose(scales, RADIUS, rtol=0.01)
+    # The robot's file suits the log as it is, with which the file before is no model of the motion.
+    assert "PASSED" in towline("simulate", "hanging-calibrated.yaml", "angles.csv", cwd=tmp_path).stdout
+    failed = json.loads(towline("simulate", robot, "angles.csv", "--json", cwd=tmp_path, code=1).stdout)
+    assert failed["explained_by"] == []
+    said = towline("simulate", robot, "angles.csv", cwd=tmp_path, code=1).stdout
+    assert "such as a drum's angles" in said
+    assert "Parameters that may explain" not in said
+
+
+def test_signs_and_units_become_encoders(tmp_path):
+    user.four_cables(tmp_path)
+    robot = load(user.hanging_robot(tmp_path))
+    read = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "mocap.csv", robot=robot)
+    log = read.with_lengths(1e3 * read.lengths * [1, -1, 1, 1])
+    found = mended(robot, log)
+    assert not found.counted  # millimetres are exact
+    assert found.measurements is not log
+    np.testing.assert_allclose(found.measurements.lengths, log.lengths)
+    np.testing.assert_allclose([one.encoder.scale for one in found.robot.cables], [1e-3, -1e-3, 1e-3, 1e-3])
+
+
+def test_a_fit_that_moves_anchors_by_metres_is_refused(tmp_path):
+    user.locked(tmp_path)
+    robot = user.hanging_robot(tmp_path)
+    text = (tmp_path / "locked.csv").read_text().splitlines()
+    rows = [line.split(",") for line in text]
+    rows = [[row[0], *(str(float(v) / 0.05) for v in row[1:5]), *row[5:]] for row in rows[1:]]
+    (tmp_path / "locked.csv").write_text("\n".join([text[0], *(",".join(row) for row in rows)]))
+    done = towline("calibrate", robot, "locked.csv", cwd=tmp_path, code=1)
+    assert "not written" in done.stderr
+    assert "Parameters" not in done.stdout
+
+
+def flight(folder, ned):
+    """Two drones with a load in a table, in north, east, down as PX4 records them, or in {G}."""
+    draw = np.random.default_rng(0)
+    t, x, drones = user.team(12)
+    columns, names = [np.round(4e6 + 1e6 * (t - t[0])) if ned else t], ["timestamp"]
+
+    def add(name, values, axes):
+        columns.append(values @ TO_NED.T if ned and len(axes) == 3 else values)
+        names.extend(f"{name}_{axis}" for axis in axes)
+
+    add("load", x + draw.normal(0, 5e-4, x.shape), "xyz")
+    for i, (p, R, thrust, q) in enumerate(drones):
+        add(f"cf{i + 1}", p + draw.normal(0, 5e-4, p.shape), "xyz")
+        R = TO_NED @ R @ np.diag([1, -1, -1]) if ned else R
+        add(f"cf{i + 1}", Rotation.from_matrix(R).as_quat()[:, [3, 0, 1, 2]], ["qw", "qx", "qy", "qz"])
+        add(f"cf{i + 1}", (thrust / (FULL if ned else 1))[:, None], ["thrust"])
+        add(f"cf{i + 1}_dir", draw.normal(0, 0.005, q.shape) - q, "xyz")
+    user.write(folder / "flight.csv", names, np.column_stack(columns), form="%.12g")
+    return user.team_robot(folder)
+
+
+@pytest.mark.parametrize("ned", [False, True])
+def test_two_drones_in_north_east_down(ned, tmp_path):
+    """Microseconds, w first, axes that point down, thrust from 0 to 1: lengths and mass are found as in {G}."""
+    robot = flight(tmp_path, ned)
+    done = json.loads(towline("log", "flight.csv", "--json", "--robot", robot, cwd=tmp_path).stdout)
+    assert done["files"][0]["topics"][0]["rate"] == pytest.approx(100, rel=1e-3)
+    options = ["--free", "offsets", "--json", "--sigma", "position=0.0005"]
+    told = json.loads(towline("calibrate", robot, "flight.csv", *options, cwd=tmp_path).stdout)
+    assert any("read as north, east, down" in note for note in told["notes"]) == ned
+    for one, length in zip(told["parameters"], (0.82, 0.79), strict=True):
+        assert one["value"] == pytest.approx(length - 0.8, abs=5e-4)
+    if ned:
+        (note, *_) = [note for note in told["notes"] if "are not used" in note]
+        # The file's load is 50 g lighter than the real one.
+        assert float(note.split("[")[1].split(" N]")[0]) == pytest.approx(FULL, rel=0.06)
+        (tmp_path / "map.yaml").write_text(f"thrusts: cf*_thrust [{FULL} N]\n")
+    fields = ["--fields", "map.yaml"] if ned else []
+    options[1] = "offsets,mass"
+    told = json.loads(towline("calibrate", robot, "flight.csv", *options, *fields, cwd=tmp_path).stdout)
+    (mass,) = [one["value"] for one in told["parameters"] if one["name"] == "mass"]
+    assert mass == pytest.approx(0.4, rel=0.01)
+    assert "PASSED" in towline("simulate", "team-calibrated.yaml", "flight.csv", *fields, cwd=tmp_path).stdout
+
+
+def test_an_ahrs_in_north_east_down(tmp_path):
+    robot, offsets = user.hanging_robot(tmp_path), np.array([0.02, 0.006, -0.02, -0.01])  # [m]
+    user.statics(tmp_path, offsets)
+    head, *lines = (tmp_path / "statics.csv").read_text().splitlines()
+    rows = np.array([line.split(",") for line in lines], dtype=float)
+    turn = TO_NED @ Rotation.from_euler("xyz", rows[:, 4:7], degrees=True).as_matrix() @ np.diag([1.0, -1, -1])
+    rows[:, 4:7] = Rotation.from_matrix(turn).as_euler("xyz", degrees=True)
+    user.write(tmp_path / "ned.csv", head.replace("_deg", "").split(","), rows)  # degrees, though nothing says so
+    options = ("--free", "offsets", "--fix", "--json")
+    told = json.loads(towline("calibrate", robot, "ned.csv", *options, cwd=tmp_path).stdout)
+    assert any("degrees read as radians, in a frame of north, east, down" in note for note in told["notes"])
+    for one, offset in zip(told["parameters"], offsets, strict=True):
+        assert abs(one["value"] - offset) < 4 * one["sigma"] + 5e-3
+
+
+def test_names_of_joints_and_of_px4():
+    found = role("/joint_states/position[winch_2_joint]")
+    assert (found.role, found.which) == ("lengths", "2")
+    assert [role(f"vehicle_attitude/q[{i}]").which for i in range(4)] == ["w", "x", "y", "z"]
+    assert (role("TimeUS").role, role("TimeUS").unit) == ("time", "us")
+    assert role("dir_x").role == "directions"
+
+
+@pytest.mark.parametrize(("step", "unit"), [(10_000, "us"), (1e7, "ns"), (200, "ms"), (0.01, "s"), (3, "s")])
+def test_units_of_times_since_the_start(step, unit):
+    assert time_unit(12_345_000 + step * np.arange(50)) == unit
+
+
+def test_lines_without_a_value_are_listed(tmp_path):
+    (tmp_path / "log.csv").write_text("t,l1,l2\n0,1,1\n0.1,,1\n0.2,1,1\n")
+    told = json.loads(towline("log", "log.csv", "--json", cwd=tmp_path).stdout)
+    assert told["files"][0]["topics"][0]["empty"] == {"lengths": 1}
+    assert "lines without lengths: 1" in towline("log", "log.csv", cwd=tmp_path).stdout
