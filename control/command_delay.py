@@ -41,12 +41,15 @@ class Pending:
 
         What was not commanded is zero.
         """
-        result, commands = np.zeros((parts, self._count)), self._commands
-        if commands:
-            begins = np.array([each[0] for each in commands])
-            values = np.frombuffer(b"".join(each[1] for each in commands)).reshape(len(begins), -1)
-            ends = np.append(begins[1:], self._time)
-            low = self._time - ago + part * np.arange(parts)[:, None]
-            overlap = np.minimum(ends, low + part) - np.maximum(begins, low)
-            result = np.maximum(overlap, 0.0) @ values / part
-        return result
+        begins: list[float] = []
+        values: list[bytes] = []
+        for begin, command in reversed(self._commands):
+            begins.append(begin)
+            values.append(command)
+            if begin <= self._time - ago:  # those before are over
+                break
+        if not begins:
+            return np.zeros((parts, self._count))
+        low = self._time - ago + part * np.arange(parts)[:, None]
+        overlap = np.minimum([self._time, *begins[:-1]], low + part) - np.maximum(begins, low)
+        return np.maximum(overlap, 0.0) @ np.frombuffer(b"".join(values)).reshape(len(begins), -1) / part

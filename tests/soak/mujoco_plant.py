@@ -15,6 +15,7 @@ pulls at the platform, its mean over the last period; the command acts from when
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 from importlib import import_module
@@ -110,9 +111,10 @@ class World:
         self._model: Any = mujoco.MjModel.from_xml_string(mjcf(robot, hardware, period / self._substeps))
         self._data: Any = mujoco.MjData(self._model)
         self._flies = np.array([carrier.body is not None for carrier in robot.carriers])
+        self._mocaps, self._flying = np.flatnonzero(~self._flies), np.flatnonzero(self._flies)
         self._poses = motion[1:, :6].copy()  # of the carriers that are put where they are commanded
         self._put(0, motion[0])
-        for number, index in enumerate(np.flatnonzero(self._flies), start=1):
+        for number, index in enumerate(self._flying, start=1):
             self._put(number, motion[1 + index])
         self._put_mocaps(motion[1:, :6])
         mujoco.mj_forward(self._model, self._data)
@@ -141,9 +143,9 @@ class World:
         self._data.qvel[v + 3 : v + 6] = dr - sp * dy, cr * dp + sr * cp * dy, cr * cp * dy - sr * dp
 
     def _put_mocaps(self, poses: np.ndarray) -> None:
-        for number, index in enumerate(np.flatnonzero(~self._flies)):
+        for number, index in enumerate(self._mocaps):
             self._data.mocap_pos[number] = poses[index, :3]
-            self._data.mocap_quat[number] = quaternion(*poses[index, 3:])
+            self._data.mocap_quat[number] = quaternion(*poses[index, 3:].tolist())
         self._poses = poses
 
     def motions(self) -> np.ndarray:
@@ -152,15 +154,16 @@ class World:
         result[1:, :6] = self._poses
         if self._started:
             result[1:, 6:] = self._moving
-        for number, body in enumerate([0, *(1 + np.flatnonzero(self._flies))]):
-            q, v = self._data.qpos[7 * number : 7 * number + 7], self._data.qvel[6 * number : 6 * number + 6]
+        for number, body in enumerate([0, *(1 + self._flying)]):
+            q = self._data.qpos[7 * number : 7 * number + 7].tolist()
+            v = self._data.qvel[6 * number : 6 * number + 6].tolist()
             w, x, y, z = q[3:]
-            roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-            pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
-            yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-            sr, cr, cp = np.sin(roll), np.cos(roll), max(np.cos(pitch), 1e-6)
+            roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+            pitch = math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0))
+            yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+            sr, cr, cp = math.sin(roll), math.cos(roll), max(math.cos(pitch), 1e-6)
             turn = (v[4] * sr + v[5] * cr) / cp
-            rates = v[3] + np.sin(pitch) * turn, v[4] * cr - v[5] * sr, turn
+            rates = v[3] + math.sin(pitch) * turn, v[4] * cr - v[5] * sr, turn
             result[body] = [*q[:3], roll, pitch, yaw, *v[:3], *rates]
         return result
 
@@ -207,7 +210,7 @@ class World:
                 actuation[has.lost[0]] = 0.0
             if not self._started:
                 self._rotors = actuation.copy()
-        flying = np.flatnonzero(self._flies)
+        flying = self._flying
         if forces is not None:
             for number, index in enumerate(flying):
                 data.xfrc_applied[2 + number, :3] = forces[index]
@@ -304,18 +307,16 @@ def _torques() -> tuple[str, str, str]:
     return "0 0 0 1 0 0", "0 0 0 0 1 0", "0 0 0 0 0 1"
 
 
-def quaternion(roll: float, pitch: float, yaw: float) -> np.ndarray:
+def quaternion(roll: float, pitch: float, yaw: float) -> list[float]:
     """Return (w, x, y, z) of Rz(yaw) Ry(pitch) Rx(roll)."""
     a, b, c = roll / 2, pitch / 2, yaw / 2
-    sa, ca, sb, cb, sc, cc = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.sin(c), np.cos(c)
-    return np.array(
-        [
-            ca * cb * cc + sa * sb * sc,
-            sa * cb * cc - ca * sb * sc,
-            ca * sb * cc + sa * cb * sc,
-            ca * cb * sc - sa * sb * cc,
-        ]
-    )
+    sa, ca, sb, cb, sc, cc = math.sin(a), math.cos(a), math.sin(b), math.cos(b), math.sin(c), math.cos(c)
+    return [
+        ca * cb * cc + sa * sb * sc,
+        sa * cb * cc - ca * sb * sc,
+        ca * sb * cc + sa * cb * sc,
+        ca * cb * sc - sa * sb * cc,
+    ]
 
 
 def _text(numbers: Any) -> str:
