@@ -14,7 +14,7 @@ MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear progra
 _PER_METRE = 40.0  # force scales that a metre costs by which a bound is missed
 _LARGEST = 1e7  # of the objective [N]
 _FOUND = 1e-5  # of the margin, or of 1 N: a smaller improvement ends the search
-_PROGRAMS = 60  # from one start, at most
+PROGRAMS = 60  # from one start, at most
 
 
 class Multipliers(NamedTuple):
@@ -83,7 +83,9 @@ class _Program:
         return np.clip(y + self.solution.x[: y.size] * self.scale, variables.low, variables.high)
 
 
-def maximise(evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1) -> None:
+def maximise(
+    evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1, programs: int = PROGRAMS
+) -> None:
     """Move the variables to a local maximum of a goal, in place: an interrupt keeps what is reached.
 
     - `evaluation`: of all rows that count.
@@ -91,16 +93,10 @@ def maximise(evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, de
     - `y`: where to start, (p,); it is moved.
     - `until`: time of `time.perf_counter` at which it ends early [s].
     - `delta`: longest step of the first program, of the range of each variable.
+    - `programs`: most linear programs.
     """
-    price = _PER_METRE * evaluation.variables.robot.force_scale
-
-    def merit(z: np.ndarray) -> tuple[float, np.ndarray]:
-        every = evaluation.all_reserves(z)
-        outcome = evaluation.outcome_besides(z, goal, float(every.min()))
-        return goal.value(z, outcome) - price * evaluation.missing(z), every
-
-    value, every = merit(y)
-    for _ in range(_PROGRAMS):
+    value, every = merit(evaluation, goal, y)
+    for _ in range(programs):
         if delta < 1e-6 or time.perf_counter() > until or not np.isfinite(value):
             break
         program = _Program(evaluation, goal, y, delta, every)
@@ -108,7 +104,7 @@ def maximise(evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, de
         if not predicted > _FOUND * max(1.0, abs(value)):
             break
         candidate = program.moved(y, evaluation.variables)
-        candidate_value, candidate_every = merit(candidate)
+        candidate_value, candidate_every = merit(evaluation, goal, candidate)
         actual = candidate_value - value
         if actual > 1e-4 * predicted:
             largest = float(np.abs(program.solution.x[: y.size]).max())
@@ -119,6 +115,14 @@ def maximise(evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, de
                 delta *= 0.5
         else:
             delta *= 0.35
+
+
+def merit(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return what `maximise` improves, the goal less the price of what the room misses [N], and all reserves."""
+    every = evaluation.all_reserves(y)
+    outcome = evaluation.outcome_besides(y, goal, float(every.min()))
+    price = _PER_METRE * evaluation.variables.robot.force_scale
+    return goal.value(y, outcome) - price * evaluation.missing(y), every
 
 
 def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float = 1e-3) -> Multipliers:

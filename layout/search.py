@@ -1,7 +1,11 @@
-"""The search of a design: annealed starts, sequential linear programs, and audits that add the worst poses."""
+"""The search of a design: annealed starts, sequential linear programs, and audits that add the worst poses.
+
+Half of the time new starts are tried, most of them symmetric. In the other half some points of the best layout are
+moved at random, and linear programs go on from there, because the optimum of a start is mostly only a local one.
+"""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +13,11 @@ import numpy as np
 from .annealing import anneal
 from .evaluation import Evaluation, Rows, rows_of
 from .goal import NOTHING, Goal, Outcome, goal_of
-from .linear_programs import maximise
+from .linear_programs import PROGRAMS, maximise, merit
+from .moves import Moves
 from .requirements import Requirements
 from .room import Room, room_of
+from .symmetry import Mirrors
 from .task_rows import FEW_INSTANTS, with_tasks
 from .variables import Variables
 
@@ -23,7 +29,8 @@ FEW = 32  # rows for annealing
 _ADDED, _APART = 20, 0.15  # worst poses that an audit adds, and how far apart they are [m]
 _SOON, _ROUNDS = 2, 6  # audits after a start that does not meet the requirements, and at the end
 _ANNEALING, _IMPROVING = 0.3, 0.4  # of the time at most, for each start and each sequence of linear programs
-_STARTING = 0.85  # of the time, for new starts
+_STARTING, _SEARCHING = 0.45, 0.9  # of the time: when new starts end, and when only audits are left
+_DRAWN, _MOST_MOVES, _FEW_PROGRAMS = 4, 3, 15  # layouts near the best one, moves to each, programs from one of them
 _FIRST_STEP, _LATER_STEP = 0.1, 0.02  # longest steps of the first linear program, of the ranges
 _SAME = 1e-3  # of the margin: what an audit may find less
 _SPARE, _FEW_SPARE = 0.002, 0.3  # of the clearance: what is searched for more than is asked, and at few poses
@@ -53,52 +60,109 @@ def search(
 
     The first layout is the robot's own unless another is given, (p,).
     """
-    robot, started = variables.robot, time.perf_counter()
-    until = started + requirements.time_limit
-    enough = started + _STARTING * requirements.time_limit
-    rng = np.random.default_rng(requirements.seed)
-    require, tasks = requirements.require, requirements.tasks
-    rows = with_tasks(rows_of(robot, require, [each.places() for each in require]), robot, tasks)
-    coarse = few(rows_of(robot, require, _coarse(requirements)), rng, FEW)
-    room = room_of(robot, requirements)
-    annealed = Evaluation(variables, with_tasks(coarse, robot, tasks, FEW_INSTANTS), room.with_spare(_FEW_SPARE))
-    goal = goal_of(variables, requirements)
-    found = Found(goal, variables.of_robot() if first is None else first, rows)
-
-    def improve(what: str, delta: float) -> None:
-        share = (time.perf_counter() - started) / requirements.time_limit
-        progress(what, min(share, 1.0), found.outcome.margin)
-        ends = min(until, time.perf_counter() + _IMPROVING * requirements.time_limit)
-        maximise(Evaluation(variables, found.rows, room.with_spare(_SPARE)), goal, y, ends, delta)
-        _take(variables, requirements, found, y, rng)
-
-    def settle(rounds: int) -> None:
-        nonlocal y
-        for _ in range(rounds):
-            if found.audit_agrees or time.perf_counter() > until:
-                break
-            y = found.y.copy()
-            improve(f"audit of start {found.starts}", _LATER_STEP)
-
-    y = found.y.copy()
+    search = _Search(variables, requirements, progress, variables.of_robot() if first is None else first)
     try:
-        while found.starts == 0 or time.perf_counter() < enough:
-            if found.starts == 0 and requirements.start == "robot":
-                improve("the robot's own layout", _FIRST_STEP)
-            else:
-                near = found.y if found.starts % 2 and found.starts > 1 else None
-                ends = min(until, time.perf_counter() + _ANNEALING * requirements.time_limit)
-                y = anneal(annealed, goal, rng, ends, near)
-                improve(f"start {found.starts + 1}", _FIRST_STEP)
-            found.starts += 1
-            if found.outcome.missing > 0.0 or found.outcome.margin < requirements.margin:
-                settle(_SOON)
-        settle(_ROUNDS)
+        search.run()
     except KeyboardInterrupt:
+        search.stop()
+    return search.found
+
+
+class _Search:
+    """The state of a search."""
+
+    def __init__(self, variables: Variables, requirements: Requirements, progress: Progress, first: np.ndarray):
+        robot, require, tasks = variables.robot, requirements.require, requirements.tasks
+        self._started = time.perf_counter()
+        self._until = self._started + requirements.time_limit
+        self._variables, self._requirements, self._progress = variables, requirements, progress
+        self._rng = np.random.default_rng(requirements.seed)
+        self._room = room_of(robot, requirements)
+        coarse = few(rows_of(robot, require, _coarse(requirements)), self._rng, FEW)
+        rows = with_tasks(coarse, robot, tasks, FEW_INSTANTS)
+        self._coarse = Evaluation(variables, rows, self._room.with_spare(_FEW_SPARE))
+        rows = with_tasks(rows_of(robot, require, [each.places() for each in require]), robot, tasks)
+        self.found = Found(goal_of(variables, requirements), first, rows)
+        self._y = first.copy()  # of the layout that is improved
+        self._free = self._best_moves = Moves(variables)
+
+    def run(self) -> None:
+        """Try starts, then layouts near the best one, and audit it at last."""
+        starts = self._starts()
+        while self.found.starts == 0 or self._share() < _SEARCHING:
+            if self.found.starts == 0 and self._requirements.start == "robot":
+                self._improve("the robot's own layout", _FIRST_STEP)
+            elif self._share() < _STARTING or (not self._met() and self.found.starts % 2):
+                next(starts)
+            else:
+                self._move_on()
+            self.found.starts += 1
+        self._settle(_ROUNDS)
+
+    def stop(self) -> None:
+        """Keep the layout that was being improved, if it is better."""
+        found = self.found
         found.stopped = True
-        if found.better(y, Evaluation(variables, found.rows, room).outcome(y, goal)):
-            found.y = y
-    return found
+        outcome = Evaluation(self._variables, found.rows, self._room).outcome(self._y, found.goal)
+        if found.better(self._y, outcome):
+            found.y = self._y
+
+    def _share(self) -> float:
+        """Return the elapsed share of the time."""
+        return (time.perf_counter() - self._started) / self._requirements.time_limit
+
+    def _met(self) -> bool:
+        return self.found.outcome.missing <= 0.0 and self.found.outcome.margin >= self._requirements.margin
+
+    def _starts(self) -> Iterator[None]:
+        """Improve annealed layouts: one of each symmetry, then as often that of the best one as any other."""
+        mirrors, rng = Mirrors(self._variables), self._rng
+        kinds = [None, *mirrors.signs]
+        order, best = list(rng.permutation(len(kinds))), 0
+        while True:
+            kind = order.pop() if order else best if rng.random() < 0.5 else int(rng.integers(len(kinds)))
+            signs = kinds[kind]
+            moves = Moves(self._variables, None if signs is None else mirrors.symmetry(signs, rng))
+            before = self.found.y
+            ends = min(self._until, time.perf_counter() + _ANNEALING * self._requirements.time_limit)
+            self._y = anneal(self._coarse, self.found.goal, moves, rng, ends)
+            self._improve(f"start {self.found.starts + 1}", _FIRST_STEP)
+            if self.found.y is not before:
+                best, self._best_moves = kind, moves
+            if not self._met():
+                self._settle(_SOON)
+            yield
+
+    def _move_on(self) -> None:
+        """Improve the best of some random layouts near the best one, every other time of the same symmetry."""
+        rng, found = self._rng, self.found
+        moves = self._free if rng.random() < 0.5 else self._best_moves
+        evaluation, value = Evaluation(self._variables, found.rows, self._room.with_spare(_SPARE)), -np.inf
+        for _ in range(_DRAWN):
+            candidate = found.y
+            for _ in range(rng.integers(1, _MOST_MOVES + 1)):
+                candidate = moves.neighbour(candidate, rng)
+            candidate_value, _ = merit(evaluation, found.goal, candidate)
+            if candidate_value > value:
+                self._y, value = candidate, candidate_value
+        self._improve(f"start {found.starts + 1}", _FIRST_STEP, _FEW_PROGRAMS)
+
+    def _settle(self, rounds: int) -> None:
+        """Improve the best layout until audits agree with its rows."""
+        for _ in range(rounds):
+            if self.found.audit_agrees or time.perf_counter() > self._until:
+                break
+            self._y = self.found.y.copy()
+            self._improve(f"audit of start {self.found.starts}", _LATER_STEP)
+
+    def _improve(self, what: str, delta: float, programs: int = PROGRAMS) -> None:
+        """Improve a layout by linear programs, and keep it if it is the best."""
+        found = self.found
+        self._progress(what, min(self._share(), 1.0), found.outcome.margin)
+        ends = min(self._until, time.perf_counter() + _IMPROVING * self._requirements.time_limit)
+        evaluation = Evaluation(self._variables, found.rows, self._room.with_spare(_SPARE))
+        maximise(evaluation, found.goal, self._y, ends, delta, programs)
+        _take(self._variables, self._requirements, found, self._y, self._rng)
 
 
 def _take(

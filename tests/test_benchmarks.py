@@ -255,7 +255,7 @@ def test_all_search_the_same_layouts():
     pytest.importorskip("pymoo")
     pytest.importorskip("cma")
     found = design.measure("ipanema-2", 0.2, 1)
-    assert list(found) == ["towline", "pymoo GA", "cma"]
+    assert list(found) == ["towline", "pymoo GA", "cma", "cma, drawn"]
     assert all(np.isfinite(each).all() for each in found.values())
     lines = design.table({"ipanema-2": found})
     assert len(lines) == 2 + len(found)

@@ -586,7 +586,7 @@ def test_cables_are_as_long_as_the_winches_permit(monkeypatch):
 
     The search starts from the robot's own layout and goes on until audits agree, whatever the machine's speed.
     """
-    monkeypatch.setattr(searching, "_STARTING", 0.0)
+    monkeypatch.setattr(searching, "_SEARCHING", 0.0)
     robot = load("ipanema-2")
     low, high = BOXES["ipanema-2"]
     corners = np.array(list(product(*np.transpose([low, high]))))

@@ -1,0 +1,92 @@
+"""Symmetric layouts: of two cables, one is the mirror image of the other.
+
+Boxes in which platforms move are mostly symmetric, and so are the best layouts for them. A search among symmetric
+layouts has half of the variables, and finds better ones in less time.
+"""
+
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from .variables import Variables, parts
+
+_ALIKE = 1e-6  # of the largest coordinate: how exactly the bounds of two cables are mirror images
+
+
+class Symmetry(NamedTuple):
+    """Variables that follow from others: y[second] = offset + sign * y[first]."""
+
+    first: np.ndarray  # (k,)
+    second: np.ndarray  # (k,)
+    offset: np.ndarray  # (k,)
+    sign: np.ndarray  # 1 or -1, (k,)
+
+    def applied(self, y: np.ndarray) -> np.ndarray:
+        """Return the variables of the symmetric layout, (p,)."""
+        y = y.copy()
+        y[self.second] = self.offset + self.sign * y[self.first]
+        return y
+
+
+class Mirrors:
+    """Random symmetries of a robot's layout.
+
+    A plane of symmetry is through the middle of all anchors' bounds, and through that of all attachments' bounds. It is
+    vertical, because weight has a direction.
+    """
+
+    def __init__(self, variables: Variables):
+        m, S = variables.robot.m, variables.S
+        ends = S * variables.low, S * variables.high
+        low = variables.fixed + np.minimum(*ends).sum(axis=1)
+        high = variables.fixed + np.maximum(*ends).sum(axis=1)
+        self._low, self._high = _by_cable(low, m), _by_cable(high, m)  # (m, 8)
+        used = (S != 0.0).sum(axis=0)
+        columns = np.where((S != 0.0).any(axis=1), (S != 0.0).argmax(axis=1), -1)
+        self._columns = _by_cable(columns, m)  # the variable of each number, or -1
+        # A variable that several cables share makes them symmetric already.
+        self._own = np.array([all(used[column] == 1 for column in row if column >= 0) for row in self._columns])
+        middle = (self._low.min(axis=0) + self._high.max(axis=0)) / 2
+        self._middle = np.r_[middle[:6], 0.0, 0.0]
+        extent = self._high.max(axis=0) - self._low.min(axis=0)
+        self._tolerance = _ALIKE * float(np.abs([self._low, self._high]).max())
+        #: Signs of x and y of the mirrorings; both at once are half a turn. Points that are all in the plane of a
+        #: mirroring are their own images.
+        self.signs = [
+            signs
+            for signs in product((1.0, -1.0), repeat=2)
+            if -1.0 in signs and all(extent[axis] > self._tolerance for axis in (0, 1) if signs[axis] < 0.0)
+        ]
+
+    def symmetry(self, signs: tuple[float, float], rng: np.random.Generator) -> Symmetry | None:
+        """Return cables in random pairs of which one may be the image of the other, or None if there are none."""
+        sign = np.array([*signs, 1.0, *signs, 1.0, 1.0, 1.0])
+        offset = (1.0 - sign) * self._middle
+        low = offset + np.minimum(sign * self._low, sign * self._high)
+        high = offset + np.maximum(sign * self._low, sign * self._high)
+        left, pairs = list(rng.permutation(np.flatnonzero(self._own))), []
+        while left:
+            one = left.pop()
+            for other in left:
+                apart = np.abs([low[one] - self._low[other], high[one] - self._high[other]])
+                if apart.max() <= self._tolerance:
+                    left.remove(other)
+                    pairs.append((one, other))
+                    break
+        chosen = [
+            (self._columns[one, k], self._columns[other, k], offset[k], sign[k])
+            for one, other in pairs
+            for k in range(8)
+            if self._columns[one, k] >= 0
+        ]
+        if not chosen:
+            return None
+        first, second, offsets, signs_of = (np.array(part) for part in zip(*chosen, strict=True))
+        return Symmetry(first, second, offsets, signs_of)
+
+
+def _by_cable(layout: np.ndarray, m: int) -> np.ndarray:
+    """Return the numbers of each cable: anchor, attachment, t_min and t_max, (m, 8)."""
+    anchors, attachments, t_min, t_max = parts(layout, m)
+    return np.column_stack([anchors, attachments, t_min, t_max])

@@ -1,0 +1,94 @@
+"""Symmetric layouts: margins are those at mirrored poses, and only cables of mirrored bounds are paired."""
+
+import numpy as np
+import pytest
+
+from towline import Robot, load, read_requirements
+from towline.layout.evaluation import Evaluation, rows_of
+from towline.layout.moves import Moves
+from towline.layout.symmetry import Mirrors
+from towline.layout.variables import variables_of
+
+HERE = np.array([[0.7, 0.4, 1.2, 0.0, 0.0, 0.0], [-0.9, 1.1, 2.0, 0.0, 0.0, 0.0], [0.2, -1.3, 1.6, 0.0, 0.0, 0.0]])
+MIRRORINGS = [(-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
+
+
+def required(poses, *free):
+    return read_requirements({"free": list(free), "require": [{"poses": poses.tolist()}]})
+
+
+def variables_with(robot, *free):
+    return variables_of(robot, required(HERE, *free))
+
+
+def box(low, high):
+    return {"min": list(low), "max": list(high)}
+
+
+def pairs(variables, signs):
+    """Return the pairs of cables, counted from 1, of a random symmetry."""
+    symmetry = Mirrors(variables).symmetry(signs, np.random.default_rng(0))
+    if symmetry is None:
+        return set()
+    cable = [int(name.split("[")[1].split("]")[0]) + 1 for name in variables.names]
+    return {frozenset((cable[i], cable[j])) for i, j in zip(symmetry.first, symmetry.second, strict=True)}
+
+
+@pytest.mark.parametrize("signs", MIRRORINGS)
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-2"])
+def test_the_margin_at_a_pose_is_that_at_its_mirror_image(name, signs):
+    """Weight is the only wrench, and the CoM is moved to the planes of symmetry."""
+    data = load(name).model_dump()
+    data["platform"]["com"] = (0.0, 0.0, 0.1)
+    robot = Robot.model_validate(data)
+    free = [
+        {"part": "anchor", "box": box((-7.0, -6.0, 3.0), (7.0, 6.0, 5.5))},
+        {"part": "attachment", "box": box((-0.5, -0.4, -0.5), (0.5, 0.4, 0.5))},
+        {"part": "t_max", "range": {"min": 500.0, "max": 900.0}},
+    ]
+    variables, rng = variables_with(robot, *free), np.random.default_rng(4)
+    moves = Moves(variables, Mirrors(variables).symmetry(signs, rng))
+    both = np.vstack([HERE, HERE * [*signs, 1.0, 1.0, 1.0, 1.0]])
+    evaluation = Evaluation(variables, rows_of(robot, required(both, *free).require, [both]))
+    y = moves.layout(rng)
+    for _ in range(50):
+        y = moves.neighbour(y, rng)
+        assert (y >= variables.low).all()
+        assert (y <= variables.high).all()
+        margins = evaluation.margins(y)
+        np.testing.assert_allclose(margins[:3], margins[3:], rtol=1e-9, atol=1e-6)
+
+
+def test_only_cables_whose_bounds_are_mirror_images_are_paired():
+    robot = load("ipanema-2")
+    left = {"part": "anchor", "cables": [1, 2, 3, 4], "box": box((-6, -4, 1), (-4, 4, 5))}
+    right = {"part": "anchor", "cables": [5, 6, 7, 8], "box": box((4, -4, 1), (6, 4, 5))}
+    anywhere = {"part": "attachment", "box": box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))}
+    variables = variables_with(robot, left, right, anywhere)
+    assert all(min(pair) <= 4 < max(pair) for pair in pairs(variables, (-1.0, 1.0)))
+    assert all((min(pair) <= 4) == (max(pair) <= 4) for pair in pairs(variables, (1.0, -1.0)))
+    assert all(len(pairs(variables, signs)) == 4 for signs in MIRRORINGS)
+    # One cable is stronger, so it has no image, and one is left.
+    data = robot.model_dump()
+    data["cables"] = [{**cable, "t_max": cable["t_max"] * (1 + (i == 0))} for i, cable in enumerate(data["cables"])]
+    stronger = variables_with(Robot.model_validate(data), left, right, anywhere)
+    assert len(pairs(stronger, (-1.0, 1.0))) == 3
+    assert 1 not in set().union(*pairs(stronger, (-1.0, 1.0)))
+    # Points that cables share, or copy from others, stay as the requirements have them.
+    shared = {"part": "attachment", "box": anywhere["box"], "equal": True}
+    assert pairs(variables_with(robot, left, right, shared), (-1.0, 1.0)) == set()
+
+
+def test_fixed_attachments_are_paired_with_their_images():
+    robot = load("cogiro")
+    variables = variables_with(robot, {"part": "anchor", "box": box((-7, -6, 3), (7, 6, 5.5))})
+    for signs in MIRRORINGS:
+        for one, other in (sorted(pair) for pair in pairs(variables, signs)):
+            image = robot.attachments[one - 1] * [*signs, 1.0]
+            np.testing.assert_allclose(image, robot.attachments[other - 1], atol=1e-3)
+
+
+def test_a_planar_robot_is_mirrored_in_its_plane_only():
+    robot = load("planar-4")
+    low, high = robot.anchors.min(axis=0), robot.anchors.max(axis=0)
+    assert Mirrors(variables_with(robot, {"part": "anchor", "box": box(low, high)})).signs == [(-1.0, 1.0)]
