@@ -46,7 +46,10 @@ class Moves:
         return self._symmetric(y)
 
     def _symmetric(self, y: np.ndarray) -> np.ndarray:
-        return y if self._symmetry is None else self._symmetry.applied(y)
+        if self._symmetry is None:
+            return y
+        # Bounds are not exactly mirror images of others.
+        return np.minimum(np.maximum(self._symmetry.applied(y), self._low), self._high)
 
 
 def drawn(low: np.ndarray, high: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -4,14 +4,13 @@ Boxes in which platforms move are mostly symmetric, and so are the best layouts 
 layouts has half of the variables, and finds better ones in less time.
 """
 
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from .variables import Variables, parts
 
-_ALIKE = 1e-6  # of the largest coordinate: how exactly the bounds of two cables are mirror images
+_ALIKE = 0.01  # of the extent of anchors, attachments or forces: how far bounds may be from mirror images of others
 
 
 class Symmetry(NamedTuple):
@@ -50,13 +49,14 @@ class Mirrors:
         middle = (self._low.min(axis=0) + self._high.max(axis=0)) / 2
         self._middle = np.r_[middle[:6], 0.0, 0.0]
         extent = self._high.max(axis=0) - self._low.min(axis=0)
-        self._tolerance = _ALIKE * float(np.abs([self._low, self._high]).max())
+        scales = [extent[:3].max(), extent[3:6].max(), self._high[:, 6:].max()]
+        self._tolerance = _ALIKE * np.repeat(scales, (3, 3, 2))  # (8,)
         #: Signs of x and y of the mirrorings; both at once are half a turn. Points that are all in the plane of a
         #: mirroring are their own images.
         self.signs = [
-            signs
-            for signs in product((1.0, -1.0), repeat=2)
-            if -1.0 in signs and all(extent[axis] > self._tolerance for axis in (0, 1) if signs[axis] < 0.0)
+            (x, y)
+            for x, y in ((1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
+            if (x > 0.0 or extent[0] > self._tolerance[0]) and (y > 0.0 or extent[1] > self._tolerance[1])
         ]
 
     def symmetry(self, signs: tuple[float, float], rng: np.random.Generator) -> Symmetry | None:
@@ -70,7 +70,7 @@ class Mirrors:
             one = left.pop()
             for other in left:
                 apart = np.abs([low[one] - self._low[other], high[one] - self._high[other]])
-                if apart.max() <= self._tolerance:
+                if (apart <= self._tolerance).all():
                     left.remove(other)
                     pairs.append((one, other))
                     break
