@@ -10,7 +10,7 @@ import numpy as np
 
 from .variables import Variables, parts
 
-_ALIKE = 0.01  # of the extent of anchors, attachments or forces: how far bounds may be from mirror images of others
+_ALIKE = 0.02  # of the extent of anchors, attachments or forces: how far bounds may be from mirror images of others
 
 
 class Symmetry(NamedTuple):
