@@ -3,11 +3,18 @@
 A loop of bandwidth w with an observer of bandwidth K, whose state is T late without being predicted, and whose measured
 positions and velocities have the noise s_x and s_v, keeps
 
-    (w + K) T <= 1        w^2 s_x + (2 w + K) s_v <= 0.05 g        h (lag + T') <= 1
+    (w + K) T <= 1        w^2 s_x + (2 w + K) s_v <= 0.05 g
 
-with the bandwidth h of the attitude loops of flying carriers, whose drives lag. Two standard deviations of the tensions
-that noise of velocities requires are inside the limits at home. At about twice these bounds robots were lost in
-simulations with an independent plant.
+Two standard deviations of the tensions that noise of velocities requires are inside the limits at home. At about twice
+these bounds robots were lost in simulations with an independent plant.
+
+The attitude loops of flying carriers, phi'' = -2 h phi' - h^2 phi, are stable up to h lag = 2 with drives that lag
+(Routh), up to h delay = 0.647 with late states (their phase where the gain is 1), and up to h period = 1 with states
+that are held for a period (Jury), each alone. Together they keep
+
+    h (lag / 2 + (delay / 0.647 + period) / 1.5) <= 0.5        h >= 6 k
+
+with the bandwidth k of the loops of position around them, which by Routh need h > 2 k without any delay.
 """
 
 from collections.abc import Mapping
@@ -28,10 +35,13 @@ from .weights import ripple
 
 NOISE = 0.05  # of gravity: acceleration by noise of the measured state
 LOST, UNSTABLE = 2.0, 1.5  # times the bounds: robots are lost
+DELAY, PERIOD = 0.647, 1.0  # times the inverse of h: where a late or a held state alone makes attitude loops unstable
 LEAST = 0.1  # of the usual bandwidths: with less a robot does not follow
 READINGS = 1e3  # [1/s], without a rate
 GRAVITY, TINY = 9.81, 1e-12  # [m/s^2]; what divides
 ATTITUDE = 40.0  # [rad/s]
+SLOWEST = 15.0  # [rad/s], of attitude loops: teams were lost below
+PLACE, CASCADE = 5.0, 6.0  # bandwidth of position [rad/s], and of attitude over it at least
 
 
 class Usual(NamedTuple):
@@ -80,15 +90,9 @@ def bandwidths_for(
     K = None if observer is None else number("observer", observer, 0.0, 1e3)
     h = None if attitude is None else number("attitude", attitude, 0.1, 1e3)
     errors = None if sensors is None else _errors_of(_noise_of(sensors), robot)
-    flies = any(carrier.actuators for carrier in robot.carriers)
-    turning = (min(rotor_lag, ROTORS_KEEP) + (0.0 if errors is None else errors.age)) if flies else 0.0
-    if h is not None and h * turning > UNSTABLE:
-        raise InputError(
-            f"attitude must be at most {UNSTABLE / turning:.3g} rad/s if carriers turn {quantity(turning, 's')} late, "
-            f"got {h:g} rad/s"
-        )
-    h = h or (min(ATTITUDE, 1.0 / turning) if turning else ATTITUDE)
+    lag = min(rotor_lag, ROTORS_KEEP)
     if errors is None:
+        h = _attitude_for(robot, None, lag, h)
         return Bandwidths(np.full(6, usual.bandwidth) if w is None else w, usual.observer if K is None else K, h)
     part, reason = errors.permit(usual.bandwidth, usual.observer)
     if w is None and K is None and part < LEAST:
@@ -104,7 +108,35 @@ def bandwidths_for(
             f"bandwidth and observer must be at most {LOST * part:.2g} of the given ones for {reason}, got "
             f"{given[0].max():g} and {given[1]:g} rad/s"
         )
-    return Bandwidths(*given, h)
+    return Bandwidths(*given, _attitude_for(robot, errors, lag, h))
+
+
+def _attitude_for(robot: Robot, errors: "_Errors | None", lag: float, given: float | None) -> float:
+    """Return the bandwidth of attitude loops, `given` or the largest that lags of rotors and sensors permit."""
+    delay, period = (0.0, 0.0) if errors is None else (errors.age - errors.period / 2, errors.period)
+    late, weight = lag + delay + period / 2, lag / 2 + (delay / DELAY + period / PERIOD) / UNSTABLE
+    if not late or not any(carrier.actuators for carrier in robot.carriers):
+        return given or ATTITUDE
+    if given is not None and given * weight * UNSTABLE > 1.0:
+        raise InputError(
+            f"attitude must be at most {1 / UNSTABLE / weight:.3g} rad/s if carriers turn {quantity(late, 's')} late, "
+            f"got {given:g} rad/s"
+        )
+    most = min(ATTITUDE, 0.5 / weight)
+    if given is None and most < SLOWEST:
+        raise InputError(
+            f"sensors must permit attitude loops of {SLOWEST:g} rad/s, got carriers that turn {quantity(late, 's')} "
+            f"late, which permits {most:.2g} rad/s"
+        )
+    return given or most
+
+
+def place_for(attitude: float, place: float | None) -> float:
+    """Return the bandwidth of the position loops of flying carriers with attitude loops of bandwidth `attitude`.
+
+    Raises `InputError` if the given one has a wrong value.
+    """
+    return min(PLACE, attitude / CASCADE) if place is None else number("place", place, 0.1, 1e3)
 
 
 def noise_of_velocity(robot: Robot, sensors: Noise | Mapping[str, Any] | None) -> float:
@@ -124,7 +156,8 @@ def _noise_of(sensors: Any) -> Noise:
 class _Errors(NamedTuple):
     """Errors of sensors: ages [s], and standard deviations of positions [m] and velocities [m/s]."""
 
-    age: float  # of all states
+    age: float  # of all states, on average
+    period: float  # for which they are held
     late: float  # what of the age and of lags is not predicted
     position: float
     velocities: np.ndarray  # (2,), of the position and by rates of angles
@@ -156,4 +189,4 @@ def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     strict = robot.fixed_lengths is None and robot.m >= len(robot.platform.dof)
     of_tensions = ripple(robot, limits_of(robot, None), np.repeat(velocity, 3)) if strict and velocity.any() else None
     most = 0.0 if of_tensions is None else OFTEN * float(np.linalg.norm(of_tensions, axis=1).max())
-    return _Errors(age, late, float((size * position).max()), size * velocity, most)
+    return _Errors(age, step if noise.rate else 0.0, late, float((size * position).max()), size * velocity, most)

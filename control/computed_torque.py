@@ -16,7 +16,7 @@ from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from ..solvers.status import OPTIMAL
 from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
-from .bandwidths import HELD, SWINGING, bandwidths_for
+from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
 from .boxes import boxes, stay_inside
 from .command import HOLD, NOTHING, NOWHERE, PLANNED, SOFT, Command
 from .controllability import uncontrolled
@@ -74,8 +74,9 @@ class ComputedTorque(Controller):
         Bandwidth of this motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
         Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`. Default of `attitude`:
-        40, or the inverse of the known lag of rotors and sensors. If carriers turn so late that the attitude loop would
-        be unstable (core/control/turning.c), it is lowered to the inverse of this lag.
+        40, or less by the known lags of rotors and sensors (control/bandwidths.py); of `place`: 5, at most a sixth of
+        it. If carriers turn so late that the attitude loop would be unstable (core/control/turning.c), it is lowered to
+        the inverse of this lag.
     patience
         Time for which the sensor of a cable may report no tension, although one is commanded, until the cable is
         treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again once
@@ -110,7 +111,7 @@ class ComputedTorque(Controller):
         reach: tuple[float, float] | None = None,
         carrier_bandwidth: float = 6.0,
         carrier_acceleration: float = 5.0,
-        place: float = 5.0,
+        place: float | None = None,
         attitude: float | None = None,
         patience: float = 0.05,
         tension_loop: float = 0.0,
@@ -130,7 +131,7 @@ class ComputedTorque(Controller):
             loops.observer,
             carrier_bandwidth,
             carrier_acceleration,
-            place,
+            place_for(loops.attitude, place),
             patience,
         )
         self._settings = settings_of(self.robot, self._limits, *gains)

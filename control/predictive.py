@@ -119,7 +119,7 @@ class Predictive(ComputedTorque):
         tube: float | None = None,
         keep_out: Sequence[Shape | dict[str, Any]] = (),
         observer: float | None = None,
-        place: float = 5.0,
+        place: float | None = None,
         attitude: float | None = None,
         patience: float = 0.05,
         tension_loop: float = 0.0,
@@ -270,9 +270,12 @@ class Predictive(ComputedTorque):
             return beside._replace(tensions=tensions, answered=answered, unexplained=unexplained)
         tensions, proof = self._predict(time, dt, reference), self._nowhere
         if tensions is None:
-            self._watch.interrupt()
-            self._moved.rest(self._steps[0], self._carriers[0])
             tensions, answered = beside.tensions[None], np.reshape(beside.answered, 1)
+            if np.isfinite(self._problems.w).all():
+                self._watch.interrupt()
+            else:
+                self._watch.skip(dt, tensions[0] - self._cables["last"][0] if self._has_winches else 0 * tensions[0])
+            self._moved.rest(self._steps[0], self._carriers[0])
             proof = beside.direction[None], np.reshape(beside.shortfall, 1)
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
@@ -285,7 +288,6 @@ class Predictive(ComputedTorque):
     def _compare(self, time: float, dt: float, reference: Reference) -> None:
         """Compare the motion with the prediction, and hand over if they differ."""
         if not np.isfinite(self._problems.w).all():
-            self._watch.interrupt()
             return
         known, last = self._cables["known"][0], self._cables["last"][0]
         otherwise = known - last if self._has_winches else np.zeros_like(last)

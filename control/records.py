@@ -37,6 +37,8 @@ CARRIER = np.dtype(
         *((name, "f8", 6) for name in ("offset", "offset_rate")),
         *((name, "f8", 3) for name in ("force", "explained", "ordered", "turning")),
         ("lacking", "f8"),
+        ("wanted", "f8", MOST_ACTUATORS),
+        ("limited", "f8"),
     ]
 )
 _AXIS = np.dtype([(name, "f8") for name in ("usual", "order", "late_order", "late_rate")])

@@ -12,7 +12,7 @@ UNSTABLE = (
 )
 LATE = "carriers turn so late that their attitude loop is nearly unstable"
 LOUD = "noise of the measured rates requires more than the tension limits permit: lower bandwidth and observer"
-WINDOW = 0.05  # [s], in which a motion is compared
+WINDOW, PAUSE = 0.05, 0.25  # [s]: in which a motion is compared, at least, and at most between two steps
 QUICK, LONG = 0.01, 0.1  # [s]: noise is quicker than what tensions correct, and how long it is heard
 OFTEN = 2.0  # standard deviations of noise have room: one command in twenty is cut off
 SMOOTH, MEAN = 0.005, 0.04  # [s], of the difference, against noise, and of the mean of its size
@@ -33,7 +33,7 @@ class Watch:
     Over the last `WINDOW` the velocity should change by the integral of the model's accelerations for the measured
     state, estimated disturbance and command of each step. The mean difference over the window is the unexplained
     acceleration. New plans and jumps of the reference do not contribute, because they act through the commands. Steps
-    that are further apart than the window are not compared.
+    that are further apart than `PAUSE` are not compared, nor those before and after more than `QUICK` without a state.
 
     - `scale`: factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for
       locked coordinates.
@@ -62,6 +62,7 @@ class Watch:
     def interrupt(self) -> None:
         """Forget all steps except the time without a solution: the robot was not controlled, or not measured."""
         self._left: deque[tuple[float, np.ndarray]] = deque()  # times, and velocities less what explains them
+        self._unseen = 0.0  # [s], without a measured state
         self._explained, self._off = np.zeros(6), np.zeros(6)
         self._acceleration: np.ndarray | None = None
         self._trend: np.ndarray | None = None
@@ -75,6 +76,18 @@ class Watch:
         if solved:
             self._solved = time
 
+    def skip(self, dt: float, change: np.ndarray) -> None:
+        """Continue without a measured state, `dt` [s] after the last step.
+
+        `change` is the difference of the current command from the last one, (m,) [N].
+        """
+        self._unseen += dt
+        if self._acceleration is None or self._unseen > QUICK:
+            self.interrupt()
+        else:
+            self._explained += dt * self._acceleration
+            self._acceleration = self._acceleration + self._by_tensions @ change
+
     def compare(self, time: float, dt: float, rate: np.ndarray, otherwise: np.ndarray) -> HandOver | None:
         """Compare the current rate of the pose, (6,), and return the reason not to use predictions, or None.
 
@@ -82,7 +95,8 @@ class Watch:
         """
         if dt > WINDOW:
             self._solved = max(self._solved, time)
-        if self._acceleration is None or dt > WINDOW:
+        self._unseen = 0.0
+        if self._acceleration is None or dt > PAUSE:
             self.interrupt()
         else:
             self._explained += dt * (self._acceleration + KNOWN * (self._by_tensions @ otherwise))

@@ -37,7 +37,7 @@ def grows(w, K, late, steps=6000, dt=1e-3):
 @pytest.mark.parametrize("delay", [0.02, 0.05, 0.1])
 def test_a_loop_with_the_permitted_bandwidths_is_stable_and_one_that_is_refused_is_not(delay):
     robot = load("multi-quadrotor-3")  # without winches: nothing but the delay is late
-    w, K, _ = bandwidths_for(robot, TEAM, {"delay": delay}, 0.0)
+    w, K, _ = bandwidths_for(robot, TEAM, {"delay": delay}, 0.0, attitude=5.0)
     assert w[0] / K == pytest.approx(TEAM.bandwidth / TEAM.observer)
     assert not grows(w[0], K, delay)
     assert grows(3 * w[0], 3 * K, delay)
@@ -69,13 +69,52 @@ def test_bandwidths_without_sensors_are_the_usual_ones_and_good_sensors_permit_m
         np.testing.assert_allclose(bandwidths_for(few, SWINGING, sensors, 0.0)[0], SWINGING.bandwidth)
 
 
+def turns_more_and_more(h, lag, delay, period, steps=4000, dt=1e-3):
+    """Return whether phi'' = u diverges with u' = (-2 h phi' - h^2 phi - u) / lag of states late and held [s]."""
+    phi, rate, u, held, states = 1.0, 0.0, 0.0, (1.0, 0.0), [(1.0, 0.0)] * (1 + round(delay / dt))
+    hold, left, largest = max(1, round(period / dt)), np.exp(-dt / max(lag, 1e-9)), np.zeros(steps)
+    for k in range(steps):
+        held = (phi, rate) if k % hold == 0 else held
+        states = [*states[1:], held]
+        wanted = -2 * h * states[0][1] - h**2 * states[0][0]
+        given = wanted + (u - wanted) * left
+        mean = 0.5 * (u + given) if lag else wanted
+        phi, rate, u = phi + dt * rate + dt**2 / 2 * mean, rate + dt * mean, given
+        largest[k] = abs(phi)
+    return bool(largest[-steps // 4 :].max() > largest[: steps // 4].max())
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 15), st.integers(0, 20), st.integers(0, 40))
+def test_attitude_loops_with_the_permitted_bandwidth_are_stable_and_refused_ones_are_not(lag, delay, period):
+    robot, late = load("multi-quadrotor-3"), (1e-3 * lag, 1e-3 * delay, 1e-3 * period)
+    sensors = {"delay": late[1]} | ({"rate": 1 / late[2]} if period else {})
+    try:
+        h = bandwidths_for(robot, TEAM, sensors, late[0]).attitude
+    except InputError:  # slower than a team can be
+        return
+    assert not turns_more_and_more(h, *late)
+    if h < 40.0:
+        assert turns_more_and_more(2.5 * h, *late)
+        with pytest.raises(InputError, match="attitude must be at most"):
+            bandwidths_for(robot, TEAM, sensors, late[0], attitude=2.5 * h)
+
+
 def test_attitude_loops_are_as_fast_as_rotors_and_sensors_permit():
     robot = load("multi-quadrotor-3")
     assert bandwidths_for(robot, TEAM, None, 0.01).attitude == 40.0
-    assert bandwidths_for(robot, TEAM, {"delay": 0.02}, 0.02).attitude == pytest.approx(1 / 0.035)
-    assert bandwidths_for(robot, TEAM, {"delay": 0.02, "stamped": True}, 0.0).attitude == 40.0
-    with pytest.raises(InputError, match=r"attitude must be at most 30 rad/s if carriers turn 0.05 s late, got 40"):
+    for late in ({"delay": 0.02}, {"delay": 0.02, "stamped": True}):  # the carriers' turning is not predicted
+        assert bandwidths_for(robot, TEAM, late, 0.0).attitude == pytest.approx(0.75 * 0.647 / 0.02)
+    # 0.06 s of which a lead leaves 0.015 s
+    with pytest.raises(InputError, match=r"attitude must be at most 15.3 rad/s if carriers turn 0.05 s late, got 40"):
         ComputedTorque(robot, attitude=40.0, sensors={"delay": 0.035}, rotor_lag=0.06)
+
+
+@pytest.mark.parametrize("make", [ComputedTorque, Predictive])
+@pytest.mark.parametrize("late", [{"delay": 0.05}, {"rate": 15}, {"rate": 50, "delay": 0.03, "stamped": True}])
+def test_a_team_is_not_started_with_sensors_that_leave_its_attitude_loops_too_slow(make, late):
+    with pytest.raises(InputError, match=r"sensors must permit attitude loops of 15 rad/s, got carriers"):
+        make("multi-quadrotor-4", sensors=late)
 
 
 @pytest.mark.parametrize("make", [ComputedTorque, Predictive, FaultTolerant])

@@ -62,6 +62,8 @@ typedef struct {
     double ordered[3];                /* angular acceleration, in its own axes; nan where an actuator is at its limit */
     double turning[3];                /* rate that is measured, in its own axes */
     double lacking;                   /* thrust that its actuators do not give, or give too much, by their limits [N] */
+    double wanted[TOWLINE_MOST_ACTUATORS]; /* commands before limits, without noise */
+    double limited;                        /* share of the last time in which one of these was beyond a limit */
 } towline_carrier_memory;
 
 /* How an axis of a carrier turns: what is ordered, and what is measured; see turning.c. */

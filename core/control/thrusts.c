@@ -9,8 +9,10 @@
  * F is the wanted thrust in {G}, T the one given, d the estimate of all other forces (air, a mass that is not as in the
  * robot file), e the rotation from the thrust's axis to F and to the ordered yaw, M the moment of the cables about the
  * CoM, k and h the bandwidths of position and attitude; q marks what is measured. Only the part of F along the thrust's
- * axis is there at once; the rest comes when the carrier has turned. Source: T. Lee, M. Leok and N. H. McClamroch,
- * "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
+ * axis is there at once; the rest comes when the carrier has turned, so it is lacking where it cannot turn as ordered:
+ * where its actuators are at their limits most of the time. This is where an attitude loop that is unstable ends, for any
+ * reason: oscillations grow until the limits stop them. Source: T. Lee, M. Leok and N. H. McClamroch, "Geometric tracking
+ * control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
  */
 #include <string.h>
 
@@ -19,6 +21,9 @@
 #include "control/usable.h"
 
 static const double NO_FORCE = 1e-9; /* [N], and of a rotation [rad] */
+static const double WINDOW = 0.1;    /* [s]: well-damped turns towards a new force stay at limits for less */
+static const double MOSTLY = 0.5;    /* of the window */
+static const double SLOWER = 4;      /* bandwidths of the attitude loop: what is quicker is noise */
 
 /* One carrier of a flight. */
 typedef struct {
@@ -101,8 +106,8 @@ static void rotation_to(const flier *it, const double *force, double *e) {
     e[2] += axis[2] * turn_between(it->motion[5], it->order[5]);
 }
 
-/* Write the force and the moment, in its own axes, that a carrier needs of its actuators. */
-static void wrench_of_carrier(const flier *it, const double *tensions, double *wrench) {
+/* Write force and moment, in its own axes, that a carrier needs of its actuators; return F across the thrust [N]. */
+static double wrench_of_carrier(const flier *it, const double *tensions, double *wrench) {
     const attitude *at = &it->at->carrier[it->index];
     const double axis[3] = {at->R[2], at->R[5], at->R[8]}, h = it->attitude, *inertia = it->body->inertia;
     double force[3], pulled[3], e[3], wanted[3], bent[3], moment[3], spin[3], gyroscopic[3], turned[3];
@@ -124,11 +129,13 @@ static void wrench_of_carrier(const flier *it, const double *tensions, double *w
         wrench[3 + k] = moment[k] + gyroscopic[k] - turned[k];
     }
     wrench[2] = dot(force, axis);
+    return sqrt(fmax(dot(force, force) - wrench[2] * wrench[2], 0));
 }
 
-/* Write commands inside their limits, where they are numbers, and remember what they lack of an order. */
-static void command(const flier *it, const double *wrench, double *actuation) {
-    int followed = 1;
+/* Write commands inside their limits, where they are numbers, and remember what they lack of F, `across` or along. */
+static void command(const flier *it, double dt, const double *wrench, double across, double *actuation) {
+    const double share = 1 - exp(-SLOWER * it->attitude * dt);
+    int followed = 1, limited = 0;
     double thrust = 0;
     for (int a = 0; a < it->body->actuators; a++) {
         const towline_actuator *limits = &it->body->actuator[a];
@@ -138,12 +145,16 @@ static void command(const flier *it, const double *wrench, double *actuation) {
         }
         const double inside = wanted < limits->low ? limits->low : wanted > limits->high ? limits->high : wanted;
         if (isfinite(inside)) {
+            double *smooth = &it->memory->wanted[a];
             actuation[a] = inside;
+            *smooth = dt > 0 ? *smooth + share * (wanted - *smooth) : wanted;
+            limited |= *smooth < limits->low || *smooth > limits->high;
         }
         followed &= wanted == actuation[a];
         thrust += actuation[a] * limits->wrench[2];
     }
-    it->memory->lacking = fabs(wrench[2] - thrust);
+    it->memory->limited += fmin(dt / WINDOW, 1) * (limited - it->memory->limited);
+    it->memory->lacking = fmax(fabs(wrench[2] - thrust), it->memory->limited > MOSTLY ? across : 0);
     for (int k = 0; k < 3 && !followed; k++) {
         it->memory->ordered[k] = NAN;
     }
@@ -169,8 +180,8 @@ double towline_write_thrusts(const towline_robot *robot, const towline_controlle
             if (measured) {
                 observe_carrier(&it, dt, flight.cables, actuation);
             }
-            wrench_of_carrier(&it, flight.tensions, wrench);
-            command(&it, wrench, actuation);
+            const double across = wrench_of_carrier(&it, flight.tensions, wrench);
+            command(&it, dt, wrench, across, actuation);
             lacking = fmax(lacking, it.memory->lacking); /* not a number that is none */
         }
     }
