@@ -60,6 +60,9 @@ PHRASES = {
 }
 WORDS = {re.compile(rf"(?<![\w`'-])({words})(?![\w`-])", re.IGNORECASE): instead for words, instead in BANNED.items()}
 FORBIDDEN = WORDS | {re.compile(words): instead for words, instead in PHRASES.items()}
+# All at once, in a quarter of the time: nearly all texts have none.
+ANY_WORD = re.compile(rf"(?<![\w`'-])({'|'.join(BANNED)})(?![\w`-])", re.IGNORECASE)
+ANY_PHRASE = re.compile("|".join(PHRASES))
 # A function's docstring begins with a verb, and so with none of these.
 NO_VERB = re.compile(
     r"(an?|all|and|as|at|being|both|by|each|for|from|here|how|if|in|is|its?|least|largest|many|most|no|none|not|of|on"
@@ -74,6 +77,8 @@ NOT_OURS = re.compile(r"``[^`]+``|`[^`\n]+`|https?://\S+|“[^”]*”")
 def offences(text):
     """Return the forbidden words in a text, each with its surroundings."""
     ours = " ".join(NOT_OURS.sub("", text).split())
+    if not ANY_WORD.search(ours) and not ANY_PHRASE.search(ours):
+        return []
     return [
         f"'{match[0].strip()}' (write: {instead}): ...{ours[max(match.start() - 40, 0) : match.end() + 40]!r}"
         for pattern, instead in FORBIDDEN.items()
