@@ -137,9 +137,9 @@ def test_a_turned_box_is_the_box_of_turned_points(ends, angles):
 
 
 def binary_stl(triangles, name=b"part"):
-    record = struct.Struct("<12fH")
-    body = b"".join(record.pack(0, 0, 0, *corners.ravel(), 0) for corners in triangles)
-    return name.ljust(80, b"\0") + struct.pack("<I", len(triangles)) + body
+    records = np.zeros(len(triangles), [("normal", "<f4", 3), ("corners", "<f4", 9), ("attribute", "<u2")])
+    records["corners"] = np.reshape(triangles, (-1, 9))
+    return name.ljust(80, b"\0") + struct.pack("<I", len(triangles)) + records.tobytes()
 
 
 def text_stl(triangles):

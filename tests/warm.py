@@ -61,11 +61,13 @@ def _server():
 
 
 def _import_all():
+    gc.disable()
     for module in pkgutil.walk_packages(package.__path__, "towline."):
         with suppress(ImportError):  # of what is not installed
             importlib.import_module(module.name)
     for name in LATE:
         importlib.import_module(name)
+    gc.enable()
     gc.freeze()  # what is never touched again is not copied for a fork
 
 
