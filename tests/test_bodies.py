@@ -15,9 +15,12 @@ from scipy.spatial.transform import Rotation
 from towline import InputError, load, plan
 from towline.models import Robot
 from towline.ocp.audits.audit import audit
+from towline.ocp.nlp.rows import Mesh, swept
 from towline.ocp.planner import Planner
+from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 
+from .soak.random_work import with_beam
 from .warm import towline
 
 SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -247,6 +250,23 @@ def test_a_beam_is_carried_past_a_pillar():
     straight = plan("cogiro", {key: value for key, value in BEAM.items() if key != "tube"})
     assert [str(each).partition(" is ")[0] for each in straight.audit.excess] == ["load's body"]
     assert nearest(straight, corners, 0.2, PILLAR) < -0.19
+
+
+def test_a_beam_under_quadrotors_does_not_jump_over_a_post():
+    """A step of 0.6 m over a post of 0.2 m: both nodes keep 0.16 m, a third of the way the beam is inside."""
+    post = {"kind": "capsule", "name": "post", "start": [0, 0.2, -1], "end": [0, 0.2, 5], "radius": 0.1, "cables": None}
+    line = {"kind": "line", "start": [-2, 0, 1.5], "end": [2, 0, 1.5]}
+    task = {"path": line, "duration": 4, "tube": {"position": "free"}, "base": {"kind": "free"}, "steps": 10}
+    scenario = lay_out(with_beam(1.0, 2), Task.model_validate(task | {"limits": {"keep_out": [post]}}))
+    ways = {limit: way for limit, way in swept(scenario, Mesh(10)).items() if "platform's body" in limit.labels}
+    [(limit, way)] = ways.items()
+    at = np.zeros((2, 18))
+    at[:, 0], at[:, 2] = (-0.3, 0.3), 1.5
+    carriers = np.zeros((2, 18))
+    values = np.array(way(at[0], *carriers, at[1], *carriers)).ravel()
+    thick = 0.1 + 0.04  # of the post and of the beam
+    assert values == pytest.approx([0.1 - thick, 0.1 - thick, 0.3 - thick], abs=1e-9)
+    assert limit.low == 0.0
 
 
 @pytest.mark.parametrize(("x", "feasible", "tube"), [(-1.5, False, 0.6), (0.5, True, 0.05)])

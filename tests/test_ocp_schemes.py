@@ -19,6 +19,8 @@ from towline.ocp.tasks.task import Task
 from towline.studies.flying import circle as flying_circle
 from towline.studies.towing import plans as towing_plans
 
+from .soak.random_work import with_beam
+
 GRAVITY = 9.81
 NAMES = tuple(SCHEMES)
 
@@ -187,6 +189,20 @@ def test_more_balances_miss_less_between_them():
     assert orders["linear"] > 1.7
     assert orders["hermite"] > orders["linear"] + 0.5
     assert missing["hermite", 20] < 0.1 * missing["linear", 20]
+
+
+def test_a_beam_that_misses_equations_between_the_nodes_takes_another_scheme():
+    """Four cables of two quadrotors: lines miss the thrust's direction, quadratics on the same nodes do not."""
+    line = {"kind": "line", "start": [-2, 0, 1.5], "end": [0, 0.5, 1.8]}
+    task = {"path": line, "duration": {"min": 1, "max": 9}, "objective": {"time": 1}, "steps": 20}
+    task |= {"tube": {"position": "free", "attitude": 0.4}, "base": {"kind": "free", "ends": "rest"}}
+    quadratic, lines = (plan(with_beam(1.0, 2), task | scheme) for scheme in ({}, {"scheme": "linear"}))
+    assert quadratic.feasible
+    assert quadratic.scenario.task.scheme == "hermite"
+    assert lines.feasible
+    assert lines.scenario.task.scheme == "linear"
+    assert len(quadratic.deviation.nodes) < len(lines.deviation.nodes)
+    assert quadratic.duration == pytest.approx(lines.duration, rel=2e-3)  # the least time
 
 
 @pytest.mark.parametrize("name", NAMES)

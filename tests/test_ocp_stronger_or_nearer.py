@@ -134,6 +134,32 @@ def with_cables(robot, **fields):
     return Robot.model_validate(data)
 
 
+def test_a_load_that_is_too_heavy_has_the_heaviest_that_can_be_carried():
+    def fetching(mass):
+        crate = {"mass": mass, "com": [0.05, 0, -0.5], "inertia": [mass / 8] * 3 + [0, 0, 0]}
+        there = {"kind": "line", "start": [-2, -1, 2.5], "end": [1, 1, 1.2]}
+        return {
+            "phases": [
+                {"name": "there", "duration": 5, "path": there},
+                {"name": "grip", "duration": 1, "ground": {}, "load": crate},
+                {
+                    "name": "back",
+                    "duration": 8,
+                    "path": there | {"start": [1, 1, 1.2], "end": [-2, -1, 2.5]},
+                    "load": crate,
+                },
+            ],
+            "limits": {"cable_speed": 2},
+        }
+
+    found = plan("cogiro", fetching(1200))
+    assert not found.feasible
+    (offer,) = (each for each in found.relaxations if each.name == "phases[1].load.mass")
+    assert (offer.requested, offer.detail) == (1200, "instead of 1200 kg, in each phase")
+    for factor, possible in ((1.0, True), (1.03, False)):
+        assert plan("cogiro", fetching(factor * offer.possible)).feasible == possible
+
+
 def test_cables_that_pull_too_hard_have_the_largest_t_min_that_is_feasible():
     task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [0.4, 0.2, 1.3]}, "duration": 3}
     found = plan(with_cables("cogiro", t_min=1500.0), task)

@@ -520,6 +520,20 @@ def test_it_is_slow_near_a_place(through, planned):
     assert speed.max() > 1
 
 
+def test_it_brakes_to_the_edge_of_a_slow_zone():
+    """No grid found a law: a point of it inside the zone was passed slowly enough, and the edge before it was not."""
+    far, radius, slow, most = 2.0, 0.77, 0.25, 2.0  # [m], [m], [m/s], [m/s^2]
+    path = {"kind": "line", "start": [-far, 0, 2], "end": [far, 0, 2]}
+    zone = {"centre": [0.13, 0, 2], "radius": radius, "speed": slow}
+    law = time_along("cogiro", {"path": path, "limits": {"zone_speed": [zone], "platform_acceleration": most}})
+    assert law.feasible
+    seconds = 2 * radius / slow
+    for way in (far + 0.13 - radius, far - 0.13 - radius):  # from rest to the zone, and back
+        peak = np.sqrt(most * way + slow**2 / 2)
+        seconds += (2 * peak - slow) / most
+    assert law.duration == pytest.approx(seconds, rel=1e-3)
+
+
 def test_a_law_is_not_cut_off_by_a_shorter_duration():
     """It ended at its speed half of the way, and the plan was feasible; a longer one rests at the end."""
     task = time_along("cogiro", {"path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1]}}).scenario.task

@@ -5,6 +5,7 @@ from the other. Bodies with the same skeleton but round edges are nearer by thei
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -21,9 +22,10 @@ from .state import State
 
 PLATFORM, LOAD = "platform's body", "load's body"  # in texts
 WITHIN = " within "  # in texts, between a body and a side of its room
+PLACES = (1 / 3, 2 / 3, 1.0)  # on the way from one instant to the next: so far apart a body cannot jump over a region
 
 
-class _BodyOutside(Outside):
+class BodyOutside(Outside):
     """Keep a body out of a region, by the edges of one of both and the whole of the other."""
 
     name, per_metre = "keep_out", 1.0  # of the region `riding` on the platform too: all corners of the body count
@@ -46,14 +48,21 @@ class _BodyOutside(Outside):
     def apart(self, pair: Pair) -> ca.SX:
         return super().apart(pair) - self._moving.radius
 
+    @override
+    def on_the_way(self, first: State, second: State) -> ca.SX:
+        """Return the values at a few places of the way, which is no edge of a body itself."""
+        poses = [first.platform.pose + share * (second.platform.pose - first.platform.pose) for share in PLACES]
+        states = (replace(first, platform=first.platform._replace(pose=pose)) for pose in poses)
+        return ca.vertcat(*(self.values(state) for state in states))
+
 
 def body_outside(body: Shape, whose: str, place: Place, called: str, least: float) -> Iterator[Distance]:
     """Yield the limits that keep a body in the platform's frame out of a region in {G}, by `least` [m]."""
     own, its = skeleton(body), skeleton(place)
     if its.solid or not own.solid:
-        yield _BodyOutside(place, own, whose, called, False, least)
+        yield BodyOutside(place, own, whose, called, False, least)
     if own.solid:
-        yield _BodyOutside(body, its, whose, called, True, least)
+        yield BodyOutside(body, its, whose, called, True, least)
 
 
 class Inside(Distance):

@@ -1,6 +1,7 @@
 """Limits of the platform: speed, also near places, acceleration, angular velocity, tilt and position."""
 
 import casadi as ca
+import numpy as np
 from typing_extensions import override
 
 from ...models.part import Vector3
@@ -34,6 +35,10 @@ class ZoneSpeed(Magnitude):
     def __init__(self, name: str, centre: Vector3, radius: float, most: float):
         super().__init__(most)
         self._centre, self._radius, self.labels = centre, radius, (f"platform near {name}",)
+
+    def contains(self, positions: np.ndarray) -> np.ndarray:
+        """Return which positions (n, 3) [m] are in the zone, (n,)."""
+        return np.linalg.norm(positions - self._centre, axis=1) < self._radius
 
     @override
     def values(self, state: State) -> ca.SX:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from ..limits import Limit
+from ..limits.bodies import BodyOutside
 from ..tasks.bernstein import Values
 from ..tasks.scenario import POSITION, Scenario
 from .held import Spans, held_spans
@@ -156,14 +157,14 @@ def in_world(scenario: Scenario, platform: list[ca.SX], carriers: list[list[ca.S
 def swept(scenario: Scenario, mesh: Mesh) -> dict[Limit, ca.Function]:
     """Return the limits that the program keeps between nodes rather than at them, and their functions.
 
-    They are distances from regions that are thinner than a few steps of the reference motion. The result is
-    empty for teams, since four quadrotors took four times as long through a slot.
+    They are distances from regions that are thinner than a few steps of the reference motion: of teams those of bodies,
+    since a beam under quadrotors jumped over a post on every mesh, but four quadrotors with a point load took four
+    times as long through a slot; of other robots those of points, since a finer mesh finds what a body jumps over.
     """
-    if scenario.count > MANY:
-        return {}
     platform, carriers = scenario.references(scenario.scheme.shares(mesh.steps) * scenario.duration)
     ways = [np.diff(motion.pose[:, POSITION], axis=0) for motion in (platform, *carriers)]
     longest = max(float(np.linalg.norm(way, axis=1).max()) for way in ways)  # from node to node
     thin = [limit for limit in scenario.limits if limit.thickness < STEPS * longest]
+    thin = [limit for limit in thin if isinstance(limit, BodyOutside) == (scenario.count > MANY)]
     functions = {limit: scenario.limits.on_the_way(limit) for limit in thin}
     return {limit: function for limit, function in functions.items() if function is not None}

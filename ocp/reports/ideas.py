@@ -31,7 +31,7 @@ def ideas(plan: PlanData) -> list[Fact]:
     if plan.feasible:
         return []
     found = [*_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
-    tried = "shorter line, weaker wind, lighter platform, stronger cables or lower t_min"
+    tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"is known that makes it feasible: no duration, limit, {tried}")]
     return found or (nothing if plan.certificate is not None and not units(plan) else [])
 

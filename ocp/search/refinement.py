@@ -8,6 +8,7 @@ import numpy as np
 
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
+from ..audits.tensions import TOLERANCE
 from ..limits.platform import PlatformSpeed
 from ..nlp.rows import Mesh
 from ..nlp.solver import Outcome
@@ -53,7 +54,10 @@ def refine(search: Search, outcome: Outcome) -> str:
             halved = tuple((name, about, share / 2) for name, about, share in mesh.further)
             further = _tightened(scenario, audit, halved)
         between = tuple(sorted({*mesh.between, *_missed_between(scenario, audit)}))
-        steps = min(_times_finer(scenario, audit) * mesh.steps, MOST_STEPS)
+        finer = _times_finer(scenario, audit)
+        if finer > 1 and scenario.task.scheme is None and _equations_missed(scenario, audit):
+            scenario, finer = search.take_scheme("hermite"), 1
+        steps = min(finer * mesh.steps, MOST_STEPS)
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further, between)
         outcome = search.solve("nonlinear program", mesh, outcome.deviation, coarser=outcome.success)
         audit = search.audit(outcome)
@@ -91,6 +95,13 @@ def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh)
             break
         outcome, audit = again, search.audit(again)
     return outcome, audit, mesh
+
+
+def _equations_missed(scenario: Scenario, audit: Audit) -> bool:
+    """Return whether an audit reports that between the nodes a motion is not one that the robot can follow."""
+    few = audit.tolerance > TOLERANCE and _missed(audit) > 0.0
+    equations = {limit.name for limit in scenario.limits if limit.is_equation}
+    return few or any(excess.limit in equations for excess in audit.excess)
 
 
 def _times_finer(scenario: Scenario, audit: Audit) -> int:

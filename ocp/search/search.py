@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from operator import itemgetter
 
 import numpy as np
@@ -23,6 +24,7 @@ from ..plan import Plan
 from ..result import PlannerStep
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
+from ..tasks.scheme import SchemeName
 from ..tasks.status import MotionStatus
 
 NEAR = 0.08  # of a motion's extent: where a place is, of which a program has rows the first time
@@ -79,6 +81,14 @@ class Search:
         self._solvers.clear()
         self._stages.clear()
         self._audited.clear()
+
+    def take_scheme(self, name: SchemeName) -> Scenario:
+        """Go on with another scheme of transcription; return the scenario that has it."""
+        task = self.scenario.task.model_copy(update={"scheme": name})
+        self.scenario = replace(self.scenario, task=task)
+        self._solvers.clear()
+        self._stages.clear()
+        return self.scenario
 
     @contextmanager
     def stage(self, name: str) -> Iterator[RunningStage]:

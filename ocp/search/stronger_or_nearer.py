@@ -1,4 +1,4 @@
-"""What else would make a motion feasible: a nearer end, less wind, a lighter platform, stronger or slacker cables."""
+"""What else would make a motion feasible: a nearer end, less wind, a lighter platform or load, other cables."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,6 +16,7 @@ from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.paths import LinePath
+from ..tasks.phase import Load
 from ..tasks.scenario import AUDIT_RATE, MOST_SAMPLES, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.wind_set import WindBox, WindDisc
@@ -48,24 +49,21 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     """Return feasible variations of what a task does not name: where its line ends, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change; if speeds or accelerations are
-    exceeded too, it may need a longer duration beside. The list is empty if the motion exceeds other limits, or for
-    tasks in phases, boxes of winds and uncertain robots.
+    exceeded too, it may need a longer duration beside, which is not tried in phases. The list is empty if the motion
+    exceeds other limits, or for boxes of winds and uncertain robots.
     """
     task = scenario.task
-    if (
-        task.phases is not None
-        or isinstance(task.wind, WindBox | WindDisc)
-        or task.robust is not None
-        or scenario.carrier_free
-    ):
+    if isinstance(task.wind, WindBox | WindDisc) or task.robust is not None or scenario.carrier_free:
         return []
     others = [excess for excess in audit.excess if excess.limit != TENSIONS]
+    if others and task.phases is not None:
+        return []
     factors = [slower(excess) for excess in others]
     if min(factors, default=2.0) <= 1.0 or (others and not scenario.stretches):
         return []
     found = list[Relaxed]()
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
-    for make in (_nearer_end, _less_wind, _lighter_platform, _stronger_cables, _slacker_cables):
+    for make in (_nearer_end, _less_wind, _lighter_load, _lighter_platform, _stronger_cables, _slacker_cables):
         its = make(search, scenario)
         if not its and others and seconds * AUDIT_RATE <= MOST_SAMPLES:
             longer = lay_out(scenario.robot, task.model_copy(update={"duration": seconds}))
@@ -110,6 +108,29 @@ def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
         return lay_out(scenario.robot, task), share * speed, f"instead of {quantity(speed, 'm/s')}"
 
     return _largest(search, with_wind, "wind", "m/s")
+
+
+def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the heaviest loads of phases that are feasible, by one factor, with moments of inertia in proportion."""
+    phases = scenario.task.phases or ()
+    masses = [0.0 if phase.load is None else phase.load.mass for phase in phases]
+    mass = max(masses, default=0.0)
+    if mass == 0.0:
+        return []
+    every = "in each phase" if len({*masses, 0.0}) == 2 else "the others by the same factor"
+
+    def lighter(load: Load | None, share: float) -> Load | None:
+        if load is None:
+            return None
+        inertia = tuple(share * value for value in load.inertia)
+        return load.model_copy(update={"mass": share * load.mass, "inertia": inertia})
+
+    def with_loads(share: float) -> Variation:
+        carried = tuple(phase.model_copy(update={"load": lighter(phase.load, share)}) for phase in phases)
+        task = scenario.task.model_copy(update={"phases": carried})
+        return lay_out(scenario.robot, task), share * mass, f"instead of {quantity(mass, 'kg')}, {every}"
+
+    return _largest(search, with_loads, f"phases[{masses.index(mass)}].load.mass", "kg")
 
 
 def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -175,8 +196,9 @@ def _largest(
 
 
 def _has_tensions(scenario: Scenario) -> bool:
-    """Return whether tensions inside their limits exist at some instants of a fixed motion."""
+    """Return whether tensions inside their limits exist at some instants of a fixed motion, off the ground."""
     times = np.linspace(0.0, scenario.duration, INSTANTS)
+    times = times[~scenario.phases.resting(times)]
     platform, carriers = scenario.motion(times, None)
     mask = scenario.robot.dof_mask
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]

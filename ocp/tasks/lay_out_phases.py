@@ -145,7 +145,7 @@ def _check_program(scenario: Scenario, phases: Phases, where: str) -> None:
         raise InputError(f"{where}: steps must be at least {LEAST_STEPS} for each phase, {least}, got {task.steps}")
     if task.tube.waypoints == "exact":
         raise InputError(f"{where}: tube.waypoints must be free with phases, got exact")
-    if scenario.count and SCHEMES[task.scheme].smooth:
+    if scenario.count and scenario.scheme.smooth:
         accepted = ", ".join(scheme.name for scheme in SCHEMES.values() if not scheme.smooth)
         raise InputError(f"{where}: scheme must be one of {accepted} with phases, got {task.scheme}")
     if not phases.rest:

@@ -24,7 +24,7 @@ from ..limits.limits import Limits
 from .deviation import Deviation
 from .paths import AnyPath, Motion, RestPath, TimedPath, WaypointPath
 from .phases import LaidPhase, Phases
-from .scheme import SCHEMES, Scheme
+from .scheme import LINEAR, SCHEMES, Scheme
 from .task import Task
 from .wind_set import WindBox, WindDisc, WindSet, as_wind, possible_winds_at
 
@@ -77,7 +77,7 @@ class Scenario(Displayed):
     @property
     def scheme(self) -> Scheme:
         """Return the scheme of the acceleration between the nodes."""
-        return SCHEMES[self.task.scheme]
+        return SCHEMES[self.task.scheme or LINEAR.name]
 
     @property
     def duration_range(self) -> PositiveRange | None:

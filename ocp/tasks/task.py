@@ -204,10 +204,11 @@ class Task(Part):
     )
     limits: TaskLimits = TaskLimits()
     steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")
-    scheme: SchemeName = Field(
-        default="linear",
+    scheme: SchemeName | None = Field(
+        default=None,
         description="acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
-        "spline: a smooth cubic B-spline",
+        "spline: a smooth cubic B-spline; default: linear, or hermite if with linear the audit reports that the robot "
+        "cannot follow the motion between the nodes",
     )
     objective: Objective = Objective()
     time_limit: Positive = Field(

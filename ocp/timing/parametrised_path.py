@@ -21,6 +21,7 @@ from ...models.part import COORDINATES
 from ..audits.checks import LENGTH_TOLERANCE
 from ..limits.limit import Magnitude
 from ..limits.limits import Limits
+from ..limits.platform import ZoneSpeed
 from ..tasks.paths import CirclePath, Curve, Motion, RestPath
 from ..tasks.scenario import in_world
 
@@ -32,6 +33,7 @@ SHARE_OF_BEND = 0.5  # of all intervals, that each bend has: there the limits of
 MOST_IN_BENDS = 6400  # in all together, if that is more than LEAST in each
 CLOSE = 1e-9  # of s
 LOOKS = 2001  # points at which the geometry is checked
+HALVES = 40  # of the s between two of them
 
 
 class PathLimits(NamedTuple):
@@ -113,6 +115,18 @@ class ParametrisedPath:
             points = [_grid(*its)[:-1] for its in zip(parts[:-1], parts[1:], counts, bent, strict=True)]
             grids.append(np.append(np.concatenate(points), end))
         return grids
+
+    def crossings(self, zone: ZoneSpeed) -> np.ndarray:
+        """Return where the path enters or leaves a zone, (k,) of s: there the bound of the speed has a corner."""
+        s = np.linspace(0.0, 1.0, LOOKS)
+        inside = zone.contains(self.at(s)[0].pose[:, :3])
+        before = np.flatnonzero(inside[1:] != inside[:-1])
+        low, high = s[before], s[before + 1]
+        for _ in range(HALVES if before.size else 0):
+            middle = (low + high) / 2
+            same = zone.contains(self.at(middle)[0].pose[:, :3]) == inside[before]
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        return high
 
     def until(self, path: Curve) -> float | None:
         """Return when a circle ends by its own time [s]; None for other paths, whose end is their own."""

@@ -20,6 +20,7 @@ from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS
 from ..audits.tensions import TOLERANCE
 from ..limits.limits import Limits
+from ..limits.platform import ZoneSpeed
 from ..plan import Plan
 from ..tasks.carrier_paths import carrier_paths
 from ..tasks.lay_out import lay_out
@@ -145,12 +146,11 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
     """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
     margin, weight = task.margin, parametrised.robot.force_scale
     short, shrink, attempts, failures = list[_Stretches](), 0.0, 0, 0
+    zones = [parametrised.crossings(limit) for limit in limits.speeds if isinstance(limit, ZoneSpeed)]
     while True:
         attempts += 1
-        pieces = [
-            _piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink)
-            for s in parametrised.pieces(intervals)
-        ]
+        grids = [_through(s, np.concatenate([[], *zones])) for s in parametrised.pieces(intervals)]
+        pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink) for s in grids]
         s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
         law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
         if failures == 0 and (proven := _proven(law, pieces)) is not None:
@@ -186,6 +186,17 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
         else:
             short.append(missing)
             shrink = min(shrink + 2 * excess, LARGEST_SHRINK)
+
+
+def _through(s: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return a grid whose nearest inner points are moved to corners of the bound of the speed.
+
+    A law that is slow enough at the first point in a zone would be too fast between its edge and that point.
+    """
+    moved = s.copy()
+    for corner in corners[(corners > s[0]) & (corners < s[-1])]:
+        moved[1:-1][np.abs(moved[1:-1] - corner).argmin()] = corner
+    return moved
 
 
 def _timed(task: Task, law: FastestLaw) -> Task:

@@ -14,7 +14,7 @@ from towline.models import Robot, load
 
 from .random_places import extent, free_base, resting_place
 
-__all__ = ["beams", "bodies", "cycles", "feed", "least", "zones"]
+__all__ = ["beams", "bodies", "cycles", "feed", "least", "with_beam", "zones"]
 
 WIDE = ("cogiro", "caroca", "ipanema-1", "ipanema-2")
 AT_WORK = (*WIDE, "the-cable-robot-simulator", "wang-flying")
@@ -141,7 +141,7 @@ def beams(rng: np.random.Generator, seed: int) -> tuple[Robot, dict[str, Any]]:
     """Return two or three quadrotors that carry a beam on two cables each, and a way past a post or through a gate."""
     carriers = 2 + seed % 2
     half = float(rng.uniform(0.7, 1.3))
-    robot = _with_beam(half, carriers)
+    robot = with_beam(half, carriers)
     start = np.array([-2.0, 0.0, 1.5, 0.0, 0.0, 0.0])
     end = start + np.r_[rng.uniform(3, 5), rng.uniform(-1, 1), rng.uniform(0, 0.5), 0, 0, 0]
     task = _line(start, end) | {"base": {"kind": "free", "ends": "rest"}, "steps": 50}
@@ -164,7 +164,7 @@ def beams(rng: np.random.Generator, seed: int) -> tuple[Robot, dict[str, Any]]:
     return robot, task | _lasting(rng, 5.0, 9.0)
 
 
-def _with_beam(half: float, carriers: int) -> Robot:
+def with_beam(half: float, carriers: int) -> Robot:
     """Return a beam of length 2 `half` [m] along y under quadrotors."""
     quadrotors, cables = [], []
     for k, y in enumerate(np.linspace(-half, half, carriers).tolist()):
