@@ -10,7 +10,9 @@ from towline import Dynamics, load, read_measurements
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.model import Model
-from towline.estimation.calibration.parameters import Parameters
+from towline.estimation.calibration.normal_equations import state_equations
+from towline.estimation.calibration.parameters import OF_CABLE, Parameters
+from towline.estimation.calibration.sightings import SEEN
 from towline.estimation.calibration.solving import model_of
 from towline.estimation.logs import names
 from towline.estimation.pose.from_log import poses_from_log
@@ -161,7 +163,7 @@ def test_gradients_are_slopes_of_the_cost(name, flat):
     model = Model(Parameters(robot, groups), given, {}, np.ones((robot.m, count)))
     state = model.begin()
     _, derivatives = model.linearised(state)
-    (e, by_parameters, by_pose) = derivatives.blocks[-1]
+    e, by_pose = derivatives.directions.residuals, derivatives.directions.poses
 
     def seen(dx, dq):
         return model.residuals(model.moved(state, dx, dq)).directions
@@ -170,16 +172,52 @@ def test_gradients_are_slopes_of_the_cost(name, flat):
         dx = np.zeros_like(state.x)
         dx[i] = 1e-6
         slope = (seen(dx, None) - seen(-dx, None)) / 2e-6
-        if not flat:
-            np.testing.assert_allclose(by_parameters[..., i], slope, atol=2e-4)
-        else:  # along the horizontal part alone; its size is taken as constant
-            np.testing.assert_allclose(by_parameters[e == 0][..., i], slope[e == 0], atol=2e-4)
+        cable, column = divmod(i, OF_CABLE)
+        found = np.zeros_like(e)  # those of other cables do not depend on it
+        if column in SEEN:
+            found[cable] = derivatives.directions.cables[cable, ..., SEEN.index(column)]
+        # Along the horizontal part alone, its size is taken as constant.
+        kept = np.ones_like(e, dtype=bool) if not flat else e == 0
+        np.testing.assert_allclose(found[kept], slope[kept], atol=2e-4)
     for i in range(6):
         dq = np.zeros((count, 6))
         dq[:, i] = 1e-6
         slope = (seen(np.zeros_like(state.x), dq) - seen(np.zeros_like(state.x), -dq)) / 2e-6
         kept = np.ones_like(e, dtype=bool) if not flat else e == 0
         np.testing.assert_allclose(by_pose[..., i][kept], slope[kept], atol=2e-4)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_normal_equations_are_those_of_all_residuals(known):
+    """Assembled from blocks of cables, they equal those of the dense Jacobian, by differences, of all residuals."""
+    robot, draw, count = load("flycrane"), np.random.default_rng(2), 4
+    poses = robot.home + draw.normal(0, 0.05, (count, 6))
+    carriers = robot.carrier_home + draw.normal(0, 0.05, (count, *robot.carrier_home.shape))
+    u = -np.swapaxes(Dynamics(robot).wrench_matrix(poses, carriers)[:, :3], 1, 2)
+    u[2, 1] = np.nan
+    lengths = Dynamics(robot).cable_lengths(poses, carriers) + draw.normal(0, 0.01, (count, robot.m))
+    sigma = {"lengths": 0.01, "directions": 0.03} | ({} if known else {"position": 0.02, "rotation": 0.05})
+    given = Measurements(lengths, poses, sigma=sigma, carrier_poses=carriers, directions=u)
+    prior = {"anchors": 0.1, "attachments": 0.1, "offsets": 0.1}
+    model = Model(Parameters(robot, tuple(prior)), given, prior, np.ones((robot.m, count)))
+    state, varies = model.begin(), model.parameters.varies
+    size = int(varies.sum())
+
+    def whole(step):
+        dx, dq = np.zeros_like(state.x), None if known else step[size:].reshape(count, 6)
+        dx[varies] = step[:size]
+        residuals = model.residuals(model.moved(state, dx, dq))
+        return np.concatenate([np.ravel(part) for part in residuals])
+
+    zero = np.zeros(size + (0 if known else 6 * count))
+    J = np.array([(whole(zero + h) - whole(zero - h)) / 2e-6 for h in 1e-6 * np.eye(len(zero))]).T
+    H, g = J.T @ J, J.T @ whole(zero)
+    own, poses_too = H[:size, size:], H[size:, size:]
+    S = H[:size, :size] - (0 if known else own @ np.linalg.solve(poses_too, own.T))
+    b = g[:size] - (0 if known else own @ np.linalg.solve(poses_too, g[size:]))
+    equations = state_equations(model, state, np.ones_like(state.x))
+    np.testing.assert_allclose(equations.S, S, rtol=2e-5, atol=2e-5 * np.abs(S).max())
+    np.testing.assert_allclose(equations.b, b, rtol=2e-5, atol=2e-5 * np.abs(b).max())
 
 
 def test_a_clock_offset_moves_carriers_too():
@@ -203,8 +241,8 @@ def test_a_clock_offset_moves_carriers_too():
     slope = (more.readings - less.readings) / 2e-5
     np.testing.assert_allclose(derivatives.others[:, inside, 0], slope[:, inside], atol=1e-2 * np.abs(slope).max())
     slope = (more.directions - less.directions) / 2e-5
-    found = derivatives.blocks[-1][1][..., clock]
-    np.testing.assert_allclose(found[inside], slope[inside], atol=1e-2 * np.abs(slope).max())
+    found = derivatives.directions.clock
+    np.testing.assert_allclose(found[:, inside], slope[:, inside], atol=1e-2 * np.abs(slope).max())
 
 
 def test_wrong_directions_are_one_line(recorded, robot, tmp_path):

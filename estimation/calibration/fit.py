@@ -101,6 +101,7 @@ def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enou
                 damping.accept(0.0 if negligible else (cost - new) / expected)
                 damping.factor *= not negligible
                 state, cost, at_best = tried, new, settles
+                del derivatives, equations  # before the next ones need as much memory
                 break
             damping.reject()
             if damping.factor > LARGEST:

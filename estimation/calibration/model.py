@@ -35,7 +35,7 @@ from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .carrier_motion import CarrierMotion
 from .geometry import runs
 from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows, prior_sigmas
-from .sightings import sightings
+from .sightings import Sighted, sightings
 
 STILL = 1e-4  # [m] along directions that are kept
 
@@ -63,7 +63,7 @@ class Residuals(NamedTuple):
     """Differences over their standard deviations.
 
     Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,) and kept directions (d,),
-    balance of forces (N, 6), directions (N, 3 m).
+    balance of forces (N, 6), directions (m, N, 3).
     """
 
     readings: np.ndarray
@@ -81,13 +81,13 @@ class Residuals(NamedTuple):
     @property
     def of_samples(self) -> np.ndarray:
         """Return the sum of squares of each sample, (N,), inf where a cable has no length."""
-        by_sample = (self.poses, self.balance, self.directions)
-        total = (self.readings**2).sum(axis=0) + sum((part**2).sum(axis=1) for part in by_sample)
+        total = (self.readings**2).sum(axis=0) + (self.directions**2).sum(axis=(0, 2))
+        total += sum((part**2).sum(axis=1) for part in (self.poses, self.balance))
         return np.where(np.isfinite(total), total, np.inf)
 
 
 class Derivatives(NamedTuple):
-    """Derivatives of the residuals of readings, and balance and directions with their own."""
+    """Derivatives of the residuals of readings, and balance and directions, where measured, with their own."""
 
     cables: np.ndarray  # derivatives by the parameters of the cable itself, (m, N, 14)
     others: np.ndarray  # derivatives by the parameters of the robot and slips, (m, N, 5 + slips)
@@ -97,16 +97,7 @@ class Derivatives(NamedTuple):
     arms: np.ndarray
     lengths: np.ndarray
     balance: Balanced | None = None
-    directions: Balanced | None = None
-
-    @property
-    def blocks(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Return residuals (N, k), derivatives by parameters (N, k, P) and by poses (N, k, 6 + d) of both."""
-        found = []
-        for one in (self.balance, self.directions):
-            if one is not None and one.by_parameters is not None and one.by_pose is not None:
-                found.append((one.residuals, one.by_parameters, one.by_pose))
-        return found
+    directions: Sighted | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +298,9 @@ class Model(Displayed):
         by_prior = change / self.prior_sigmas
         by_prior = np.concatenate([by_prior, self.kept_rows @ change / STILL])
         seen = sightings(parameters, state.x, (position, rotation), run, at, self.measurements, carried, derive)
-        seen_residuals = np.zeros((len(position), 0)) if seen is None else seen.residuals * inside[:, None]
+        if seen is not None:
+            seen.leave_out(~inside)
+        seen_residuals = np.zeros((m, len(position), 0)) if seen is None else seen.residuals
         residuals = Residuals(readings, poses, by_prior, in_balance, seen_residuals)
         if not derive:
             return residuals, None
@@ -329,15 +322,17 @@ class Model(Displayed):
         if velocity is not None and rate is not None:
             twist = np.concatenate([velocity, rate], axis=1)
             others[..., 0] = np.einsum("mni,ni->mn", by_pose, twist)
-            for one in (forces, seen):
-                if one is not None and one.by_parameters is not None and one.by_pose is not None:
-                    one.by_parameters[..., parameters.clock] += (one.by_pose @ twist[..., None])[..., 0]
+            if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
+                forces.by_parameters[..., parameters.clock] += (forces.by_pose @ twist[..., None])[..., 0]
+            if seen is not None and seen.clock is not None and seen.poses is not None:
+                seen.clock[...] += (seen.poses @ twist[..., None])[..., 0]
             if carried is not None:
                 others[..., 0] -= np.einsum("mni,mni->mn", along, carried[0])
         for column, (cable, first) in enumerate(parameters.slips, start=OF_ROBOT):
             others[cable, first:, column] = -gain[cable, first:]
-        forces, seen = self._kept(forces, weighs), self._kept(seen, inside)
-        by_pose = np.concatenate([by_pose, np.broadcast_to(by_errors, (*by_pose.shape[:2], self._open))], axis=2)
+        forces = self._kept(forces, weighs)
+        if self._open:
+            by_pose = np.concatenate([by_pose, np.broadcast_to(by_errors, (*by_pose.shape[:2], self._open))], axis=2)
         return residuals, Derivatives(cables, others, by_pose, arms, run.lengths, forces, seen)
 
     def _kept(self, one: Balanced | None, rows: np.ndarray) -> Balanced | None:

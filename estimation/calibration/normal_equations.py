@@ -8,8 +8,8 @@ With J and G the derivatives of all residuals by parameters and by the pose of e
 
 with prior standard deviations as residuals of their own. With L_k L_k' = C_k, the sum is one product Y'Y of the matrix
 Y of all L_k^-1 E_k on top of each other. Parameters are multiplied by `metric`, so that each is a length [m]. Damping
-adds to the diagonals of J'J and of C_k. Rows of the balance of forces and of directions have
-derivatives by all parameters.
+adds to the diagonals of J'J and of C_k. A reading, and each component of a direction, has derivatives by the parameters
+of its own cable and of the robot, so the normal matrix is assembled from blocks. The balance of forces depends on all.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from .curvature import curvature
 from .model import STILL, Derivatives, Model, Residuals, State
 from .parameters import OF_CABLE
 from .products import inner
+from .sightings import SEEN
 
 NEARLY_SINGULAR = 1e-10  # added to C_k, relative to its mean, where it has no inverse: the lengths leave the pose open
 LARGEST_VARIANCE = 1e4  # [m^2, rad^2] of a pose that is determined
@@ -85,26 +86,19 @@ class NormalEquations(Displayed):
     ) -> NormalEquations:
         """Return the equations; `scale` is `metric`, and `damping` is added to the diagonals of J'J and C_k."""
         varies = model.parameters.varies
-        J, others, keep = _columns(model, derivatives, scale)
-        m, count, width = J.shape
-        e = residuals.readings
-        size = m * width + others.shape[2]
+        layers, keep = _layers(model, residuals, derivatives, scale)
+        m, count, width = layers[0].J.shape
+        size = m * width + layers[0].others.shape[2]
         full, right = np.zeros((size, size)), np.zeros(size)
-        blocks, cross = inner(J, J), inner(J, others)
-        for i in range(m):
-            own = slice(i * width, (i + 1) * width)
-            full[own, own] = blocks[i]
-            full[own, m * width :], full[m * width :, own] = cross[i], cross[i].T
-        flat = others.reshape(m * count, -1)
-        full[m * width :, m * width :] = inner(flat, flat)
-        right[: m * width] = inner(J, e[..., None]).ravel()
-        right[m * width :] = inner(flat, e.reshape(-1, 1))[:, 0]
+        for layer in layers:
+            layer.add(full, right)
         S, b = full[np.ix_(keep, keep)], right[keep]
         sigma = model.prior_sigmas[varies] * scale[varies]
-        blocks = [(e, by_x[..., varies] / scale[varies], by_pose) for e, by_x, by_pose in derivatives.blocks]
-        for e, H, _ in blocks:  # (N, k), (N, k, p)
-            flat = H.reshape(e.size, -1) if len(b) else np.zeros((e.size, 0))
-            S, b = S + inner(flat, flat), b + inner(flat, e.reshape(-1, 1))[:, 0]
+        forces, H = derivatives.balance, np.zeros((0, 6, len(b)))
+        if forces is not None and forces.by_parameters is not None:
+            H = forces.by_parameters[..., varies] / scale[varies]  # (N, 6, p)
+            flat = H.reshape(forces.residuals.size, -1) if len(b) else np.zeros((forces.residuals.size, 0))
+            S, b = S + inner(flat, flat), b + inner(flat, forces.residuals.reshape(-1, 1))[:, 0]
         S[np.diag_indices(len(b))] += 1 / sigma**2
         b += residuals.parameters[: len(varies)][varies] / sigma
         kept = model.kept_rows[:, varies] / scale[varies] / STILL
@@ -114,13 +108,13 @@ class NormalEquations(Displayed):
             S[np.diag_indices(len(b))] += damping.parameters
         if not model.poses_vary.any():
             return cls(S, b, None, None, None, Diagonals(own, np.zeros((count, 6))))
-        inverse_root, G, g, of_poses = _poses(model, residuals, derivatives, damping)
-        E = np.empty((count, G.shape[1], size))
-        E[..., : m * width] = (G[..., None] * np.swapaxes(J, 0, 1)[:, None]).reshape(*G.shape[:2], m * width)
-        E[..., m * width :] = G @ np.swapaxes(others, 0, 1)
+        inverse_root, g, of_poses = _poses(model, residuals, derivatives, damping)
+        E = np.zeros((*g.shape, size))
+        for layer in layers:
+            layer.cross(E, model.poses_vary)
         E = E if keep.all() else E[..., keep]
-        for _, H, by_pose in blocks:
-            E = E + np.swapaxes(by_pose * model.poses_vary[:, None], 1, 2) @ H
+        if forces is not None and forces.by_pose is not None:
+            E = E + np.swapaxes(forces.by_pose * model.poses_vary[:, None], 1, 2) @ H
         Y = np.matmul(inverse_root, E)
         y = np.matmul(inverse_root, g[..., None])[..., 0]
         stacked = Y.reshape(y.size, Y.shape[2])
@@ -134,28 +128,81 @@ class NormalEquations(Displayed):
         return -np.matmul(np.swapaxes(self.inverse_root, 1, 2), (self.y + self.Y @ dp)[..., None])[..., 0]
 
 
-def _columns(model: Model, derivatives: Derivatives, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the derivatives by what may vary, in metres, and which of their columns vary."""
+class _Layer(NamedTuple):
+    """Rows of each cable: k components of N samples, with derivatives by the cable's parameters and the robot's."""
+
+    J: np.ndarray  # (m, k N, width)
+    others: np.ndarray  # (m, k N, s)
+    e: np.ndarray  # (m, k N)
+    poses: np.ndarray  # by the poses of the samples, (m, N, k, 6 or more)
+
+    def add(self, full: np.ndarray, right: np.ndarray) -> None:
+        """Add J'J and J'e to the normal matrix and its right side, in place."""
+        m, _, width = self.J.shape
+        blocks, cross = inner(self.J, self.J), inner(self.J, self.others)
+        for i in range(m):
+            own = slice(i * width, (i + 1) * width)
+            full[own, own] += blocks[i]
+            full[own, m * width :] += cross[i]
+            full[m * width :, own] += cross[i].T
+        flat = self.others.reshape(-1, self.others.shape[2])
+        full[m * width :, m * width :] += inner(flat, flat)
+        right[: m * width] += inner(self.J, self.e[..., None]).ravel()
+        right[m * width :] += inner(flat, self.e.reshape(-1, 1))[:, 0]
+
+    def cross(self, E: np.ndarray, vary: np.ndarray) -> None:
+        """Add G_k'J_k to E (N, 6 + d, P), in place, for the coordinates of poses that vary, (N, 6 + d)."""
+        m, count, k, size = self.poses.shape
+        width = self.J.shape[2]
+        G = np.moveaxis(self.poses, (0, 2), (2, 3)) * vary[:, :size, None, None]  # (N, 6, m, k)
+        for i in range(m):
+            own, part = G[:, :, i], self.J[i].reshape(count, k, width)
+            E[:, :size, i * width : (i + 1) * width] += own * part if k == 1 else own @ part
+        others = np.moveaxis(self.others.reshape(m, count, k, -1), 0, 1).reshape(count, m * k, -1)
+        E[:, :size, m * width :] += G.reshape(count, size, m * k) @ others
+
+
+def _layers(
+    model: Model, residuals: Residuals, derivatives: Derivatives, scale: np.ndarray
+) -> tuple[list[_Layer], np.ndarray]:
+    """Return readings and directions with derivatives by what may vary, in metres, and which columns vary."""
     parameters = model.parameters
     flags, factors = parameters.table(parameters.varies), parameters.table(scale)
     used = np.flatnonzero(flags.any(axis=0))
     J = derivatives.cables[..., used] / factors[:, None, used]
     last = slice(parameters.clock, parameters.count)
     others = derivatives.others / scale[last]
-    return J, others, np.concatenate([flags[:, used].ravel(), parameters.varies[last]])
+    keep = np.concatenate([flags[:, used].ravel(), parameters.varies[last]])
+    layers = [_Layer(J, others, residuals.readings, derivatives.poses[:, :, None])]
+    seen = derivatives.directions
+    if seen is not None and seen.cables is not None and seen.clock is not None and seen.poses is not None:
+        m, count = seen.residuals.shape[:2]
+        own, more = np.zeros((m, count, 3, len(used))), np.zeros((m, count, 3, others.shape[2]))
+        for place, column in enumerate(used):
+            if column in SEEN:
+                own[..., place] = seen.cables[..., SEEN.index(column)] / factors[:, None, None, column]
+        more[..., 0] = seen.clock / scale[parameters.clock]
+        own, more = (part.reshape(m, 3 * count, -1) for part in (own, more))
+        layers.append(_Layer(own, more, seen.residuals.reshape(m, -1), seen.poses))
+    return layers, keep
 
 
 def _poses(
     model: Model, residuals: Residuals, derivatives: Derivatives, damping: Diagonals | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return L_k^-1 (N, 6, 6), G_k' (N, 6, m), G_k'e (N, 6) and C_k's diagonal (N, 6) of the coordinates that vary."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return L_k^-1 (N, 6, 6), G_k'e (N, 6) and C_k's diagonal (N, 6) of the coordinates that vary."""
     vary, sigmas = model.poses_vary, model.pose_sigmas
     G = np.ascontiguousarray(derivatives.poses.transpose(1, 2, 0)) * vary[..., None]
     C = G @ np.swapaxes(G, 1, 2)
     g = (G @ np.ascontiguousarray(residuals.readings.T)[..., None])[..., 0]
-    for e, _, by_pose in derivatives.blocks:
-        K = np.swapaxes(by_pose * vary[:, None], 1, 2)
-        C, g = C + K @ np.swapaxes(K, 1, 2), g + (K @ e[..., None])[..., 0]
+    if derivatives.balance is not None and derivatives.balance.by_pose is not None:
+        K = np.swapaxes(derivatives.balance.by_pose * vary[:, None], 1, 2)
+        C, g = C + K @ np.swapaxes(K, 1, 2), g + (K @ derivatives.balance.residuals[..., None])[..., 0]
+    if derivatives.directions is not None and derivatives.directions.poses is not None:
+        for e, by_pose in zip(derivatives.directions.residuals, derivatives.directions.poses, strict=True):
+            K = np.swapaxes(by_pose, 1, 2) * vary[:, :6, None]
+            C[:, :6, :6] += K @ np.swapaxes(K, 1, 2)
+            g[:, :6] += (K @ e[..., None])[..., 0]
     inverse = np.divide(1.0, sigmas, out=np.zeros_like(sigmas), where=vary)
     g += residuals.poses * inverse
     diagonal = np.arange(C.shape[1])
@@ -169,13 +216,13 @@ def _poses(
     except np.linalg.LinAlgError:
         C[:, diagonal, diagonal] += NEARLY_SINGULAR * own.mean(axis=1, keepdims=True) + 1e-300
         root = np.linalg.cholesky(C)
-    return np.linalg.inv(root), G, g, own
+    return np.linalg.inv(root), g, own
 
 
 def pose_steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tuple[np.ndarray, np.ndarray]:
     """Return Newton's steps of poses with parameters as they are, (N, 6), and the decrease to expect of each, (N,)."""
     vary = model.poses_vary
-    inverse_root, _, g, _ = _poses(model, residuals, derivatives, None)
+    inverse_root, g, _ = _poses(model, residuals, derivatives, None)
     bent = curvature(residuals, derivatives) * (vary[:, :, None] & vary[:, None, :])
     values, vectors = np.linalg.eigh(inverse_root @ bent @ np.swapaxes(inverse_root, 1, 2))
     inverse_root = (

@@ -16,8 +16,9 @@ from ..logs.measurements import Measurements
 from .fit import fit, held
 from .model import Derivatives, Model, State
 from .normal_equations import NormalEquations, metric
-from .parameters import Parameters
+from .parameters import OF_CABLE, Parameters
 from .products import onto
+from .sightings import SEEN
 
 LEVEL = 0.005  # of both tests, for all readings together
 LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distribution
@@ -106,14 +107,25 @@ def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess:
 
 def _of_samples(model: Model, found: _Projected) -> np.ndarray:
     """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (N, p) [1/m]."""
-    varies = model.parameters.varies
+    varies, forces, seen = model.parameters.varies, found.derivatives.balance, found.derivatives.directions
+    inverse_root, Y = found.equations.inverse_root, found.equations.Y
     total = np.zeros((found.residuals.shape[1], int(varies.sum())))
-    for e, by_parameters, by_pose in found.derivatives.blocks:
-        rows = by_parameters[..., varies] / found.scale[varies]
-        if found.equations.inverse_root is not None and found.equations.Y is not None:
-            K = by_pose * model.poses_vary[:, None]
-            rows = rows - K @ np.swapaxes(found.equations.inverse_root, 1, 2) @ found.equations.Y
-        total += np.einsum("nip,ni->np", rows, e)
+    if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
+        rows = forces.by_parameters[..., varies] / found.scale[varies]
+        if inverse_root is not None and Y is not None:
+            rows = rows - forces.by_pose * model.poses_vary[:, None] @ np.swapaxes(inverse_root, 1, 2) @ Y
+        total += np.einsum("nip,ni->np", rows, forces.residuals)
+    if seen is None or seen.cables is None or seen.clock is None or seen.poses is None:
+        return total
+    for i, k in np.ndindex(len(seen.residuals), 3):
+        own = np.zeros((len(total), OF_CABLE))
+        own[:, SEEN] = seen.cables[i, :, k]
+        others = np.zeros((len(total), found.derivatives.others.shape[2]))
+        others[:, 0] = seen.clock[i, :, k]
+        root = None
+        if inverse_root is not None:
+            root = (inverse_root[:, :, :6] @ (seen.poses[i, :, k] * model.poses_vary[:, :6])[..., None])[..., 0]
+        total += _without_poses(model, found, i, own, others, root) * seen.residuals[i, :, k, None]
     return total
 
 
@@ -272,12 +284,21 @@ def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
 
 def without_poses(model: Model, found: _Projected, cable: int) -> np.ndarray:
     """Return the derivatives of one cable's residuals by the parameters, minus the poses' part, (N, p) [1/m]."""
-    parameters, derivatives = model.parameters, found.derivatives
-    width = derivatives.cables.shape[2]
-    full = np.zeros((derivatives.cables.shape[1], parameters.count))
-    full[:, cable * width : (cable + 1) * width] = derivatives.cables[cable]
-    full[:, parameters.clock :] = derivatives.others[cable]
-    rows = (full / found.scale)[:, parameters.varies]
-    if found.root is None or found.equations.Y is None:
+    of = found.derivatives
+    root = None if found.root is None else found.root[cable]
+    return _without_poses(model, found, cable, of.cables[cable], of.others[cable], root)
+
+
+def _without_poses(
+    model: Model, found: _Projected, cable: int, own: np.ndarray, others: np.ndarray, root: np.ndarray | None
+) -> np.ndarray:
+    """Return derivatives by all parameters, of those by a cable's (N, 14) and the robot's, and L^-1 G (N, 6 + d)."""
+    parameters, begin = model.parameters, cable * own.shape[1]
+    where = np.flatnonzero(parameters.varies)
+    mine, rest = (where >= begin) & (where < begin + own.shape[1]), where >= parameters.clock
+    rows = np.zeros((len(own), len(where)))
+    rows[:, mine] = own[:, where[mine] - begin] / found.scale[where[mine]]
+    rows[:, rest] = others[:, where[rest] - parameters.clock] / found.scale[where[rest]]
+    if root is None or found.equations.Y is None:
         return rows
-    return rows - np.einsum("na,nap->np", found.root[cable], found.equations.Y)
+    return rows - np.einsum("na,nap->np", root, found.equations.Y)

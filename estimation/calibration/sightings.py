@@ -5,18 +5,41 @@ only the part across the cable is not zero to first order. Of an azimuth alone, 
 it and the horizontal part v of u, it is h . u / (|v| sigma).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...core import columns_by_geometry
 from ...models import points
 from ...models.record import record_of
 from ..logs.measurements import Measurements
-from .balance import Balanced
 from .geometry import Runs
 from .motion import cross
 from .parameters import Parameters
 
+SEEN = (*range(6), 8)  # parameters of a cable on which its direction depends
+BLOCK = 20_000  # samples whose derivatives are computed together
 STEEPEST = 1e-3  # horizontal part of a unit vector, of which an azimuth tells nothing
+
+
+class Sighted(NamedTuple):
+    """Residuals (m, N, 3) of directions and, if wanted, their derivatives, which are by each cable's own parameters.
+
+    - `cables`: by anchor, attachment and radius of the pulley, the columns `SEEN`, (m, N, 3, 7).
+    - `clock`: by the clock offset, (m, N, 3).
+    - `poses`: by shift and rotation of the sample, (m, N, 3, 6).
+    """
+
+    residuals: np.ndarray
+    cables: np.ndarray | None = None
+    clock: np.ndarray | None = None
+    poses: np.ndarray | None = None
+
+    def leave_out(self, rows: np.ndarray) -> None:
+        """Set residuals and derivatives of some samples, (N,) of bool, to zero in place."""
+        for one in (self.residuals, self.cables, self.clock, self.poses):
+            if one is not None:
+                one[:, rows] = 0.0
 
 
 def sightings(
@@ -28,49 +51,68 @@ def sightings(
     measurements: Measurements,
     carried: tuple[np.ndarray, np.ndarray] | None = None,
     derive: bool = True,
-) -> Balanced | None:
-    """Return residuals (N, 3 m) with positions (N, 3) and rotations (N, 3, 3) of the platform; None without directions.
+) -> Sighted | None:
+    """Return residuals with positions (N, 3) and rotations (N, 3, 3) of the platform; None without directions.
 
     `run` is the geometry of the cables there, `carriers` are poses, and `carried` is `Carriers.of_cables` if these move
     with the clock offset. What was not measured has zeros.
     """
-    robot, d = of.robot, measurements.directions
+    d = measurements.directions
     if d is None:
         return None
-    position, rotation = placed
     count, m = d.shape[:2]
-    u = np.swapaxes(run.directions, 0, 1)  # (N, m, 3)
+    shapes = ((3,), (3, 7), (3,), (3, 6)) if derive else ((3,),)
+    whole = [np.empty((m, count, *shape)) for shape in shapes]
+    at = np.broadcast_to(carriers, (count, *carriers.shape[-2:]))
+    for first in range(0, count, BLOCK):
+        rows = slice(first, first + BLOCK)
+        moved = None if carried is None else (carried[0][:, rows], carried[1][:, rows])
+        part = _block(
+            of, x, (placed[0][rows], placed[1][rows]), run.directions[:, rows], at[rows], d[rows], moved, derive
+        )
+        for one, values in zip(whole, part, strict=True):
+            one[:, rows] = values / measurements.sigma.directions
+    return Sighted(*whole)
+
+
+def _block(
+    of: Parameters,
+    x: np.ndarray,
+    placed: tuple[np.ndarray, np.ndarray],
+    u: np.ndarray,
+    carriers: np.ndarray,
+    d: np.ndarray,
+    carried: tuple[np.ndarray, np.ndarray] | None,
+    derive: bool,
+) -> list[np.ndarray]:
+    """Return the parts of `Sighted` of some samples for a standard deviation of 1, with unit vectors u (m, N, 3)."""
+    d = np.swapaxes(d, 0, 1)
+    m, count = d.shape[:2]
     known, flat = np.isfinite(d[..., 0]), np.isnan(d[..., 2])
-    W = np.where((known & ~flat)[..., None, None], np.eye(3), 0.0)
+    W = np.where((known & ~flat)[..., None, None], np.eye(3), 0.0)  # (m, N, 3, 3)
     steep = np.hypot(u[..., 0], u[..., 1])
     level = known & flat & (steep > STEEPEST)
     W[level, 0, 0], W[level, 0, 1] = -d[level, 1] / steep[level], d[level, 0] / steep[level]
-    W /= measurements.sigma.directions
-    target = np.where(flat[..., None], 0.0, d)
-    residuals = (W @ (u - target)[..., None])[..., 0].reshape(count, 3 * m)
+    target = np.where(flat[..., None], 0.0, np.where(known[..., None], d, 0.0))
+    residuals = (W @ (u - target)[..., None])[..., 0]
     if not derive:
-        return Balanced(residuals)
-    record, table = record_of(robot).copy(), of.table(x)
+        return [residuals]
+    position, rotation = placed
+    record, table = record_of(of.robot).copy(), of.table(x)
     cables = record["cable"][:m]
     cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
     poses = np.concatenate([position, points.angles(rotation)], axis=1)
     S = np.empty((count, m, 6, 7))
     columns_by_geometry(record, poses, np.ascontiguousarray(carriers), S)
-    by_geometry = -W @ S[:, :, :3]  # (N, m, 3, 7)
-    by_shift = by_geometry[..., 3:6] @ np.swapaxes(rotation, 1, 2)[:, None]
-    arms = np.einsum("nij,mj->nmi", rotation, table[:, 3:6])
-    by_turn = -by_shift @ cross(arms.reshape(-1, 3)).reshape(count, m, 3, 3)
-    by_parameters = np.zeros((count, m, 3, of.count))
-    for i in range(m):
-        own = i * (of.clock // m)
-        by_parameters[:, i, :, own : own + 6] = by_geometry[:, i, :, :6]
-        by_parameters[:, i, :, own + 8] = by_geometry[:, i, :, 6]
+    by_geometry = -W @ np.swapaxes(S[:, :, :3], 0, 1)  # (m, N, 3, 7)
+    by_shift = by_geometry[..., 3:6] @ np.swapaxes(rotation, 1, 2)
+    arms = np.einsum("nij,mj->mni", rotation, table[:, 3:6])
+    by_turn = -by_shift @ cross(arms.reshape(-1, 3)).reshape(m, count, 3, 3)
+    by_clock = np.zeros((m, count, 3))
     if carried is not None:
-        velocity, rate = (np.swapaxes(part, 0, 1)[..., None] for part in carried)
-        turning = np.cross(rate[..., 0], u)[..., None]
-        by_parameters[..., of.clock] = (W @ turning - by_shift @ velocity)[..., 0]
-    by_pose = np.concatenate([by_shift, by_turn], axis=3).reshape(count, 3 * m, 6)
-    return Balanced(residuals, by_parameters.reshape(count, 3 * m, of.count), by_pose)
+        velocity, rate = carried
+        by_clock = (W @ np.cross(rate, u)[..., None] - by_shift @ velocity[..., None])[..., 0]
+    return [residuals, by_geometry, by_clock, np.concatenate([by_shift, by_turn], axis=3)]
 
 
 def sighted(measurements: Measurements) -> np.ndarray:
