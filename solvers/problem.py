@@ -66,6 +66,10 @@ class TensionProblem(Displayed):
     t_ref: Array  # (m,)
     weights: Array  # (m,)
     length: float
+    n: int
+    """The number of wrench rows."""
+    m: int
+    """The number of cables."""
     packed: Array = field(repr=False)
     """The whole problem in one array, in the order of the arguments; the others are views of it."""
 
@@ -120,18 +124,8 @@ class TensionProblem(Displayed):
             view = packed[start : start + part.size]
             object.__setattr__(self, name, view.reshape(n, m) if name == "A" else view)
             start += part.size
-        object.__setattr__(self, "length", float(packed[-1]))
-        object.__setattr__(self, "packed", packed)
-
-    @property
-    def n(self) -> int:
-        """Return the number of wrench rows."""
-        return self.A.shape[0]
-
-    @property
-    def m(self) -> int:
-        """Return the number of cables."""
-        return self.A.shape[1]
+        for name, value in (("length", float(packed[-1])), ("n", n), ("m", m), ("packed", packed)):
+            object.__setattr__(self, name, value)
 
     @cached_property
     def row_scale(self) -> Array:

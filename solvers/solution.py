@@ -11,7 +11,9 @@ from ..base.errors import SolverError
 from ..base.text import quantity, quantity_range, quantity_row
 from .certificate import Certificate
 from .problem import Array, TensionProblem
-from .status import Status
+from .status import OPTIMAL, STATUSES, Status
+
+_OPTIMAL = STATUSES[OPTIMAL]  # to read it from the enumeration takes longer than the rest of `feasible`
 
 
 @dataclass(slots=True, eq=False)
@@ -101,7 +103,7 @@ class TensionSolution(Displayed):
     @property
     def feasible(self) -> bool:
         """Return whether the tensions are usable."""
-        return self.status is Status.OPTIMAL
+        return self.status is _OPTIMAL
 
     @property
     def residual(self) -> float:
@@ -151,3 +153,21 @@ class TensionSolution(Displayed):
             "iterations": self.iterations,
             "detail": self.detail,
         }
+
+
+def of_core(problem: TensionProblem, tensions: Array, time: float) -> TensionSolution:
+    """Return the optimum that the C core found; the constructor of the class would take 0.1 us of some 1.2."""
+    solution = _new(TensionSolution)
+    solution.problem = problem
+    solution.tensions = tensions
+    solution.status = _OPTIMAL
+    solution.method = "active-set"
+    solution.backend = "c"
+    solution.time = time
+    solution.iterations = None
+    solution.detail = ""
+    solution.proof = None
+    return solution
+
+
+_new = object.__new__

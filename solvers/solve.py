@@ -15,7 +15,7 @@ from .methods import METHODS
 from .methods.method import Method, Proposal
 from .methods.qp import ActiveSet
 from .problem import Array, TensionProblem
-from .solution import TensionSolution
+from .solution import TensionSolution, of_core
 from .standard_form import StandardForm, standard_forms
 from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES
 from .verify import verify
@@ -56,10 +56,10 @@ def solve(
         raise InputError(f"problem must be a TensionProblem, got {shown(problem)}, a {type(problem).__name__}")
     # These few lines decide the time of a step.
     if type(method) is str and method == "active-set" and backend is None and not options:
-        tensions = np.empty(problem.t_min.size)
+        tensions = np.empty(problem.m)
         code = solve_packed(problem.packed, tensions)
         if code == OPTIMAL:
-            return TensionSolution(problem, tensions, _OPTIMAL, "active-set", "c", perf_counter() - start)
+            return of_core(problem, tensions, perf_counter() - start)
         if code <= SINGULAR:
             spent = perf_counter() - start
             return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _PROOFS[code])
@@ -103,7 +103,6 @@ def _prove(problem: TensionProblem, singular: bool) -> Certificate | None:
     return certificate
 
 
-_OPTIMAL = STATUSES[OPTIMAL]
 _PROOFS = {code: partial(_prove, singular=code == SINGULAR) for code in (INFEASIBLE, SINGULAR)}
 
 

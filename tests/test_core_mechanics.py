@@ -226,6 +226,19 @@ def test_numbers_that_are_none_are_found_at_any_address(number):
         assert not _core.finite(moved)
 
 
+def test_the_extent_of_an_array_is_that_which_numpy_computes():
+    values = np.random.default_rng(9).normal(size=21) * 10.0 ** np.arange(-150, 270, 20)
+    for count in range(1, 22):
+        part = values[:count]
+        assert _core.extent(part) == (part.min(), part.max())
+        assert _core.extent(np.frombuffer(b"x" + part.tobytes(), dtype="i1")[1:]) == (part.min(), part.max())
+    assert _core.extent(values[:0]) == (np.inf, -np.inf)
+    with pytest.raises(TypeError):
+        _core.extent(None)
+    with pytest.raises(ValueError, match="not C-contiguous"):
+        _core.extent(values[::2])
+
+
 @pytest.mark.parametrize(
     ("lanes", "processor"), [(False, 0), *((True, processor) for processor in range(_core.PROCESSOR + 1))]
 )

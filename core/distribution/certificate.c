@@ -8,7 +8,7 @@
 static void write_direction(form *f, int worst, real side, real *d) {
     const int rank = f->rank;
     for (int j = 0; j < rank && worst < 0; j++) {
-        towline_reflect(f, j, f->push);
+        reflect(f, j, f->push);
     }
     for (int i = 0; i < f->n; i++) {
         d[i] = 0;

@@ -100,6 +100,13 @@ static inline void add_to(real *restrict y, real factor, const real *restrict x,
     }
 }
 
+/* Apply reflector j to x: subtract tau v v^T x, with v = B[j], which is zero before column j; see reduction.c. */
+static inline void reflect(const form *f, int j, real *x) {
+    const int from = j / 4 * 4, count = f->width - from;
+    const real *v = f->B + j * f->width + from;
+    add_to(x + from, -f->tau[j] * dot(v, x + from, count), v, count);
+}
+
 static inline real reference(const towline_problem *problem, int i) { return problem->t_ref ? problem->t_ref[i] : 0; }
 
 static inline real weight(const towline_problem *problem, int i) { return problem->weights ? problem->weights[i] : 1; }
@@ -111,7 +118,6 @@ TOWLINE_LINKAGE outcome towline_enter_limits(form *f);
 
 /* reduction.c */
 TOWLINE_LINKAGE int towline_reduce(form *f, int cut);
-TOWLINE_LINKAGE void towline_reflect(const form *f, int j, real *x);
 TOWLINE_LINKAGE void towline_null_space(form *f);
 
 /* slabs.c and dual_active_set.c: move s to the point of least norm inside the limits. */

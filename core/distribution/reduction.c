@@ -17,11 +17,15 @@ static void swap_rows(form *f, int i, int j) {
     f->order[j] = row;
 }
 
-/* Apply reflector j to x: subtract tau v v^T x, with v = B[j], which is zero before column j. */
-void towline_reflect(const form *f, int j, real *x) {
-    const int from = j / 4 * 4, count = f->width - from;
-    const real *v = f->B + j * f->width + from;
-    add_to(x + from, -f->tau[j] * dot(v, x + from, count), v, count);
+/* Return which of the rows from j on is the largest. */
+static int largest(const real *squares, int j, int n) {
+    int best = j;
+    real most = squares[j];
+    for (int i = j + 1; i < n; i++) { /* nothing branches: no processor can predict it */
+        best = squares[i] > most ? i : best;
+        most = larger(squares[i], most);
+    }
+    return best;
 }
 
 /*
@@ -29,50 +33,42 @@ void towline_reflect(const form *f, int j, real *x) {
  * `cut` each row counts that is not zero.
  */
 int towline_reduce(form *f, int cut) {
-    const int n = f->n, steps = n < f->columns ? n : f->columns;
+    const int n = f->n, width = f->width, steps = n < f->columns ? n : f->columns;
     real squares[ROWS]; /* of what is left of each row */
     for (int i = 0; i < n; i++) {
-        const real *row = f->B + i * f->width;
-        squares[i] = dot(row, row, f->width);
+        const real *row = f->B + i * width;
+        squares[i] = dot(row, row, width);
         f->order[i] = i;
     }
     for (int j = 0; j < steps; j++) {
-        real *v = f->B + j * f->width;
-        int best = j;
-        for (int i = j + 1; i < n; i++) {
-            if (squares[i] > squares[best]) {
-                best = i;
-            }
-        }
+        real *v = f->B + j * width;
+        int best = largest(squares, j, n);
         /* The squares are kept by subtraction; far below the first one no digits are left, and they are taken anew. */
         if (j > 0 && squares[best] <= RECOUNT * f->L[0] * f->L[0]) {
-            best = j;
             for (int i = j; i < n; i++) {
-                const real *row = f->B + i * f->width;
-                squares[i] = dot(row, row, f->width);
-                if (squares[i] > squares[best]) {
-                    best = i;
-                }
+                const real *row = f->B + i * width;
+                squares[i] = dot(row, row, width);
             }
+            best = largest(squares, j, n);
         }
         if (best != j) {
             swap_rows(f, j, best);
             squares[best] = squares[j];
         }
-        const real length = root(dot(v, v, f->width)), first = j > 0 ? magnitude(f->L[0]) : length;
+        const real length = root(dot(v, v, width)), first = j > 0 ? magnitude(f->L[0]) : length;
         if (length == 0) {
             return j;
         }
         if (cut && length <= SURE_PIVOT * first) {
             return length <= SMALL_PIVOT * first ? j : -1;
         }
-        const real head = v[j], pivot = head > 0 ? -length : length;
+        const real head = v[j], pivot = (real)(1 - 2 * (head > 0)) * length;
         f->L[j * ROWS + j] = pivot;
         v[j] = head - pivot;
         f->tau[j] = -1 / (pivot * (head - pivot));
         for (int i = j + 1; i < n; i++) {
-            real *row = f->B + i * f->width;
-            towline_reflect(f, j, row);
+            real *row = f->B + i * width;
+            reflect(f, j, row);
             f->L[i * ROWS + j] = row[j];
             squares[i] -= row[j] * row[j];
             row[j] = 0;
@@ -89,8 +85,10 @@ void towline_null_space(form *f) {
             row[c] = 0;
         }
         row[f->rank + e] = 1;
-        for (int j = f->rank - 1; j >= 0; j--) {
-            towline_reflect(f, j, row);
+    }
+    for (int j = f->rank - 1; j >= 0; j--) {
+        for (int e = 0; e < f->k; e++) {
+            reflect(f, j, f->basis + e * f->width);
         }
     }
 }

@@ -3,11 +3,12 @@
 
 /* Whether a cable adds to the wrench at all: one that does not stays at its reference, and is not chosen. */
 static int pulls(const towline_problem *problem, int c) {
-    int does = 0;
     for (int i = 0; i < problem->n; i++) {
-        does |= problem->A[i * problem->m + c] != 0;
+        if (problem->A[i * problem->m + c] != 0) {
+            return 1;
+        }
     }
-    return does;
+    return 0;
 }
 
 /*
@@ -97,7 +98,7 @@ real towline_least_norm(form *f, int *worst, real *missing) {
         f->s[c] = 0;
     }
     for (int j = f->rank - 1; j >= 0; j--) {
-        towline_reflect(f, j, f->s);
+        reflect(f, j, f->s);
     }
     return root(square);
 }
@@ -109,7 +110,7 @@ outcome towline_enter_limits(form *f) {
         last < 0 ? PARALLEL : larger(PARALLEL, PARALLEL_PIVOT * magnitude(f->L[0] / f->L[last * ROWS + last]));
     int outside = 0;
     for (int c = 0; c < f->cables; c++) {
-        outside |= f->s[c] < f->low[c] - f->slack || f->s[c] > f->high[c] + f->slack;
+        outside |= (f->s[c] < f->low[c] - f->slack) | (f->s[c] > f->high[c] + f->slack);
     }
     if (!outside) {
         return REACHED;

@@ -15,6 +15,8 @@ static PyMethodDef functions[] = {
 #include "python/functions.h"
     {"finite", towline_py_finite, METH_O,
      "finite(array)\n--\n\nReturn whether all numbers of an array of float64 in C order are finite."},
+    {"extent", towline_py_extent, METH_O,
+     "extent(array)\n--\n\nReturn the least and the largest number of an array of finite float64 in C order."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -13,5 +13,6 @@
 #undef FUNCTION
 
 PyObject *towline_py_finite(PyObject *module, PyObject *array);
+PyObject *towline_py_extent(PyObject *module, PyObject *array);
 
 #endif

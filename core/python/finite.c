@@ -1,4 +1,8 @@
-/* Whether the numbers of an array are finite, for Python: one call of NumPy takes longer than the mechanics of a pose. */
+/*
+ * Whether the numbers of an array are finite, and between which they lie, for Python: one call of NumPy takes longer
+ * than the mechanics of a pose.
+ */
+#include <math.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -22,4 +26,22 @@ PyObject *towline_py_finite(PyObject *module, PyObject *array) {
     }
     PyBuffer_Release(&view);
     return PyBool_FromLong(finite);
+}
+
+PyObject *towline_py_extent(PyObject *module, PyObject *array) {
+    (void)module;
+    Py_buffer view;
+    if (PyObject_GetBuffer(array, &view, PyBUF_SIMPLE) < 0) {
+        return NULL;
+    }
+    const char *bytes = view.buf;
+    double least = INFINITY, largest = -INFINITY;
+    for (Py_ssize_t at = 0; at + DOUBLE <= view.len; at += DOUBLE) {
+        double x;
+        memcpy(&x, bytes + at, sizeof x);
+        least = x < least ? x : least;
+        largest = x > largest ? x : largest;
+    }
+    PyBuffer_Release(&view);
+    return Py_BuildValue("(dd)", least, largest);
 }

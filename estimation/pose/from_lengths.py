@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
 from ...base.inputs import leading, repeated, shown
+from ...core import extent
 from ...models.batch import as_array
 from ...models.files import as_robot
 from ...models.part import LARGEST
@@ -63,8 +64,7 @@ def pose_from_lengths(
     if start is not None:
         start = _poses("start", start, (6,))
         shapes["start"] = start.shape[:-1]
-    first, *others = shapes.values()
-    batch = first if all(other == first for other in others) else leading(shapes)
+    batch = lengths.shape[:-1] if len(set(shapes.values())) == 1 else leading(shapes)
     rows = _rows(lengths, batch, 1)
     each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
     problem = problem_of(robot, each)
@@ -79,8 +79,9 @@ def pose_from_lengths(
 def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
     """Return lengths (..., m), or raise InputError unless all are above zero and of a size that can be squared."""
     array = as_array("lengths", lengths, (robot.m,))
-    if not array.min(initial=np.inf) > 0.0:
-        raise InputError(f"lengths must be numbers > 0 [m], got {array.min():g}")
+    least, _ = extent(np.ascontiguousarray(array))
+    if not least > 0.0:
+        raise InputError(f"lengths must be numbers > 0 [m], got {least:g}")
     return _of_a_size("lengths", "m", array)
 
 
@@ -122,14 +123,16 @@ def _poses(name: str, value: ArrayLike, core: tuple[int, ...]) -> np.ndarray:
 
 def _of_a_size(name: str, unit: str, array: np.ndarray) -> np.ndarray:
     """Return an array, or raise InputError if the square of a number would be too large."""
-    # No number is larger than the root of the sum of squares, which is faster.
-    if not np.vdot(array, array) <= LARGEST**2 and (largest := np.abs(array).max()) > LARGEST:
+    least, most = extent(np.ascontiguousarray(array))
+    if (largest := max(-least, most)) > LARGEST:
         raise InputError(f"{name} must be numbers up to {LARGEST:g} [{unit}], got {largest:g}")
     return array
 
 
 def _rows(array: np.ndarray, batch: tuple[int, ...], core: int) -> np.ndarray:
     """Return (N, ...) of an array whose last `core` dimensions are its own."""
+    if not batch:
+        return np.ascontiguousarray(array[None])
     own = array.shape[array.ndim - core :]
     if array.shape == batch + own:
         return np.ascontiguousarray(array.reshape(-1, *own))
