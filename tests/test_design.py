@@ -65,7 +65,7 @@ def found():
     """From the published layout, and audits until they agree: the result does not depend on the machine's speed."""
     robot = load("ipanema-2")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(searching, "_STARTING", 0.0)
+        patch.setattr(searching, "_SEARCHING", 0.0)
         return design(robot, requirements=wanted(robot, clearance=0.04, time_limit=60.0))
 
 

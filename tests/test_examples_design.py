@@ -25,7 +25,7 @@ def test_every_file_is_used():
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda command: Path(command).stem.split()[-1])
 def test_a_better_robot_is_found(command, monkeypatch):
     """From the robot's own layout until the audits agree: the result does not depend on the machine's speed."""
-    monkeypatch.setattr(searching, "_STARTING", 0.0)
+    monkeypatch.setattr(searching, "_SEARCHING", 0.0)
     for module in (run, searching):
         monkeypatch.setattr(module, "AUDITED", 10_000)  # of larger audits, test_design.py has tests
         monkeypatch.setattr(module, "ROOM_AUDITED", 2000)
