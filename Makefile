@@ -17,8 +17,8 @@ demo: .venv/core.stamp
 	$(BIN)/towline demo
 
 test: .venv/dev.stamp
-	$(MAKE) --jobs=2 lint docs
-	$(MAKE) --jobs=2 types unit
+	$(MAKE) lint
+	$(MAKE) --jobs=3 docs types unit
 
 setup: .venv/dev.stamp
 
