@@ -226,6 +226,7 @@ def markdown(report: Report) -> str:
         "",
         f"Measured on {report.machine}.",
         f"Random problems per task: {report.count}. Rounds after a warm-up round: {report.repeats}.",
+        "Required is the tolerance that a solver was given. A solver is out if a task takes it longer than the limit.",
         f"The ratio is that to `{REFERENCE}` in the same round. The error is the largest one of a tension, divided by "
         "the largest tension; it is - if there is nothing to compare.",
         f"A failure is a missing result, an error above {FAILED:g}, or a result for an infeasible problem.",

@@ -25,7 +25,7 @@ def design(
     robot: RobotArgument,
     requirements: Annotated[
         Path,
-        typer.Argument(metavar="REQUIREMENTS", help="A requirement file (YAML): free numbers, poses and wrenches."),
+        typer.Argument(metavar="REQUIREMENTS", help="A requirement file (YAML): what is free, poses and wrenches."),
     ],
     out: Annotated[
         Path | None,

@@ -183,7 +183,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
         ]
     lines = [f"  can rest, {attitude} and with its carriers at home, in the box", f"    {', '.join(sides)}"]
     if (box.centre != robot.home[:3]).any():
-        lines[0] += f" about ({quantity_row(box.centre)}) m, the position nearest to home at which it can rest"
+        lines[0] += f" about ({quantity_row(box.centre)}) m, the sampled position nearest to home at which it can rest"
     steps = quantity_row(box.spacing[box.spacing > 0], digits=2)
     return [*lines, f"    ({quantity(box.samples)} positions sampled, spaced by {steps} m along the axes)"]
 

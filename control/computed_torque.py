@@ -71,7 +71,7 @@ class ComputedTorque(Controller):
         Largest deviation of carriers from their reference to help the tensions (see `core/control/compensation.c`):
         position [m] and attitude [rad]. Default: 0, but 0.5 m with fewer cables than degrees of freedom.
     carrier_bandwidth, carrier_acceleration
-        Bandwidth of this motion [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
+        Bandwidth of the carriers' deviation [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
     place, attitude
         Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`. Default of `attitude`:
         40, or less by the known lags of rotors and sensors (control/bandwidths.py); of `place`: 5, at most a sixth of

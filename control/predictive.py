@@ -81,8 +81,8 @@ class Predictive(ComputedTorque):
         correct errors. A flying carrier that does not correct errors is moved by the compensation of `ComputedTorque`,
         not by the solution.
     carrier_bandwidth, carrier_acceleration
-        Bandwidth with which these carriers return [rad/s] (default: 2, but 6 if carriers correct errors), and their
-        largest acceleration in addition to the reference's [m/s^2 and rad/s^2].
+        Bandwidth with which carriers return to their reference [rad/s] (default: 2, but 6 if carriers correct errors),
+        and their largest acceleration in addition to the reference's [m/s^2 and rad/s^2].
     tube
         Largest distance of the platform from its reference [m] (default: no limit).
     keep_out

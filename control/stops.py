@@ -55,8 +55,8 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
 def longest_stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], period: float = 0.02) -> Stop:
     """Return the longest of the stops that begin at regular instants of a plan, or the first one that is infeasible.
 
-    If it is feasible, the robot can stop within its duration from each of these instants. Computing a stop takes some
-    5 ms.
+    If it is feasible, the robot can stop within its duration from each of these instants. Computing a stop takes a
+    few milliseconds.
 
     Parameters
     ----------

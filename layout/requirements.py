@@ -118,7 +118,7 @@ class Requirement(Part):
         return self
 
     def places(self, grid: tuple[int, ...] | None = None) -> np.ndarray:
-        """Return the poses, of the box with another number of positions along each axis if given, (N, 6) [m, rad]."""
+        """Return the poses, (N, 6) [m, rad]: those given, or those of `grid`, or of another grid, in the box."""
         if self.box is None:
             return np.array(self.poses)
         axes = [
@@ -128,7 +128,7 @@ class Requirement(Part):
         return np.array([(*position, *attitude) for attitude in self.attitudes for position in product(*axes)])
 
     def sampled(self, count: int, rng: np.random.Generator) -> np.ndarray:
-        """Return random poses of the box with its attitudes, (count, 6); of a list all poses.
+        """Return random poses in the box with its attitudes, (count, 6), or all poses of a list.
 
         A third of the values of each coordinate are at its bounds, where the worst poses often are.
         """
@@ -169,7 +169,7 @@ class Prices(Part):
 
 
 class Requirements(Part):
-    """Requirements of a design: free numbers, poses and wrenches. In a file: YAML with these keys."""
+    """Requirements of a design: what is free, poses and wrenches. In a file: YAML with these keys."""
 
     name: Name = Field(default="design", description="name of the requirements, for reports and file names")
     free: Annotated[tuple[Free, ...], Field(min_length=1, max_length=200)] = Field(

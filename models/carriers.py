@@ -66,7 +66,7 @@ class Actuator(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """An effort that a motion requires of a carrier, with the range that it has."""
+    """An effort that a motion requires of a carrier, with its limits."""
 
     name: str
     unit: str

@@ -43,8 +43,8 @@ def casadi_function(
     exact; at kinks they are one-sided, see `sensitivity`. There are no second derivatives: give IPOPT
     `{"ipopt.hessian_approximation": "limited-memory"}`.
 
-    It is a Python callback: it costs a `solve` per evaluation, cannot be turned into C code, and must be kept in a
-    variable as long as anything that calls it.
+    It is a Python callback: each evaluation costs a `solve`, and it cannot be exported as C code. Keep it in a variable
+    as long as anything calls it.
 
     Parameters
     ----------

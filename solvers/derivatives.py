@@ -54,8 +54,8 @@ def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     :
         dt_i / dw_j, shape (m, n) [N per N, N per N m]. The tensions are piecewise linear in w. Where pieces meet (a
         cable is at its limit but nothing holds it there) the result is one-sided: that of the piece on which such
-        cables are free. In directions of w that the free cables cannot give, the optimum changes its active set at once
-        (w at an edge of the pieces) or there is none (w on the boundary): there it is 0.
+        cables are free. It is 0 in directions of w that the free cables cannot give: there the active set
+        changes at once (where pieces meet), or no tensions exist (on the boundary of the available wrench set).
 
     Raises
     ------

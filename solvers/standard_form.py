@@ -69,8 +69,8 @@ class StandardForm(NamedTuple):
     def is_optimal(self, tensions: Array) -> bool:
         r"""Return whether multipliers prove that tensions, (m,) [N], which give w inside the limits, are the optimum.
 
-        The point of least norm leaves no part of its gradient, s itself, in the null space of the equations except for
-        limits that it is at and that push against it:
+        At the point of least norm, the gradient of the cost, s itself, has no part in the null space of the equations
+        that the multipliers of active limits do not balance:
 
         $$
         N s = N \mu, \qquad \mu_i \ge 0 \text{ at } lower_i, \quad \mu_i \le 0 \text{ at } upper_i, \quad

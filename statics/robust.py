@@ -5,12 +5,13 @@ A t = w, balance again with the smallest correction
 
     t + dt      dt = -A^+ dA t = G dp      G = -A^+ d(A t)/dp
 
-So dt is normally distributed with the covariance G Sigma G^T, and t inside the limits less k sigma_i, of each cable,
-leaves t + dt inside the limits as long as |dt_i| <= k sigma_i. There are two factors k with which this holds for the
-fraction P of the robots at all poses simultaneously:
+So dt is normally distributed with the covariance G Sigma G^T. If each tension t_i keeps the distance k sigma_i from its
+limits, t + dt is inside the limits as long as |dt_i| <= k sigma_i. There are two factors k with which this holds for
+the fraction P of the robots at all poses simultaneously:
 
-- any poses (`ellipsoid_factor`): the ellipsoid dp^T Sigma^-1 dp <= k^2 has P of the robots for k^2 = chi-square of r
-  degrees of freedom, r the rank of Sigma, and in it |g . dp| <= k sqrt(g^T Sigma g) for whatever g (Scheffe);
+- any poses (`ellipsoid_factor`): the ellipsoid dp^T Sigma^-1 dp <= k^2 contains the fraction P of the robots if k^2 is
+  the quantile P of the chi-square distribution with r degrees of freedom, r the rank of Sigma. Inside it
+  |g . dp| <= k sqrt(g^T Sigma g) for every g (Scheffe);
 - a motion (`motion_factor`): along it the row of each cable, scaled to variance 1, is a curve of length L_i on the unit
   sphere. Rice's formula bounds the probability that it exceeds k anywhere by 2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2).
   The sum over the cables is 1 - P. The factor is usually half of the first one, and never taken larger.

@@ -36,7 +36,7 @@ NEARER = 0.85  # than in the viewer, whose panel lies over the scene
 def live_page(subject: Subject) -> str:
     """Return the page of a robot, with the points of its workspace if there are any, as one HTML document.
 
-    Raises `InputError` if the core has no room for the robot, or the robot cannot be drawn.
+    Raises `InputError` if the robot is too large for the core, or the robot cannot be drawn.
     """
     robot, geometry = subject.robot, Geometry(subject.robot)
     data = _data(subject, geometry)

@@ -97,8 +97,8 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     Raises
     ------
     InputError
-        If `subject` is not a `Subject`, viser is not installed and the subject is a plan or a simulation, the core
-        has no room for the robot, or the file cannot be written.
+        If `subject` is not a `Subject`, viser is not installed and the subject is a plan or a simulation, the robot
+        is too large for the core, or the file cannot be written.
     """
     required("subject", subject, Subject)
     path = file_path("file", file)

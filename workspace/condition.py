@@ -68,8 +68,8 @@ class Condition(Part, ABC):
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
         """Return a distance to fulfilment, (n,), zero exactly where the condition holds.
 
-        It has a unit of the condition and decreases towards fulfilment, which searches use. The default is 1
-        where the condition does not hold. The configurations must be finite.
+        It is in a unit of the condition's choice, and decreases towards fulfilment, so that searches can follow it. The
+        default is 1 where the condition does not hold. The configurations must be finite.
         """
         return np.where(self.holds(robot, places), 0.0, 1.0)
 
@@ -163,12 +163,12 @@ class _Joined(Condition, ABC):
         return type(self)(conditions=tuple(one.for_robots(robust) for one in self.conditions))
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the sum of the shortfalls x, or the smallest if one must hold, each as x / (1 + x) in its unit."""
+        """Return the sum of x / (1 + x) over the shortfalls x, each in its unit; of `AnyOf` the smallest of these."""
         shares = [1.0 - 1.0 / (1.0 + one.shortfall(robot, places)) for one in self.conditions]
         return (np.sum if self.every else np.min)(shares, axis=0)
 
     def why_nowhere(self, robot: Robot) -> str | None:
-        """Return the first reason of a condition; if one must hold, only where every condition has a reason."""
+        """Return the first reason that a condition gives; of `AnyOf` only if every condition gives one."""
         reasons = [one.why_nowhere(robot) for one in self.conditions]
         return next(filter(None, reasons), None) if self.every or all(reasons) else None
 

@@ -72,7 +72,7 @@ class PoseEstimate(Displayed):
         ]
 
     def reshape(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> None:
-        """Give N estimates the leading dimensions `batch`, and `carrier_pose` as it was given."""
+        """Replace the leading dimension N by `batch`, and set `carrier_pose`."""
         for name in ("pose", "residuals", "converged", "ambiguous", "by_gravity", "known_covariance"):
             value = getattr(self, name)
             if not isinstance(value, np.ndarray):

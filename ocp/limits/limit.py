@@ -40,7 +40,7 @@ class Hull(NamedTuple):
     coordinates
         Coordinates on which the values depend: 0 to 5 for x, y, z, roll, pitch, yaw.
     at_ends
-        True if points at the ends of an interval have rows; False if bounds of the unknowns do the same.
+        True if the program limits the points at the ends of an interval; False if bounds of its unknowns already do.
     """
 
     carrier: int | None
@@ -108,12 +108,12 @@ class Limit(ABC):
     def on_the_way(self, first: State, second: State) -> ca.SX | None:
         """Return the smallest values while all points move straight from one instant to another, (k, 1).
 
-        The program keeps these instead of those at its nodes where a step may jump over a region; None if not known.
+        Where a step may jump over a region, the program limits these, not the values at its nodes; default: not known.
         """
         return None
 
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
-        """Return the limit as rows of a program, in parts of `scale`.
+        """Return the limit as rows of a program, in units of `scale`.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Limit(ABC):
         return values
 
     def share_beyond(self, value: float) -> float:
-        """Return how far a value is beyond the bounds, in the unit of `shrink` of `rows`."""
+        """Return how far a value is beyond the bounds, in units of `scale`."""
         return max(self.low - value, value - self.high, 0.0) / self.scale
 
     def about(self, index: int) -> str:
@@ -154,7 +154,7 @@ class Limit(ABC):
 
     @property
     def is_equation(self) -> bool:
-        """Return whether it is met at the nodes, and between them only nearly."""
+        """Return whether it is an equation, which holds at the nodes, and between them only nearly."""
         return self.low == self.high
 
     @property
@@ -164,7 +164,7 @@ class Limit(ABC):
 
     @property
     def tightens(self) -> bool:
-        """Return whether a program can have tighter bounds: neither of an equation nor of a convex limit of poses."""
+        """Return whether a program can tighten the bounds: not of an equation, nor of a convex limit of poses."""
         return not (self.is_equation or (self.is_convex and self.order == 0))
 
     @property

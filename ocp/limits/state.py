@@ -24,7 +24,7 @@ class Body(NamedTuple):
 
     @classmethod
     def symbols(cls) -> Self:
-        """Return symbols: pieces of one symbol are no symbols, and derivatives are taken with respect to these."""
+        """Return a motion of three symbols, by which expressions can be differentiated, unlike by parts of one."""
         return cls(ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("a", 6))
 
     @property

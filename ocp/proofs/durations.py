@@ -42,7 +42,7 @@ class Durations(NamedTuple):
         """Return the shortest and the longest duration as text."""
         if not self.exist:
             part = f"first {quantity(100 * self.at, '%', 3)}" if self.at else "start"
-            return f"no duration is feasible with the task's time law (shown on the {part} of the motion)"
+            return f"no duration is feasible with the task's time law (proven by the {part} of the motion alone)"
         upper = "" if self.longest == float("inf") else f", at most {quantity(self.longest, 's')}"
         return f"at least {quantity(self.shortest, 's')}{upper} with the task's time law"
 

@@ -286,7 +286,7 @@ class Task(Part):
     def seconds(self) -> float:
         """Return the duration of the motion [s]; for a range its geometric mean, from which the planner starts.
 
-        Of a path with dwell times, only durations that are longer than these count.
+        If the path has dwell times, durations below their sum are left out.
 
         Raises
         ------

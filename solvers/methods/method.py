@@ -24,8 +24,8 @@ class Proposal(NamedTuple):
     detail :
         The reason when `s` is None.
     final :
-        True if the failure is the result even if the problem is feasible, for example because the feasible tensions
-        are unbounded: `solve` then does not try exact arithmetic.
+        True if `solve` reports this failure even if the problem is feasible, for example because the feasible
+        tensions are unbounded; it then does not try exact arithmetic.
     """
 
     s: Array | None
@@ -37,7 +37,7 @@ class Proposal(NamedTuple):
 
 
 class Method(ABC):
-    """A method to choose tensions. Subclass it, fill the class variables, write `propose`, and register it."""
+    """A method to choose tensions. Subclass it, set the class variables, write `propose`, and pass it to `solve`."""
 
     name: ClassVar[str]
     """The name that `solve` takes."""

@@ -7,15 +7,15 @@ The exit code is 1 if anything is wrong, and each wrong case is printed with its
 
     exactness    statuses, tensions and certificates of tension distribution, in exact arithmetic
     continuity   methods that claim to be continuous, along motions
-    step         exported control steps beside Python's answers
+    step         exported control steps, compared with Python
     control      steps of computed torque in closed loops, from every state
-    predictive   flights of predictive control
+    predictive   runs of predictive control
     mujoco       both controllers in MuJoCo, on robots that differ from their files
-    silence      flights with nothing wrong, which predictive control must not hand over
+    silence      runs without faults, in which predictive control must stay in control
     files        crafted files of every kind that a command reads
     signals      SIGINT and SIGTERM at random moments of every long command
-    tasks        plans of random tasks, and what they claim
-    replanning   plans of the rest of a motion, in flight
+    tasks        plans of random tasks, and their results
+    replanning   plans of the remainder of a motion, during the motion
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ class ExistsPlacement(Condition):
         return held
 
     def for_robots(self, robust: float) -> Condition:
-        """Return the condition whose inner one must hold for a fraction `robust` of the robots."""
+        """Return this condition with an inner condition that must hold for a fraction `robust` of the robots."""
         return self.model_copy(update={"condition": self.condition.for_robots(robust)})
 
     def why_nowhere(self, robot: Robot) -> str | None:

@@ -43,7 +43,7 @@ class Stations(NamedTuple):
         return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
 
     def since(self, start: float) -> Stations:
-        """Return those of the rest of the path from `start` [s] on, which is time zero."""
+        """Return the waypoints from the time `start` [s] on, with times that count from it."""
         later = self.times >= start
         names = tuple(name for name, kept in zip(self.names, later, strict=True) if kept)
         return Stations(names, self.times[later] - start, self.poses[later])
