@@ -7,11 +7,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
+from pydantic import BaseModel
 
 from ..base.errors import InputError
 from ..base.inputs import file_path, finite_array, number, real_array, shown
 from ..base.netcdf import load_netcdf, numbers_of
 from ..figures.outlines import outlines_from
+from ..models.parsing import parse_yaml
 from ..models.part import LARGEST
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
@@ -26,6 +28,12 @@ DOUBTS = {  # by the status of a plan
 }
 SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")
+
+
+class InPhases(BaseModel):
+    """The phases of the task of a plan, whatever else it has."""
+
+    phases: list[dict[str, Any]]
 
 
 class HasTrajectory(Protocol):
@@ -113,10 +121,6 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     missing = [name for name in needed if name not in dataset]
     if missing:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
-    if "phase_load" in dataset and (loads := read("phase_load", (-1,))).any():
-        raise InputError(
-            f"reference must be a plan without loads, which simulations do not support, got one of {loads.max():g} kg"
-        )
     first, *_ = str(dataset.attrs.get("robot", "")).splitlines() or [""]
     name = first.removeprefix("name:").strip().strip("\"'")
     count, m = len(robot.carriers), robot.m
@@ -138,16 +142,37 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     air = dataset.attrs.get("wind")
     wind = None if air is None or robot.platform.aero is None else finite_array("reference.wind", air, (3,))
     keep_out = outlines_from(dataset, "reference")
-    doubt = DOUBTS.get(str(dataset.attrs.get("status")), "")
+    doubt, loads = DOUBTS.get(str(dataset.attrs.get("status")), ""), _loads_of(dataset, read)
     planned = read("tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():
-        return Trajectory(float(nodes[-1]), at, keep_out=keep_out, doubt=doubt, wind=wind)
+        return Trajectory(float(nodes[-1]), at, keep_out=keep_out, doubt=doubt, wind=wind, loads=loads)
 
     def tensions(times: np.ndarray) -> np.ndarray:
         return np.stack([np.interp(times, nodes[known], column[known]) for column in planned.T], axis=1)
 
-    return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt, wind)
+    return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt, wind, loads)
+
+
+def _loads_of(dataset: xr.Dataset, read: Any) -> list[tuple[float, dict[str, Any] | None]]:
+    """Return what the platform carries in the phases of a plan, by the plan's task."""
+    if "phase_load" not in dataset or not (masses := read("phase_load", (-1,))).any():
+        return []
+    try:
+        phases = parse_yaml(str(dataset.attrs["task"]), InPhases, "reference.task").phases
+        loads, grounds = [phase.get("load") for phase in phases], [phase.get("ground") for phase in phases]
+        known = [(load or {}).get("mass", 0.0) for load in loads] == masses.tolist()
+    except (KeyError, TypeError, AttributeError, InputError):
+        known, loads, grounds = False, [], []
+    if not known:
+        raise InputError(f"reference must be a plan whose task describes its loads, got one of {masses.max():g} kg")
+    if any(ground is not None for ground in grounds):
+        raise InputError(
+            "reference must be a plan of loads without ground, which simulations do not have, got one with"
+        )
+    keys, starts = ("mass", "com", "inertia"), read("phase_start", (len(loads),)).tolist()
+    described = [load and {key: load[key] for key in keys if key in load} for load in loads]
+    return list(zip(starts, described, strict=True))
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

@@ -1,7 +1,7 @@
 """`Trajectory`: motions of platform and carriers over time, as controllers and stops follow them."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,3 +27,5 @@ class Trajectory(NamedTuple):
     keep_out: Sequence[Sequence[np.ndarray]] = ()
     doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit; empty if it is not
     wind: np.ndarray | None = None  # velocity of the air in {G} for which it is planned, (3,) [m/s]; None without air
+    # What the platform carries from a time on [s]: mass, CoM and inertia as a mapping, or None for nothing.
+    loads: Sequence[tuple[float, dict[str, Any] | None]] = ()

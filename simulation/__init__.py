@@ -6,7 +6,7 @@ from ..base.execution import Execution
 from ..base.former_names import moved_name
 from ..control.noise import Noise
 from .conditions import Conditions
-from .events import Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
+from .events import Carry, Cut, Event, Follow, Lose, Miss, Push, Stick, StopReference, Wall
 from .log_replay import Replay, replay
 from .mismatch import Mismatch
 from .own_run import simulation_of
@@ -14,6 +14,7 @@ from .simulate import simulate
 from .simulation import Simulation
 
 __all__ = [
+    "Carry",
     "Conditions",
     "Cut",
     "Event",

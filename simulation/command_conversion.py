@@ -25,12 +25,14 @@ class Orders:
     - `plant`: the plant.
     - `conditions`: conditions of the runs.
     - `seeds`: seed of the wind and of the drives, one for each run.
+    - `record`: the robot as events change it; default: that of the plant.
     """
 
-    def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int]):
+    def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int], record: np.ndarray | None = None):
         robot, times = plant.robot, conditions.period * np.arange(len(conditions.references))
         self._period, self._drive, self._fixed = conditions.period, plant.drive, robot.fixed_lengths
-        self._record, self._last_rates = plant.record, np.full((len(seeds), robot.m), np.nan)
+        self._record = plant.record if record is None else record
+        self._last_rates = np.full((len(seeds), robot.m), np.nan)
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
         calm = None if self.wind is None else np.zeros(3)

@@ -98,7 +98,7 @@ def fly(
     end, numbers = history[:, 1], history.reshape(-1)
     pulls = np.tile(start, (flights, 1))  # means of the last period
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
-    orders = Orders(plant, conditions, seeds)
+    orders = Orders(plant, conditions, seeds, periods.record)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
     coming, pushing, command, expected = list(conditions.events), list[tuple[float, Event]](), None, None
     for k, reference in enumerate(conditions.references):
@@ -108,7 +108,7 @@ def fly(
             event.begin(running)
             pushing += [(time, event)] if type(event).wrench is not Event.wrench else []
         states = running.states
-        sense(plant.record, states, motions, lengths)
+        sense(periods.record, states, motions, lengths)
         if pushing:
             orders.push(_wrench(pushing, time, period, motions))
         reported = sensors.report(k, motions, pulls)

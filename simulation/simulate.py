@@ -28,7 +28,7 @@ from ..plant import Plant
 from ..plant.steps import default_drive, steps_in
 from .command_conversion import Orders
 from .conditions import Conditions
-from .events import Event, read_events
+from .events import Carry, Event, read_events
 from .experiment import Experiment
 from .flights import copies, flights, plant_of, summary
 from .flying import fly
@@ -202,6 +202,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
     named = read_events(robot, meets.events, events)
     happening = tuple(event for _, event in named)
     parts = _in_turn(robot, trajectory, happening)
+    happening = tuple(sorted((*_loads(parts), *happening), key=lambda event: event.at))
     ends = [begins + part.duration for begins, part in parts if part.duration is not None]
     if meets.duration is None and not ends:
         raise InputError("duration must be the simulated time [s] if the reference is a pose, got None")
@@ -237,6 +238,17 @@ def _in_turn(robot: Robot, first: Trajectory, events: Sequence[Event]) -> list[t
         new = event.follow(robot, current, event.at - begins)
         parts += [] if new is None else [(event.at, new)]
     return parts
+
+
+def _loads(parts: Sequence[tuple[float, Trajectory]]) -> list[Event]:
+    """Return the changes of the loads that plans carry, each at the beginning of its phase, as events."""
+    ends, events, carried = [begins for begins, _ in parts[1:]] + [np.inf], list[Event](), None
+    for (begins, part), end in zip(parts, ends, strict=True):
+        for time, load in part.loads:
+            if begins + time < end and load != carried:
+                events.append(Carry.model_validate({"at": begins + time, **(load or {"mass": 0.0})}))
+                carried = load
+    return events
 
 
 def _references(robot: Robot, parts: Sequence[tuple[float, Trajectory]], times: np.ndarray) -> list[Reference]:

@@ -58,8 +58,7 @@ def test_a_reference_that_jumps_is_reported_until_it_is_reached(make):
         pose = COGIRO.home + np.array([x, 0, 0, 0, 0, yaw])
         tensions = np.full(COGIRO.m, 300.0)
         reference = Reference(pose, np.zeros(6), np.zeros(6), COGIRO.carrier_home, still, still, tensions)
-        # so far apart that predictions are not compared: this robot does not move, whatever is commanded
-        assert controller.step(0.3 * k, state, reference).answered in (status, ANSWERS.index("soft wrench"))
+        assert controller.step(0.1 * k, state, reference).answered in (status, ANSWERS.index("soft wrench"))
 
 
 def test_rows_of_a_batch_have_their_own_status():
@@ -122,7 +121,7 @@ class Blind(Controller):
         return self.controller.step(time, state, reference)
 
 
-@pytest.mark.parametrize(("period", "blind"), [(1e-3, 1), (1e-3, 5), (0.06, 0), (0.1, 0)])
+@pytest.mark.parametrize(("period", "blind"), [(1e-3, 1), (1e-3, 5), (0.06, 0), (0.08, 0)])
 @pytest.mark.parametrize("what", ["nothing", "cut 1 at 0.2", "push 49 0 0 at 0.2"])
 def test_predictions_are_compared_with_rare_states_and_between_failures_of_sensors(period, blind, what):
     robot = load("wang-ctmrts")

@@ -460,6 +460,7 @@ EVENTS: dict[str, dict[str, Any]] = {
     "Stick": {"at": 0.005, "cable": 1},
     "Lose": {"at": 0.005, "carrier": "quad1"},
     "Miss": {"at": 0.005, "duration": 0.01},
+    "Carry": {"at": 0.005, "mass": 1.0},
     "Push": {"at": 0.005, "force": [1, 0, 0]},
     "Wall": {"at": 0.005, "point": [0, 0, 0], "normal": [0, 0, 1], "stiffness": 1e3},
     "StopReference": {"at": 0.005},

@@ -302,9 +302,9 @@ def test_a_controller_of_ones_own_that_orders_nothing_lets_the_load_fall():
     np.testing.assert_allclose(many["error_max"].values, flight.error.max())
 
 
-def test_a_plan_whose_loads_the_plant_would_not_carry_is_refused(crane):
+def test_a_plan_whose_loads_are_not_described_is_refused(crane):
     loaded = crane.trajectory.assign(phase_load=("phase", [0.0, 12.0]))
-    with pytest.raises(InputError, match="without loads, which simulations do not support, got one of 12 kg"):
+    with pytest.raises(InputError, match="must be a plan whose task describes its loads, got one of 12 kg"):
         simulate("ipanema-1", loaded)
 
 

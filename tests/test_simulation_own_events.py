@@ -1,5 +1,6 @@
 """Pushes, walls, hand-overs and events of one's own: what they do to a robot, by computations of their own."""
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from towline import InputError, load, plan, simulate
-from towline.control import ComputedTorque, OpenLoop, references
+from towline.control import ComputedTorque, OpenLoop, Predictive, references
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall
 
@@ -239,7 +240,7 @@ def test_a_file_of_events_names_no_other(robot, tmp_path):
             {"kind": "wall", "at": 0, "point": [0, 0, 0], "normal": [0, 0, 0], "stiffness": 1},
             "normal must have a length, got zeros",
         ),
-        ({"kind": "brush", "at": 0}, "events[0]: kind must be one of cut, follow, lose, miss, push,"),
+        ({"kind": "brush", "at": 0}, "events[0]: kind must be one of carry, cut, follow, lose, miss, push,"),
         ({"at": 0}, "events[0]: kind must be one of"),
         ("follow none.nc at 0", "no such file"),
         ("none.yaml", "none.yaml: no such file"),
@@ -254,3 +255,87 @@ def test_wrong_events_are_one_clear_line(robot, event, message):
         simulate(robot, robot.home, duration=0.01, events=[event])
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+class Held(ComputedTorque):
+    """A controller whose tensions are constant."""
+
+    def step(self, time, state, reference):
+        return super().step(time, state, reference)._replace(tensions=self.pulls)
+
+
+def test_a_load_adds_its_wrench_to_the_motion_and_changes_no_velocity():
+    """By the wrench that a carried load needs, from the symbolic model; the plant has one body with both inertias."""
+    robot, load_on, step = (
+        load("wang-flying"),
+        np.array([0.4, 0.05, -0.1, 0.02, 0.01, 0.02, 0.015, 2e-3, 0, 1e-3]),
+        1e-4,
+    )
+    held, dynamics = Held(robot), Dynamics(robot)
+    held.pulls = np.linspace(14, 22, robot.m)
+    events = [
+        {"kind": "carry", "at": 0.1, "mass": load_on[0], "com": list(load_on[1:4]), "inertia": list(load_on[4:])},
+        "carry 0 at 0.15",
+    ]
+    run = simulate(robot, robot.home, held, duration=0.2, period=step, events=events, drive="tensions")
+    acceleration = np.diff(run.record.motions[:, 0, 6:], axis=0) / step  # in the middle of each period, as tensions
+    motions = (run.record.motions[1:] + run.record.motions[:-1]) / 2
+    pose, velocity = motions[:, 0, :6], motions[:, 0, 6:]
+    assert np.abs(acceleration).max() < 200.0  # no jump of a velocity at either event
+    for k in (500, 990, 1010, 1300, 1490, 1510, 1900):
+        carried = 1000 <= k < 1500
+        A = dynamics.wrench_matrix(pose[k], motions[k, 1:, :6])
+        needed = dynamics.required_wrench(pose[k], velocity[k], acceleration[k], motions[k, 1:, :6])
+        if carried:
+            needed = needed + dynamics.carried_wrench(pose[k], velocity[k], acceleration[k], load_on)
+        np.testing.assert_allclose(A @ run.record.tensions[k], needed, atol=1e-4 * robot.weight)
+        without = dynamics.carried_wrench(pose[k], velocity[k], acceleration[k], load_on)
+        assert np.abs(without).max() > 0.02 * robot.weight  # what a test without the load would miss
+    assert np.linalg.norm(velocity[1000, 3:]) > 0.05
+
+
+@pytest.mark.parametrize(
+    ("event", "message"),
+    [
+        ("carry at 1", r"events\[0\].*mass"),
+        ("carry -1 at 0.1", r"events\[0\].*mass"),
+        ({"kind": "carry", "at": 0.1, "mass": 1, "inertia": [-1, 0, 0, 0, 0, 0]}, "inertia without negative moments"),
+    ],
+)
+def test_loads_that_cannot_be_are_refused(event, message):
+    with pytest.raises(InputError, match=message):
+        simulate("wang-flying", load("wang-flying").home, duration=0.2, events=[event])
+
+
+def test_the_loads_of_a_plan_are_carried_in_their_phases(tmp_path):
+    """Tensions balance the load that the plan has at each time; the task of the saved plan describes it."""
+    robot, load_on = load("cogiro"), np.array([25.0, 0.1, 0, -0.2, 1, 2, 1.5, 0, 0.2, 0])
+    bag = {"mass": load_on[0], "com": load_on[1:4].tolist(), "inertia": load_on[4:].tolist()}
+    at = [robot.home[:3] + np.array(step) for step in ([0, 0, 0], [0.5, 0, 0.3], [0, 0.5, 0.3], [0, 0, 0])]
+    lines = [{"kind": "line", "start": a.tolist(), "end": b.tolist()} for a, b in itertools.pairwise(at)]
+    phases = [{"name": f"phase-{k}", "path": line, "duration": 1.5} for k, line in enumerate(lines)]
+    phases[1]["load"] = bag
+    plan(robot, {"phases": phases}).save(tmp_path / "moved.nc")
+    run = simulate(robot, tmp_path / "moved.nc", Predictive(robot), duration=4.5)
+    assert run.passed
+    assert run.error.max() < 3e-3
+    text = run.report()
+    assert "a load of 25 kg was picked up at 1.5 s; the load was released at 3 s" in text
+    assert "at 0 s" not in text
+    dynamics, (pose, velocity) = Dynamics(robot), np.split(run.record.motions[:, 0], 2, axis=1)
+    for k, carries in ((700, False), (2000, True), (2500, True), (3700, False)):
+        acceleration = (velocity[k + 20] - velocity[k - 20]) / 0.04
+        needed = dynamics.required_wrench(pose[k], velocity[k], acceleration)
+        needed = needed + carries * dynamics.carried_wrench(pose[k], velocity[k], acceleration, load_on)
+        given = dynamics.wrench_matrix(pose[k]) @ run.record.tensions[k - 20 : k + 20].mean(axis=0)
+        np.testing.assert_allclose(given, needed, atol=0.01 * robot.weight)
+
+
+def test_loads_on_the_ground_are_refused(tmp_path):
+    robot = load("cogiro")
+    line = {"kind": "line", "start": [0, 0, 1.3], "end": [0, 0, 1]}
+    bag = {"mass": 20}
+    phases = [{"name": "down", "path": line, "duration": 2, "load": bag}]
+    phases.append({"name": "put", "ground": {}, "duration": 0.5, "load": bag})
+    with pytest.raises(InputError, match="reference must be a plan of loads without ground"):
+        simulate(robot, plan(robot, {"phases": phases}))

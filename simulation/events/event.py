@@ -49,6 +49,10 @@ class Running(Displayed):
     states: np.ndarray
     silent_until: float = -1.0
 
+    def carry(self, robot: Robot) -> None:
+        """Give the platform the mass, CoM and inertia of a robot; its motion does not change."""
+        self.states = self.periods.carry(self.states, robot)
+
 
 class Event(Part, ABC):
     """An event. One of your own defines `kind`, `describe`, and one or more of `begin`, `wrench` and `follow`.
