@@ -177,7 +177,11 @@ def test_a_region_on_the_way_has_a_way_round(width):
     found = plan("cogiro", task)
     assert not found.relaxations
     assert "`tube: {position: free}`" in advice(found, "a way round")
-    assert plan("cogiro", task | {"tube": {"position": "free"}}).feasible
+    assert "`limits.platform_box` keeps it above the floor" in advice(found, "a way round")
+    inside = task["limits"] | {"platform_box": {"min": [-6, -4, 0], "max": [6, 4, 5]}}
+    followed = plan("cogiro", task | {"tube": {"position": "free"}, "limits": inside})
+    assert followed.feasible
+    assert not any("leaves the frame" in warning for warning in followed.warnings)
 
 
 @pytest.mark.parametrize(("which", "tube"), [("start", {}), ("end", {}), ("start", {"position": "free"})])

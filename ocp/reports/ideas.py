@@ -53,8 +53,15 @@ def _obstacles(plan: PlanData) -> list[Fact]:
     if (width := scenario.task.tube.position) == "free":
         return []
     now = f" instead of {quantity(width, 'm')}" if width else ""
+    robot = scenario.robot
+    leaves = all(robot.carriers[index].confined for index in robot.carrier_of_cable) and robot.workspace_box is None
+    leaves &= robot.floor is None and scenario.task.limits.platform_box is None
+    kept = "; `limits.platform_box` keeps it above the floor and in the frame of the robot" if leaves else ""
     return [
-        ("a way round", f"`tube: {{position: free}}`{now}: the planner then searches for a path round the obstacle")
+        (
+            "a way round",
+            f"`tube: {{position: free}}`{now}: the planner then searches for a path round the obstacle{kept}",
+        )
     ]
 
 
