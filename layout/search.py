@@ -1,7 +1,7 @@
 """The search of a design: annealed starts, sequential linear programs, and audits that add the worst poses.
 
 Half of the time new starts are tried, most of them symmetric. In the other half some points of the best layout are
-moved at random, and linear programs go on from there, because the optimum of a start is mostly only a local one.
+moved at random, and linear programs continue from there, because the optimum of a start is mostly only a local one.
 """
 
 import time
