@@ -22,7 +22,8 @@ from .as_floats import as_floats
 from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_velocity
 from .carrier_references import Flown, Freed, Moved, Tethered
 from .command import HOLD, OTHERWISE, SHIFTED, Command
-from .computed_torque import ComputedTorque, agree
+from .computed_torque import ComputedTorque
+from .hand_over import agree
 from .keep_out import Surroundings
 from .noise import Noise
 from .preview import Preview, turns
