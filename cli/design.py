@@ -6,8 +6,8 @@ from typing import Annotated
 import typer
 
 from ..base.errors import InputError
-from ..base.inputs import check_ending
-from .options import JsonOption, ReportOption, RobotArgument, print_json, print_result
+from ..base.inputs import check_ending, one_of
+from .options import FormatOption, JsonOption, ReportOption, RobotArgument, print_json, print_result
 from .outputs import check_outputs
 from .stopping import requested, unlisten
 from .watching import progress_bar
@@ -41,6 +41,10 @@ def design(
     seed: Annotated[
         int | None, typer.Option(help="Seed of the random numbers; default: `seed` of the requirements, or 0.")
     ] = None,
+    figures: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Folder for figures: before.png and after.png, the robots.")
+    ] = None,
+    form: FormatOption = "png",
     report: ReportOption = None,
     as_json: JsonOption = False,
     schema: Annotated[
@@ -58,18 +62,21 @@ def design(
     The exit code is 1 if no layout that meets the requirements was found, or if none exists, which is then proven.
     Ctrl-C ends the search with the best layout so far.
     """
+    from ..figures.style import FORMATS
     from ..layout import Requirements, read_requirements
     from ..layout import design as find
     from ..models import load
     from ..models.parsing import validate
 
+    one_of("--format", form, FORMATS)
     loaded, read = load(robot), read_requirements(requirements)
     given = {"time_limit": seconds, "seed": seed}
     changed = {key: value for key, value in given.items() if value is not None}
     if changed:
         read = validate(read.model_dump() | changed, Requirements, "--seconds or --seed")
     target = out if out is not None else Path(f"{loaded.name}-{read.name}.yaml")
-    check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml"), "--report": report})
+    check_ending("--out", target, ".yaml", ".yml")
+    check_outputs({"--out": target, "--report": report, "--figures": figures and figures / f"before.{form}"})
     unlisten()  # an interrupt ends the search, not the command
     with progress_bar(f"design of {read.name}", quiet=as_json) as move:
 
@@ -86,6 +93,8 @@ def design(
     written = {"file": found.robot.save(target)} if found.feasible else {}
     if report is not None:
         written["report"] = found.save_report(report)
-    print_result(as_json, {**found.to_dict(), "file": None, **written}, found.report, list(written.values()))
+    pictures = [] if figures is None else found.plot(figures, form)
+    data = {**found.to_dict(), "file": None, **written, "figures": pictures}
+    print_result(as_json, data, found.report, [*written.values(), *pictures])
     if not found.feasible:
         raise typer.Exit(1)

@@ -1,13 +1,16 @@
 """`Design`: the robot that a design found, how good it is, and why it is not better."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ..base.display import Displayed, Fact
 from ..base.text import quantity, quantity_range, quantity_row
 from ..figures.drawing import Drawing
+from ..figures.drawn import Drawn
 from ..figures.report import Part, Report, Reported, Section, Table
 from ..figures.robot import draw
 from ..models import Robot
@@ -23,12 +26,15 @@ from .reasons import Binding, Reasons
 from .requirements import Requirements
 from .room import room_of
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Status = Literal["feasible", "infeasible", "not-found"]
 MOST_LISTED = 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Design(Reported, Displayed):
+class Design(Drawn, Reported, Displayed):
     """The result of `design`.
 
     Attributes
@@ -202,20 +208,27 @@ class Design(Reported, Displayed):
             )
         return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
 
-    def _drawings(self) -> list[Drawing]:
-        """Return pictures of the robots at the pose that limits the margin most, or at the impossible pose."""
+    def figures(self) -> dict[str, Figure]:
+        """Draw the robot `before` and `after` the design, by name: without any, if no pose limits the margin.
+
+        Both are at the pose that limits the margin most or, if the requirements are impossible, `before` is at the
+        impossible pose.
+        """
         one = self.impossibility or next(iter(self.reasons.binding if self.reasons else ()), None)
         if one is None:
-            return []
-        robots = {"after": self.robot} if not self.impossibility else {}
-        where = "at the pose that limits the margin most" if robots else "at the impossible pose"
-        robots["before"] = self.before
-        drawings = []
-        for name, robot in robots.items():
-            problem = wrench_problem(robot, dynamics_of(robot).wrench_matrix(one.pose), one.wrench)
-            shown = scene_at(robot, one.pose, solve(problem).tensions, f"{self.before.name}, {name}")
-            drawings.append(Drawing(f"The robot {name} the design, {where}", draw(shown)))
-        return drawings
+            return {}
+        drawn = {}
+        for name, robot in {"before": self.before, "after": self.robot}.items():
+            if name == "before" or not self.impossibility:
+                problem = wrench_problem(robot, dynamics_of(robot).wrench_matrix(one.pose), one.wrench)
+                shown = scene_at(robot, one.pose, solve(problem).tensions, f"{self.before.name}, {name}")
+                drawn[name] = draw(shown)
+        return drawn
+
+    def _drawings(self) -> list[Drawing]:
+        where = "at the impossible pose" if self.impossibility else "at the pose that limits the margin most"
+        figures = reversed(self.figures().items())  # what was found comes first
+        return [Drawing(f"The robot {name} the design, {where}", figure) for name, figure in figures]
 
     def _state(self) -> list[Fact]:
         """Return in a sentence whether the layout can be improved."""

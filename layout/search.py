@@ -97,6 +97,7 @@ class _Search:
             else:
                 self._move_on()
             self.found.starts += 1
+        self._improve_best()
         self._settle(_ROUNDS)
 
     def stop(self) -> None:
@@ -152,8 +153,12 @@ class _Search:
         for _ in range(rounds):
             if self.found.audit_agrees or time.perf_counter() > self._until:
                 break
-            self._y = self.found.y.copy()
-            self._improve(f"audit of start {self.found.starts}", _LATER_STEP)
+            self._improve_best()
+
+    def _improve_best(self) -> None:
+        """Improve the best layout over the rows that audits have added, and to the end."""
+        self._y = self.found.y.copy()
+        self._improve(f"audit of start {self.found.starts}", _LATER_STEP)
 
     def _improve(self, what: str, delta: float, programs: int = PROGRAMS) -> None:
         """Improve a layout by linear programs, and keep it if it is the best."""

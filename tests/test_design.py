@@ -105,6 +105,7 @@ def test_the_report_names_what_binds(found, tmp_path):
     page = found.save_report(tmp_path / "report.html").read_text()
     assert page.count("<img") + page.count("<svg") == 2  # the robot after and before
     assert "What a change would gain" in page
+    assert [path.name for path in found.plot(tmp_path / "figures", "svg")] == ["before.svg", "after.svg"]
     robot = load("ipanema-2")
     for one in found.reasons.binding[:5]:  # the reserve along its direction is the margin
         A = Dynamics(found.robot).wrench_matrix(one.pose)
