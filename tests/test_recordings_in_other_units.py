@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline import load, read_measurements
+from towline import Dynamics, load, read_measurements
+from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.correction import mended
 from towline.estimation.logs.names import role, time_unit
 
@@ -151,3 +152,27 @@ def test_lines_without_a_value_are_listed(tmp_path):
     told = json.loads(towline("log", "log.csv", "--json", cwd=tmp_path).stdout)
     assert told["files"][0]["topics"][0]["empty"] == {"lengths": 1}
     assert "lines without lengths: 1" in towline("log", "log.csv", cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize("turn", [0.002, 0.2])
+def test_attachments_of_a_platform_that_hardly_turns(turn):
+    """Cables that stretch in proportion to the small pitch look like displaced attachments; `auto` keeps the file's."""
+    robot, draw = load("planar-4"), np.random.default_rng(0)
+    t = np.arange(0, 20, 0.05)
+    poses = np.tile(robot.home, (len(t), 1))
+    poses[:, 0] += 0.4 * np.sin(0.7 * t)
+    poses[:, 2] += 0.3 * np.sin(1.1 * t)
+    poses[:, 4] = turn * np.sin(2.3 * t)
+    anchors = draw.normal(0, 0.01, (robot.m, 3)) * [1, 0, 1]
+    names = [f"cables[{i}].anchor.{axis}" for i in range(robot.m) for axis in "xyz"]
+    values = robot.parameter_values(names) + anchors.ravel()
+    true = robot.with_parameters(dict(zip(names, values.tolist(), strict=True)))
+    lengths = Dynamics(true).cable_lengths(poses)
+    stretched = lengths * (1 - 0.5 * np.minimum(turn, 0.002) * np.sin(2.3 * t)[:, None] * [1, -1, 1, -1])
+    log = Measurements(stretched + draw.normal(0, 1e-3, lengths.shape), poses, times=t)
+    found = calibrate(robot, log, "auto")
+    assert ("attachments" in found.free) <= (turn > 0.1)
+    assert np.abs(found.robot.attachments - robot.attachments).max() < 0.01
+    assert np.abs(found.robot.anchors - true.anchors)[:, [0, 2]].max() < 0.01
+    free = ("anchors", "attachments", "offsets")
+    assert ("leave them out" in calibrate(robot, log, free).report()) == (turn < 0.1)

@@ -33,6 +33,7 @@ from .solving import (
     usual,
 )
 from .starts import fit_from
+from .turning import turning
 
 REGIONS = 6  # of the workspace
 MOST_COMPARED = 1500  # samples
@@ -122,12 +123,16 @@ def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[st
     """Return the smallest parameter set whose cross-validation error is close to the best.
 
     The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales, pulley radii and,
-    with tensions, stiffness; with a clock offset if times and poses of a motion were measured. Before, mass, CoM and
+    with tensions, stiffness; with a clock offset if times and poses of a motion were measured. Attachments are left out
+    if the platform hardly turns. Before, mass, CoM and
     friction are added one by one if they let the balance of forces of the validation samples be predicted better. With
     `outliers`, slips and outliers are removed first. Raises `InputError` if there are too few measurements even for the
     offsets.
     """
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
+    turns = turning(robot, measurements)
+    if turns is not None and not turns.enough:
+        sets = [one for one in sets if "attachments" not in one]
     check_enough(robot, measurements, ("offsets",), {})
     clock = ("clock",) if "clock" in usual(robot, measurements) else ()
     first = [one for one in sets if one and set(one) <= CLEANED and is_enough(robot, measurements, (*one, *clock))][-1]

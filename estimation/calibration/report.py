@@ -10,6 +10,7 @@ from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
 from .result import CalibrationData, Parameter
+from .turning import turning
 
 MOST_LISTED = 12
 MOST_NAMED = 4
@@ -27,7 +28,9 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
         f"residual of the lengths {residual}",
         *([] if result.refused is None else [f"{warning}{result.refused}"]),
         *([f"CHECK THE LOG: {result.mistake.text}"] if result.mistake and not result.mistake.severe else []),
-        *([*_of_held_out(result), *_of_noise(result), *_of_parameters(result)] if result.means_something else []),
+        *(_of_held_out(result) if result.means_something else []),
+        *(_of_noise(result) if result.doubt is None else []),
+        *(_of_parameters(result) if result.means_something else []),
         *([*_of_exceptions(result), *_of_open(result)] if result.doubt is None else []),
     ]
     return Report(
@@ -101,6 +104,13 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.noise > LACKS * stated and "scales" not in result.free:
         lines.append("the model lacks something: --free auto tries scales, attachments and others")
+    turns = turning(result.file, result.measurements) if "attachments" in result.free else None
+    if turns is not None and not turns.enough:
+        by = quantity(np.degrees(turns.angle), "deg", 2)
+        lines.append(
+            f"the platform turns by {by}, which moves its attachments by {_mm(turns.shift)}: errors of the model may "
+            "look like displaced attachments; turn it farther, or leave them out of --free"
+        )
     if result.alike > 1:
         lines.append(
             "residuals are autocorrelated, because the model is incomplete: the standard deviations "
