@@ -42,7 +42,7 @@ def design(
         int | None, typer.Option(help="Seed of the random numbers; default: `seed` of the requirements, or 0.")
     ] = None,
     figures: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder for figures: before.png and after.png, the robots.")
+        Path | None, typer.Option(metavar="FOLDER", help="Folder for figures of the robot: before.png and after.png.")
     ] = None,
     form: FormatOption = "png",
     report: ReportOption = None,

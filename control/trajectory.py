@@ -167,9 +167,7 @@ def _loads_of(dataset: xr.Dataset, read: Any) -> list[tuple[float, dict[str, Any
     if not known:
         raise InputError(f"reference must be a plan whose task describes its loads, got one of {masses.max():g} kg")
     if any(ground is not None for ground in grounds):
-        raise InputError(
-            "reference must be a plan of loads without ground, which simulations do not have, got one with"
-        )
+        raise InputError("reference must be a plan of loads without phases on the ground, got one with such phases")
     keys, starts = ("mass", "com", "inertia"), read("phase_start", (len(loads),)).tolist()
     described = [load and {key: load[key] for key in keys if key in load} for load in loads]
     return list(zip(starts, described, strict=True))

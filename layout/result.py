@@ -209,7 +209,7 @@ class Design(Drawn, Reported, Displayed):
         return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
 
     def figures(self) -> dict[str, Figure]:
-        """Draw the robot `before` and `after` the design, by name: without any, if no pose limits the margin.
+        """Draw the robot `before` and `after` the design, by these names; nothing if no pose limits the margin.
 
         Both are at the pose that limits the margin most or, if the requirements are impossible, `before` is at the
         impossible pose.
