@@ -93,8 +93,8 @@ def simulate(
             help="Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
             "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), "
             "'carry 2.5 at 1' (the platform carries a load of 2.5 kg; 0: none), 'stop at 3' (the reference stops on "
-            "its path), 'follow next.nc at 3' (another plan becomes the reference), 'push 20 0 0 at 1 for 0.5' (a force "
-            "on the platform [N]), or the YAML file of a list of events. Repeat the option for more.",
+            "its path), 'follow next.nc at 3' (another plan becomes the reference), 'push 20 0 0 at 1 for 0.5' (a "
+            "force on the platform [N]), or the YAML file of a list of events. Repeat the option for more.",
         ),
     ] = None,
     duration: Annotated[
