@@ -55,6 +55,10 @@ class Contents(NamedTuple):
 
         return cls(plain(dataset.data_vars), plain(dataset.coords), dataset.attrs)
 
+    def get(self, name: str) -> Variable | None:
+        """Return a variable or coordinate, or None if there is none of that name."""
+        return self.variables.get(name) or self.coordinates.get(name)
+
     def dataset(self) -> xr.Dataset:
         """Return the contents as an `xarray.Dataset`."""
         import xarray as xr
@@ -141,20 +145,27 @@ def check_units(name: str, attributes: Mapping[Any, Any]) -> None:
 
 
 def numbers_of(
-    dataset: xr.Dataset, name: str, shape: tuple[int, ...], where: str, gaps: bool = False, largest: float = 1e12
+    dataset: xr.Dataset | Contents,
+    name: str,
+    shape: tuple[int, ...],
+    where: str,
+    gaps: bool = False,
+    largest: float = 1e12,
 ) -> np.ndarray:
     """Return a copy of a variable's numbers, of the expected shape, -1 for any length; `gaps` permits nan.
 
     Raises `InputError` that names the dataset as `where` if they are anything else.
     """
-    if name not in dataset.variables or dataset[name].dtype.kind not in "fiu":
-        given = f"an array of {dataset[name].dtype}" if name in dataset.variables else "none"
+    variable = (dataset if isinstance(dataset, Contents) else Contents.of(dataset)).get(name)
+    kind = None if variable is None else np.asarray(variable.values).dtype
+    if variable is None or kind is None or kind.kind not in "fiu":
+        given = "none" if kind is None else f"an array of {kind}"
         raise InputError(f"{where}: {name} must be an array of numbers, got {given}")
     try:
-        check_units(name, dataset[name].attrs)
+        check_units(name, variable.attributes)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    values = dataset[name].to_numpy().astype(float)
+    values = np.array(variable.values, dtype=float)
     fits = values.ndim == len(shape) and all(want in (-1, have) for want, have in zip(shape, values.shape, strict=True))
     if not fits:
         raise InputError(f"{where}: {name} must have the shape {shape} for its robot, got {values.shape}")

@@ -56,10 +56,10 @@ def references(
 def planned(plan: "HasTrajectory | xr.Dataset | str | os.PathLike[str]") -> tuple[Robot, Trajectory]:
     """Return the robot of a plan, and its trajectory. Raises `InputError` if it is none."""
     samples = samples_of("plan", plan)
-    if samples is None or "robot" not in samples.attrs:
+    if samples is None or "robot" not in samples.attributes:
         raise InputError(f"plan must be a plan, its dataset or its NetCDF file, got {shown(plan)}")
     robot = getattr(getattr(plan, "scenario", plan), "robot", None)
-    robot = robot if isinstance(robot, Robot) else _robot(str(samples.attrs["robot"]))
+    robot = robot if isinstance(robot, Robot) else _robot(str(samples.attributes["robot"]))
     return robot, read_trajectory(robot, samples, None)
 
 

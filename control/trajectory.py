@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from ..base.errors import InputError
 from ..base.inputs import file_path, finite_array, number, real_array, shown
-from ..base.netcdf import load_netcdf, numbers_of
+from ..base.netcdf import Contents, load_netcdf, numbers_of
 from ..figures.outlines import outlines_from
 from ..models.parsing import parse_yaml
 from ..models.part import LARGEST
@@ -45,15 +45,18 @@ class HasTrajectory(Protocol):
         ...
 
 
-def samples_of(name: str, given: object) -> xr.Dataset | None:
+def samples_of(name: str, given: object) -> Contents | None:
     """Return the samples of a plan, also of one that is in a file; None if it has none.
 
     Raises `InputError`, with the `name` of the argument, if no such file can be read.
     """
+    contents = getattr(given, "_contents", given)  # without loading xarray
+    if isinstance(contents, Contents):
+        return contents
     samples: Any = _loaded(name, given) if isinstance(given, str | os.PathLike) else given
     if not hasattr(samples, "data_vars"):
         samples = getattr(given, "trajectory", None)
-    return samples if hasattr(samples, "data_vars") else None
+    return Contents.of(samples) if hasattr(samples, "data_vars") else None
 
 
 def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Trajectory:
@@ -63,7 +66,7 @@ def read_trajectory(robot: Robot, reference: Any, duration: float | None) -> Tra
     """
     samples = samples_of("reference", reference)
     if samples is not None:
-        return _of_dataset(robot, samples)
+        return _of_samples(robot, samples)
     if callable(getattr(reference, "at", None)):
         return _of_path(robot, reference, duration)
     try:
@@ -112,19 +115,19 @@ def _resting(motion: Any, times: np.ndarray, end: float) -> Motion:
     return pose, velocity, acceleration
 
 
-def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
+def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
     """Interpolate the samples of a plan: its pieces are polynomials of time between far fewer nodes."""
     needed = (*_PARTS, *(f"carrier_{part}" for part in _PARTS), "time")
-    if why := dataset.attrs.get("no_reference"):
+    if why := samples.attributes.get("no_reference"):
         raise InputError(f"reference must be a plan whose motion a robot can follow, got {why}")
-    read = partial(numbers_of, dataset, where="reference", largest=LARGEST)
-    missing = [name for name in needed if name not in dataset]
+    read = partial(numbers_of, samples, where="reference", largest=LARGEST)
+    missing = [name for name in needed if samples.get(name) is None]
     if missing:
         raise InputError(f"reference must be a plan with the variable {missing[0]}, got a dataset without it")
-    first, *_ = str(dataset.attrs.get("robot", "")).splitlines() or [""]
+    first, *_ = str(samples.attributes.get("robot", "")).splitlines() or [""]
     name = first.removeprefix("name:").strip().strip("\"'")
-    count, m = len(robot.carriers), robot.m
-    if (name and name != robot.name) or dataset["carrier_pose"].shape[1:] != (count, 6):
+    count, m, bases = len(robot.carriers), robot.m, samples.get("carrier_pose")
+    if (name and name != robot.name) or bases is None or np.shape(bases.values)[1:] != (count, 6):
         raise InputError(f"reference must be a plan of robot {robot.name!r}, got one of {name!r}")
     nodes = read("time", (-1,))
     n = len(nodes)
@@ -139,11 +142,11 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
         return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
 
-    air = dataset.attrs.get("wind")
+    air = samples.attributes.get("wind")
     wind = None if air is None or robot.platform.aero is None else finite_array("reference.wind", air, (3,))
-    keep_out = outlines_from(dataset, "reference")
-    doubt, loads = DOUBTS.get(str(dataset.attrs.get("status")), ""), _loads_of(dataset, read)
-    planned = read("tensions", (n, m), gaps=True) if "tensions" in dataset else np.full((n, m), np.nan)
+    keep_out = outlines_from(samples, "reference")
+    doubt, loads = DOUBTS.get(str(samples.attributes.get("status")), ""), _loads_of(samples, read)
+    planned = read("tensions", (n, m), gaps=True) if samples.get("tensions") else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():
         return Trajectory(float(nodes[-1]), at, keep_out=keep_out, doubt=doubt, wind=wind, loads=loads)
@@ -154,12 +157,12 @@ def _of_dataset(robot: Robot, dataset: xr.Dataset) -> Trajectory:
     return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt, wind, loads)
 
 
-def _loads_of(dataset: xr.Dataset, read: Any) -> list[tuple[float, dict[str, Any] | None]]:
+def _loads_of(samples: Contents, read: Any) -> list[tuple[float, dict[str, Any] | None]]:
     """Return what the platform carries in the phases of a plan, by the plan's task."""
-    if "phase_load" not in dataset or not (masses := read("phase_load", (-1,))).any():
+    if samples.get("phase_load") is None or not (masses := read("phase_load", (-1,))).any():
         return []
     try:
-        phases = parse_yaml(str(dataset.attrs["task"]), InPhases, "reference.task").phases
+        phases = parse_yaml(str(samples.attributes["task"]), InPhases, "reference.task").phases
         loads, grounds = [phase.get("load") for phase in phases], [phase.get("ground") for phase in phases]
         known = [(load or {}).get("mass", 0.0) for load in loads] == masses.tolist()
     except (KeyError, TypeError, AttributeError, InputError):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.netcdf import Variable, numbers_of
+from ..base.netcdf import Contents, Variable, numbers_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,15 +27,16 @@ def outline_variables(regions: Sequence[Sequence[np.ndarray]]) -> dict[str, Vari
     }
 
 
-def outlines_from(dataset: xr.Dataset, where: str) -> list[list[np.ndarray]]:
+def outlines_from(dataset: xr.Dataset | Contents, where: str) -> list[list[np.ndarray]]:
     """Return the lines of each region that a dataset, named `where` in errors, has; none without regions.
 
     Raises `InputError` if its variables are no outlines.
     """
-    if "keep_out" not in dataset:
+    contents = dataset if isinstance(dataset, Contents) else Contents.of(dataset)
+    if contents.get("keep_out") is None:
         return []
-    points = numbers_of(dataset, "keep_out", (-1, 3), where, gaps=True)
-    numbers = numbers_of(dataset, "keep_out_region", (len(points),), where)
+    points = numbers_of(contents, "keep_out", (-1, 3), where, gaps=True)
+    numbers = numbers_of(contents, "keep_out_region", (len(points),), where)
     gaps = np.isnan(points[:, 0])
     regions: dict[float, list[np.ndarray]] = {}
     for rows in np.split(np.arange(len(points)), np.flatnonzero(gaps) + 1):

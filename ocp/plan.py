@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from ..base.netcdf import Contents
     from ..figures.scene import Scene
 
 
@@ -41,18 +42,20 @@ class Plan(PlanData, Filmed, Reported):
 
         Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
         """
+        return self._contents.dataset()
+
+    @cached_property
+    def _contents(self) -> Contents:
         from .reports.trajectory import trajectory
 
-        return trajectory(self).dataset()
+        return trajectory(self)
 
     def save(self, file: str | os.PathLike[str]) -> Path:
         """Save the trajectory atomically: as NetCDF (.nc), which `xarray.load_dataset` reads, or as MCAP (.mcap).
 
         Raises `InputError` if the file cannot be written.
         """
-        from .reports.trajectory import trajectory
-
-        return save_motion(self.scenario.robot, trajectory(self), file)
+        return save_motion(self.scenario.robot, self._contents, file)
 
     def figures(self) -> dict[str, Figure]:
         """Draw the figures of `plot` by name: `path`, `views`, `tensions`, ...; to show in a notebook.

@@ -73,8 +73,9 @@ class Simulation(SimulationData, Filmed, Reported):
 
         Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
         """
-        return self._contents().dataset()
+        return self._contents.dataset()
 
+    @cached_property
     def _contents(self) -> Contents:
         robot, record, rows = self.robot, self.record, slice(self._recorded)
         motions, references = record.motions[rows], self.references[: self._recorded]
@@ -136,7 +137,7 @@ class Simulation(SimulationData, Filmed, Reported):
 
         Raises `InputError` if the file cannot be written.
         """
-        return save_motion(self.robot, self._contents(), file)
+        return save_motion(self.robot, self._contents, file)
 
     def figures(self) -> dict[str, Figure]:
         """Draw "simulation" (error, controller status, wind and carriers over time) and "tensions", by file names."""

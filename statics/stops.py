@@ -102,11 +102,15 @@ class Stop(Displayed):
     @property
     def trajectory(self) -> xr.Dataset:
         """Return the motion and its tensions over time, as `Plan.trajectory` does; `simulate` follows it."""
+        return self._contents.dataset()
+
+    @property
+    def _contents(self) -> Contents:
         variables = motion_variables(self.platform, self.carriers)
         variables["tensions"] = over(("time", "cable"), self.tensions, "N", "cable tensions")
         status = "feasible" if self.feasible else "not-found"
         attributes = {"title": f"{self.robot.name}, stop", "status": status, "robot": to_yaml(self.robot)}
-        return Contents(variables, dimensions(self.robot, self.times), attributes).dataset()
+        return Contents(variables, dimensions(self.robot, self.times), attributes)
 
     def _headline(self) -> str:
         return f"{'stop' if self.feasible else 'stop beyond limits'} in {quantity(self.duration, 's')}"
