@@ -207,7 +207,7 @@ class Task(Part):
     scheme: SchemeName | None = Field(
         default=None,
         description="acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
-        "spline: a smooth cubic B-spline; default: linear, or hermite if with linear the audit reports that the robot "
+        "spline: a smooth cubic B-spline; default: linear, or hermite if with linear the audit reports that carriers "
         "cannot follow the motion between the nodes",
     )
     objective: Objective = Objective()
