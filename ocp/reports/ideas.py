@@ -66,12 +66,15 @@ def _obstacles(plan: PlanData) -> list[Fact]:
 
 
 def _clear_ends(scenario: Scenario) -> list[Fact]:
-    """Return, for each end of the path at which the platform is in the way of something, a near one at which not."""
+    """Return, for each end of the path at which the robot is in the way of something, a near one at which not.
+
+    If there is none, as where cables cross a wall through the robot, no path leads from there either.
+    """
     space = Space(scenario)
     platform, carriers = space.references
     kept = AtRest(scenario, space.size, spare=0.0)
     limits_alone = AtRest(scenario, space.size, balance=False)(platform, carriers)
-    facts = []
+    facts, blocked = [], []
     for end, (slack, worst) in enumerate(zip(limits_alone.slack, limits_alone.worst, strict=True)):
         limit = scenario.limits.all[worst]
         if slack >= 0 or limit.name not in IN_THE_WAY:
@@ -82,6 +85,12 @@ def _clear_ends(scenario: Scenario) -> list[Fact]:
             away = quantity(float(np.linalg.norm(place - platform[end, :3])), "m")
             where = f"({quantity_row(place + 0.0)}) m, {away} away, is clear of everything (checked at rest)"
             facts.append((f"another {ENDS[end]}", where))
+        elif limit.name == "keep_out":
+            blocked.append(ENDS[end])
+    if blocked:
+        where = " and at the ".join(blocked)
+        why = f"the robot is inside one at the {where}, and along x, y and z no position was found that helps"
+        facts.append(("other regions", f"or other anchors: {why}"))
     return facts
 
 
