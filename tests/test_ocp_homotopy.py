@@ -32,6 +32,7 @@ def test_an_equation_missed_between_nodes_takes_finer_meshes_each_once():
         "path": {"kind": "line", "start": [0, 0, -1], "end": [0.25, 0.1, -0.8]},
         "duration": 1.0,
         "steps": 20,
+        "scheme": "linear",
         "base": {"kind": "free", "ends": "rest"},
         "tube": {"position": "free", "attitude": 0.3, "ends": "exact"},
         "objective": {"deviation": 0.3},
@@ -41,6 +42,13 @@ def test_an_equation_missed_between_nodes_takes_finer_meshes_each_once():
     steps = [int(stage.name.split()[2]) for stage in planned.stages if stage.name.startswith("nonlinear")]
     assert len(steps) > 1
     assert steps == sorted(set(steps))
+    # By default the same nodes are tried once with the scheme hermite.
+    del towed["scheme"]
+    again = plan("wang-flying-quadrotor", towed)
+    assert again.feasible
+    assert again.scenario.scheme.name == "hermite"
+    steps = [int(stage.name.split()[2]) for stage in again.stages if stage.name.startswith("nonlinear")]
+    assert steps[1:] == sorted(set(steps))
     # By Newton's law the thrust is along the axis at all instants, but for a thousandth of the weight.
     robot, seen = planned.scenario.robot, planned.audit
     anchors, attachments = planned.scenario.dynamics.points(seen.motion.pose, seen.carriers.pose)

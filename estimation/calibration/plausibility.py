@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...base.display import record
 from ...base.text import quantity
 from ...models import points
 from ...models.files import as_robot
@@ -63,6 +64,8 @@ class Mistake(NamedTuple):
     corrected: Measurements | None
     severe: bool = True
     factors: np.ndarray | float = 1.0
+
+    __repr__ = record
 
 
 class _Log(NamedTuple):
