@@ -44,10 +44,10 @@ class Mirrors:
         used = (S != 0.0).sum(axis=0)
         columns = np.where((S != 0.0).any(axis=1), (S != 0.0).argmax(axis=1), -1)
         self._columns = _by_cable(columns, m)  # the variable of each number, or -1
-        # A variable that several cables share makes them symmetric already.
-        self._own = np.array([all(used[column] == 1 for column in row if column >= 0) for row in self._columns])
+        self._shared = np.append(used > 1, False)[self._columns]  # with other numbers, (m, 8)
         middle = (self._low.min(axis=0) + self._high.max(axis=0)) / 2
         self._middle = np.r_[middle[:6], 0.0, 0.0]
+        pulls = np.array(variables.robot.gravity) != 0.0
         extent = self._high.max(axis=0) - self._low.min(axis=0)
         scales = [extent[:3].max(), extent[3:6].max(), self._high[:, 6:].max()]
         self._tolerance = _ALIKE * np.repeat(scales, (3, 3, 2))  # (8,)
@@ -56,7 +56,7 @@ class Mirrors:
         self.signs = [
             (x, y)
             for x, y in ((1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
-            if (x > 0.0 or extent[0] > self._tolerance[0]) and (y > 0.0 or extent[1] > self._tolerance[1])
+            if all(sign > 0.0 or (extent[k] > self._tolerance[k] and not pulls[k]) for k, sign in enumerate((x, y)))
         ]
 
     def symmetry(self, signs: tuple[float, float], rng: np.random.Generator) -> Symmetry | None:
@@ -65,12 +65,12 @@ class Mirrors:
         offset = (1.0 - sign) * self._middle
         low = offset + np.minimum(sign * self._low, sign * self._high)
         high = offset + np.maximum(sign * self._low, sign * self._high)
-        left, pairs = list(rng.permutation(np.flatnonzero(self._own))), []
+        left, pairs = list(rng.permutation(len(low))), []
         while left:
             one = left.pop()
             for other in left:
                 apart = np.abs([low[one] - self._low[other], high[one] - self._high[other]])
-                if (apart <= self._tolerance).all():
+                if (apart <= self._tolerance).all() and self._may_follow(one, other, sign):
                     left.remove(other)
                     pairs.append((one, other))
                     break
@@ -78,12 +78,18 @@ class Mirrors:
             (self._columns[one, k], self._columns[other, k], offset[k], sign[k])
             for one, other in pairs
             for k in range(8)
-            if self._columns[one, k] >= 0
+            if self._columns[one, k] != self._columns[other, k]
         ]
         if not chosen:
             return None
         first, second, offsets, signs_of = (np.array(part) for part in zip(*chosen, strict=True))
         return Symmetry(first, second, offsets, signs_of)
+
+    def _may_follow(self, one: int, other: int, sign: np.ndarray) -> bool:
+        """Return whether each number of two cables is fixed, is free in each, or is shared and its own image."""
+        first, second = self._columns[one], self._columns[other]
+        alone = (first >= 0) & (second >= 0) & ~self._shared[one] & ~self._shared[other]
+        return bool((alone | ((first == second) & ((first < 0) | (sign > 0)))).all())
 
 
 def _by_cable(layout: np.ndarray, m: int) -> np.ndarray:

@@ -91,3 +91,38 @@ def test_a_planar_robot_is_mirrored_in_its_plane_only():
     robot = load("planar-4")
     low, high = robot.anchors.min(axis=0), robot.anchors.max(axis=0)
     assert Mirrors(variables_with(robot, {"part": "anchor", "box": box(low, high)})).signs == [(-1.0, 1.0)]
+
+
+def test_cables_that_share_a_limit_are_paired_too():
+    robot = load("ipanema-2")
+    anywhere = {"part": "anchor", "box": box((-6, -4, 1), (6, 4, 5))}
+    attachments = {"part": "attachment", "box": box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5))}
+    shared = {"part": "t_max", "range": {"min": 500.0, "max": 900.0}, "equal": True}
+    variables = variables_with(robot, anywhere, attachments, shared)
+    symmetry = Mirrors(variables).symmetry((-1.0, 1.0), np.random.default_rng(0))
+    assert len(symmetry.first) == 4 * 6  # of each pair an anchor and an attachment
+    assert variables.names.index("cables[0].t_max") not in {*symmetry.first, *symmetry.second}
+
+
+def test_a_cable_with_a_small_box_does_not_lead_one_without():
+    """The variable of the second one did not exist, so the last one was changed."""
+    robot = load("cogiro")
+    near = {"part": "anchor", "cables": [1], "box": box(robot.anchors[0] - 0.05, robot.anchors[0] + 0.05)}
+    limit = {"part": "t_max", "cables": [1], "range": {"min": 4990.0, "max": 5010.0}}
+    mirrors = Mirrors(variables_with(robot, near, limit))
+    for signs in MIRRORINGS:
+        for seed in range(20):
+            symmetry = mirrors.symmetry(signs, np.random.default_rng(seed))
+            assert symmetry is None or (symmetry.second >= 0).all()
+
+
+def test_no_mirroring_turns_the_weight_around():
+    data = load("planar-4").model_dump()
+    turned = [[1, 0, 0], [0, 0, 1], [0, 1, 0]]  # z to y
+    for cable in data["cables"]:
+        cable |= {end: (np.array(turned) @ cable[end]).tolist() for end in ("anchor", "attachment")}
+    platform = data["platform"] | {"home": [*(np.array(turned) @ data["platform"]["home"][:3]), 0, 0, 0]}
+    platform["dof"] = ["x", "y", "yaw"]
+    robot = Robot.model_validate(data | {"platform": platform, "gravity": [0, -9.81, 0]})
+    low, high = robot.anchors.min(axis=0), robot.anchors.max(axis=0)
+    assert Mirrors(variables_with(robot, {"part": "anchor", "box": box(low, high)})).signs == [(-1.0, 1.0)]

@@ -534,6 +534,30 @@ def test_it_brakes_to_the_edge_of_a_slow_zone():
     assert law.duration == pytest.approx(seconds, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("ends", "zones", "slow"),
+    [
+        ((-0.5, 0.5), [(0.0, 0.5)], 1.0),  # both ends are at the edge
+        ((-1.0, 1.0), [(-0.5, 0.5), (0.5, 0.5)], 2.0),  # zones that touch
+        ((-1.0, 1.0), [(0.0013, 0.0015)], 0.003),  # smaller than a step of the grid
+    ],
+)
+def test_edges_of_zones_at_ends_and_at_each_other(ends, zones, slow):
+    """Points of the grid were at one place, where the law stood still."""
+    v, most, fastest = 0.3, 2.0, 1.0  # [m/s], [m/s^2], [m/s]
+    path = {"kind": "line", "start": [ends[0], 0, 2], "end": [ends[1], 0, 2]}
+    limits = {"platform_speed": fastest, "platform_acceleration": most}
+    limits["zone_speed"] = [{"centre": [x, 0, 2], "radius": radius, "speed": v} for x, radius in zones]
+    law = time_along("cogiro", {"path": path, "limits": limits})
+    assert law.feasible
+    seconds = slow / v + v / most  # from rest and to rest inside
+    if slow < ends[1] - ends[0]:
+        braking = (fastest**2 - v**2) / (2 * most), (fastest - v) / most  # [m], [s]
+        rest = ends[1] - ends[0] - slow - 2 * braking[0] - fastest**2 / most
+        seconds = slow / v + 2 * braking[1] + rest / fastest + 2 * fastest / most
+    assert law.duration == pytest.approx(seconds, rel=2e-3)
+
+
 def test_a_law_is_not_cut_off_by_a_shorter_duration():
     """It ended at its speed half of the way, and the plan was feasible; a longer one rests at the end."""
     task = time_along("cogiro", {"path": {"kind": "line", "start": [0, 0, 1], "end": [1, 0, 1]}}).scenario.task

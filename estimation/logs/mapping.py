@@ -22,6 +22,7 @@ OF_DIRECTION = ("x", "y", "z", "swivel", "azimuth", "elevation")
 TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
 OF_STRUCTURES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
 MOST_LISTED = 12
+BEHIND_NUMBER = re.compile(r"\d[_ ][^\]0-9]+\]$")  # words in the name of a joint
 
 
 class Field(NamedTuple):
@@ -233,6 +234,8 @@ def _usual(
             complete.append(tuple(by_name[i] for i in order))
     if len(complete) > 1 and m is not None and what in ("lengths", "tensions", "commands"):
         complete = [one for one in complete if len(one) == m] or complete
+    if len(complete) > 1 and what == "lengths":  # winch_1 rather than pulley_1_joint
+        complete = [one for one in complete if not BEHIND_NUMBER.search(one[0].full)] or complete
     if len(complete) > 1 and what in ("lengths", "tensions", "directions"):
         complete = [one for one in complete if measured_name(one[0].full) is None] or complete
     if len(complete) > 1 and what == "position":  # messages of poses rather than transforms and scenes

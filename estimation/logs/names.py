@@ -75,7 +75,7 @@ PATTERNS = {
     ),
 }
 LARGEST_COUNTED = {"ns": 1e17, "us": 1e14, "ms": 1e11}  # from 1970
-LEAST_COUNTED, SLOWEST = 100.0, 1.0  # step of times that are no seconds; time between samples [s]
+LEAST_COUNTED, SLOWEST = 100.0, 0.5  # step of times that are no seconds; time between samples [s]
 # What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
 _COMMAND = re.compile(
     r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?)(?=[./_ \[]|\d|$)"
@@ -128,7 +128,8 @@ def measured_name(name: str) -> str | None:
 def time_unit(times: np.ndarray) -> str:
     """Return the unit of times (N,) without one: by their size if they count from 1970, whole numbers by their steps.
 
-    A recording has a sample per second or more; otherwise times are in seconds.
+    A recording has two samples per second or more: 1000 is a step of 1 kHz in us, not of 1 Hz in ms. Steps that are
+    smaller are in seconds.
     """
     known = times[np.isfinite(times)]
     largest = float(np.abs(known).max(initial=0.0))

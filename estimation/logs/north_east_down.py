@@ -8,12 +8,14 @@ from ...models.robot import Robot
 # Rotations from north, east, down to {G}, by the axis of x of {G}; and from forward, right, down to x, y, z of a body.
 FROM_NED = {"east": np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), "north": np.diag([1.0, -1, -1])}
 FROM_FRD = np.diag([1.0, -1, -1])
+HANGS = 0.5  # of the height of carriers above the load at home: less is a load on the ground beside its carriers
 
 
 def ned_frame(robot: Robot, poses: np.ndarray | None, carriers: np.ndarray) -> str | None:
     """Return the axis of x of {G} by which poses in a frame of north, east, down are those of a team, or None.
 
-    Cables cannot push, so a load cannot be above all carriers that move. Which axis it is follows from the home poses.
+    Cables cannot push, so a load cannot be above all carriers that move, unless their frames are below it at home too,
+    as those of vehicles with masts. Which axis it is follows from the home poses.
 
     - `poses`: of the platform, (N, 6) [m, rad], nan where not measured.
     - `carriers`: of the carriers, (N, c, 6).
@@ -21,12 +23,13 @@ def ned_frame(robot: Robot, poses: np.ndarray | None, carriers: np.ndarray) -> s
     moving = [i for i in sorted(set(robot.carrier_of_cable)) if robot.carriers[i].moves]
     if poses is None or not moving or len(moving) < len(set(robot.carrier_of_cable)):
         return None
-    away = carriers[:, moving, :3] - poses[:, None, :3]
-    away = away[np.isfinite(away).all(axis=(1, 2))]
-    gravity = np.array(robot.gravity)
-    if not len(away) or not gravity.any() or (np.median(away @ gravity, axis=0) <= 0).any():
-        return None
     at_home = robot.carrier_home[moving, :3] - robot.home[:3]
+    if not (at_home[:, 2] > 0).all() or np.any(robot.gravity[:2]) or not robot.gravity[2] < 0:
+        return None
+    away = carriers[:, moving, :3] - poses[:, None, :3]
+    away = away[(np.abs(away[..., 2]) > HANGS * at_home[:, 2]).all(axis=1) & np.isfinite(away).all(axis=(1, 2))]
+    if not len(away) or (np.median(away[..., 2], axis=0) >= 0).any():
+        return None
     middle = np.median(away, axis=0)
     return min(FROM_NED, key=lambda axis: float(np.linalg.norm(middle @ FROM_NED[axis].T - at_home)))
 
@@ -38,6 +41,22 @@ def from_ned(poses: np.ndarray, axis: str) -> np.ndarray:
     known = np.isfinite(poses[..., 3:]).all(axis=-1)
     result[known, 3:] = points.angles(turn @ points.rotations(poses[known, 3:]) @ FROM_FRD)
     return result
+
+
+def carriers_from_ned(robot: Robot, poses: np.ndarray, axis: str) -> np.ndarray:
+    """Return poses of carriers (N, c, 6) in {G}, as `from_ned`; carriers and attitudes at home are in {G} already."""
+    result, home = poses.copy(), robot.carrier_home
+    for i, carrier in enumerate(robot.carriers):
+        if carrier.moves:
+            result[:, i] = from_ned(poses[:, i], axis)
+        if (poses[:, i, 3:] == home[i, 3:]).all():
+            result[:, i, 3:] = home[i, 3:]
+    return result
+
+
+def platform_from_ned(robot: Robot, poses: np.ndarray, axis: str) -> np.ndarray:
+    """Return poses of the platform (N, 6) in {G}, as `from_ned`; locked coordinates stay at home."""
+    return np.where((robot.dof_mask > 0) | ~(poses == robot.home), from_ned(poses, axis), poses)
 
 
 def note_of(axis: str) -> str:

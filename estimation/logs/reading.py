@@ -19,7 +19,7 @@ from .clocks import clock_of_poses
 from .frozen import frozen
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, read_map
 from .measurements import Measurements, changed
-from .north_east_down import FROM_FRD, FROM_NED, from_ned, ned_frame, note_of
+from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .opening import recordings
 from .pose_track import PoseTrack
 from .recording import COUNTED, Recording, Samples
@@ -156,8 +156,8 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     tensions = None
     axis = ned_frame(robot, measured.poses, poses)
     if axis is not None and measured.poses is not None:
-        poses[:, there] = from_ned(poses[:, there], axis)
-        measured = changed(measured, poses=from_ned(measured.poses, axis))
+        poses = carriers_from_ned(robot, poses, axis)
+        measured = changed(measured, poses=platform_from_ned(robot, measured.poses, axis))
         read.notes.append(note_of(axis))
     if measured.tensions is None:
         tensions = tensions_by_thrust(robot, poses[kept], thrusts[kept], times if times is None else times[kept])

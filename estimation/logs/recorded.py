@@ -16,7 +16,7 @@ from ..pose.from_log import poses_from_log
 from .carrier_poses import carriers_at, filled
 from .encoders import lengths_of
 from .mapping import Field, command_fields, read_map
-from .north_east_down import from_ned, ned_frame, note_of
+from .north_east_down import carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .reading import Log, Paths, read_log
 from .streams import Reader
 
@@ -102,9 +102,8 @@ def read_recorded(
         carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
         axis = read.ned or ned_frame(known, pose, carrier_pose)
         if axis is not None:
-            pose = pose if read.ned else from_ned(pose, axis)
-            moving = [i for i, carrier in enumerate(known.carriers) if carrier.moves]
-            carrier_pose[:, moving] = from_ned(carrier_pose[:, moving], axis)
+            pose = pose if read.ned else platform_from_ned(known, pose, axis)
+            carrier_pose = carriers_from_ned(known, carrier_pose, axis)
             notes += [] if read.ned else [note_of(axis)]
         return Recorded(
             robot=known,

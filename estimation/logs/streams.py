@@ -7,7 +7,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import quantity
 from .mapping import Field, Fields
-from .names import UNITS, time_unit
+from .names import LARGEST_COUNTED, UNITS, time_unit
 from .recording import GAP, Samples, check_rising
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
@@ -50,7 +50,7 @@ class Reader:
             clock = self._times.get(key)
             if clock is not None and one.topic.times is None:
                 column = values[:, self._of[key].index(clock.name)]
-                unit = clock.unit or time_unit(column)
+                unit = clock.unit or self._unit_of(clock, column)
                 times = clock.factor * UNITS["time"][unit] * column
                 again = np.diff(times, prepend=np.nan) == 0
                 if 0 < again.mean() <= MOST_REPEATED:
@@ -62,6 +62,17 @@ class Reader:
                 times, values = times[kept], values[rows[kept]]
             self._done[key] = Samples(times, values)
         return self._done[key]
+
+    def _unit_of(self, clock: Field, column: np.ndarray) -> str:
+        """Return the unit of times without one, and note it where it is no more than likely."""
+        unit = time_unit(column)
+        if unit != "s" and float(np.nanmax(np.abs(column))) <= LARGEST_COUNTED["ms"]:
+            step = quantity(UNITS["time"][unit] * float(np.nanmedian(np.diff(column))), "s", 3)
+            self.notes.append(
+                f"{clock.full} is read in {unit}, so that samples are {step} apart; if that is wrong, write its unit "
+                f"in its name, as {clock.full}_s"
+            )
+        return unit
 
 
 def at_times(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:

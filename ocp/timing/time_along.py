@@ -45,6 +45,7 @@ RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
 LARGEST_RESERVE = 0.01  # of the weight
 LARGEST_SHRINK = 0.01
 COARSE = 4e-3  # of the weight: if more is missing it takes a finer grid, if less a reserve there
+CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are one
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
 
 
@@ -193,10 +194,14 @@ def _through(s: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
     A law that is slow enough at the first point in a zone would be too fast between its edge and that point.
     """
-    moved = s.copy()
-    for corner in corners[(corners > s[0]) & (corners < s[-1])]:
-        moved[1:-1][np.abs(moved[1:-1] - corner).argmin()] = corner
-    return moved
+    moved, left = s.copy(), np.arange(1, len(s) - 1)
+    least = CLOSEST * (s[-1] - s[0]) / len(s)
+    corners = np.sort(corners)
+    apart = (np.diff(corners, prepend=-np.inf) > least) & (corners > s[0] + least) & (corners < s[-1] - least)
+    for corner in corners[apart][: left.size]:
+        nearest = left[np.abs(s[left] - corner).argmin()]
+        moved[nearest], left = corner, left[left != nearest]
+    return np.sort(moved)
 
 
 def _timed(task: Task, law: FastestLaw) -> Task:

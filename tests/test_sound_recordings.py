@@ -1,0 +1,89 @@
+"""Recordings that look like others with an error are read as they are."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from towline.estimation.logs import read_log
+from towline.estimation.logs.mapping import fields_of
+from towline.estimation.logs.names import time_unit
+from towline.estimation.logs.recorded import read_recorded
+from towline.estimation.logs.recording import Recording, Topic
+
+from . import user_recordings as user
+from .test_recordings_in_other_units import flight
+
+BESIDE = {"load_z": 0.35, "cf1_z": 0.05, "cf2_z": 0.05}  # [m]: a high load on the ground between its drones
+
+
+def test_vehicles_with_masts_are_below_their_load(tmp_path):
+    """Their frames are on the ground, and their anchors 3 m above."""
+    carriers = [
+        f"{{name: car{i + 1}, kind: mobile, home: [{x}, {y}, 0, 0, 0, 0], reach: {{min: [-2, -2, 0], max: [2, 2, 0]}}, "
+        "speed_max: 1, acceleration_max: 1}"
+        for i, (x, y) in enumerate(user.CORNERS)
+    ]
+    masts, home = np.tile([0.0, 0, 3], (4, 1)), [0, 0, 1.2, 0, 0, 0]
+    robot = user.robot_file(tmp_path / "masts.yaml", masts, user.PLATFORM, home, carriers=carriers)
+    t = np.arange(0, 5, 0.05)
+    place = np.column_stack([0.3 * np.sin(t), 0.3 * np.cos(t), np.full_like(t, 1.2)])
+    names, columns = (
+        ["t", *(f"load_{axis}" for axis in "xyz"), "roll", "pitch", "yaw"],
+        [t, place, np.zeros((len(t), 3))],
+    )
+    for i, (x, y) in enumerate(user.CORNERS):
+        car = np.column_stack([x + 0.1 * np.sin(t), y + 0 * t, 0 * t])
+        columns += [car, np.linalg.norm(place + user.PLATFORM[i] - car - masts[i], axis=1)]
+        names += [*(f"car{i + 1}_{axis}" for axis in "xyz"), f"l{i + 1}"]
+    read = read_log(user.write(tmp_path / "log.csv", names, np.column_stack(columns)), robot=robot)
+    assert read.ned is None
+    np.testing.assert_allclose(read.measurements.poses[:, :3], place, atol=1e-9)
+
+
+@pytest.mark.parametrize("ned", [False, True])
+def test_a_load_on_the_ground_beside_its_drones(ned, tmp_path):
+    """Most of the recording is before the flight, with drones below the centre of the load."""
+    robot = flight(tmp_path, ned)
+    head, *lines = (tmp_path / "flight.csv").read_text().splitlines()
+    kept = [i for i, name in enumerate(head.split(",")) if "dir" not in name]  # cables are slack on the ground
+    names = [head.split(",")[i] for i in kept]
+    flown = np.array([line.split(",") for line in lines], dtype=float)[:, kept]
+    before = np.repeat(flown[:1], 2 * len(flown), axis=0)
+    before[:, 0] += (flown[1, 0] - flown[0, 0]) * np.arange(len(before))
+    flown[:, 0] += before[-1, 0] + flown[1, 0] - 2 * flown[0, 0]
+    for name, height in BESIDE.items():
+        before[:, names.index(name)] = (-height if ned else height) + 1e-4 * np.sin(np.arange(len(before)))
+    log = user.write(tmp_path / "all.csv", names, np.vstack([before, flown]), form="%.12g")
+    read = read_log(log, robot=robot)
+    assert (read.ned is not None) == ned
+    heights = read.measurements.carrier_poses[:, :, 2] - read.measurements.poses[:, None, 2]
+    assert heights[-len(flown) // 2 :].min() > 0.4
+
+
+def test_a_load_without_a_rotation_does_not_turn_with_north_east_down(tmp_path):
+    robot = flight(tmp_path, ned=True)
+    found = read_recorded(robot, tmp_path / "flight.csv")
+    np.testing.assert_array_equal(found.pose[:, 3:], 0.0)
+    _, x, drones = user.team(12)
+    np.testing.assert_allclose(found.pose[:, :3], x, atol=5e-3)
+    for i, (_, R, _, _) in enumerate(drones):
+        turned = Rotation.from_euler("xyz", found.carrier_pose[:, i, 3:]) * Rotation.from_matrix(R).inv()
+        assert turned.magnitude().max() < 1e-3
+
+
+def test_joints_that_wind_cables_rather_than_others():
+    """Both kinds are in one message, with as many joints."""
+    joints = ["winch_1", "winch_2", "pulley_1_joint", "pulley_2_joint"]
+    fields = {f"position[{joint}]": "" for joint in joints}
+    topic = Topic("/joint_states", "sensor_msgs/msg/JointState", 5, np.arange(5.0), fields, lambda names: None)
+    found = fields_of([Recording("a.mcap", "MCAP", {topic.name: topic})], m=2)
+    assert [one.name for one in found.lengths] == list(fields)[:2]
+
+
+@pytest.mark.parametrize(("step", "unit"), [(1000, "us"), (1e6, "ns"), (500, "ms"), (100, "ms"), (4000, "us")])
+def test_loops_of_1_khz_count_microseconds_or_nanoseconds(step, unit, tmp_path):
+    times = 12_345_000 + step * np.arange(50)
+    assert time_unit(times) == unit
+    log = user.write(tmp_path / "log.csv", ["t", "l0"], np.column_stack([times, np.ones(50)]))
+    (note,) = read_log(log).notes
+    assert f"t is read in {unit}" in note
