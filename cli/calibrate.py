@@ -95,7 +95,7 @@ def calibrate(
     names = None if free is None else [name.strip() for name in free.split(",")]
     stated = None if sigma is None else _sigma(sigma)
     known = None if prior is None else by_name("--prior", prior)
-    loaded = load(robot)
+    loaded = given = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
     check_outputs(
         {"--out": target, "--report": report, "--figures": figures and figures / f"residuals.{form}"},
@@ -114,15 +114,20 @@ def calibrate(
             typer.echo(f"  {note}")
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     text = result.report()  # before anything is written
-    written = {} if result.refused else {"file": result.save(target)}
+    # The encoders of the mended robot are right, whether or not other parameters improve it.
+    kept = bool(result.refused) and result.means_something and loaded.cables != given.cables
+    refused = None if kept else result.refused
+    written = {} if refused else {"file": loaded.save(target) if kept else result.save(target)}
     if report is not None:
         written["report"] = result.save_report(report)
     pictures = [] if figures is None else result.plot(figures, form)
     data = {**result.to_dict(), "notes": read.notes, "file": None, **written, "figures": pictures}
     print_result(as_json, data, lambda: text, [*written.values(), *pictures])
-    if result.refused:
+    if kept:
+        typer.echo("towline: the file has corrected encoders alone, which other parameters do not improve", err=True)
+    if refused:
         hint = "; --fix corrects it" if result.doubt and result.mistake and result.mistake.corrected else ""
-        typer.echo(f"towline: {target} is not written: {result.refused}{hint}", err=True)
+        typer.echo(f"towline: {target} is not written: {refused}{hint}", err=True)
         raise typer.Exit(1)
 
 

@@ -50,6 +50,40 @@ def test_angles_of_drums_become_encoders(tmp_path):
     assert "Parameters that may explain" not in said
 
 
+@pytest.mark.parametrize("signs", [[-1, -1, -1, -1], [1, -1, 1, -1]])
+def test_drums_that_turn_the_other_way(signs, tmp_path):
+    """Nonsense was corrected instead: a frame tens of kilometres away."""
+    robot, _ = drum_angles(tmp_path)
+    head, *lines = (tmp_path / "angles.csv").read_text().splitlines()
+    rows = np.array([line.split(",") for line in lines], dtype=float)
+    rows[:, 1:5] *= signs
+    user.write(tmp_path / "angles.csv", head.split(","), rows)
+    towline("calibrate", robot, "angles.csv", "--fix", cwd=tmp_path)
+    scales = [cable.encoder.scale for cable in load(tmp_path / "hanging-calibrated.yaml").cables]
+    np.testing.assert_allclose(scales, RADIUS * signs, rtol=0.01)
+
+
+@pytest.mark.parametrize("free", [(), ("--free", "auto")])
+def test_corrected_encoders_are_written_if_nothing_else_is_to_improve(free, tmp_path):
+    user.four_cables(tmp_path)
+    robot = load(path := user.hanging_robot(tmp_path))
+    poses = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "mocap.csv", robot=robot).poses
+    lengths = user.lengths_at(
+        user.FRAME, user.PLATFORM, poses[:, :3], Rotation.from_euler("xyz", poses[:, 3:]).as_matrix()
+    )
+    lengths += np.random.default_rng(0).normal(0, 3e-4, lengths.shape)
+    header = [*(f"l{i}" for i in range(4)), *"xyz", "roll", "pitch", "yaw"]
+    user.write(tmp_path / "mm.csv", header, np.hstack([1e3 * lengths, poses]))
+    done = towline("calibrate", path, "mm.csv", "--fix", *free, "--out", "fixed.yaml", cwd=tmp_path)
+    assert "corrected encoders alone" in done.stderr
+    assert [cable.encoder.scale for cable in load(tmp_path / "fixed.yaml").cables] == [1e-3] * 4
+    assert load(tmp_path / "fixed.yaml").anchors.tolist() == robot.anchors.tolist()
+    # Without --fix, or where it has nothing to correct, no file is written.
+    user.write(tmp_path / "m.csv", header, np.hstack([lengths, poses]))
+    towline("calibrate", path, "m.csv", "--fix", "--free", "auto", "--out", "none.yaml", cwd=tmp_path, code=1)
+    assert not (tmp_path / "none.yaml").exists()
+
+
 def test_signs_and_units_become_encoders(tmp_path):
     user.four_cables(tmp_path)
     robot = load(user.hanging_robot(tmp_path))

@@ -200,7 +200,8 @@ def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], f
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
     base = _parts(log, tried[0])
     own = base[1][order, order]
-    factor = float((base[0] * own).sum() / max(float((own**2).sum()), 1e-300))
+    # Of the middle cable, as signs may differ.
+    factor = float(np.median(np.abs((base[0] * own).sum(axis=1)) / np.maximum((own**2).sum(axis=1), 1e-300)))
     if factor > 0 and all(abs(factor / usual - 1) > OTHER_FACTOR for usual in (1.0, *FACTORS)):
         unit = quantity(factor, "m", 3)
         tried.append(
