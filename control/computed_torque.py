@@ -35,6 +35,7 @@ from .tension_loop import TensionLoop
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
 NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
 CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
+QUICK = 6.0  # [rad/s]: the bandwidth of a carrier's deviation, unless a slower loop has to follow it
 
 
 class ComputedTorque(Controller):
@@ -71,7 +72,9 @@ class ComputedTorque(Controller):
         Largest deviation of carriers from their reference to help the tensions (see `core/control/compensation.c`):
         position [m] and attitude [rad]. Default: 0, but 0.5 m with fewer cables than degrees of freedom.
     carrier_bandwidth, carrier_acceleration
-        Bandwidth of the carriers' deviation [rad/s], and its largest acceleration [m/s^2 and rad/s^2].
+        Bandwidth of the carriers' deviation [rad/s], and its largest acceleration [m/s^2 and rad/s^2]. Default of the
+        bandwidth: 6, but a quarter of `place` if flying carriers only take over what is steady. With a faster one,
+        carriers that turn and the damping of their cables make the observer's loop unstable.
     place, attitude
         Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`. Default of `attitude`:
         40, or less by the known lags of rotors and sensors (control/bandwidths.py); of `place`: 5, at most a sixth of
@@ -109,7 +112,7 @@ class ComputedTorque(Controller):
         observer: float | None = None,
         rate: Any = None,
         reach: tuple[float, float] | None = None,
-        carrier_bandwidth: float = 6.0,
+        carrier_bandwidth: float | None = None,
         carrier_acceleration: float = 5.0,
         place: float | None = None,
         attitude: float | None = None,
@@ -124,6 +127,10 @@ class ComputedTorque(Controller):
         self._scale, self._limits = self.robot.wrench_scale, limits_of(self.robot, rate)
         rotors, usual = number("rotor_lag", rotor_lag, 0.0, 0.1), SWINGING if few else HELD
         loops = bandwidths_for(self.robot, usual, sensors, rotors, bandwidth, observer, attitude)
+        held = place_for(loops.attitude, place)
+        if carrier_bandwidth is None:
+            steady = not few and any(carrier.efforts for carrier in self.robot.carriers)
+            carrier_bandwidth = held / 4 if steady else QUICK
         gains = (
             loops.bandwidth,
             damping,
@@ -131,7 +138,7 @@ class ComputedTorque(Controller):
             loops.observer,
             carrier_bandwidth,
             carrier_acceleration,
-            place_for(loops.attitude, place),
+            held,
             patience,
         )
         self._settings = settings_of(self.robot, self._limits, *gains)

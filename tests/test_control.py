@@ -9,7 +9,7 @@ from towline.control import ANSWERS, ComputedTorque, OpenLoop, Predictive, Refer
 from towline.control.settings import reach_of
 from towline.control.tension_loop import TensionLoop
 from towline.core import control_move_on
-from towline.models import Dynamics, load
+from towline.models import Dynamics, Robot, load
 from towline.models.record import record_of
 from towline.plant import Plant
 from towline.simulation import simulate
@@ -291,6 +291,22 @@ def test_carriers_react_to_what_the_plan_does_not_know_alone():
         moved.append(np.linalg.norm(flight.record.motions[-1, 1, :3] - robot.carrier_home[0, :3]))
     assert moved[0] < 0.01 * moved[1]
     assert moved[1] > 0.05
+
+
+@pytest.mark.parametrize("gains", [{}, {"bandwidth": 20.0, "observer": 20.0}, {"bandwidth": 40.0, "observer": 60.0}])
+@pytest.mark.parametrize("damping", [20.0, 200.0, 300.0])  # 1.5 times that of the file
+def test_quadrotors_that_take_over_a_disturbance_do_not_swing(gains, damping):
+    """Cables damp what quadrotors do when they turn, and the observer takes these tensions for a disturbance."""
+    data = load("wang-flying-quadrotor").model_dump()
+    data["cables"] = [{**cable, "damping": damping} for cable in data["cables"]]
+    robot = Robot.model_validate(data)
+    controller = ComputedTorque(robot, reach=(0.5, 0.0), **gains)
+    still = simulate(robot, robot.home, controller, duration=1.5)
+    assert still.error.max() < 1e-8  # rounding errors do not grow
+    pushed = simulate(robot, robot.home, controller, duration=1.5, disturbance=(0.4, 0.3, 0.2, 0, 0, 0))
+    assert pushed.passed
+    assert pushed.error[-100:].max() < 1e-4
+    assert np.linalg.norm(pushed.record.motions[-1, 1, :3] - robot.carrier_home[0, :3]) > 0.01
 
 
 def test_robot_ends_stay_inside_their_boxes():

@@ -317,6 +317,7 @@ def _tensions(motion: SavedMotion, robot: Robot, task: Mapping[str, Any], datase
     u, A, w = _wrenches(motion, robot, at)
     across, needed = _across(motion, robot, at, u)
     spare = np.where(low < high, low, low - 1e-12), np.where(low < high, high, high + 1e-12)
+    found = np.zeros((len(at), robot.m))
     for weight in BESIDE:
         rows = np.concatenate([scale[:, None] * A, weight * across], axis=1)
         values = np.concatenate([scale * w, weight * needed], axis=1)
