@@ -63,6 +63,25 @@ def test_drums_that_turn_the_other_way(signs, tmp_path):
     np.testing.assert_allclose(scales, RADIUS * signs, rtol=0.01)
 
 
+@pytest.mark.parametrize(
+    ("columns", "units"),
+    [
+        ([1, 0, 2, 3], RADIUS),
+        ([1, 2, 3, 0], -RADIUS),
+        ([0, 1, 2, 3], RADIUS / [1, 2, 1, 3]),  # two kinds of winches
+        ([0, 1, 2, 3], np.full(4, 0.025)),  # nearly inches
+        ([0, 1, 2, 3], np.array([1.0, 1e-3, 1, 1])),  # one amplifier in mm
+    ],
+)
+def test_readings_of_any_size_and_order(columns, units, tmp_path):
+    path, _ = drum_angles(tmp_path)
+    robot, read = load(path), read_measurements(tmp_path / "angles.csv", robot=path)
+    found = mended(robot, read.with_lengths((read.lengths * RADIUS / units)[:, np.argsort(columns)]))
+    assert len(found.texts) == 1
+    np.testing.assert_allclose([one.encoder.scale for one in found.robot.cables], units, rtol=0.017)
+    np.testing.assert_allclose(found.measurements.lengths, read.lengths * RADIUS / units, rtol=1e-9)
+
+
 @pytest.mark.parametrize("free", [(), ("--free", "auto")])
 def test_corrected_encoders_are_written_if_nothing_else_is_to_improve(free, tmp_path):
     user.four_cables(tmp_path)

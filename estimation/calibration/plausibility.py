@@ -42,7 +42,7 @@ MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
 DISPLACED = 3.0  # times smaller differences, by a frame near the file's
 FAR = 3.0  # times the noise, of differences that are not explained yet
 PLAUSIBLE = 0.03  # of a cable's length, by which its ends may be displaced
-OTHER_FACTOR = 0.1  # from 1 and the usual ones
+OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # from 1, and from those of units
 
 
 class Mistake(NamedTuple):
@@ -199,14 +199,6 @@ def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], f
     turns: list[tuple[np.ndarray, _Way]] = []
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
     base = _parts(log, tried[0])
-    own = base[1][order, order]
-    # Of the middle cable, as signs may differ.
-    factor = float(np.median(np.abs((base[0] * own).sum(axis=1)) / np.maximum((own**2).sum(axis=1), 1e-300)))
-    if factor > 0 and all(abs(factor / usual - 1) > OTHER_FACTOR for usual in (1.0, *FACTORS)):
-        unit = quantity(factor, "m", 3)
-        tried.append(
-            Interpretation(f"the lengths look like multiples of {unit}, such as a drum's angles", factor=factor)
-        )
     for way in tried:
         lengths, y = _parts(log, way) if way.placed is not tried[0].placed or way.turned else base
         both = np.stack([lengths[:, None] - sign * way.factor * y for sign in (1, -1)]) / way.factor
@@ -230,12 +222,43 @@ def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], f
             size = _rms(best[order, columns])
             weighted = VERY_CLEARLY * least * (min(size, gain * as_given) if not way.text else size)
             ways.append(_Way(weighted, size, text, way, columns, signs))
+    ways += _multiples(*base, len(log.y))
     likeliest = _likeliest(e, turns)
     if likeliest is not None:
         # Errors that are no noise may seem smaller in another convention by chance.
         sure = _root_mean_square(likeliest[0]) <= noise
         ways.append(likeliest[1]._replace(weighted=(1.0 if sure else CLEARLY) * likeliest[1].size))
     return ways, as_given
+
+
+def _multiples(lengths: np.ndarray, y: np.ndarray, count: int) -> list[_Way]:
+    """Return the explanation that readings count something whose size is another one for each cable, or nothing.
+
+    - `lengths`, `y`: as `_parts` returns them for `count` samples.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    order = np.arange(len(lengths))
+    fitted = np.einsum("mk,mnk->mn", lengths, y) / np.maximum((y**2).sum(axis=2), 1e-300)  # of cable i and column j
+    sizes = np.abs(fitted)
+    for usual, near in ((1.0, OTHER_FACTOR), *((factor, SAME_FACTOR) for factor in FACTORS)):
+        sizes = np.where(np.abs(sizes / usual - 1) < near, usual, sizes)
+    apart = _medians(lengths[:, None] - (np.sign(fitted) * sizes)[..., None] * y, count)
+    if not np.isfinite(apart).all():
+        return []
+    columns = linear_sum_assignment(apart**2)[1]
+    sizes, factors = sizes[order, columns], (np.sign(fitted) * sizes)[order, columns]
+    if not sizes.all() or (sizes[0] in (1.0, *FACTORS) and (sizes == sizes[0]).all()):
+        return []
+    unit = float(np.median(sizes))
+    similar = bool((np.abs(sizes / unit - 1) < OTHER_FACTOR).all())
+    listed = [unit] if similar else sizes.tolist()
+    text = f"the lengths look like multiples of {', '.join(quantity(one, 'm', 3) for one in listed)}"
+    text = _and(f"{text}, such as a drum's angles", columns, factors)
+    simple = similar and (columns == order).all() and (factors > 0).all()
+    size = _rms(apart[order, columns]) / unit
+    weight = VERY_CLEARLY * (1.0 if simple else VERY_CLEARLY)
+    return [_Way(weight * size, size, text, Interpretation(text, factor=unit), columns, factors / unit)]
 
 
 def _root_mean_square(e: np.ndarray) -> float:
