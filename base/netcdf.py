@@ -156,7 +156,9 @@ def numbers_of(
 
     Raises `InputError` that names the dataset as `where` if they are anything else.
     """
-    variable = (dataset if isinstance(dataset, Contents) else Contents.of(dataset)).get(name)
+    if not isinstance(dataset, Contents):  # which may be larger than the memory
+        dataset = Contents.of(dataset[[name] if name in dataset.variables else []])
+    variable = dataset.get(name)
     kind = None if variable is None else np.asarray(variable.values).dtype
     if variable is None or kind is None or kind.kind not in "fiu":
         given = "none" if kind is None else f"an array of {kind}"

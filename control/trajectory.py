@@ -15,6 +15,7 @@ from ..base.netcdf import Contents, load_netcdf, numbers_of
 from ..figures.outlines import outlines_from
 from ..models.parsing import parse_yaml
 from ..models.part import LARGEST
+from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 
@@ -30,10 +31,17 @@ SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")
 
 
+class InPhase(BaseModel):
+    """A phase of the task of a plan, whatever else it has."""
+
+    load: dict[str, Any] | None = None
+    ground: Any = None
+
+
 class InPhases(BaseModel):
     """The phases of the task of a plan, whatever else it has."""
 
-    phases: list[dict[str, Any]]
+    phases: list[InPhase]
 
 
 class HasTrajectory(Protocol):
@@ -50,7 +58,8 @@ def samples_of(name: str, given: object) -> Contents | None:
 
     Raises `InputError`, with the `name` of the argument, if no such file can be read.
     """
-    contents = getattr(given, "_contents", given)  # without loading xarray
+    # Without loading xarray, unless somebody has the dataset, and may have changed it.
+    contents = given if "trajectory" in getattr(given, "__dict__", {}) else getattr(given, "_contents", given)
     if isinstance(contents, Contents):
         return contents
     samples: Any = _loaded(name, given) if isinstance(given, str | os.PathLike) else given
@@ -157,23 +166,25 @@ def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
     return Trajectory(float(nodes[-1]), at, tensions, keep_out, doubt, wind, loads)
 
 
-def _loads_of(samples: Contents, read: Any) -> list[tuple[float, dict[str, Any] | None]]:
+def _loads_of(samples: Contents, read: Any) -> list[tuple[float, RigidLoad | None]]:
     """Return what the platform carries in the phases of a plan, by the plan's task."""
     if samples.get("phase_load") is None or not (masses := read("phase_load", (-1,))).any():
         return []
     try:
         phases = parse_yaml(str(samples.attributes["task"]), InPhases, "reference.task").phases
-        loads, grounds = [phase.get("load") for phase in phases], [phase.get("ground") for phase in phases]
-        known = [(load or {}).get("mass", 0.0) for load in loads] == masses.tolist()
-    except (KeyError, TypeError, AttributeError, InputError):
-        known, loads, grounds = False, [], []
-    if not known:
+        loads = [None if phase.load is None else _rigid(phase.load) for phase in phases]
+    except (KeyError, InputError):
+        phases, loads = [], []
+    if [load.mass if load else 0.0 for load in loads] != masses.tolist():
         raise InputError(f"reference must be a plan whose task describes its loads, got one of {masses.max():g} kg")
-    if any(ground is not None for ground in grounds):
+    if any(phase.ground is not None for phase in phases):
         raise InputError("reference must be a plan of loads without phases on the ground, got one with such phases")
-    keys, starts = ("mass", "com", "inertia"), read("phase_start", (len(loads),)).tolist()
-    described = [load and {key: load[key] for key in keys if key in load} for load in loads]
-    return list(zip(starts, described, strict=True))
+    return list(zip(read("phase_start", (len(loads),)).tolist(), loads, strict=True))
+
+
+def _rigid(load: dict[str, Any]) -> RigidLoad:
+    """Return a load of a task without its tolerances and its body."""
+    return RigidLoad.model_validate({key: load[key] for key in RigidLoad.model_fields if key in load})
 
 
 def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray) -> Motion:

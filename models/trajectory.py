@@ -1,10 +1,13 @@
 """`Trajectory`: motions of platform and carriers over time, as controllers and stops follow them."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from .rigid_load import RigidLoad
+
+ROUNDING = 1e-9  # [s]
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -27,5 +30,9 @@ class Trajectory(NamedTuple):
     keep_out: Sequence[Sequence[np.ndarray]] = ()
     doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit; empty if it is not
     wind: np.ndarray | None = None  # velocity of the air in {G} for which it is planned, (3,) [m/s]; None without air
-    # What the platform carries from a time on [s]: mass, CoM and inertia as a mapping, or None for nothing.
-    loads: Sequence[tuple[float, dict[str, Any] | None]] = ()
+    # What the platform carries from a time on [s]; None for nothing.
+    loads: Sequence[tuple[float, RigidLoad | None]] = ()
+
+    def load_at(self, time: float) -> RigidLoad | None:
+        """Return what the platform carries at a time [s], or None."""
+        return next((load for begins, load in reversed(self.loads) if begins <= time + ROUNDING), None)

@@ -22,6 +22,7 @@ from ..control.trajectory import read_trajectory
 from ..estimation.logs.opening import is_recording
 from ..models.files import as_robot
 from ..models.parsing import validate
+from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from ..models.trajectory import Trajectory
 from ..plant import Plant
@@ -176,6 +177,7 @@ def simulate(
     if controller is not None and not isinstance(controller, Controller):
         raise InputError(f"controller must be a Controller, got {shown(controller)}")
     pilot = ComputedTorque(the_robot) if controller is None else controller
+    _check_shape(the_robot, pilot)
     meets = replace(meets, drive=meets.drive or pilot.drive or default_drive(the_robot))
     plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
@@ -190,6 +192,18 @@ def simulate(
         again = _one(plant, copies(pilot, 1)[0], experiment, worst, error)
         table.attrs["worst"] = again.cause()  # all from the seed alone
     return table
+
+
+def _check_shape(robot: Robot, controller: Controller) -> None:
+    """Check that a controller is for a robot with as many cables, carriers and actuators; its numbers may differ."""
+    model = getattr(getattr(controller, "controller", controller), "robot", None)
+    if not isinstance(model, Robot):
+        return
+    has, wants = ((one.m, [len(carrier.actuators) for carrier in one.carriers]) for one in (model, robot))
+    if has != wants:
+        raise InputError(
+            f"controller must be for robot {robot.name!r}, got {type(controller).__name__} for {model.name!r}"
+        )
 
 
 def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> tuple[Plant, Experiment]:
@@ -242,11 +256,13 @@ def _in_turn(robot: Robot, first: Trajectory, events: Sequence[Event]) -> list[t
 
 def _loads(parts: Sequence[tuple[float, Trajectory]]) -> list[Event]:
     """Return the changes of the loads that plans carry, each at the beginning of its phase, as events."""
-    ends, events, carried = [begins for begins, _ in parts[1:]] + [np.inf], list[Event](), None
+    ends, events = [begins for begins, _ in parts[1:]] + [np.inf], list[Event]()
+    carried: RigidLoad | None = None
     for (begins, part), end in zip(parts, ends, strict=True):
         for time, load in part.loads:
             if begins + time < end and load != carried:
-                events.append(Carry.model_validate({"at": begins + time, **(load or {"mass": 0.0})}))
+                fields = {"mass": 0.0} if load is None else load.model_dump()
+                events.append(Carry.model_validate({"at": begins + time, **fields}))
                 carried = load
     return events
 

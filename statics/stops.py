@@ -11,7 +11,8 @@ therefore bounds u at each tau and r. A stop takes the least u, from r = 1 to r 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from ..base.text import quantity
 from ..models.dynamics import dynamics_of
 from ..models.motion_file import dimensions, motion_variables, over
 from ..models.parsing import to_yaml
+from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory, moved_on
 from ..solvers import Certificate, certify, solve_batch
@@ -72,6 +74,8 @@ class Stop(Displayed):
         Certificate of the instant with the largest shortfall; None if tensions inside their limits always exist.
     limit
         Of a team of flying carriers: the limit that the stop breaks most, its value and time; empty if it breaks none.
+    load
+        What the platform carries as the stop begins, and until the robot rests; None for nothing.
     """
 
     robot: Robot
@@ -84,6 +88,7 @@ class Stop(Displayed):
     distance: float
     certificate: Certificate | None
     limit: str = ""
+    load: RigidLoad | None = None
 
     @property
     def duration(self) -> float:
@@ -110,6 +115,10 @@ class Stop(Displayed):
         variables["tensions"] = over(("time", "cable"), self.tensions, "N", "cable tensions")
         status = "feasible" if self.feasible else "not-found"
         attributes = {"title": f"{self.robot.name}, stop", "status": status, "robot": to_yaml(self.robot)}
+        if self.load is not None:  # as a plan of one phase has it
+            variables["phase_load"] = over(("phase",), np.array([self.load.mass]), "kg", "mass of the load")
+            variables["phase_start"] = over(("phase",), np.zeros(1), "s", "start of the phase")
+            attributes["task"] = json.dumps({"phases": [{"load": self.load.model_dump()}]})
         return Contents(variables, dimensions(self.robot, self.times), attributes)
 
     def _headline(self) -> str:
@@ -127,8 +136,15 @@ def stop_along(robot: Robot, trajectory: Trajectory, time: float) -> Stop:
 
     Raises `InputError` if the robot has flying carriers with other cables than `control.stop` describes.
     """
+    begins = min(time, trajectory.duration or 0.0)
+    load = trajectory.load_at(begins)
+    found = _stop_along(robot if load is None else load.on(robot), trajectory, begins)
+    return replace(found, robot=robot, load=load)
+
+
+def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
+    """Stop a robot that carries nothing else."""
     end = trajectory.duration or 0.0
-    begins = min(time, end)
     if any(carrier.efforts for carrier in robot.carriers):
         return _of_team(robot, team_stop_along(robot, _continued(trajectory, end), begins))
     trajectory = _continued(trajectory, end)

@@ -1,5 +1,7 @@
 """Stops: on the path, inside the limits, as short as a linear program at each instant permits."""
 
+import itertools
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -7,8 +9,8 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag
 from scipy.spatial import KDTree
 
-from towline import Dynamics, InputError, Planner, load, plan, simulate
-from towline.control import Stop, longest_stop, references, stop
+from towline import Dynamics, InputError, Planner, export_fmu, load, plan, simulate
+from towline.control import Predictive, Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
 
 from .framed import framed
@@ -247,3 +249,32 @@ def test_flying_carriers_are_refused():
     )
     with pytest.raises(InputError, match="carriers of kind ground, prescribed or mobile, got 'wang-flying-quadrotor'"):
         stop(found, 0.5)
+
+
+def test_a_stop_carries_the_load_of_its_phase(tmp_path):
+    """By the wrench that a carried load needs, from the symbolic model; none in the phases before and after."""
+    robot = load("cogiro")
+    bag = {"mass": 60.0, "com": [0.1, 0, -0.2], "inertia": [1, 2, 1.5, 0, 0.2, 0], "mass_tolerance": 0.1}
+    at = [robot.home[:3] + np.array(step) for step in ([0, 0, 0], [0.5, 0, 0.3], [0, 0.5, 0.3], [0, 0, 0])]
+    lines = [{"kind": "line", "start": a.tolist(), "end": b.tolist()} for a, b in itertools.pairwise(at)]
+    phases = [{"name": f"phase-{k}", "path": line, "duration": 1.5} for k, line in enumerate(lines)]
+    phases[1]["load"] = bag
+    found = plan(robot, {"phases": phases})
+    dynamics, numbers = Dynamics(robot), np.array([bag["mass"], *bag["com"], *bag["inertia"]])
+    for time, carries in ((0.7, False), (1.5, True), (2.2, True), (3.7, False)):
+        halt = stop(found, time)
+        assert halt.feasible
+        assert (halt.load is not None) == carries
+        needed = dynamics.required_wrench(*halt.platform) + carries * dynamics.carried_wrench(*halt.platform, numbers)
+        given = np.einsum("nij,nj->ni", dynamics.wrench_matrix(halt.platform[0]), halt.tensions)
+        np.testing.assert_allclose(given, needed, atol=1e-5 * robot.weight)
+    halt = stop(found, 2.2)
+    for run in (
+        simulate(robot, halt, Predictive(robot), duration=halt.duration + 0.3),
+        simulate(robot, found, Predictive(robot), events=["stop at 2.2"], duration=2.2 + halt.duration + 0.3),
+    ):
+        assert run.passed
+        loaded = run.record.tensions[-1] @ dynamics.wrench_matrix(run.record.motions[-1, 0, :6]).T
+        assert loaded[2] == pytest.approx(robot.weight + 9.81 * bag["mass"], rel=0.01)
+    with pytest.raises(InputError, match="reference must begin without a load, which no unit carries, got one of 60"):
+        export_fmu(robot, tmp_path / "stop.fmu", reference=halt)

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from towline.base.errors import InputError
-from towline.base.netcdf import Contents, Variable, load_netcdf, save_netcdf
+from towline.base.netcdf import Contents, Variable, load_netcdf, numbers_of, save_netcdf
 
 CONTENTS = Contents(
     {
@@ -83,3 +83,16 @@ def test_damaged_files_are_refused_in_one_line_and_leave_no_traceback(tmp_path, 
     assert all(line.startswith("file must be a plan (") and line.isprintable() for line in refusals)
     gc.collect()
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_variable_is_read_without_the_others_of_a_dataset():
+    """A workspace in a Zarr folder may be larger than the memory."""
+    delayed = pytest.importorskip("dask").delayed
+    array = pytest.importorskip("dask.array")
+
+    def fail():
+        raise AssertionError("another variable was read")
+
+    large = array.from_delayed(delayed(fail)(), (3,), float)
+    dataset = xr.Dataset({"time": ("n", [0.0, 1.0, 2.0]), "large": ("n", large)})
+    np.testing.assert_array_equal(numbers_of(dataset, "time", (3,), "file"), [0.0, 1.0, 2.0])

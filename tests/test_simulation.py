@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from towline import load, plan
 from towline.base.errors import InputError
-from towline.control import ANSWERS, Command, ComputedTorque, Controller, State
+from towline.control import ANSWERS, Command, ComputedTorque, Controller, OpenLoop, Predictive, State
 from towline.control.trajectory import read_trajectory
 from towline.core._core import sense, winch_lengths
 from towline.models import Dynamics, Robot
@@ -519,3 +519,13 @@ def test_processes_fly_as_one_does_and_refuse_what_they_cannot_receive():
         simulate(
             robot, robot.home, wind=lambda times, seed: np.zeros((len(times), 3)), duration=0.01, runs=2, workers=2
         )
+
+
+@pytest.mark.parametrize("make", [ComputedTorque, Predictive, OpenLoop])
+def test_a_controller_of_a_robot_with_other_cables_is_refused_before_the_run(make):
+    message = f"controller must be for robot 'cogiro', got {make.__name__} for 'wang-flying'"
+    for runs in (None, 2):
+        with pytest.raises(InputError, match=message):
+            simulate("cogiro", load("cogiro").home, make("wang-flying"), duration=0.1, runs=runs)
+    heavier = load("cogiro").model_copy(update={"name": "as-built"})  # the same cables: a model that differs
+    assert simulate("cogiro", load("cogiro").home, make(heavier), duration=0.01).lasted == 10

@@ -4,7 +4,7 @@ import itertools
 import json
 import re
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, OpenLoop, Predictive, references
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall
+from towline.simulation.events import read_events
 
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-an-event.md").read_text()
 (CODE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
@@ -299,7 +300,16 @@ def test_a_load_adds_its_wrench_to_the_motion_and_changes_no_velocity():
     [
         ("carry at 1", r"events\[0\].*mass"),
         ("carry -1 at 0.1", r"events\[0\].*mass"),
-        ({"kind": "carry", "at": 0.1, "mass": 1, "inertia": [-1, 0, 0, 0, 0, 0]}, "inertia without negative moments"),
+        (
+            {"kind": "carry", "at": 0.1, "mass": 1, "inertia": [-1, 0, 0, 0, 0, 0]},
+            r"events\[0\]: inertia must have principal moments >= 0 .*smallest moment is -1, got \[-1, 0, 0, 0, 0, 0\]",
+        ),
+        (
+            {"kind": "carry", "at": 0.1, "mass": 0, "inertia": [1, 1, 1, 0, 0, 0]},
+            r"events\[0\] must have the inertia 0 kg m\^2 with the mass 0 kg, got \(1.0, 1.0, 1.0, 0.0, 0.0, 0.0\)",
+        ),
+        ("carry nan at 0.1", r"events\[0\]: mass must be a finite number, got nan"),
+        ("carry 2.5kg at 0.1", r"events\[0\]: mass must be a number, got '2.5kg'"),
     ],
 )
 def test_loads_that_cannot_be_are_refused(event, message):
@@ -339,3 +349,42 @@ def test_loads_on_the_ground_are_refused(tmp_path):
     phases.append({"name": "put", "ground": {}, "duration": 0.5, "load": bag})
     with pytest.raises(InputError, match="reference must be a plan of loads without phases on the ground"):
         simulate(robot, plan(robot, {"phases": phases}))
+
+
+def test_a_thin_rod_is_a_load_in_any_direction():
+    """Its moment about its own axis is zero, and as an eigenvalue a rounding error of either sign."""
+    random = np.random.default_rng(0)
+    for axis in random.normal(size=(50, 3)):
+        axis /= np.linalg.norm(axis)
+        of = np.eye(3) - np.outer(axis, axis)
+        inertia = [of[0, 0], of[1, 1], of[2, 2], of[0, 1], of[0, 2], of[1, 2]]
+        read_events(load("wang-flying"), [{"kind": "carry", "at": 0, "mass": 1, "inertia": inertia}])
+
+
+@pytest.mark.parametrize("name", ["multi-quadrotor-3", "flycrane", "cogiro"])
+def test_loads_of_robots_of_each_drive_have_the_wrench_of_the_symbolic_model(name):
+    """Also with a disturbance, which acts at the CoM of both, and in parallel runs."""
+    robot, step, push = load(name), 2e-4, np.array([1, 0.5, 0.2, 0.02, 0.01, 0.03])
+    own, dynamics, push = robot.platform.mass, Dynamics(robot), 0.05 * robot.weight * push
+    load_on = own * np.array([0.3, 0.05 / own, -0.03 / own, 0.02 / own, 2e-3, 1e-3, 1.5e-3, 0, 2e-4, 0])
+    event = {"kind": "carry", "at": 0.04, "mass": load_on[0], "com": list(load_on[1:4]), "inertia": list(load_on[4:])}
+    given: dict[str, Any] = {
+        "duration": 0.12,
+        "period": step,
+        "disturbance": push,
+        "events": [event, "carry 0 at 0.08"],
+    }
+    run = simulate(robot, robot.home, **given)
+    acceleration = np.diff(run.record.motions[:, 0, 6:], axis=0) / step
+    motions = (run.record.motions[1:] + run.record.motions[:-1]) / 2
+    arm = load_on[0] * (load_on[1:4] - robot.platform.com) / (own + load_on[0])
+    for k in (150, 190, 210, 390, 410, 590):
+        pose, velocity, carriers = motions[k, 0, :6], motions[k, 0, 6:], motions[k, 1:, :6]
+        needed, pushed = dynamics.required_wrench(pose, velocity, acceleration[k], carriers), push.copy()
+        if 200 <= k < 400:
+            needed = needed + dynamics.carried_wrench(pose, velocity, acceleration[k], load_on)
+            pushed[3:] += np.cross(arm, push[:3])  # nearly level
+        given_by = dynamics.wrench_matrix(pose, carriers) @ run.record.tensions[k] + pushed
+        np.testing.assert_allclose(given_by, needed, atol=1e-4 * robot.weight)
+    many = simulate(robot, robot.home, runs=3, **given)
+    np.testing.assert_allclose(many["error_max"].values, run.error.max(), rtol=1e-9)

@@ -2,37 +2,22 @@
 
 from collections.abc import Sequence
 from itertools import product
-from typing import Annotated
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from ...models.body import AnyBody
-from ...models.part import AT_ORIGIN, Inertia, Name, NonNegative, Part, Pose, Positive, Vector3, inertia_matrix
+from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
 from ...models.ranges import PositiveRange
+from ...models.rigid_load import RigidLoad
 from .paths import RestPath, SequencePath, SinglePath
 from .paths.sequence import Piece, check_continuity, lasting
 
-ROUNDING = 1e-12  # of the largest moment of inertia
 
-
-def _check_positive_semidefinite(inertia: Inertia) -> Inertia:
-    moments = np.linalg.eigvalsh(inertia_matrix(inertia))
-    if moments[0] < -ROUNDING * max(moments[-1], 0.0):
-        raise ValueError(f"must have principal moments >= 0 kg m^2; the smallest moment is {moments[0]:g}")
-    return inertia
-
-
-class Load(Part):
+class Load(RigidLoad):
     """A rigid body that is fixed to the platform, in addition to the platform of the robot's file."""
 
     mass: Positive = Field(description="mass [kg]")
-    com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM of the load in the platform frame [m]")
-    inertia: Annotated[Inertia, AfterValidator(_check_positive_semidefinite)] = Field(
-        default=AT_ORIGIN,
-        description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs "
-        "[kg m^2]",
-    )
     mass_tolerance: float = Field(
         default=0.0,
         ge=0,
