@@ -83,6 +83,7 @@ def test_joints_that_wind_cables_rather_than_others():
 @pytest.mark.parametrize(("step", "unit"), [(1000, "us"), (1e6, "ns"), (500, "ms"), (100, "ms"), (4000, "us")])
 def test_loops_of_1_khz_count_microseconds_or_nanoseconds(step, unit, tmp_path):
     times = 12_345_000 + step * np.arange(50)
+    assert time_unit(2.6e14 + np.round(step) * np.arange(50)) == unit  # nanoseconds of a computer that is on for days
     assert time_unit(times) == unit
     log = user.write(tmp_path / "log.csv", ["t", "l0"], np.column_stack([times, np.ones(50)]))
     (note,) = read_log(log).notes

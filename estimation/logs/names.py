@@ -74,7 +74,7 @@ PATTERNS = {
         r"(elapsed(?:[_ ]time)?)",
     ),
 }
-LARGEST_COUNTED = {"ns": 1e17, "us": 1e14, "ms": 1e11}  # from 1970
+DATES = 1e9, 4e9  # [s] from 1970, of recordings: 2001 to 2096
 LEAST_COUNTED, SLOWEST = 100.0, 0.5  # step of times that are no seconds; time between samples [s]
 # What is commanded rather than measured: cmd_l0, length_0_ref, /winch_commands/position[0].
 _COMMAND = re.compile(
@@ -125,6 +125,12 @@ def measured_name(name: str) -> str | None:
     return found if count else None
 
 
+def dated_unit(times: np.ndarray) -> str | None:
+    """Return the unit, ms, us or ns, in which times (N,) count from 1970 to the date of a recording, or None."""
+    largest = float(np.nanmax(np.abs(times), initial=0.0))
+    return next((unit for unit in ("ms", "us", "ns") if DATES[0] <= largest * TIMES[unit] < DATES[1]), None)
+
+
 def time_unit(times: np.ndarray) -> str:
     """Return the unit of times (N,) without one: by their size if they count from 1970, whole numbers by their steps.
 
@@ -132,9 +138,8 @@ def time_unit(times: np.ndarray) -> str:
     smaller are in seconds.
     """
     known = times[np.isfinite(times)]
-    largest = float(np.abs(known).max(initial=0.0))
-    if largest > LARGEST_COUNTED["ms"]:
-        return next(unit for unit, least in LARGEST_COUNTED.items() if largest > least)
+    if (dated := dated_unit(known)) is not None:
+        return dated
     step = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
     if step < LEAST_COUNTED or (known % 1).any():
         return "s"

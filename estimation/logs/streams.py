@@ -7,7 +7,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.text import quantity
 from .mapping import Field, Fields
-from .names import LARGEST_COUNTED, UNITS, time_unit
+from .names import UNITS, dated_unit, time_unit
 from .recording import GAP, Samples, check_rising
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
@@ -66,7 +66,7 @@ class Reader:
     def _unit_of(self, clock: Field, column: np.ndarray) -> str:
         """Return the unit of times without one, and note it where it is no more than likely."""
         unit = time_unit(column)
-        if unit != "s" and float(np.nanmax(np.abs(column))) <= LARGEST_COUNTED["ms"]:
+        if unit != "s" and dated_unit(column) is None:
             step = quantity(UNITS["time"][unit] * float(np.nanmedian(np.diff(column))), "s", 3)
             self.notes.append(
                 f"{clock.full} is read in {unit}, so that samples are {step} apart; if that is wrong, write its unit "
