@@ -11,7 +11,7 @@ from towline.estimation.logs.recorded import read_recorded
 from towline.estimation.logs.recording import Recording, Topic
 
 from . import user_recordings as user
-from .test_recordings_in_other_units import flight
+from .test_recordings_in_other_units import FULL, flight
 
 BESIDE = {"load_z": 0.35, "cf1_z": 0.05, "cf2_z": 0.05}  # [m]: a high load on the ground between its drones
 
@@ -69,6 +69,26 @@ def test_a_load_without_a_rotation_does_not_turn_with_north_east_down(tmp_path):
     for i, (_, R, _, _) in enumerate(drones):
         turned = Rotation.from_euler("xyz", found.carrier_pose[:, i, 3:]) * Rotation.from_matrix(R).inv()
         assert turned.magnitude().max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("factors", "kept", "unit"),
+    [((1, 1), 2, FULL), ((1, 1), 1, FULL), ((-1, -1), 2, -FULL), ((1, 0), 2, FULL), ((0, 0), 2, 0)],
+)
+def test_the_suggested_unit_of_thrusts(factors, kept, unit, tmp_path):
+    """Also of one drone alone, with an axis that points down, and without what tells nothing."""
+    robot = flight(tmp_path, ned=True)
+    head, *lines = (tmp_path / "flight.csv").read_text().splitlines()
+    names, values = head.split(","), np.array([line.split(",") for line in lines], dtype=float)
+    for i, factor in enumerate(factors):
+        values[:, names.index(f"cf{i + 1}_thrust")] *= factor
+    used = [i for i, name in enumerate(names) if kept == 2 or not name.startswith("cf2")]
+    user.write(tmp_path / "log.csv", [names[i] for i in used], values[:, used], form="%.12g")
+    notes = [note for note in read_log(tmp_path / "log.csv", robot=robot).notes if "are not used" in note]
+    assert len(notes) == kept
+    suggested = [float(note.split("thrust_* [")[1].split(" N]")[0]) for note in notes if "thrust_*" in note]
+    assert len(suggested) == sum(factor != 0 for factor in factors[:kept])
+    np.testing.assert_allclose(suggested, unit, rtol=0.1)
 
 
 def test_joints_that_wind_cables_rather_than_others():

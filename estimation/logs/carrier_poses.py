@@ -31,19 +31,22 @@ def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarra
     """Return thrusts (N, c) [N], nan of carriers that they could not hold up, or that fly without any load."""
     result, gravity = thrusts.copy(), float(np.linalg.norm(robot.gravity))
     # In hover all thrusts together hold all weights, which gives the unit of those from 0 to 1.
-    own_weights = gravity * sum(getattr(carrier, "mass", 0.0) for carrier in robot.carriers if carrier.actuators)
-    measured = thrusts[:, np.isfinite(thrusts).any(axis=0)]
-    together = float(np.nanmedian(measured, axis=0).sum()) if measured.size else 0.0
-    unit = f"{(own_weights + robot.weight) / together:.3g}" if together > 0 else "20"
-    for index, carrier in enumerate(robot.carriers):
-        if not carrier.actuators or not np.isfinite(thrusts[:, index]).any():
-            continue
+    flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators and np.isfinite(thrusts[:, i]).any()]
+    driven = [i for i in flying if np.nanmedian(thrusts[:, i]) != 0]
+    count = sum(bool(carrier.actuators) for carrier in robot.carriers)
+    weights = sum(getattr(robot.carriers[i], "mass", 0.0) * gravity + robot.weight / count for i in driven)
+    together = float(np.nanmedian(thrusts[:, driven], axis=0).sum())
+    for index in flying:
+        carrier = robot.carriers[index]
         usual, own = float(np.nanmedian(thrusts[:, index])), getattr(carrier, "mass", 0.0) * gravity
         if not LEAST_THRUST * own < usual < MOST_THRUST * (own + robot.weight):
             result[:, index] = np.nan
+            hint = ""
+            if index in driven and together:
+                hint = f"; a map may state their unit, as in 'thrusts: thrust_* [{weights / together:.3g} N]'"
             notes.append(
                 f"thrusts of {carrier.name} are not used: they are {quantity(usual, 'N', 3)} (median) for a weight of "
-                f"{quantity(own, 'N', 3)}; a map may state their unit, as in 'thrusts: thrust_* [{unit} N]'"
+                f"{quantity(own, 'N', 3)}{hint}"
             )
     return result
 
