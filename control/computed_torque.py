@@ -18,7 +18,7 @@ from ..solvers.status import OPTIMAL
 from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
 from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
 from .boxes import boxes, stay_inside
-from .command import HOLD, NOTHING, NOWHERE, PLANNED, SOFT, Command
+from .command import HOLD, NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
 from .controller import Controller
 from .deviation import Deviation
@@ -83,7 +83,8 @@ class ComputedTorque(Controller):
     patience
         Time for which the sensor of a cable may report no tension, although one is commanded, until the cable is
         treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again once
-        its sensor reports a tension. Cables of fixed length are never treated as cut.
+        its sensor reports a tension. Cables of fixed length are never treated as cut. If no sensor reports a tension,
+        the sensors are treated as failed: the commands replace their readings, with the status "soft wrench".
     tension_loop
         Bandwidth of a loop on measured tensions [rad/s], for winches that do not deliver the commanded tensions: the
         command is corrected until the sensors report the desired tensions, inside the limits of tensions and rates.
@@ -237,7 +238,7 @@ class ComputedTorque(Controller):
             if self._paused:
                 self._platform["integrates"] = 1
             self._paused = False
-            simple = self._is_plain and self._is_one and not self._has_cut
+            simple = self._is_plain and self._is_one and not self._is_missing
             if simple and not self._deviation.is_far(*self._poses):  # the rest, at a fifth of the time
                 tensions = problems.tensions[0].copy()
                 self._last = tensions.tobytes()
@@ -300,7 +301,7 @@ class ComputedTorque(Controller):
             memory = otherwise, self._platform["disturbance"], self._accelerations
             late = self._sent_lately.move_on(age, self._measured, *memory)
             done = control_step(dt, since, self._problems.length, solves, None, None, *own, late, *self._arrays)
-        self._has_cut, self._optimal = done[0] > 0, done[1]
+        self._is_missing, self._optimal = done[0] > 0, done[1]  # whether cables or their sensors are missing
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
 
@@ -314,8 +315,10 @@ class ComputedTorque(Controller):
     ) -> Command:
         """Return the command from tensions (N, m) and the reference of carriers that do not compensate or fly."""
         carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
-        if self._has_cut:
+        if self._is_missing:
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
+            unheard = (self._platform["silent"] > 1) & ((answered == PLANNED) | (answered == SHIFTED))
+            answered = np.where(unheard, SOFT, answered).astype(np.int8)
         rows, self._cables["last"], self._last = len(tensions), tensions, tensions.tobytes()
         if self._moves_carriers:
             own = self._carriers.copy()

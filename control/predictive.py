@@ -21,7 +21,7 @@ from ..statics.distribution import tensions as tensions_at
 from .as_floats import as_floats
 from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_velocity
 from .carrier_references import Flown, Freed, Moved, Tethered
-from .command import HOLD, OTHERWISE, SHIFTED, Command
+from .command import HOLD, OTHERWISE, SHIFTED, SOFT, Command
 from .computed_torque import ComputedTorque
 from .hand_over import agree
 from .keep_out import Surroundings
@@ -31,13 +31,12 @@ from .reference import Reference
 from .settings import reach_of, set_reach
 from .stability import grows
 from .state import State
-from .watch import LATE, UNSTABLE, HandOver, Watch
+from .watch import BLIND, LATE, QUICK, UNSTABLE, HandOver, Watch
 from .weights import ripple, terminal, weights
 
 TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
-NEARLY = 0.1  # residuals of an iterate with which the next step begins, though it is not used
-GOOD = 1e-3  # residuals of a solution that did not converge and is used all the same
+NEARLY, GOOD = 0.1, 1e-3  # residuals, not converged, of an iterate for the next step to begin with, and of one to use
 USUAL_REACH = 0.06  # of the cables' mean length
 LEAST_REACH = 0.02  # the same for cables of fixed length: with less, errors of the load are not corrected
 FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
@@ -169,9 +168,9 @@ class Predictive(ComputedTorque):
         self._horizon = self._program(reaches, returning)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
         usual = self.robot.force_scale / self.robot.platform.mass
-        rates = 2 * self._bandwidth + float(self._settings["observer"])
         noise = noise_of_velocity(self.robot, sensors)
-        self._watch = Watch(scale, usual, noise, None if correct else ripple(self.robot, self._limits, rates))
+        loud = None if correct else ripple(self.robot, self._limits, 2 * self._bandwidth + self._settings["observer"])
+        self._watch = Watch(scale, usual, noise, loud, BLIND if self._has_winches else QUICK)
         self._from_the_start: HandOver | None = None
         self.handed_over: HandOver | None
         self.reset()
@@ -270,14 +269,16 @@ class Predictive(ComputedTorque):
             tensions = self._sent(beside.tensions[None])[0]
             return beside._replace(tensions=tensions, answered=answered, unexplained=unexplained)
         tensions, proof = self._predict(time, dt, reference), self._nowhere
+        instead = np.reshape(beside.answered, 1), (beside.direction[None], np.reshape(beside.shortfall, 1))
         if tensions is None:
-            tensions, answered = beside.tensions[None], np.reshape(beside.answered, 1)
+            tensions, (answered, proof) = beside.tensions[None], instead
             if np.isfinite(self._problems.w).all():
                 self._watch.interrupt()
             else:
                 self._watch.skip(dt, tensions[0] - self._cables["last"][0] if self._has_winches else 0 * tensions[0])
             self._moved.rest(self._steps[0], self._carriers[0])
-            proof = beside.direction[None], np.reshape(beside.shortfall, 1)
+        elif self._is_missing and beside.answered == SOFT:  # the program has a solution even without cables
+            answered, proof = instead
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         command = self._command(reference, tensions, answered, proof, alone=True)

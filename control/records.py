@@ -30,7 +30,12 @@ CABLE = np.dtype(
     ]
 )
 PLATFORM = np.dtype(
-    [*((name, "f8", 6) for name in ("integral", "disturbance", "explained")), ("attitude", "f8"), ("integrates", "i8")]
+    [
+        *((name, "f8", 6) for name in ("integral", "disturbance", "explained")),
+        ("attitude", "f8"),
+        ("integrates", "i8"),
+        ("silent", "i8"),
+    ]
 )
 CARRIER = np.dtype(
     [

@@ -3,6 +3,7 @@
 from collections import deque
 from math import sqrt
 from typing import NamedTuple
+from warnings import warn
 
 import numpy as np
 
@@ -13,6 +14,7 @@ UNSTABLE = (
 LATE = "carriers turn so late that their attitude loop is nearly unstable"
 LOUD = "noise of the measured rates requires more than the tension limits permit: lower bandwidth and observer"
 WINDOW, PAUSE = 0.05, 0.09  # [s]: in which a motion is compared, at least, and at most between two steps
+BLIND, UNCHECKED = 0.015, 0.5  # [s], at most: without a state, and without a comparison
 QUICK, LONG = 0.01, 0.1  # [s]: noise is quicker than what tensions correct, and how long it is heard
 OFTEN = 2.0  # standard deviations of noise have room: one command in twenty is cut off
 SMOOTH, MEAN = 0.005, 0.04  # [s], of the difference, against noise, and of the mean of its size
@@ -33,7 +35,8 @@ class Watch:
     Over the last `WINDOW` the velocity should change by the integral of the model's accelerations for the measured
     state, estimated disturbance and command of each step. The mean difference over the window is the unexplained
     acceleration. New plans and jumps of the reference do not contribute, because they act through the commands. Steps
-    that are further apart than `PAUSE` are not compared, nor those before and after more than `QUICK` without a state.
+    that are further apart than `PAUSE` are not compared, nor those before and after more than `blind` without a state.
+    If nothing was compared for longer than `UNCHECKED`, a warning is given once.
 
     - `scale`: factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for
       locked coordinates.
@@ -44,10 +47,19 @@ class Watch:
     - `ripple`: tensions commanded for unit rates of the pose, relative to the distance of tensions from their limits,
       (m, 6) [s/m, s/rad]. The limits clip the effect of rate noise, more on one side than on the other, so `OFTEN`
       standard deviations beyond the limits are a reason to hand over. Default: noise is ignored.
+    - `blind`: largest time without a state that is bridged by predictions [s]; less for cables of fixed length, whose
+      tensions change as carriers turn.
     """
 
-    def __init__(self, scale: np.ndarray, usual: float, noise: float = 0.0, ripple: np.ndarray | None = None):
-        self._scale = scale
+    def __init__(
+        self,
+        scale: np.ndarray,
+        usual: float,
+        noise: float = 0.0,
+        ripple: np.ndarray | None = None,
+        blind: float = BLIND,
+    ):
+        self._scale, self._blind = scale, blind
         self._bound = BOUND * usual + sqrt(2) * noise / WINDOW
         self._ripple = None if ripple is None else (OFTEN * ripple) ** 2
         self.reset()
@@ -57,12 +69,13 @@ class Watch:
         self.unexplained = 0.0  # mean acceleration [m/s^2]
         self._noise = np.zeros(6)  # variance of the rates
         self._solved = np.inf  # time of the last solution [s]
+        self._checked: float | None = None  # time of the last comparison, or of the first step [s]; inf after a warning
+        self._unseen = 0.0  # [s], without a measured state
         self.interrupt()
 
     def interrupt(self) -> None:
         """Forget all steps except the time without a solution: the robot was not controlled, or not measured."""
         self._left: deque[tuple[float, np.ndarray]] = deque()  # times, and velocities less what explains them
-        self._unseen = 0.0  # [s], without a measured state
         self._explained, self._off = np.zeros(6), np.zeros(6)
         self._acceleration: np.ndarray | None = None
         self._trend: np.ndarray | None = None
@@ -82,7 +95,7 @@ class Watch:
         `change` is the difference of the current command from the last one, (m,) [N].
         """
         self._unseen += dt
-        if self._acceleration is None or self._unseen > QUICK:
+        if self._acceleration is None or self._unseen > self._blind * (1 + EARLY):
             self.interrupt()
         else:
             self._explained += dt * self._acceleration
@@ -93,15 +106,15 @@ class Watch:
 
         `otherwise` are the measured differences from the commanded tensions since the last step, (m,) [N].
         """
+        gap, self._unseen = self._unseen + dt, 0.0  # since the last state
         if dt > WINDOW:
             self._solved = max(self._solved, time)
-        self._unseen = 0.0
         if self._acceleration is None or dt > PAUSE:
             self.interrupt()
         else:
             self._explained += dt * (self._acceleration + KNOWN * (self._by_tensions @ otherwise))
         left, steps = rate - self._explained, self._left
-        if self._ripple is not None and self._is_loud(self._ripple, dt, left):
+        if self._ripple is not None and self._is_loud(self._ripple, gap, left):
             return HandOver(time, LOUD)
         left = self._scale * left
         steps.append((time, left))
@@ -111,8 +124,18 @@ class Watch:
         if time - self._solved > WINDOW:
             self._add(dt, self._bound / BOUND)
         elif since >= WINDOW * (1 - EARLY):
-            self._off += min(dt / SMOOTH, 1.0) * (left - steps[0][1] - self._off)
-            self._add(dt, sqrt(self._off @ self._off) / since)
+            self._off += min(gap / SMOOTH, 1.0) * (left - steps[0][1] - self._off)
+            self._add(gap, sqrt(self._off @ self._off) / since)
+            self._checked = time
+        elif self._checked is None:
+            self._checked = time
+        elif time - self._checked > UNCHECKED:
+            warn(
+                f"the motion was not compared with the model of Predictive for {time - self._checked:.2g} s: steps "
+                f"must be at most {PAUSE:g} s apart, and states may be missing for at most {self._blind:g} s",
+                stacklevel=2,
+            )
+            self._checked = np.inf
         if self.unexplained <= self._bound:
             return None
         return HandOver(time, f"{self.unexplained:.2g} m/s^2 of its acceleration are not as predicted")

@@ -103,10 +103,10 @@ def test_noise_is_no_reason_to_report_that_carriers_are_at_their_limits(name):
 
 
 class Blind(Controller):
-    """A controller whose sensors fail in the last `steps` of every 30 steps."""
+    """A controller whose sensors fail in the last `steps` of each so many steps."""
 
-    def __init__(self, controller, steps):
-        self.controller, self.steps, self.count = controller, steps, 0
+    def __init__(self, controller, steps, each=30):
+        self.controller, self.steps, self.each, self.count = controller, steps, each, 0
 
     def reset(self):
         self.controller.reset()
@@ -116,17 +116,20 @@ class Blind(Controller):
 
     def step(self, time, state, reference):
         self.count += 1
-        if self.count % 30 >= 30 - self.steps:
+        if self.count % self.each >= self.each - self.steps:
             state = state._replace(pose=np.full(6, np.nan))
         return self.controller.step(time, state, reference)
 
 
-@pytest.mark.parametrize(("period", "blind"), [(1e-3, 1), (1e-3, 5), (0.06, 0), (0.08, 0)])
+@pytest.mark.parametrize(
+    ("period", "blind", "each"),
+    [(1e-3, 1, 30), (1e-3, 5, 30), (1e-3, 15, 60), (5e-3, 3, 8), (0.01, 1, 4), (0.06, 0, 30), (0.08, 0, 30)],
+)
 @pytest.mark.parametrize("what", ["nothing", "cut 1 at 0.2", "push 49 0 0 at 0.2"])
-def test_predictions_are_compared_with_rare_states_and_between_failures_of_sensors(period, blind, what):
+def test_predictions_are_compared_with_rare_states_and_between_failures_of_sensors(period, blind, each, what):
     robot = load("wang-ctmrts")
     controller, events = Predictive(robot), [] if what == "nothing" else [what]
-    run = simulate(robot, robot.home, Blind(controller, blind), period=period, duration=0.6, events=events)
+    run = simulate(robot, robot.home, Blind(controller, blind, each), period=period, duration=0.6, events=events)
     if what == "nothing":
         assert controller.handed_over is None
         return
@@ -134,3 +137,76 @@ def test_predictions_are_compared_with_rare_states_and_between_failures_of_senso
     assert controller.handed_over.time < 0.2 + 0.25
     silent = np.isin(run.record.answered[: run.lasted], [PLANNED, ANSWERS.index("shifted plan")])
     assert run.error[: run.lasted][silent].max() < 0.025
+
+
+@pytest.mark.parametrize(("period", "blind"), [(0.1, 0), (0.02, 1)])
+def test_motions_that_are_not_compared_with_the_model_are_warned_of_once(period, blind):
+    robot = load("cogiro")
+    with pytest.warns(UserWarning, match="the motion was not compared with the model of Predictive for 0.") as warned:
+        simulate(robot, robot.home, Blind(Predictive(robot), blind, 3), period=period, duration=2.0)
+    assert len(warned) == 1
+
+
+class Sensed(Controller):
+    """A controller whose tension sensors report a number from 0.1 s to 0.4 s, all of them or those of some cables."""
+
+    def __init__(self, controller, reported, cables=slice(None)):
+        self.controller, self.reported, self.cables, self.drive = controller, reported, cables, controller.drive
+
+    def reset(self):
+        self.controller.reset()
+
+    def follow(self, *coming):
+        self.controller.follow(*coming)
+
+    def step(self, time, state, reference):
+        if 0.1 <= time < 0.4:
+            pulls = np.array(state.tensions)
+            pulls[self.cables] = self.reported
+            state = state._replace(tensions=pulls)
+        return self.controller.step(time, state, reference)
+
+
+@pytest.mark.parametrize("make", [ComputedTorque, Predictive])
+@pytest.mark.parametrize("name", ["cogiro", "wang-flying", "wang-ctmrts"])
+@pytest.mark.parametrize("reported", [-1.0, 0.0])
+def test_a_robot_is_held_while_all_tension_sensors_fail_which_is_reported_at_once(make, name, reported):
+    """Its cables pull all the time, so that it moves as with sensors that work."""
+    robot = load(name)
+    usual = simulate(robot, robot.home, make(robot), duration=0.6)
+    run = simulate(robot, robot.home, Sensed(make(robot), reported), duration=0.6)
+    soft = np.flatnonzero(run.record.answered[: run.lasted] != PLANNED)
+    np.testing.assert_array_equal(soft, np.arange(101, 400))  # one reading may be that before the first command
+    assert set(run.record.answered[soft].tolist()) == {ANSWERS.index("soft wrench")}
+    np.testing.assert_allclose(run.record.motions[:, 0, :3], usual.record.motions[:, 0, :3], atol=2e-5)
+
+
+@pytest.mark.parametrize("make", [ComputedTorque, Predictive])
+@pytest.mark.parametrize("name", ["cogiro", "wang-flying"])
+def test_sensors_of_all_cables_but_one_that_fail_are_reported_before_the_load_falls(make, name):
+    """These cables are treated as cut, and the last one cannot hold the platform."""
+    robot = load(name)
+    run = simulate(robot, robot.home, Sensed(make(robot), -1.0, slice(1, None)), duration=0.3)
+    silent = np.isin(run.record.answered[: run.lasted], [PLANNED, ANSWERS.index("shifted plan")])
+    assert run.error[: run.lasted][silent].max() < 3e-3
+    assert run.error.max() > 0.05
+
+
+def test_failed_sensors_of_one_robot_of_a_batch_change_no_other_row():
+    robot = load("cogiro")
+    one, many = ComputedTorque(robot), ComputedTorque(robot)
+    still, pull = np.zeros_like(robot.carrier_home), np.full(robot.m, 300.0)
+    reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, pull)
+    rows = np.stack([pull, 0 * pull])
+    for k in range(3):
+        alone = one.step(0.01 * k, State(robot.home, np.zeros(6), robot.carrier_home, still, rows[0]), reference)
+        both = many.step(
+            0.01 * k,
+            State(*(np.stack([part, part]) for part in (robot.home, np.zeros(6), robot.carrier_home, still)), rows),
+            reference,
+        )
+        rows = both.tensions.copy()
+        rows[1] = 0.0
+        np.testing.assert_allclose(both.tensions[0], alone.tensions, rtol=1e-12)
+        assert both.answered[0] == alone.answered
+    assert both.answered[1] == ANSWERS.index("soft wrench")

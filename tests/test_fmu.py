@@ -334,3 +334,22 @@ def test_wrong_options_are_refused_in_one_line(options, said, tmp_path):
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_a_controller_whose_tension_sensors_fail_holds_the_robot_and_says_so(unit):
+    plant, controller = unit("cogiro", "plant"), unit("cogiro", "controller")
+    sensors = [name for name in controller.names("input") if not name.startswith("reference.")]
+    tensions = [name for name in sensors if name.endswith("mean_tension")]
+    orders = [name for name in plant.names("input") if name in controller.names("output")]
+    assert len(tensions) == 8
+    before, answered = plant.get(motion("platform", "pose")), []
+    for k in range(300):
+        controller.set(sensors, plant.get(sensors))
+        if 100 <= k < 200:
+            controller.set(tensions, [-1.0] * 8)
+        controller.step(k * STEP, STEP)
+        answered.append(controller.get(["answered"])[0])
+        plant.set(orders, controller.get(orders))
+        plant.step(k * STEP, STEP)
+    np.testing.assert_array_equal(answered, [0] * 101 + [2] * 99 + [0] * 100)
+    assert np.abs(plant.get(motion("platform", "pose")) - before).max() < 1e-4

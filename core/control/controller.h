@@ -52,6 +52,7 @@ typedef struct {
     double explained[6];   /* momentum less what the estimate explains */
     double attitude;       /* bandwidth with which flying carriers turn [rad/s] */
     int64_t integrates;    /* 1: the integral goes on */
+    int64_t silent;        /* steps in which tensions were commanded and no sensor reported one; from 2 on it matters */
 } towline_platform_memory;
 
 /* What is remembered of a carrier. */

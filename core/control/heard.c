@@ -3,6 +3,9 @@
  *
  * A cable is taken for cut once it reports less than LITTLE of what it is commanded, which takes the patience if it
  * reports nothing. It is trusted again once it reports ENOUGH of the little that it is commanded then.
+ *
+ * Where no cable reports a tension, the sensors are taken for lost, not all cables, without which nothing could be
+ * controlled: the commands take the place of the reports.
  */
 #include "control/internal.h"
 #include "control/usable.h"
@@ -43,8 +46,26 @@ static void learn(double share, towline_cable_memory *cable) {
     cable->known = cable->measured - cable->excess;
 }
 
-void towline_write_bounds(const towline_robot *robot, const towline_controller *controller, double dt,
-                          towline_cable_memory *cables, double *low, double *high) {
+/* Return whether tensions are commanded and no sensor reports one. */
+static int are_silent(const towline_robot *robot, const towline_controller *controller,
+                      const towline_cable_memory *cables) {
+    int commanded = 0;
+    for (int i = 0; i < robot->cables; i++) {
+        const towline_cable_memory *cable = &cables[i];
+        if (!(cable->measured <= LITTLE * fmax(cable->then, 0))) {
+            return 0; /* also where a report is no number */
+        }
+        commanded |= cable->then >= SOMETHING * controller->limits[i].high;
+    }
+    return commanded;
+}
+
+int towline_write_bounds(const towline_robot *robot, const towline_controller *controller, double dt,
+                         towline_cable_memory *cables, double *low, double *high) {
+    const int silent = are_silent(robot, controller, cables);
+    for (int i = 0; silent && i < robot->cables; i++) {
+        cables[i].measured = cables[i].then;
+    }
     for (int i = 0; i < robot->cables; i++) {
         const towline_limits *limits = &controller->limits[i];
         towline_cable_memory *cable = &cables[i];
@@ -62,4 +83,5 @@ void towline_write_bounds(const towline_robot *robot, const towline_controller *
             high[i] = fmax(fmin(limits->high, cable->last + step), limits->low);
         }
     }
+    return silent;
 }

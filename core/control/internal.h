@@ -5,9 +5,12 @@
 #include "control/configuration.h"
 #include "control/control.h"
 
-/* heard.c: update what is known of all cables, and write the bounds of their tensions. */
-void towline_write_bounds(const towline_robot *robot, const towline_controller *controller, double dt,
-                          towline_cable_memory *cables, double *low, double *high);
+/*
+ * heard.c: update what is known of all cables, write the bounds of their tensions, and return whether tensions are
+ * commanded and no sensor reports one.
+ */
+int towline_write_bounds(const towline_robot *robot, const towline_controller *controller, double dt,
+                         towline_cable_memory *cables, double *low, double *high);
 
 /* compensation.c: update how far carriers are off their reference to give a `missing` wrench (6), and order it. */
 void towline_compensate(const towline_robot *robot, const towline_controller *controller, double dt,

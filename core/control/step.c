@@ -95,7 +95,8 @@ void towline_write_problem(const towline_robot *robot, const towline_controller 
                            towline_row row) {
     configuration at;
     double wanted[6];
-    towline_write_bounds(robot, controller, dt, row.cables, row.low, row.high);
+    const int silent = towline_write_bounds(robot, controller, dt, row.cables, row.low, row.high);
+    row.platform->silent = silent ? row.platform->silent + 1 : 0;
     if (!is_usable(robot, &row)) {
         for (int k = 0; k < 6; k++) {
             row.w[k] = NAN;

@@ -260,7 +260,7 @@ TOWLINE_PY(control_step) {
     enum { DT, SINCE, LENGTH, NUMBERS, SOLVES = NUMBERS, STATE, TAKEN, BEFORE };
     arrays given;
     double numbers[NUMBERS] = {0, 0, 0};
-    Py_ssize_t cut = 0, optimal = 0;
+    Py_ssize_t missing = 0, optimal = 0;
     if (count != BEFORE + STEP_ARRAYS) {
         PyErr_SetString(PyExc_TypeError, "the function takes three numbers, a flag, state, reference, and arrays");
         return NULL;
@@ -299,12 +299,15 @@ TOWLINE_PY(control_step) {
         optimal = solve_all(at, rows, robot->cables, numbers[LENGTH], solves > 1);
     }
     for (Py_ssize_t i = 0; i < rows * m; i++) {
-        cut += cables[i].is_cut != 0;
+        missing += cables[i].is_cut != 0;
         cables[i].last = optimal == rows ? at.tensions[i] : cables[i].last;
+    }
+    for (Py_ssize_t row = 0; row < rows; row++) {
+        missing += ((const towline_platform_memory *)(const void *)of[PLATFORM])[row].silent > 1;
     }
     Py_END_ALLOW_THREADS;
     release(&given);
-    return Py_BuildValue("(nn)", cut, optimal);
+    return Py_BuildValue("(nn)", missing, optimal);
 }
 
 TOWLINE_PY(control_thrusts) {

@@ -130,7 +130,7 @@ static void control(towline_unit *unit, double dt) {
         answered = lacking > unit->negligible && answered == PLANNED ? SOFT : answered;
     }
     stay_inside(unit);
-    unit->answered = answered;
+    unit->answered = unit->platform.silent > 1 && answered == PLANNED ? SOFT : answered;
 }
 
 /* ---- The plant. ---- */
