@@ -22,6 +22,7 @@ _SAME = 0.005  # relative change of a size that ends the search
 _SAMPLES = 2_000  # random poses of each requirement, besides its grid, at which a size is judged
 _LARGEST = 1e3  # times the required size
 _SMALLER = 0.5  # of a step of which the audit has found that it was too large
+_AT_ONCE = 1e-3  # [s] of a search after an interrupt: the robot's own layout is only audited
 _SPARE = 1.005  # of the margin: what is kept, since another audit may find a little less
 
 
@@ -66,14 +67,20 @@ def grow(variables: Variables, requirements: Requirements, progress: Progress) -
         size = before
         best = Grown(search(variables, grown(inner, size), of_all), grown(inner, size), size, before)
     if best is None or not _meets(best):
-        size = 1.0
-        best = Grown(search(variables, inner, of_all), inner, size, before)
+        size, stopped = 1.0, best is not None and best.found.stopped
+        shorter = inner.model_copy(update={"time_limit": _AT_ONCE}) if stopped else inner
+        best = Grown(search(variables, shorter, of_all), inner, size, before)
+        best.found.stopped |= stopped
         if not _meets(best):
             return best
     inner = inner.model_copy(update={"start": "robot"})
     share = 1.0
     while not best.found.stopped and time.perf_counter() < until:
-        holds = _largest(_holds(variables, inner, best.found.y), best.size)
+        try:
+            holds = _largest(_holds(variables, inner, best.found.y), best.size)
+        except KeyboardInterrupt:
+            best.found.stopped = True
+            break
         size = best.size + share * (max(holds, best.size * (1.0 + 2 * _SAME)) - best.size)
         if size < best.size * (1.0 + _SAME):
             break

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, InputError, TensionProblem, design, load, read_requirements
+from towline.layout import growth
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import goal_of
 from towline.layout.linear_programs import maximise
@@ -121,6 +122,40 @@ def test_a_layout_for_the_largest_boxes_keeps_the_margin_in_them():
     report = found.report()
     assert f"boxes {found.size:.2f} times as long and wide as required" in report
     assert found.to_dict()["size"] == found.size
+
+
+@pytest.mark.parametrize("call", [0, 2, 5])
+def test_an_interrupted_search_for_the_largest_boxes_keeps_the_best(call):
+    """Wherever it is: in the first search, which is for boxes that the layout may not hold, or in a later one."""
+    calls = []
+
+    def progress(what, share, margin):
+        calls.append(what)
+        if len(calls) == call + 1:
+            raise KeyboardInterrupt
+
+    options = {"maximise": "volume", "margin": 10.0, "time_limit": 1.0}
+    found = design(ROBOT, POINTS, REQUIRE, progress=progress, **options)
+    assert found.stopped
+    assert found.feasible
+    assert found.size >= 1.0
+    assert len(calls) <= call + 8  # no search begins again
+
+
+def test_an_interrupt_between_two_searches_keeps_the_best(monkeypatch):
+    sizes = []
+
+    def largest(holds, least):
+        sizes.append(least)
+        if len(sizes) == 2:
+            raise KeyboardInterrupt
+        return its(holds, least)
+
+    its = growth._largest
+    monkeypatch.setattr(growth, "_largest", largest)
+    found = design(ROBOT, POINTS, REQUIRE, maximise="volume", margin=10.0, time_limit=1.0)
+    assert found.stopped
+    assert found.feasible
 
 
 @pytest.mark.parametrize(
