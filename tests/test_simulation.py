@@ -1,5 +1,7 @@
 """Flights: plans flown by a controller, in wind, with sensors and faults; the same seed, the same flight."""
 
+import copy
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -529,3 +531,11 @@ def test_a_controller_of_a_robot_with_other_cables_is_refused_before_the_run(mak
             simulate("cogiro", load("cogiro").home, make("wang-flying"), duration=0.1, runs=runs)
     heavier = load("cogiro").model_copy(update={"name": "as-built"})  # the same cables: a model that differs
     assert simulate("cogiro", load("cogiro").home, make(heavier), duration=0.01).lasted == 10
+
+
+def test_a_plan_whose_dataset_was_changed_is_followed_as_changed(crane):
+    robot, changed = crane.scenario.robot, copy.copy(crane)
+    dataset = vars(changed)["trajectory"] = crane.trajectory.copy(deep=True)
+    dataset["pose"] = dataset["pose"] + np.array([0.1, 0, 0, 0, 0, 0])
+    (before, _), (after, _) = (read_trajectory(robot, one, None).at(np.linspace(0, 1, 5)) for one in (crane, changed))
+    np.testing.assert_allclose(after[0] - before[0], np.tile([0.1, 0, 0, 0, 0, 0], (5, 1)), atol=1e-9)
