@@ -27,6 +27,8 @@ DOUBTS = {  # by the status of a plan
     "infeasible": "a plan that is infeasible: no motion of its task keeps every limit",
     "not-found": "a plan that breaks a limit: no feasible one was found",
 }
+GROUND = "a plan with phases on the ground, which simulations do not have: the cables bear everything"
+LITTLE = 1e-3  # of the robot's forces: less is no reaction of the ground
 SHORTEST = 1e-9  # between two samples [s]
 _PARTS = ("pose", "velocity", "acceleration")
 
@@ -155,6 +157,8 @@ def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
     wind = None if air is None or robot.platform.aero is None else finite_array("reference.wind", air, (3,))
     keep_out = outlines_from(samples, "reference")
     doubt, loads = DOUBTS.get(str(samples.attributes.get("status")), ""), _loads_of(samples, read)
+    if samples.get("ground_reaction") and read("ground_reaction", (n,)).max() > LITTLE * robot.force_scale:
+        doubt = "; ".join(filter(None, [doubt, GROUND]))
     planned = read("tensions", (n, m), gaps=True) if samples.get("tensions") else np.full((n, m), np.nan)
     known = np.isfinite(planned).all(axis=1)
     if not known.any():

@@ -388,3 +388,15 @@ def test_loads_of_robots_of_each_drive_have_the_wrench_of_the_symbolic_model(nam
         np.testing.assert_allclose(given_by, needed, atol=1e-4 * robot.weight)
     many = simulate(robot, robot.home, runs=3, **given)
     np.testing.assert_allclose(many["error_max"].values, run.error.max(), rtol=1e-9)
+
+
+def test_a_plan_that_rests_on_the_ground_is_no_silent_reference():
+    """Its cables would bear less with the ground than in a simulation without one."""
+    robot = load("cogiro")
+    line = {"kind": "line", "start": robot.home[:3].tolist(), "end": (robot.home[:3] + np.array([0, 0, 0.3])).tolist()}
+    rest = {"name": "rest", "path": {"kind": "rest", "pose": robot.home.tolist()}, "duration": 0.5, "ground": {}}
+    found = plan(robot, {"phases": [rest, {"name": "up", "duration": 1.5, "path": line}]})
+    assert found.trajectory["ground_reaction"].max() > 0.1 * robot.weight
+    assert "a plan with phases on the ground, which simulations do not have" in simulate(robot, found).report()
+    above = plan(robot, {"path": line, "duration": 1.5})
+    assert "ground" not in simulate(robot, above, duration=0.01).report()
