@@ -85,7 +85,7 @@ def calibrate(
     not converge, or validation samples fit worse than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
-    from ..estimation.calibration.correction import mended
+    from ..estimation.calibration.correction import correction_of
     from ..estimation.calibration.solving import usual
     from ..estimation.logs import read_log
     from ..figures.style import FORMATS
@@ -105,7 +105,7 @@ def calibrate(
     read = read_log(log, stated, poses, loaded, fields)
     measurements = read.measurements
     if fix:
-        loaded, measurements, texts, counted = mended(loaded, measurements)
+        loaded, measurements, texts, counted = correction_of(loaded, measurements)
         read.notes.extend(f"corrected: {text}" for text in texts)
         if counted and names is None:
             names = [*usual(loaded, measurements), "scales"]
@@ -114,7 +114,7 @@ def calibrate(
             typer.echo(f"  {note}")
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     text = result.report()  # before anything is written
-    # The encoders of the mended robot are right, whether or not other parameters improve it.
+    # The encoders of the corrected robot are right, whether or not other parameters improve it.
     kept = bool(result.refused) and result.means_something and loaded.cables != given.cables
     refused = None if kept else result.refused
     written = {} if refused else {"file": loaded.save(target) if kept else result.save(target)}

@@ -47,9 +47,8 @@ class LengthControl(Controller):
         their corrections with as much lead.
     proportional, integral
         P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 4 and 10 if
-        it is current, 0.3 and 2 up to 20 ms, less beyond. For a late pose
-        without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the platform
-        on its cables grow.
+        it is current, 0.3 and 2 up to 20 ms, less beyond. For a late pose without its `time` of measurement, give the
+        gains for its age: with larger ones, oscillations of the platform on its cables grow.
     most
         Largest correction of a length [m]; default: 5 % of the robot's length. There the integral stops, and the
         status is "hold".

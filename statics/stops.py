@@ -75,7 +75,7 @@ class Stop(Displayed):
     limit
         Of a team of flying carriers: the limit that the stop breaks most, its value and time; empty if it breaks none.
     load
-        What the platform carries as the stop begins, and until the robot rests; None for nothing.
+        Load of the platform from the beginning of the stop until the robot rests; default: no load.
     """
 
     robot: Robot

@@ -352,7 +352,7 @@ def test_neighbours_that_are_alike_make_parameters_less_certain():
     independent = calibrate("cogiro", Measurements(built.readings + drift[mixed], built.poses))
     assert smooth.noise == pytest.approx(independent.noise, rel=0.02)
     assert smooth.noise > 3e-3
-    assert independent.alike == 1
+    assert independent.autocorrelation == 1
     assert not smooth.slips
     assert not independent.slips
 
@@ -363,7 +363,7 @@ def test_readings_taken_four_times_are_as_good_as_one():
     for seed in range(6):
         built = as_built(400, seed)
         again = Measurements(np.repeat(built.readings, 4, axis=0), np.repeat(built.poses, 4, axis=0))
-        ratios.append(calibrate("cogiro", again, outliers=False).alike)
+        ratios.append(calibrate("cogiro", again, outliers=False).autocorrelation)
     assert np.mean(ratios) == pytest.approx(4, rel=0.045)
 
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import Dynamics, load, read_measurements
 from towline.estimation.calibration import Measurements, calibrate
-from towline.estimation.calibration.correction import mended
+from towline.estimation.calibration.correction import correction_of
 from towline.estimation.logs.names import role, time_unit
 
 from . import user_recordings as user
@@ -76,7 +76,7 @@ def test_drums_that_turn_the_other_way(signs, tmp_path):
 def test_readings_of_any_size_and_order(columns, units, tmp_path):
     path, _ = drum_angles(tmp_path)
     robot, read = load(path), read_measurements(tmp_path / "angles.csv", robot=path)
-    found = mended(robot, read.with_lengths((read.lengths * RADIUS / units)[:, np.argsort(columns)]))
+    found = correction_of(robot, read.with_lengths((read.lengths * RADIUS / units)[:, np.argsort(columns)]))
     assert len(found.texts) == 1
     np.testing.assert_allclose([one.encoder.scale for one in found.robot.cables], units, rtol=0.017)
     np.testing.assert_allclose(found.measurements.lengths, read.lengths * RADIUS / units, rtol=1e-9)
@@ -108,7 +108,7 @@ def test_signs_and_units_become_encoders(tmp_path):
     robot = load(user.hanging_robot(tmp_path))
     read = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "mocap.csv", robot=robot)
     log = read.with_lengths(1e3 * read.lengths * [1, -1, 1, 1])
-    found = mended(robot, log)
+    found = correction_of(robot, log)
     assert not found.counted  # millimetres are exact
     assert found.measurements is not log
     np.testing.assert_allclose(found.measurements.lengths, log.lengths)

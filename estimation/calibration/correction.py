@@ -1,4 +1,4 @@
-"""`corrected`, `mended`: a log and its robot without the probable input errors of the log."""
+"""`corrected`, `correction_of`: a log and its robot without the probable input errors of the log."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from .plausibility import mistake
 MOST_MISTAKES = 3
 
 
-class Mended(NamedTuple):
+class Correction(NamedTuple):
     """A log and its robot without the probable input errors of the log.
 
     Attributes
@@ -45,13 +45,13 @@ def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, l
     InputError
         If the measurements have another number of cables, or several errors are equally probable.
     """
-    found = mended(robot, measurements)
+    found = correction_of(robot, measurements)
     first, last = (Parameters(one, ()).table(Parameters(one, ()).first)[:, 7] for one in (as_robot(robot), found.robot))
     lengths = found.measurements.lengths * (last / first)
     return (found.measurements.with_lengths(lengths) if found.texts else measurements), found.texts
 
 
-def mended(robot: Robot, measurements: Measurements) -> Mended:
+def correction_of(robot: Robot, measurements: Measurements) -> Correction:
     """Return a log and its robot without the probable input errors of the log; raise InputError as `corrected`."""
     robot, texts, counted = as_robot(robot), list[str](), False
     for _ in range(MOST_MISTAKES):
@@ -65,7 +65,7 @@ def mended(robot: Robot, measurements: Measurements) -> Mended:
         counted |= not set(np.abs(sizes).tolist()) <= {1.0, *FACTORS}
         measurements = found.corrected.with_lengths(found.corrected.lengths / sizes)
         robot = _scaled(robot, sizes)
-    return Mended(robot, measurements, texts, counted)
+    return Correction(robot, measurements, texts, counted)
 
 
 def _scaled(robot: Robot, factors: np.ndarray) -> Robot:

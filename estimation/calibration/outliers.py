@@ -29,7 +29,7 @@ NEARLY = 0.3  # of the clearest slip's statistic, of another cable's that may be
 MOST_CANDIDATES = 3
 WINDOW = 25  # samples on each side, over which a slip must be visible as a step
 VISIBLE = 0.5  # share of it that must be
-BLOCKS = 25  # of the record, of at least so many samples each, to see whether residuals are alike
+BLOCKS = 25  # of the record, of at least so many samples each, to see whether residuals are autocorrelated
 SHORTEST_BLOCK = 8
 UNBALANCED = 1 - 1e-7  # share of sound samples whose forces are in better balance than those that are left out
 BY_CHANCE = 0.3  # of which the ratio of variances may exceed 1 where residuals are independent
@@ -83,7 +83,7 @@ def project(model: Model, state: State) -> _Projected:
     return _Projected(residuals.readings, redundancy, derivatives, scale, equations, root)
 
 
-def alike(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
+def autocorrelation(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
     """Return the factor by which autocorrelation increases the variances of the parameters; at least 1.
 
     With g_b the sum of J'e over block b of the record, the parameters have the covariance S^-1 (sum g_b g_b') S^-1 for

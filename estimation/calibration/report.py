@@ -111,10 +111,10 @@ def _of_noise(result: CalibrationData) -> list[str]:
             f"the platform turns by {by}, which moves its attachments by {_mm(turns.shift)}: errors of the model may "
             "look like displaced attachments; turn it farther, or leave them out of --free"
         )
-    if result.alike > 1:
+    if result.autocorrelation > 1:
         lines.append(
             "residuals are autocorrelated, because the model is incomplete: the standard deviations "
-            f"below are multiplied by {quantity(result.alike**0.5, digits=2)}"
+            f"below are multiplied by {quantity(result.autocorrelation**0.5, digits=2)}"
         )
     return lines
 

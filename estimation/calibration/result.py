@@ -163,7 +163,7 @@ class CalibrationData(Displayed):
         """Return the covariance of the parameters, (p, p), in their order and units.
 
         It is zero along unobservable directions. It is scaled up if residuals are larger than stated or autocorrelated
-        (`noise`, `alike`).
+        (`noise`, `autocorrelation`).
         """
         return covariance_of(self._solved) * self._inflation
 
@@ -171,7 +171,7 @@ class CalibrationData(Displayed):
     def information(self) -> np.ndarray:
         """Return the information about the parameters, priors included, with parameters as lengths, (p, p) [1/m^2].
 
-        It is the pseudo-inverse of the covariance, factors `noise` and `alike` included.
+        It is the pseudo-inverse of the covariance, factors `noise` and `autocorrelation` included.
         """
         return self._solved.observability.information / self._inflation
 
@@ -194,7 +194,7 @@ class CalibrationData(Displayed):
         return self._solved.model.measurements.sigma.lengths
 
     @property
-    def alike(self) -> float:
+    def autocorrelation(self) -> float:
         """Return the factor of the covariance for autocorrelated residuals; 1 if they are independent."""
         return self._noise[1]
 
@@ -295,7 +295,7 @@ class CalibrationData(Displayed):
             "residual_before": self.residual_before,
             "residual_after": self.residual_after,
             "noise": self.noise,
-            "alike": self.alike,
+            "autocorrelation": self.autocorrelation,
             "clock": self.clock if "clock" in self.free else None,
             "parameters": [
                 {**parameter._asdict(), "sigma": parameter.sigma if np.isfinite(parameter.sigma) else None}

@@ -17,7 +17,7 @@ from .fit import Fit, fit
 from .model import Model, State
 from .normal_equations import metric
 from .observability import Observability
-from .outliers import LEAST_THRESHOLD, Outlier, Slip, alike, find_outliers, find_slips, find_unbalanced
+from .outliers import LEAST_THRESHOLD, Outlier, Slip, autocorrelation, find_outliers, find_slips, find_unbalanced
 from .parameters import IN_BALANCE, OF_ROBOT, Parameters
 from .pose_noise import observed
 from .sightings import sighted
@@ -232,7 +232,7 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
 
 
 def noise_of(solved: Solved) -> tuple[float, float, int]:
-    """Return the ratio of residuals to their sigmas, the factor `alike`, and the redundancy.
+    """Return the ratio of residuals to their sigmas, the factor `autocorrelation`, and the redundancy.
 
     The first is the square root of the sum of squares over the redundancy: number of readings minus number of unknowns.
     """
@@ -249,7 +249,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     if redundancy <= 0:
         return np.nan, 1.0, redundancy
     excess = float(np.sqrt(solved.fit.cost / redundancy))
-    return excess, alike(model, state, solved.observability.inverse, found, excess), redundancy
+    return excess, autocorrelation(model, state, solved.observability.inverse, found, excess), redundancy
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
@@ -268,8 +268,8 @@ def lengths_of(model: Model, state: State) -> np.ndarray:
 
 def inflation_of(noise: tuple[float, float, int]) -> float:
     """Return the factor of the covariance, from `noise_of`: for residuals larger than stated, or autocorrelated."""
-    excess, alike, _ = noise
-    return (excess**2 if excess > 1 + EXCEEDS else 1.0) * alike if np.isfinite(excess) else 1.0
+    excess, autocorrelation, _ = noise
+    return (excess**2 if excess > 1 + EXCEEDS else 1.0) * autocorrelation if np.isfinite(excess) else 1.0
 
 
 def covariance_of(solved: Solved) -> np.ndarray:

@@ -108,7 +108,8 @@ class Limit(ABC):
     def on_the_way(self, first: State, second: State) -> ca.SX | None:
         """Return the smallest values while all points move straight from one instant to another, (k, 1).
 
-        Where a step may jump over a region, the program limits these, not the values at its nodes; default: not known.
+        The program limits these values where a step may jump over a region. By default there are none, and it limits
+        those at its nodes.
         """
         return None
 
