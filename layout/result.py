@@ -209,24 +209,31 @@ class Design(Drawn, Reported, Displayed):
         return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
 
     def figures(self) -> dict[str, Figure]:
-        """Draw the robot `before` and `after` the design, by these names; nothing if no pose limits the margin.
+        """Draw the robot `before` and `after` the design, by these names.
 
-        Both are at the pose that limits the margin most or, if the requirements are impossible, `before` is at the
-        impossible pose.
+        Both are at the pose that limits the margin most, or at home if there is none. If the requirements are
+        impossible, only `before` is drawn, at the impossible pose.
         """
-        one = self.impossibility or next(iter(self.reasons.binding if self.reasons else ()), None)
-        if one is None:
-            return {}
+        one, still = self._limiting, np.zeros(6)
         drawn = {}
         for name, robot in {"before": self.before, "after": self.robot}.items():
             if name == "before" or not self.impossibility:
-                problem = wrench_problem(robot, dynamics_of(robot).wrench_matrix(one.pose), one.wrench)
-                shown = scene_at(robot, one.pose, solve(problem).tensions, f"{self.before.name}, {name}")
+                dynamics = dynamics_of(robot)
+                pose = robot.home if one is None else np.asarray(one.pose)
+                wrench = dynamics.required_wrench(pose, still, still) if one is None else one.wrench
+                problem = wrench_problem(robot, dynamics.wrench_matrix(pose), wrench)
+                shown = scene_at(robot, pose, solve(problem).tensions, f"{self.before.name}, {name}")
                 drawn[name] = draw(shown)
         return drawn
 
+    @property
+    def _limiting(self) -> Impossibility | Binding | None:
+        """Return what has the pose that is impossible, or that limits the margin most."""
+        return self.impossibility or next(iter(self.reasons.binding if self.reasons else ()), None)
+
     def _drawings(self) -> list[Drawing]:
-        where = "at the impossible pose" if self.impossibility else "at the pose that limits the margin most"
+        limiting = "at the pose that limits the margin most" if self._limiting else "at home"
+        where = "at the impossible pose" if self.impossibility else limiting
         figures = reversed(self.figures().items())  # what was found comes first
         return [Drawing(f"The robot {name} the design, {where}", figure) for name, figure in figures]
 

@@ -1,6 +1,7 @@
 """Designs of robots: better than published ones, inside their boxes, honest about what is impossible and what binds."""
 
 import json
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -106,6 +107,9 @@ def test_the_report_names_what_binds(found, tmp_path):
     assert page.count("<img") + page.count("<svg") == 2  # the robot after and before
     assert "What a change would gain" in page
     assert [path.name for path in found.plot(tmp_path / "figures", "svg")] == ["before.svg", "after.svg"]
+    at_home = replace(found, reasons=None)  # as after a search that no pose limited
+    assert list(at_home.figures()) == ["before", "after"]
+    assert "The robot after the design, at home" in at_home.save_report(tmp_path / "home.html").read_text()
     robot = load("ipanema-2")
     for one in found.reasons.binding[:5]:  # the reserve along its direction is the margin
         A = Dynamics(found.robot).wrench_matrix(one.pose)
