@@ -121,8 +121,7 @@ class Limit(ABC):
         values
             (k, 1).
         shrink
-            Part of `scale` by which the bounds move inwards, if the limit `tightens`. It does not
-            change the values.
+            Part of `scale` by which the bounds move inwards, if the limit `tightens`. It does not change the values.
         """
         reserve = shrink * self.scale if self.tightens else 0.0
         return Rows(values / self.scale, (self.low + reserve) / self.scale, (self.high - reserve) / self.scale)

@@ -83,7 +83,7 @@ class Search:
         self._audited.clear()
 
     def take_scheme(self, name: SchemeName) -> Scenario:
-        """Go on with another scheme of transcription; return the scenario that has it."""
+        """Continue with another scheme of transcription; return the scenario that has it."""
         task = self.scenario.task.model_copy(update={"scheme": name})
         self.scenario = replace(self.scenario, task=task)
         self._solvers.clear()

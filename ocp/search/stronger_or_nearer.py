@@ -49,7 +49,7 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     """Return feasible variations of what a task does not name: where its line ends, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change; if speeds or accelerations are
-    exceeded too, it may need a longer duration beside, which is not tried in phases. The list is empty if the motion
+    exceeded too, it may also need a longer duration, which is not tried in phases. The list is empty if the motion
     exceeds other limits, or for boxes of winds and uncertain robots.
     """
     task = scenario.task
