@@ -5,11 +5,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from .options import PLAIN, Command, JsonOption, print_json
+from .options import PLAIN, Command, JsonOption, parameters, print_json
 from .watching import progress_bar
 
 app = typer.Typer(**PLAIN)
@@ -37,12 +36,19 @@ def results_alone() -> Iterator[None]:
 
 
 @app.command("tension", cls=Command)
+@parameters("""
+    --count: Random problems per task.
+    --repeats: Runs of each solver on each task.
+    --m: How many cables the problems have, separated by commas.
+    --limit: Longest time for one solver on one task [s].
+    --out: Folder for tension.md and tension.png.
+""")
 def tension(
-    count: Annotated[int, typer.Option(help="Random problems per task.")] = 100,
-    repeats: Annotated[int, typer.Option(help="Runs of each solver on each task.")] = 5,
-    m: Annotated[str, typer.Option("--m", help="How many cables the problems have, separated by commas.")] = "6,7,8,12",
-    limit: Annotated[float, typer.Option(help="Longest time for one solver on one task [s].")] = 5.0,
-    out: Annotated[Path | None, typer.Option("--out", help="Folder for tension.md and tension.png.")] = None,
+    count: int = 100,
+    repeats: int = 5,
+    m: str = "6,7,8,12",
+    limit: float = 5.0,
+    out: Path | None = None,
     as_json: JsonOption = False,
 ) -> None:
     """Measure speed, accuracy and failures of every installed solver."""
@@ -68,11 +74,11 @@ def tension(
 
 
 @app.command("control", cls=Command)
-def control(
-    steps: Annotated[int, typer.Option(help="Control steps per run, one per millisecond.")] = 500,
-    seeds: Annotated[int, typer.Option(help="Runs of each controller, each with different gusts.")] = 3,
-    as_json: JsonOption = False,
-) -> None:
+@parameters("""
+    --steps: Control steps per run, one per millisecond.
+    --seeds: Runs of each controller, each with different gusts.
+""")
+def control(steps: int = 500, seeds: int = 3, as_json: JsonOption = False) -> None:
     """Compare control steps and solvers for predictive control."""
     from ..benchmarks import control as benchmark
 

@@ -1,78 +1,46 @@
 """`towline calibrate`: geometric calibration from a log of cable lengths."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of
 from .log import FieldsOption
-from .options import FormatOption, JsonOption, ReportOption, RobotArgument, print_result
+from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters, print_result
 from .outputs import check_outputs
 
 
+@parameters("""
+    LOG: Log of lengths and, if known, poses, tensions and times: NetCDF, MCAP, a ROS bag, or CSV with a header such as
+        't [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.
+    --poses LOG: Log of the poses, if they are in another file; its clock is aligned by cable speeds.
+    --free NAMES: Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, build-up,
+        clock, com; with tensions also mass, stiffness, capstan, friction, gains; or auto. Default: anchors, offsets,
+        and clock if the log records times and poses of a motion.
+    --prior NAME=SIGMA,...: Standard deviations of the file's values, in their units, such as
+        'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.
+    --sigma SIGMA|NAME=SIGMA,...: Standard deviation of the lengths [m], or of lengths [m], position [m], rotation
+        [rad], tensions (relative) and directions [rad], such as 'lengths=0.001,tensions=0.05'; default: the log's, or 1
+        mm, exact poses, 2 % and 0.02 rad.
+    --outliers/--no-outliers: Detect outliers and slipped winches.
+    --fix: Correct probable input errors of the log first (order of cables, units, conventions, frames).
+    --out FILE.yaml: Robot file to write; default: ROBOT-calibrated.yaml in this folder.
+    --figures FOLDER: Folder for figures of residuals, anchors and standard deviations.
+""")
 def calibrate(
     robot: RobotArgument,
-    log: Annotated[
-        Path,
-        typer.Argument(
-            metavar="LOG",
-            help="Log of lengths and, if known, poses, tensions and times: NetCDF, MCAP, a ROS bag, or CSV with a "
-            "header such as 't [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.",
-        ),
-    ],
-    poses: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="LOG", help="Log of the poses, if they are in another file; its clock is aligned by cable speeds."
-        ),
-    ] = None,
+    log: Path,
+    poses: Path | None = None,
     fields: FieldsOption = None,
-    free: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, build-up, "
-            "clock, com; with tensions also mass, stiffness, capstan, friction, gains; or auto. "
-            "Default: anchors, offsets, and clock if the log records times and poses of a motion.",
-        ),
-    ] = None,
-    prior: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME=SIGMA,...",
-            help="Standard deviations of the file's values, in their units, such as "
-            "'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.",
-        ),
-    ] = None,
-    sigma: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SIGMA|NAME=SIGMA,...",
-            help="Standard deviation of the lengths [m], or of lengths [m], position [m], rotation [rad], tensions "
-            "(relative) and directions [rad], such as 'lengths=0.001,tensions=0.05'; default: the log's, or 1 mm, "
-            "exact poses, 2 % and 0.02 rad.",
-        ),
-    ] = None,
-    outliers: Annotated[
-        bool, typer.Option("--outliers/--no-outliers", help="Detect outliers and slipped winches.")
-    ] = True,
-    fix: Annotated[
-        bool,
-        typer.Option(
-            "--fix",
-            help="Correct probable input errors of the log first (order of cables, units, conventions, frames).",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.yaml", help="Robot file to write; default: ROBOT-calibrated.yaml in this folder."),
-    ] = None,
-    figures: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Folder for figures of residuals, anchors and standard deviations."),
-    ] = None,
+    free: str | None = None,
+    prior: str | None = None,
+    sigma: str | None = None,
+    outliers: bool = True,
+    fix: bool = False,
+    out: Path | None = None,
+    figures: Path | None = None,
     form: FormatOption = "png",
     report: ReportOption = None,
     as_json: JsonOption = False,

@@ -1,20 +1,18 @@
 """`towline demo`: plan a circle of the flying cable robot, and simulate it."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from ..base.inputs import one_of
-from .options import FormatOption, JsonOption, print_json, print_written
+from .options import FormatOption, JsonOption, parameters, print_json, print_written
 from .watching import watching
 
 
-def demo(
-    folder: Annotated[Path, typer.Option("--out", help="Folder for pictures and files.")] = Path("towline-demo"),
-    form: FormatOption = "png",
-    as_json: JsonOption = False,
-) -> None:
+@parameters("""
+    --out: Folder for pictures and files.
+""")
+def demo(folder: Path = Path("towline-demo"), form: FormatOption = "png", as_json: JsonOption = False) -> None:
     """Plan a circle of the flying cable robot and simulate it in wind.
 
     The circle is infeasible while the quadrotor hovers, and feasible if it moves. The exit code is 0 if the plans show

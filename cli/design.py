@@ -7,52 +7,31 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of
-from .options import FormatOption, JsonOption, ReportOption, RobotArgument, print_json, print_result
+from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters, print_result, schema_option
 from .outputs import check_outputs
 from .stopping import requested, unlisten
 from .watching import progress_bar
 
 
-def _print_schema(wanted: bool) -> None:
-    if wanted:
-        from ..layout import Requirements
-
-        print_json(Requirements.model_json_schema())
-        raise typer.Exit
-
-
+@parameters("""
+    REQUIREMENTS: A requirement file (YAML): what is free, poses and wrenches.
+    --out FILE.yaml: Robot file to write, if the requirements are met; default: ROBOT-REQUIREMENTS.yaml in this folder,
+        from the `name` keys of both files. An existing file is overwritten.
+    --seconds: Time of the search [s]; default: `time_limit` of the requirements, or 10.
+    --seed: Seed of the random numbers; default: `seed` of the requirements, or 0.
+    --figures FOLDER: Folder for figures of the robot: before.png and after.png.
+""")
 def design(
     robot: RobotArgument,
-    requirements: Annotated[
-        Path,
-        typer.Argument(metavar="REQUIREMENTS", help="A requirement file (YAML): what is free, poses and wrenches."),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.yaml",
-            help="Robot file to write, if the requirements are met; default: ROBOT-REQUIREMENTS.yaml in this folder, "
-            "from the `name` keys of both files. An existing file is overwritten.",
-        ),
-    ] = None,
-    seconds: Annotated[
-        float | None, typer.Option(help="Time of the search [s]; default: `time_limit` of the requirements, or 10.")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Seed of the random numbers; default: `seed` of the requirements, or 0.")
-    ] = None,
-    figures: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder for figures of the robot: before.png and after.png.")
-    ] = None,
+    requirements: Path,
+    out: Path | None = None,
+    seconds: float | None = None,
+    seed: int | None = None,
+    figures: Path | None = None,
     form: FormatOption = "png",
     report: ReportOption = None,
     as_json: JsonOption = False,
-    schema: Annotated[
-        bool,
-        typer.Option(
-            "--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of requirement files."
-        ),
-    ] = False,
+    schema: Annotated[bool, schema_option("requirement files", "layout", "Requirements")] = False,
 ) -> None:
     """Find the best anchors, attachments and tension limits, and report what limits them.
 

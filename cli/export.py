@@ -1,60 +1,36 @@
 """`towline export`: a robot for other programs."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, RobotArgument, print_result
+from .options import JsonOption, RobotArgument, parameters, print_result
 from .outputs import check_outputs
 
 
+@parameters("""
+    --mjcf: Write a MuJoCo model.
+    --c: Write the functions of the dynamics as C code without dependencies.
+    --step DIR: Write a control step as C, from state to tensions, into this new folder.
+    --float: With --step: compute in float instead of double.
+    --fmu FILE.fmu: Write a unit for co-simulation (FMI 3.0), for example Simulink.
+    --fmu-of PART: With --fmu: plant, controller, or both in a loop.
+    --drive DRIVE: With --fmu: type of the plant's cable commands (lengths, rates, forces or tensions); default:
+        tensions, or constant lengths for robots that have these.
+    --reference PLAN.nc|'x y z roll pitch yaw': With --fmu: pose in {G} [m, rad], or plan, at which a simulation starts;
+        default: home.
+    --out FILE: File to write; default: ROBOT.xml or ROBOT.c in this folder, from the robot's `name`.
+""")
 def export(
     robot: RobotArgument,
-    mjcf: Annotated[bool, typer.Option("--mjcf", help="Write a MuJoCo model.")] = False,
-    c_code: Annotated[
-        bool, typer.Option("--c", help="Write the functions of the dynamics as C code without dependencies.")
-    ] = False,
-    step: Annotated[
-        Path | None,
-        typer.Option(
-            "--step", metavar="DIR", help="Write a control step as C, from state to tensions, into this new folder."
-        ),
-    ] = None,
-    single: Annotated[bool, typer.Option("--float", help="With --step: compute in float instead of double.")] = False,
-    fmu: Annotated[
-        Path | None,
-        typer.Option(
-            "--fmu", metavar="FILE.fmu", help="Write a unit for co-simulation (FMI 3.0), for example Simulink."
-        ),
-    ] = None,
-    part: Annotated[
-        str, typer.Option("--fmu-of", metavar="PART", help="With --fmu: plant, controller, or both in a loop.")
-    ] = "plant",
-    drive: Annotated[
-        str | None,
-        typer.Option(
-            metavar="DRIVE",
-            help="With --fmu: type of the plant's cable commands (lengths, rates, forces or tensions); default: "
-            "tensions, or constant lengths for robots that have these.",
-        ),
-    ] = None,
-    reference: Annotated[
-        str | None,
-        typer.Option(
-            metavar="PLAN.nc|'x y z roll pitch yaw'",
-            help="With --fmu: pose in {G} [m, rad], or plan, at which a simulation starts; default: home.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help="File to write; default: ROBOT.xml or ROBOT.c in this folder, from the robot's `name`.",
-        ),
-    ] = None,
+    mjcf: bool = False,
+    c_code: bool = False,
+    step: Path | None = None,
+    single: bool = False,
+    fmu: Path | None = None,
+    part: str = "plant",
+    drive: str | None = None,
+    reference: str | None = None,
+    out: Path | None = None,
     as_json: JsonOption = False,
 ) -> None:
     """Export a robot: MuJoCo model, dynamics as C code, control step as C code, or functional mock-up unit (FMU)."""

@@ -1,12 +1,11 @@
 """`towline import`: robots of other programs as towline robot files."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from ..base.inputs import check_ending
-from .options import PLAIN, Command, JsonOption, print_json
+from .options import PLAIN, Command, JsonOption, parameters, print_json
 from .outputs import check_outputs
 
 app = typer.Typer(**PLAIN)
@@ -18,16 +17,12 @@ def _import() -> None:
 
 
 @app.command("caspr", cls=Command)
-def caspr(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with *_bodies.xml and *_cables.xml.")],
-    cable_set: Annotated[
-        str | None, typer.Option("--cable-set", metavar="ID", help="The set of cables; default: CASPR's own default.")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Robot file to write; default: standard output.")
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
+@parameters("""
+    DIR: Folder with *_bodies.xml and *_cables.xml.
+    --cable-set ID: The set of cables; default: CASPR's own default.
+    --out FILE: Robot file to write; default: standard output.
+""")
+def caspr(folder: Path, cable_set: str | None = None, out: Path | None = None, as_json: JsonOption = False) -> None:
     """Convert a CASPR robot to a robot file, and list what is lost."""
     from ..base.writing import whole_file
     from ..models.caspr import read_caspr

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import JsonOption, print_result
+from .options import JsonOption, parameters, print_result
 
 FieldsOption = Annotated[
     Path | None,
@@ -16,18 +16,11 @@ FieldsOption = Annotated[
 ]
 
 
-def log(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG", help="CSV, NetCDF or MCAP files, or bags of ROS 1 (.bag) or ROS 2 (folder)."),
-    ],
-    fields: FieldsOption = None,
-    robot: Annotated[
-        str | None,
-        typer.Option(metavar="ROBOT", help="Robot of the logs; the poses of its moving carriers are then listed too."),
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
+@parameters("""
+    LOG: CSV, NetCDF or MCAP files, or bags of ROS 1 (.bag) or ROS 2 (folder).
+    --robot ROBOT: Robot of the logs; the poses of its moving carriers are then listed too.
+""")
+def log(logs: list[Path], fields: FieldsOption = None, robot: str | None = None, as_json: JsonOption = False) -> None:
     """List what logs contain (topics, rates, gaps, fields, units), which fields towline uses, and what for.
 
     The exit code is 1 if no lengths are found, since a log without them cannot be used.

@@ -8,7 +8,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import one_of, shown
-from .options import JsonOption, print_json, print_written
+from .options import JsonOption, parameters, print_json, print_written
 
 TEMPLATES = Path(__file__).parent / "templates"
 KINDS = {
@@ -19,8 +19,11 @@ KINDS = {
 }
 
 
+@parameters("""
+    NAME: Name of the robot and of its file, without .yaml.
+""")
 def new(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the robot and of its file, without .yaml.")],
+    name: str,
     kind: Annotated[
         str, typer.Option(metavar="KIND", help="; ".join(f"{kind}: {meaning}" for kind, meaning in KINDS.items()) + ".")
     ] = "frame",

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from textwrap import dedent
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_origin, get_type_hints
 
 import typer
 from typer.core import TyperCommand
@@ -18,6 +22,31 @@ if TYPE_CHECKING:
 
 # Rich takes half a second to load, squeezes help into columns, and takes units, [m], for its tags.
 PLAIN: dict[str, Any] = {"rich_markup_mode": None, "add_completion": False}
+
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def parameters(text: str) -> Callable[[F], F]:
+    """Declare the parameters of a command that are not `Annotated`, from an entry for each, in their order.
+
+    An entry is `--name METAVAR: help`, or `METAVAR: help` for an argument; lines that continue it are indented more.
+    """
+    entries = [" ".join(entry.split()) for entry in re.split(r"\n(?! )", dedent(text).strip())]
+
+    def declare(function: F) -> F:
+        hints = get_type_hints(function, include_extras=True)
+        plain = [name for name in signature(function).parameters if get_origin(hints[name]) is not Annotated]
+        for name, entry in zip(plain, entries, strict=True):
+            head, _, about = entry.partition(": ")
+            names = [word.rstrip(",") for word in head.split() if word.startswith("--")]
+            metavar = " ".join(word for word in head.split() if not word.startswith("--")) or None
+            declared = typer.Option if names else typer.Argument
+            info = declared(*names, metavar=metavar, help=about)
+            function.__annotations__[name] = Annotated[hints[name], info]
+        return function
+
+    return declare
 
 
 class Command(TyperCommand):
@@ -83,6 +112,17 @@ def check_animation(animate: Path | None, speed: float, fps: float) -> None:
     for name, value, default in (("--speed", speed, SPEED), ("--fps", fps, FPS)):
         if value != default:
             raise InputError(f"{name} must be left out without --animate, got {value:g}")
+
+
+def schema_option(files: str, package: str, model: str) -> Any:
+    """Return --schema, which prints the JSON Schema of `files`, of a model of one of towline's packages."""
+
+    def show(wanted: bool) -> None:
+        if wanted:
+            print_json(getattr(import_module(f"..{package}", __package__), model).model_json_schema())
+            raise typer.Exit
+
+    return typer.Option("--schema", callback=show, is_eager=True, help=f"Print the JSON Schema of {files}.")
 
 
 def print_json(value: dict[str, Any]) -> None:

@@ -17,80 +17,54 @@ from .options import (
     RobotArgument,
     SpeedOption,
     check_animation,
-    print_json,
+    parameters,
     print_result,
+    schema_option,
 )
 from .outputs import check_outputs
-from .resuming import check_unused, checkpoint_of, checkpoint_option, resume_option, scheduler_option
+from .resuming import check_unused, checkpoint_of, long_run
 from .sweep import sweep
 from .watching import watching
 
 
-def _print_schema(requested: bool) -> None:
-    if requested:
-        from ..ocp import Task
-
-        print_json(Task.model_json_schema())
-        raise typer.Exit
-
-
+@parameters(f"""
+    TASK: A task file (YAML).
+    --out: NetCDF (.nc) or MCAP (.mcap) file to write; default: ROBOT-TASK.nc in this folder, from the `name` keys of
+        both files, and ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing
+        file is overwritten.
+    --figures: Folder for figures: path.png, views.png, tensions.png and, if applicable, base.png (carriers), limits.png
+        and convergence.png.
+    --animate: Film of the robot to write: .gif, or .mp4 with ffmpeg.
+    --robust SHARE: Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension
+        limits must hold; default: the task's value.
+    --vary KEY=VALUES: Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8',
+        'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as
+        robot.platform.mass. 'robot=cogiro,my.yaml' and 'task=a.yaml,b.yaml' vary the whole robot or task. Repeat the
+        option to plan all combinations. Writes one table instead of one plan: --out names its NetCDF file, and a CSV
+        file of the same name is written too (default: ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility,
+        cost and margin. The exit code is 1 if no plan is feasible.
+{long_run("With --vary: ")}
+    --keep FOLDER: With --vary: folder in which to save every plan (NetCDF).
+""")
 def plan(
     robot: RobotArgument,
-    task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="NetCDF (.nc) or MCAP (.mcap) file to write; default: ROBOT-TASK.nc in this folder, from the `name` "
-            "keys of both files, and "
-            "ROBOT-TASK-infeasible.nc or ROBOT-TASK-not-found.nc if the plan is not feasible. An existing file is "
-            "overwritten."
-        ),
-    ] = None,
-    figures: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder for figures: path.png, views.png, tensions.png and, if applicable, base.png (carriers), "
-            "limits.png and convergence.png."
-        ),
-    ] = None,
+    task: Path,
+    out: Path | None = None,
+    figures: Path | None = None,
     form: FormatOption = "png",
     report: ReportOption = None,
-    animate: Annotated[Path | None, typer.Option(help="Film of the robot to write: .gif, or .mp4 with ffmpeg.")] = None,
+    animate: Path | None = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
-    robust: Annotated[
-        float | None,
-        typer.Option(
-            metavar="SHARE",
-            help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
-            "limits must hold; default: the task's value.",
-        ),
-    ] = None,
-    vary: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=VALUES",
-            help="Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8', "
-            "'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as "
-            "robot.platform.mass. 'robot=cogiro,my.yaml' and 'task=a.yaml,b.yaml' vary the whole robot or task. "
-            "Repeat the option to plan all combinations. Writes one table instead of one plan: "
-            "--out names its NetCDF file, and a CSV file of the same name is written too (default: "
-            "ROBOT-TASK-sweep.nc). --figures draws sweep.png with feasibility, cost and margin. The exit code is 1 if "
-            "no plan is feasible.",
-        ),
-    ] = None,
-    workers: Annotated[int, typer.Option(help="With --vary: number of processes on this machine.")] = 1,
-    scheduler: Annotated[str | None, scheduler_option("With --vary: ")] = None,
-    checkpoint: Annotated[Path | None, checkpoint_option("With --vary: ")] = None,
-    resume: Annotated[Path | None, resume_option("With --vary: ")] = None,
-    keep: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="With --vary: folder in which to save every plan (NetCDF).")
-    ] = None,
+    robust: float | None = None,
+    vary: list[str] | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
+    checkpoint: Path | None = None,
+    resume: Path | None = None,
+    keep: Path | None = None,
     as_json: JsonOption = False,
-    schema: Annotated[
-        bool,
-        typer.Option("--schema", callback=_print_schema, is_eager=True, help="Print the JSON Schema of task files."),
-    ] = False,
+    schema: Annotated[bool, schema_option("task files", "ocp", "Task")] = False,
 ) -> None:
     """Plan a motion that keeps every tension inside its limits, or report why none exists.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -17,6 +17,7 @@ from .options import (
     JsonOption,
     RobotArgument,
     numbers,
+    parameters,
     print_json,
     print_table,
     print_written,
@@ -31,43 +32,27 @@ SIX = "x y z roll pitch yaw"
 FEWEST_FIT = 0.95  # of the samples of a log
 
 
+@parameters(f"""
+    --lengths 'one number for each cable': Measured lengths of the cables [m].
+    --log LOG: Log of readings of the winches, instead of --lengths: CSV, NetCDF, MCAP or a ROS bag. The encoders of the
+        robot file convert them to lengths.
+    --out FILE.csv: With --log: file of poses and covariances; default: LOG-poses.csv in this folder.
+    --figures FOLDER: With --log: folder for a figure of the residuals over time.
+    --start '{SIX}': Pose to start from [m, rad]; default: search without a start.
+    --sigma S: Standard deviation of the lengths [m]: one number, or one per cable; with --log also
+        'lengths=0.001,directions=0.01,rotation=0.01'.
+""")
 def pose(
     robot: RobotArgument,
-    lengths: Annotated[
-        str | None, typer.Option(metavar="'one number for each cable'", help="Measured lengths of the cables [m].")
-    ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="LOG",
-            help="Log of readings of the winches, instead of --lengths: CSV, NetCDF, MCAP or a ROS bag. The encoders "
-            "of the robot file convert them to lengths.",
-        ),
-    ] = None,
+    lengths: str | None = None,
+    log: Path | None = None,
     fields: FieldsOption = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.csv", help="With --log: file of poses and covariances; default: LOG-poses.csv in this folder."
-        ),
-    ] = None,
-    figures: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="With --log: folder for a figure of the residuals over time.")
-    ] = None,
+    out: Path | None = None,
+    figures: Path | None = None,
     form: FormatOption = "png",
-    start: Annotated[
-        str | None,
-        typer.Option(metavar=f"'{SIX}'", help="Pose to start from [m, rad]; default: search without a start."),
-    ] = None,
+    start: str | None = None,
     carrier_pose: CarrierPoseOption = None,
-    sigma: Annotated[
-        str,
-        typer.Option(
-            metavar="S",
-            help="Standard deviation of the lengths [m]: one number, or one per cable; with --log also "
-            "'lengths=0.001,directions=0.01,rotation=0.01'.",
-        ),
-    ] = "0.001",
+    sigma: str = "0.001",
     as_json: JsonOption = False,
 ) -> None:
     """Estimate the pose of the platform from its cable lengths, and list other poses that fit them.

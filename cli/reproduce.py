@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from ..base.errors import InputError
 from ..base.inputs import one_of
-from .options import FormatOption, JsonOption, print_json, print_written
+from .options import FormatOption, JsonOption, parameters, print_json, print_written
 from .watching import progress_bar
 
 if TYPE_CHECKING:
     from ..studies.accounts.account import Account
 
 
-def reproduce(
-    paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="flying: the flying cable robot; ctmrts: the towing robots.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option("--out", help="Folder for report, errata and figures; default: towline-PAPER.")
-    ] = None,
-    form: FormatOption = "png",
-    as_json: JsonOption = False,
-) -> None:
+@parameters("""
+    PAPER: flying: the flying cable robot; ctmrts: the towing robots.
+    --out: Folder for report, errata and figures; default: towline-PAPER.
+""")
+def reproduce(paper: str, out: Path | None = None, form: FormatOption = "png", as_json: JsonOption = False) -> None:
     """Recompute the equations, tables and figures of a paper, and report for each claim whether it is reproduced."""
     from ..base.writing import check_writable
     from ..figures.style import FORMATS

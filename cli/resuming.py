@@ -4,35 +4,24 @@ import os
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
-
-import typer
 
 from ..base.errors import InputError
 from .stopping import add_to_message
 
 
-def scheduler_option(when: str = "") -> Any:
-    """Return --scheduler, with `when` it may be used, such as "With --runs: "."""
-    text = f"{when}Dask scheduler to use instead of --workers, such as tcp://host:8786 (extra cluster)."
-    return typer.Option(metavar="ADDRESS", help=_sentence(text))
+def long_run(when: str = "") -> str:
+    """Return the entries of --workers, --scheduler, --checkpoint and --resume for `parameters`.
 
-
-def checkpoint_option(when: str = "") -> Any:
-    """Return --checkpoint, with `when` it may be used."""
-    text = f"{when}file in which to save progress; must not exist. Continue later with --resume."
-    return typer.Option("--checkpoint", help=_sentence(text))
-
-
-def resume_option(when: str = "") -> Any:
-    """Return --resume, with `when` it may be used."""
-    return typer.Option(
-        "--resume", metavar="FILE", help=_sentence(f"{when}checkpoint to continue, or to create if it does not exist.")
-    )
-
-
-def _sentence(text: str) -> str:
-    return text[0].upper() + text[1:]
+    `when`: when they may be used, such as "With --runs: ".
+    """
+    entries = {
+        "workers": f"{when}number of processes on this machine.",
+        "scheduler ADDRESS": f"{when}Dask scheduler to use instead of --workers, such as tcp://host:8786 "
+        "(extra cluster).",
+        "checkpoint": f"{when}file in which to save progress; must not exist. Continue later with --resume.",
+        "resume FILE": f"{when}checkpoint to continue, or to create if it does not exist.",
+    }
+    return "\n".join(f"    --{name}: {text[0].upper()}{text[1:]}" for name, text in entries.items())
 
 
 def check_unused(options: Mapping[str, object], without: str, many: str) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .options import JsonOption, print_json, print_table, robot_names
+from .options import JsonOption, parameters, print_json, print_table, robot_names
 from .outputs import check_outputs
 
 if TYPE_CHECKING:
@@ -23,15 +23,17 @@ MOVES = {
 }
 
 
+@parameters("""
+    --figure FILE: Picture of the robot to write: .png, .pdf or .svg.
+    --schema: Print the JSON Schema of robot files.
+""")
 def robots(
     name: Annotated[
         str | None,
         typer.Argument(metavar="ROBOT", help="A robot or robot file to diagnose.", autocompletion=robot_names),
     ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Picture of the robot to write: .png, .pdf or .svg.")
-    ] = None,
-    schema: Annotated[bool, typer.Option("--schema", help="Print the JSON Schema of robot files.")] = False,
+    figure: Path | None = None,
+    schema: bool = False,
     as_json: JsonOption = False,
 ) -> None:
     """List the robots of the library, or diagnose one.

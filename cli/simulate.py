@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -28,11 +28,12 @@ from .options import (
     SpeedOption,
     check_animation,
     numbers,
+    parameters,
     print_result,
 )
 from .outputs import check_outputs
 from .replay import replay_log
-from .resuming import check_unused, checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
+from .resuming import check_unused, checkpoint_of, long_run, resumable
 from .stopping import add_to_message
 from .watching import counting, watching
 
@@ -41,128 +42,73 @@ if TYPE_CHECKING:
 
     from ..simulation import Execution, Simulation
 
-_MANY = "With --runs: "
 WINDOW = 0.5  # [s]
 CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "open-loop", "fault-tolerant")
 
 
+@parameters(f"""
+    PLAN|LOG: A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF); or a recording to
+        replay: CSV, NetCDF, MCAP or a ROS bag.
+    --controller: The controller: {", ".join(CONTROLLERS)}; Python accepts controllers of your own.
+    --wind 'X Y Z': Velocity of the air [m/s], for robots with platform.aero; default: no air, and so no drag.
+    --gusts SIGMA: With --wind: intensity of Dryden turbulence, added to the wind [m/s].
+    --noise FILE: Errors and delay of the sensors (YAML), such as {{position: 0.001, delay: 0.002}}.
+    --mismatch FILE: How the simulated robot and its drives differ from the file (YAML), such as {{mass: [0.9, 1.1],
+        winch_lag: 0.02}}; from a range each run draws a number.
+    --event, --fault EVENT: Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2
+        stops), 'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'carry 2.5
+        at 1' (the platform carries a load of 2.5 kg; 0: none), 'stop at 3' (the reference stops on its path), 'follow
+        next.nc at 3' (another plan becomes the reference), 'push 20 0 0 at 1 for 0.5' (a force on the platform [N]), or
+        the YAML file of a list of events. Repeat the option for more.
+    --duration: Simulated time [s]; default: the plan's. After its end the robot holds the final pose.
+    --tolerance: Largest position error allowed for a pass [m].
+    --seed: Seed of gusts and noise; the same seed gives the same run.
+    --runs: Number of runs, with the seeds --seed, --seed + 1, ... Writes one table instead of one motion.
+{long_run("With --runs: ")}
+    --out: NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default, in this folder: PLAN-simulation.nc,
+        PLAN-runs.nc with --runs, or LOG-replay.nc for a recording. An existing file is overwritten.
+    --figures: Folder for figures of error, tensions and controller status; with --runs: errors of all runs and their
+        envelopes over time.
+    --animate: Film of the simulation to write: .gif, or .mp4 with ffmpeg.
+    --replay: Replay PLAN as a recording, even if it is the file of a simulation.
+    --poses LOG: With a recording: log of the poses, if they are in another file.
+    --drive: With a recording: commands of the plant: lengths, tensions or forces (default: depends on the log).
+    --delay: With a recording: known delay of the robot behind its recorded commands [s].
+    --window: With a recording: duration of a window, a part replayed from its recorded state [s].
+    --fit FILE.yaml: With a recording: robot file to write, with parameters fitted to half of the windows; written only
+        if they reduce the residuals of the other half.
+""")
 def simulate(
     robot: RobotArgument,
-    plan: Annotated[
-        Path,
-        typer.Argument(
-            metavar="PLAN|LOG",
-            help="A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF); or a "
-            "recording to replay: CSV, NetCDF, MCAP or a ROS bag.",
-        ),
-    ],
-    controller: Annotated[
-        str, typer.Option(help=f"The controller: {', '.join(CONTROLLERS)}; Python accepts controllers of your own.")
-    ] = CONTROLLERS[0],
-    wind: Annotated[
-        str | None,
-        typer.Option(
-            metavar="'X Y Z'",
-            help="Velocity of the air [m/s], for robots with platform.aero; default: no air, and so no drag.",
-        ),
-    ] = None,
-    gusts: Annotated[
-        float,
-        typer.Option(metavar="SIGMA", help="With --wind: intensity of Dryden turbulence, added to the wind [m/s]."),
-    ] = 0.0,
-    noise: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Errors and delay of the sensors (YAML), such as {position: 0.001, delay: 0.002}."
-        ),
-    ] = None,
-    mismatch: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="How the simulated robot and its drives differ from the file (YAML), such as {mass: [0.9, 1.1], "
-            "winch_lag: 0.02}; from a range each run draws a number.",
-        ),
-    ] = None,
-    event: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--event",
-            "--fault",
-            metavar="EVENT",
-            help="Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2 stops), "
-            "'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), "
-            "'carry 2.5 at 1' (the platform carries a load of 2.5 kg; 0: none), 'stop at 3' (the reference stops on "
-            "its path), 'follow next.nc at 3' (another plan becomes the reference), 'push 20 0 0 at 1 for 0.5' (a "
-            "force on the platform [N]), or the YAML file of a list of events. Repeat the option for more.",
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(help="Simulated time [s]; default: the plan's. After its end the robot holds the final pose."),
-    ] = None,
-    tolerance: Annotated[float, typer.Option(help="Largest position error allowed for a pass [m].")] = 0.05,
-    seed: Annotated[int, typer.Option(help="Seed of gusts and noise; the same seed gives the same run.")] = 0,
-    runs: Annotated[
-        int | None,
-        typer.Option(
-            help="Number of runs, with the seeds --seed, --seed + 1, ... Writes one table instead of one motion."
-        ),
-    ] = None,
-    workers: Annotated[int, typer.Option(help="With --runs: number of processes on this machine.")] = 1,
-    scheduler: Annotated[str | None, scheduler_option(_MANY)] = None,
-    checkpoint: Annotated[Path | None, checkpoint_option(_MANY)] = None,
-    resume: Annotated[Path | None, resume_option(_MANY)] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="NetCDF file (.nc) to write, or MCAP (.mcap) without --runs; default, in this folder: "
-            "PLAN-simulation.nc, PLAN-runs.nc with --runs, or LOG-replay.nc for a recording. An existing file is "
-            "overwritten."
-        ),
-    ] = None,
-    figures: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder for figures of error, tensions and controller status; with --runs: errors of all runs and "
-            "their envelopes over time."
-        ),
-    ] = None,
+    plan: Path,
+    controller: str = CONTROLLERS[0],
+    wind: str | None = None,
+    gusts: float = 0.0,
+    noise: Path | None = None,
+    mismatch: Path | None = None,
+    event: list[str] | None = None,
+    duration: float | None = None,
+    tolerance: float = 0.05,
+    seed: int = 0,
+    runs: int | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
+    checkpoint: Path | None = None,
+    resume: Path | None = None,
+    out: Path | None = None,
+    figures: Path | None = None,
     form: FormatOption = "png",
-    animate: Annotated[
-        Path | None, typer.Option(help="Film of the simulation to write: .gif, or .mp4 with ffmpeg.")
-    ] = None,
+    animate: Path | None = None,
     speed: SpeedOption = SPEED,
     fps: FpsOption = FPS,
     report: ReportOption = None,
-    replay: Annotated[
-        bool, typer.Option("--replay", help="Replay PLAN as a recording, even if it is the file of a simulation.")
-    ] = False,
-    poses: Annotated[
-        Path | None,
-        typer.Option(metavar="LOG", help="With a recording: log of the poses, if they are in another file."),
-    ] = None,
+    replay: bool = False,
+    poses: Path | None = None,
     fields: FieldsOption = None,
-    drive: Annotated[
-        str | None,
-        typer.Option(
-            help="With a recording: commands of the plant: lengths, tensions or forces (default: depends on the log)."
-        ),
-    ] = None,
-    delay: Annotated[
-        float, typer.Option(help="With a recording: known delay of the robot behind its recorded commands [s].")
-    ] = 0.0,
-    window: Annotated[
-        float, typer.Option(help="With a recording: duration of a window, a part replayed from its recorded state [s].")
-    ] = WINDOW,
-    fit: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.yaml",
-            help="With a recording: robot file to write, with parameters fitted to half of the windows; written only "
-            "if they reduce the residuals of the other half.",
-        ),
-    ] = None,
+    drive: str | None = None,
+    delay: float = 0.0,
+    window: float = WINDOW,
+    fit: Path | None = None,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate a plan in closed loop, with wind, sensor noise and events; or replay a recording.

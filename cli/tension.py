@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from .options import CarrierPoseOption, JsonOption, RobotArgument, numbers, print_json, print_table
+from .options import CarrierPoseOption, JsonOption, RobotArgument, numbers, parameters, print_json, print_table
 
 if TYPE_CHECKING:
     from ..models import Robot
     from ..solvers import TensionProblem, TensionSolution
 
-SIX = "x y z roll pitch yaw"
 # Those of `solvers.methods`, which takes longer to load than help may.
 METHODS = (
     "active-set, daqp, qp, min-norm, closed-form, improved-closed-form, centroid, 1-norm, 2-norm, dykstra, least-sum, "
@@ -20,31 +19,24 @@ METHODS = (
 )
 
 
+@parameters(f"""
+    --pose 'x y z roll pitch yaw': Pose of the platform in the frame {{G}} [m, rad]; default: its home.
+    --velocity 'six numbers': Time derivative of the pose; default: zero.
+    --acceleration 'six numbers': Second time derivative of the pose; default: zero.
+    --wind 'x y z': Velocity of the air in {{G}} [m/s]; default: no aerodynamic forces. '0 0 0' is still air, with drag
+        on a moving platform.
+    --method NAME: Method whose result decides the exit code: {METHODS}.
+    --backend NAME: QP solver that the method qp uses.
+""")
 def tension(
     robot: RobotArgument,
-    pose: Annotated[
-        str | None,
-        typer.Option(metavar=f"'{SIX}'", help="Pose of the platform in the frame {G} [m, rad]; default: its home."),
-    ] = None,
-    velocity: Annotated[
-        str | None, typer.Option(metavar="'six numbers'", help="Time derivative of the pose; default: zero.")
-    ] = None,
-    acceleration: Annotated[
-        str | None, typer.Option(metavar="'six numbers'", help="Second time derivative of the pose; default: zero.")
-    ] = None,
+    pose: str | None = None,
+    velocity: str | None = None,
+    acceleration: str | None = None,
     carrier_pose: CarrierPoseOption = None,
-    wind: Annotated[
-        str | None,
-        typer.Option(
-            metavar="'x y z'",
-            help="Velocity of the air in {G} [m/s]; default: no aerodynamic forces. '0 0 0' is still air, with drag on "
-            "a moving platform.",
-        ),
-    ] = None,
-    method: Annotated[
-        str, typer.Option(metavar="NAME", help=f"Method whose result decides the exit code: {METHODS}.")
-    ] = "active-set",
-    backend: Annotated[str | None, typer.Option(metavar="NAME", help="QP solver that the method qp uses.")] = None,
+    wind: str | None = None,
+    method: str = "active-set",
+    backend: str | None = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the cable tensions at one pose and motion, by every method.

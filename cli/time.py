@@ -1,27 +1,25 @@
 """`towline time`: the fastest time law along a task's path."""
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, ReportOption, RobotArgument, print_result
+from .options import JsonOption, ReportOption, RobotArgument, parameters, print_result
 from .outputs import check_outputs
 
 
+@parameters("""
+    TASK: A task file (YAML).
+    --out: Task file to write; default: ROBOT-TASK-timed.yaml in this folder, from the `name` keys of both files. An
+        existing file is overwritten.
+    --grid: Initial number of intervals of the path; refined if necessary.
+""")
 def time(
     robot: RobotArgument,
-    task: Annotated[Path, typer.Argument(metavar="TASK", help="A task file (YAML).")],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            help="Task file to write; default: ROBOT-TASK-timed.yaml in this folder, from the `name` keys of both "
-            "files. An existing file is overwritten.",
-        ),
-    ] = None,
-    grid: Annotated[int, typer.Option(help="Initial number of intervals of the path; refined if necessary.")] = 200,
+    task: Path,
+    out: Path | None = None,
+    grid: int = 200,
     report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -7,7 +7,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending
-from .options import JsonOption, print_result, robot_names
+from .options import JsonOption, parameters, print_result, robot_names
 from .outputs import check_outputs
 from .stopping import end_at_once, requested, unlisten
 
@@ -15,6 +15,14 @@ HOST, PORT = "127.0.0.1", 8080
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
+@parameters("""
+    OTHER: A second plan or simulation file, for comparison.
+    --html: HTML file to write instead of serving a page. It needs no server; the page of a robot does not need the
+        extra either.
+    --robot: Robot file of a workspace whose robot is not in the library.
+    --host: Address to listen on; 127.0.0.1: this machine only.
+    --port: Port to listen on; if taken, the next free port is used; 0 picks any.
+""")
 def view(
     target: Annotated[
         str | None,
@@ -25,24 +33,11 @@ def view(
             autocompletion=robot_names,
         ),
     ] = None,
-    other: Annotated[
-        str | None, typer.Argument(metavar="OTHER", help="A second plan or simulation file, for comparison.")
-    ] = None,
-    html: Annotated[
-        Path | None,
-        typer.Option(
-            "--html",
-            help="HTML file to write instead of serving a page. It needs no server; the page of a robot does not need "
-            "the extra either.",
-        ),
-    ] = None,
-    robot: Annotated[
-        str | None, typer.Option("--robot", help="Robot file of a workspace whose robot is not in the library.")
-    ] = None,
-    host: Annotated[str, typer.Option(help="Address to listen on; 127.0.0.1: this machine only.")] = HOST,
-    port: Annotated[
-        int, typer.Option(help="Port to listen on; if taken, the next free port is used; 0 picks any.")
-    ] = PORT,
+    other: str | None = None,
+    html: Path | None = None,
+    robot: str | None = None,
+    host: str = HOST,
+    port: int = PORT,
     as_json: JsonOption = False,
 ) -> None:
     """Show a robot, a plan, a simulation or a workspace in the browser, or compare two motions (extra viewer)."""

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending
-from .options import JsonOption, RobotArgument, numbers, print_json, print_written
+from .options import JsonOption, RobotArgument, numbers, parameters, print_json, print_written
 from .outputs import check_outputs
-from .resuming import checkpoint_of, checkpoint_option, resumable, resume_option, scheduler_option
+from .resuming import checkpoint_of, long_run, resumable
 from .stopping import add_to_message, requested
 from .watching import counting
 
@@ -32,90 +32,53 @@ METRICS = (
 )
 
 
+@parameters(f"""
+    --condition KIND|JSON: Condition: its kind, or JSON with the kind and its keys, such as '{{"kind": "margin",
+        "above": 5}}'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. Default: static-equilibrium.
+    --define FILE.py: Python file with conditions of your own.
+    --metric NAME: Metric to compute at the samples that the file keeps; --figure draws it: {METRICS}. May be repeated.
+        Default: none.
+    --robust SHARE: Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension
+        conditions hold at all accepted poses simultaneously. Default: the nominal robot only.
+    --box: Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors.
+    --attitude: One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: the attitude at
+        home.
+    --carriers: Positions of the carriers: home, or reach (mobile carriers anywhere in their reach boxes).
+    --lengths: For robots with three cables, instead of --box: range 'min max' of their lengths [m]; the positions
+        follow from them.
+    --samples: Number of samples, such as 60000 or 1e8.
+    --method: Sampling method: random, sobol, grid or adaptive.
+    --seed: Seed of the random numbers.
+    --size: Smallest cell edge of the method adaptive [m]. Default: as small as the number of samples permits.
+{long_run()}
+    --keep: Samples to keep in the file, at most a million: accepted, all or none.
+    --out: NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: ROBOT-workspace.nc in
+        this folder, from the robot's `name`.
+    --figure: Picture of the reached positions to write: .png, .pdf or .svg.
+    --mesh: STL file for the boundary, at one attitude and with carriers at home (extra mesh).
+""")
 def workspace(
     robot: RobotArgument,
-    condition: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KIND|JSON",
-            help="Condition: its kind, or JSON with the kind and its keys, such as "
-            f'\'{{"kind": "margin", "above": 5}}\'. Kinds: {CONDITIONS}. Repeat the option to combine; all must hold. '
-            "Default: static-equilibrium.",
-        ),
-    ] = None,
-    define: Annotated[
-        list[Path] | None, typer.Option(metavar="FILE.py", help="Python file with conditions of your own.")
-    ] = None,
-    metric: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help=f"Metric to compute at the samples that the file keeps; --figure draws it: {METRICS}. May be "
-            "repeated. Default: none.",
-        ),
-    ] = None,
-    robust: Annotated[
-        float | None,
-        typer.Option(
-            metavar="SHARE",
-            help="Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension "
-            "conditions hold at all accepted poses simultaneously. Default: the nominal robot only.",
-        ),
-    ] = None,
-    box: Annotated[
-        str | None,
-        typer.Option(
-            help="Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors."
-        ),
-    ] = None,
-    attitude: Annotated[
-        str | None,
-        typer.Option(
-            help="One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: the attitude at "
-            "home."
-        ),
-    ] = None,
-    carriers: Annotated[
-        str,
-        typer.Option(help="Positions of the carriers: home, or reach (mobile carriers anywhere in their reach boxes)."),
-    ] = "home",
-    lengths: Annotated[
-        str | None,
-        typer.Option(
-            help="For robots with three cables, instead of --box: range 'min max' of their lengths [m]; the positions "
-            "follow from them."
-        ),
-    ] = None,
-    samples: Annotated[float, typer.Option(help="Number of samples, such as 60000 or 1e8.")] = 60_000,
-    method: Annotated[str, typer.Option(help="Sampling method: random, sobol, grid or adaptive.")] = "random",
-    seed: Annotated[int, typer.Option(help="Seed of the random numbers.")] = 0,
-    size: Annotated[
-        float | None,
-        typer.Option(
-            help="Smallest cell edge of the method adaptive [m]. Default: as small as the number of samples permits."
-        ),
-    ] = None,
-    workers: Annotated[int, typer.Option(help="Number of processes on this machine.")] = 1,
-    scheduler: Annotated[str | None, scheduler_option()] = None,
-    checkpoint: Annotated[Path | None, checkpoint_option()] = None,
-    resume: Annotated[Path | None, resume_option()] = None,
-    keep: Annotated[
-        str, typer.Option(help="Samples to keep in the file, at most a million: accepted, all or none.")
-    ] = "accepted",
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: "
-            "ROBOT-workspace.nc in this folder, from the robot's `name`."
-        ),
-    ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="Picture of the reached positions to write: .png, .pdf or .svg.")
-    ] = None,
-    mesh: Annotated[
-        Path | None,
-        typer.Option(help="STL file for the boundary, at one attitude and with carriers at home (extra mesh)."),
-    ] = None,
+    condition: list[str] | None = None,
+    define: list[Path] | None = None,
+    metric: list[str] | None = None,
+    robust: float | None = None,
+    box: str | None = None,
+    attitude: str | None = None,
+    carriers: str = "home",
+    lengths: str | None = None,
+    samples: float = 60_000,
+    method: str = "random",
+    seed: int = 0,
+    size: float | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
+    checkpoint: Path | None = None,
+    resume: Path | None = None,
+    keep: str = "accepted",
+    out: Path | None = None,
+    figure: Path | None = None,
+    mesh: Path | None = None,
     as_json: JsonOption = False,
 ) -> None:
     """Sample the poses at which a condition holds; the exit code is 1 if there are none."""
