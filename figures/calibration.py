@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 WITHIN_95 = 2.795  # standard deviations: the root of the 95 % quantile of chi-square with three degrees of freedom
 MOST_SAMPLES = 2000  # of a cable in a panel: more are not visible, and files grow
@@ -19,7 +15,7 @@ MOST_SAMPLES = 2000  # of a cable in a panel: more are not visible, and files gr
 
 def residuals(
     before: np.ndarray, after: np.ndarray, times: np.ndarray | None = None, wrong: np.ndarray | None = None
-) -> Figure:
+) -> style.Figure:
     """Draw the residuals of each cable's length with the parameters of the file, and with the calibrated ones.
 
     - `before`, `after`: (N, m) [m].
@@ -44,7 +40,9 @@ def residuals(
     return canvas
 
 
-def consistency(residuals: np.ndarray, cost: np.ndarray, largest: float, times: np.ndarray | None = None) -> Figure:
+def consistency(
+    residuals: np.ndarray, cost: np.ndarray, largest: float, times: np.ndarray | None = None
+) -> style.Figure:
     """Draw how well poses fit their lengths: the residual of each cable, and their sums of squares with a limit.
 
     - `residuals`: residuals of the lengths, (N, m) [m].
@@ -68,7 +66,7 @@ def consistency(residuals: np.ndarray, cost: np.ndarray, largest: float, times: 
     return canvas
 
 
-def _of_cables(ax: Axes, values: np.ndarray, times: np.ndarray | None) -> None:
+def _of_cables(ax: style.Axes, values: np.ndarray, times: np.ndarray | None) -> None:
     """Draw values (N, m) [m] of the cables in a panel."""
     at = np.arange(len(values)) if times is None else times
     step = -(-len(values) // MOST_SAMPLES)
@@ -88,17 +86,13 @@ def _of_cables(ax: Axes, values: np.ndarray, times: np.ndarray | None) -> None:
     style.heading(ax, f"root mean square {rms:.3g} mm")
 
 
-def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> Figure:
+def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> style.Figure:
     """Draw each calibrated anchor relative to the file, with the ellipsoid that contains it with 95 % probability.
 
     There is a panel for each cable, all at the same scale: y against x, and z against x.
 
-    Parameters
-    ----------
-    file, found
-        Anchors of the file and calibrated ones, (m, 3) each [m].
-    covariances
-        Of the calibrated ones, (m, 3, 3) [m^2].
+    - `file`, `found`: anchors of the file and calibrated ones, (m, 3) each [m].
+    - `covariances`: of the calibrated ones, (m, 3, 3) [m^2].
     """
     from matplotlib.patches import Ellipse
 
@@ -132,7 +126,7 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> Fig
     return canvas
 
 
-def observability(sigmas: Mapping[str, np.ndarray]) -> Figure:
+def observability(sigmas: Mapping[str, np.ndarray]) -> style.Figure:
     """Draw the standard deviations of the parameters by cable, one series for each kind of parameter.
 
     `sigmas`: (m,) [m] by kind, such as "anchor x"; inf where the measurements leave a parameter open, nan where it is

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Iterate = tuple[int, float, float]  # iteration, objective, infeasibility
 FLOOR = 1e-16  # a logarithmic axis has no place for an infeasibility of exactly zero
@@ -25,7 +21,7 @@ def runs(iterates: Sequence[Iterate]) -> list[np.ndarray]:
     return [run for run in np.split(rows, starts) if len(run)]
 
 
-def convergence(iterates: Sequence[Iterate]) -> Figure:
+def convergence(iterates: Sequence[Iterate]) -> style.Figure:
     """Draw infeasibility and objective over the iterations, numbered through all runs, with a colour for each run.
 
     `iterates`: rows of (iteration, objective, infeasibility) in order. Another run begins where the iteration number
@@ -52,7 +48,7 @@ def convergence(iterates: Sequence[Iterate]) -> Figure:
     return canvas
 
 
-def _scale_objective(ax: Axes, values: np.ndarray) -> None:
+def _scale_objective(ax: style.Axes, values: np.ndarray) -> None:
     """Use a logarithmic axis; if an objective is not positive, one that is linear near zero."""
     sizes = np.abs(values[np.isfinite(values) & (values != 0)])
     if not sizes.size:
@@ -65,7 +61,7 @@ def _scale_objective(ax: Axes, values: np.ndarray) -> None:
         ax.set_yscale("symlog", linthresh=float(sizes.min()))
 
 
-def _plain_labels(ax: Axes) -> None:
+def _plain_labels(ax: style.Axes) -> None:
     """Label a logarithmic axis of less than a decade by plain numbers, because it may contain no power of ten."""
     from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import style
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-
-def curve_in_space(ways: Mapping[str, np.ndarray]) -> Figure:
+def curve_in_space(ways: Mapping[str, np.ndarray]) -> style.Figure:
     """Draw curves (n, 3) [m] with their names and equal scales; a dot marks the start of each."""
     canvas = style.figure(height=3.3)
     ax = style.axes_in_space(canvas)

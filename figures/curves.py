@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 FLATTEST = 1e-3  # height of a panel over its largest value: below, curves that are constant would show rounding
 
@@ -35,17 +31,13 @@ def curves(
     *,
     logarithmic: bool = False,
     marks: Mapping[str, float] | None = None,
-) -> Figure:
+) -> style.Figure:
     """Draw panels over `x` (n,); curves of one name look the same in all of them.
 
     Curves differ by their dashes, so that those on top of each other stay visible.
 
-    Parameters
-    ----------
-    logarithmic
-        Use a logarithmic horizontal axis.
-    marks
-        Positions of vertical lines, by their names in the legend.
+    - `logarithmic`: use a logarithmic horizontal axis.
+    - `marks`: positions of vertical lines, by their names in the legend.
     """
     canvas = style.figure(height=0.9 + 1.4 * len(panels))
     looks: dict[str, int] = {}

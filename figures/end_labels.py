@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 GAP = 0.065  # of a panel's height, between the names of curves at its edge
 HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
@@ -36,7 +31,7 @@ def together(values: np.ndarray, names: list[str], height: float) -> tuple[np.nd
     return values[:, [group[0] for group in groups]], texts
 
 
-def name_at_the_end(ax: Axes, values: np.ndarray, names: list[str], about: str = "cable ") -> None:
+def name_at_the_end(ax: style.Axes, values: np.ndarray, names: list[str], about: str = "cable ") -> None:
     """Write the names of curves beside their ends, whose last values are (k,), by default numbers of cables.
 
     The highest also has the text `about` before it.

@@ -12,13 +12,11 @@ from .flight import draw_tolerance, scale_of
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 GREY = "#444444"
 
 
-def envelopes(flights: xr.Dataset) -> Figure:
+def envelopes(flights: xr.Dataset) -> style.Figure:
     """Draw median, range of 5 to 95 % and extreme of the runs: errors above, smallest and largest tensions below."""
     canvas = style.figure(height=3.4)
     errors, tensions = style.panels_below(canvas, "time [s]", ["", "tension [N]"], [1.7, 1.7])
@@ -43,7 +41,7 @@ def envelopes(flights: xr.Dataset) -> Figure:
     return canvas
 
 
-def _draw_band(ax: Axes, flights: xr.Dataset, values: np.ndarray, index: int, extreme: int) -> None:
+def _draw_band(ax: style.Axes, flights: xr.Dataset, values: np.ndarray, index: int, extreme: int) -> None:
     """Draw quantiles (q, n) of a value over time in one colour, and one of them as its extreme."""
     time, quantiles, colour = flights["time"].values, flights["quantile"].values, style.colour(index)
     low, median, high = (values[int(np.abs(quantiles - share).argmin())] for share in (0.05, 0.5, 0.95))

@@ -15,8 +15,6 @@ from .end_labels import name_at_the_end, together
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 OFFSET = 1e-6  # [m]; carriers that stay so near to their reference have no panel
 GREY = "#d4d4d4"
@@ -27,7 +25,7 @@ EVENT_DASHES = ["-", (0, (4, 2)), (0, (1, 1.5)), (0, (6, 1.5, 1, 1.5))]
 THRUST = "thrust"  # an actuator of carriers that fly
 
 
-def flight(trajectory: xr.Dataset) -> Figure:
+def flight(trajectory: xr.Dataset) -> style.Figure:
     """Draw error, wind, carriers' deviations and thrusts, if any, and the status of each control step."""
     time = trajectory["time"].values
     draws: list[tuple[str, float, Any]] = [("", 1.7, _draw_error)]
@@ -54,7 +52,7 @@ def flight(trajectory: xr.Dataset) -> Figure:
     return canvas
 
 
-def tensions(trajectory: xr.Dataset) -> Figure:
+def tensions(trajectory: xr.Dataset) -> style.Figure:
     """Draw real tensions, those commanded where they differ, their limits, and grey spans in which a cable is slack."""
     canvas = style.figure(height=3.1)
     ax = style.axes(canvas, "time [s]", "tension [N]")
@@ -96,7 +94,7 @@ def tensions(trajectory: xr.Dataset) -> Figure:
     return canvas
 
 
-def errors(flights: xr.Dataset) -> Figure:
+def errors(flights: xr.Dataset) -> style.Figure:
     """Draw the largest error of each of many runs, in ascending order, with the tolerance."""
     canvas = style.figure(height=2.5)
     largest, tolerance = np.sort(flights["error_max"].values), float(flights.attrs["tolerance_m"])
@@ -117,7 +115,7 @@ def errors(flights: xr.Dataset) -> Figure:
     return canvas
 
 
-def _mark_events(panels: list[Axes], trajectory: xr.Dataset) -> None:
+def _mark_events(panels: list[style.Axes], trajectory: xr.Dataset) -> None:
     """Draw a line at each event through all panels, and name it in the legend."""
     happened = json.loads(trajectory.attrs.get("report", "{}")).get("events", [])
     for event, dashes in zip(happened, itertools.cycle(EVENT_DASHES), strict=False):
@@ -128,7 +126,7 @@ def _mark_events(panels: list[Axes], trajectory: xr.Dataset) -> None:
         )
 
 
-def _draw_error(ax: Axes, trajectory: xr.Dataset) -> None:
+def _draw_error(ax: style.Axes, trajectory: xr.Dataset) -> None:
     error = trajectory["tracking_error"].values
     largest = float(error.max(initial=0.0, where=np.isfinite(error)))
     scale, unit = scale_of(largest)
@@ -138,7 +136,7 @@ def _draw_error(ax: Axes, trajectory: xr.Dataset) -> None:
     draw_tolerance(ax, float(trajectory.attrs["tolerance_m"]), largest, scale)
 
 
-def draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) -> None:
+def draw_tolerance(ax: style.Axes, tolerance: float, largest: float, scale: float) -> None:
     """Draw the tolerance if it is near, else name it."""
     own, unit = scale_of(tolerance)
     text = f"tolerance {tolerance / own:g} {unit}"
@@ -149,7 +147,7 @@ def draw_tolerance(ax: Axes, tolerance: float, largest: float, scale: float) -> 
         style.far_limit(ax, f"{text}, above the plot")
 
 
-def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
+def _draw_offsets(ax: style.Axes, trajectory: xr.Dataset) -> None:
     offsets = _offsets(trajectory)
     scale, unit = scale_of(float(offsets.max()))
     ax.set_ylabel(f"offset of\ncarriers [{unit}]")
@@ -158,7 +156,7 @@ def _draw_offsets(ax: Axes, trajectory: xr.Dataset) -> None:
     ax.set_ylim(bottom=0.0)
 
 
-def _draw_answers(ax: Axes, trajectory: xr.Dataset) -> None:
+def _draw_answers(ax: style.Axes, trajectory: xr.Dataset) -> None:
     """Draw a row for each status, black where steps had it."""
     time, answered = trajectory["time"].values, trajectory["answered"].values
     answers = _answers(trajectory)
@@ -205,7 +203,7 @@ def scale_of(largest: float) -> tuple[float, str]:
     return next(((size, unit) for least, size, unit in SCALES if largest >= least), SCALES[-1][1:])
 
 
-def _draw_named(ax: Axes, trajectory: xr.Dataset, names: Iterable[Any], values: np.ndarray) -> None:
+def _draw_named(ax: style.Axes, trajectory: xr.Dataset, names: Iterable[Any], values: np.ndarray) -> None:
     """Draw the columns of values (n, k) that have any, with their names beside the panel."""
     for index, name in enumerate(names):
         if np.isfinite(values[:, index]).any():

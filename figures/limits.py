@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.text import quantity
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 SHOWN = 0.2  # of a limit: what uses less is only named
 MOST = 10.0  # of a limit: larger values are drawn as this
@@ -59,7 +56,7 @@ class Limited(NamedTuple):
         return style.typeset(f"{self.name.replace('_', ' ')} ({bounds})")
 
 
-def limits(times: np.ndarray, quantities: list[Limited]) -> Figure:
+def limits(times: np.ndarray, quantities: list[Limited]) -> style.Figure:
     """Draw what quantities over `times` (n,) [s] use of their limits; those that use little are named below."""
     canvas = style.figure(height=1.9 + 0.16 * len(quantities))
     ax = style.axes(canvas, "time [s]", "share of the limit [%]")

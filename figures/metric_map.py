@@ -13,9 +13,7 @@ from .workspace import outer_edges
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
     from matplotlib.contour import QuadContourSet
-    from matplotlib.figure import Figure
 
 CELLS = 32  # along each axis, at most
 IN_A_CELL = 8  # samples that a cell should have: of half as many, some cells have none
@@ -24,7 +22,7 @@ LEVELS = 8
 SHARE = 2.0  # [%] of the values below the lowest level, and above the highest one
 
 
-def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray | None = None) -> Figure:
+def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray | None = None) -> style.Figure:
     """Draw contours of metrics, one row of panels each: the mean of the samples in each cell of the positions.
 
     A region without extent along one axis has one panel, a volume three: the lower, middle and upper third of its
@@ -79,7 +77,7 @@ def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray |
 
 
 def _contours(
-    ax: Axes, position: np.ndarray, values: np.ndarray, cells: list[np.ndarray], levels: np.ndarray
+    ax: style.Axes, position: np.ndarray, values: np.ndarray, cells: list[np.ndarray], levels: np.ndarray
 ) -> QuadContourSet | None:
     """Fill contours of the means of values in cells, given by their edges, if some neighbouring cells have samples."""
     count, *_ = np.histogram2d(*position.T, bins=cells)

@@ -27,14 +27,8 @@ class Link(NamedTuple):
 def page(title: str, word: str, summary: str, colour: str, parts: Iterable[str]) -> str:
     """Assemble the HTML page.
 
-    Parameters
-    ----------
-    title
-        Title of the page.
-    word, summary, colour
-        The status in one word, the reason for it, and the colour of the bar beside them, from `style.colour`.
-    parts
-        Results of the other functions of this module, in order.
+    - `word`, `summary`, `colour`: status in one word, its reason, and the colour of the bar beside them (`style`).
+    - `parts`: results of the other functions of this module, in order.
     """
     from ..base.version import __version__
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import style
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-
-def phase_plane(s: np.ndarray, sd: np.ndarray, active: Sequence[tuple[float, float, str]]) -> Figure:
+def phase_plane(s: np.ndarray, sd: np.ndarray, active: Sequence[tuple[float, float, str]]) -> style.Figure:
     """Draw ds/dt over s, (n,) each.
 
     - `s`, `sd`: fraction of the path, increasing from 0 to 1, and its rate [1/s], whose square is linear between grid

@@ -12,14 +12,12 @@ from .end_labels import name_at_the_end, together
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 FLAT = 0.3  # of the largest range of tensions: panels with a smaller range have their own scale
 
 
-def path(trajectory: xr.Dataset) -> Figure:
+def path(trajectory: xr.Dataset) -> style.Figure:
     """Draw the paths of platform and carriers in {G}, with the lines between them at a few instants."""
     canvas = style.figure(height=3.3)
     ax = style.axes_in_space(canvas)
@@ -43,12 +41,12 @@ def path(trajectory: xr.Dataset) -> Figure:
     return canvas
 
 
-def tensions(trajectory: xr.Dataset) -> Figure:
+def tensions(trajectory: xr.Dataset) -> style.Figure:
     """Draw the tension of every cable over time with its limits, as `tensions_side_by_side` does."""
     return tensions_side_by_side({"": trajectory})
 
 
-def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
+def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> style.Figure:
     """Draw the tensions of several plans of one robot with their limits, panels below each other.
 
     Where no tensions exist, thin lines show the tensions that the motion would need without limits, pushing included.
@@ -70,7 +68,7 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> Figure:
     return canvas
 
 
-def base_offset(trajectory: xr.Dataset) -> Figure:
+def base_offset(trajectory: xr.Dataset) -> style.Figure:
     """Draw the horizontal distance of each carrier from the platform, and its height above it."""
     canvas = style.figure(height=2.7)
     ax = style.axes(canvas, "time [s]", "carrier position\nrelative to platform [m]")
@@ -87,7 +85,7 @@ def base_offset(trajectory: xr.Dataset) -> Figure:
     return canvas
 
 
-def _same_scale(panels: list[Axes]) -> None:
+def _same_scale(panels: list[style.Axes]) -> None:
     """Give panels one vertical range, unless the curves of one panel would look flat in it."""
     ends = np.array([ax.get_ylim() for ax in panels])
     spans = np.ptp(ends, axis=1)
@@ -98,7 +96,7 @@ def _same_scale(panels: list[Axes]) -> None:
     panels[0].set_ylim(ends[:, 0].min(), ends[:, 1].max())
 
 
-def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> None:
+def _draw_tensions(ax: style.Axes, trajectory: xr.Dataset) -> None:
     """Draw one panel."""
     time = trajectory["time"].values
     values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
@@ -125,7 +123,7 @@ def _draw_tensions(ax: Axes, trajectory: xr.Dataset) -> None:
     _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
 
 
-def _name_cables(ax: Axes, trajectory: xr.Dataset) -> None:
+def _name_cables(ax: style.Axes, trajectory: xr.Dataset) -> None:
     """Write the numbers of the cables beside their curves, of which those that coincide share a label."""
     ax.margins(x=0.0)
     values, unlimited = trajectory["tensions"].values, trajectory["tensions_unlimited"].values
@@ -137,7 +135,7 @@ def _name_cables(ax: Axes, trajectory: xr.Dataset) -> None:
     name_at_the_end(ax, shown[-1], names)
 
 
-def _draw_phases(ax: Axes, trajectory: xr.Dataset) -> None:
+def _draw_phases(ax: style.Axes, trajectory: xr.Dataset) -> None:
     """Draw where phases begin, with their names, and the force of the ground; nothing for a task without phases."""
     if "phase" not in trajectory.coords:
         return
@@ -165,7 +163,7 @@ def _draw_phases(ax: Axes, trajectory: xr.Dataset) -> None:
         )
 
 
-def _draw_limits(ax: Axes, trajectory: xr.Dataset, shown: np.ndarray) -> None:
+def _draw_limits(ax: style.Axes, trajectory: xr.Dataset, shown: np.ndarray) -> None:
     """Draw the limits; upper ones too far away to draw without flattening the curves are in the legend."""
     for low in np.unique(trajectory["t_min"].values):
         style.limit_line(ax, low, f"t_min = {low:g} N")

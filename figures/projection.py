@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 AIR = 0.05  # of an extent, beyond its ends
 FLAT = 0.22  # of the largest extent: thinner objects have panels so thick
@@ -33,7 +29,7 @@ FRONT = View("front view", 0, 2)
 SIDE = View("side view", 1, 2)
 
 
-def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> tuple[Figure, list[Axes]]:
+def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> tuple[style.Figure, list[style.Axes]]:
     """Return a figure with a panel for each view, large enough for `points` (n, 3) [m], all at one scale.
 
     The view from above is above the view along y, and the view along x is beside it, so that coordinates line up.
@@ -56,9 +52,9 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
         width_ratios=[widths[column] for column in sorted(widths)],
         height_ratios=[heights[row] for row in sorted(heights)],
     )
-    panels: list[Axes] = []
-    in_column: dict[int, Axes] = {}
-    in_row: dict[int, Axes] = {}
+    panels: list[style.Axes] = []
+    in_column: dict[int, style.Axes] = {}
+    in_row: dict[int, style.Axes] = {}
     for view, (column, row) in zip(views, places, strict=True):
         lowest = row == max(heights)
         ax = canvas.add_subplot(grid[row, column], sharex=in_column.get(column), sharey=in_row.get(row))

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 LABELS = {
     "position": ("position [mm]", 1e3),
@@ -28,21 +25,14 @@ def replay(
     noise: Mapping[str, float],
     title: str,
     by: str = "",
-) -> Figure:
+) -> style.Figure:
     """Draw the size of each kind of residual over time, and its noise.
 
-    Parameters
-    ----------
-    times
-        Times of the samples of each window, (W, S) [s].
-    residuals, explained
-        Measured minus simulated by kind, (W, S, k), with the model and with the parameter that explains most.
-    noise
-        Standard deviation of each kind.
-    title
-        Result in one line.
-    by
-        Name of the parameter of `explained`.
+    - `times`: times of the samples of each window, (W, S) [s].
+    - `residuals`, `explained`: measured minus simulated by kind, (W, S, k), with the model and with the parameter that
+      explains most, which is called `by`.
+    - `noise`: standard deviation of each kind.
+    - `title`: result in one line.
     """
     canvas = style.figure(height=0.9 + 1.1 * len(residuals))
     panels = style.panels_below(canvas, "time [s]", [LABELS[name][0] for name in residuals])

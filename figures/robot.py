@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,6 @@ from .hull import faces, outline
 from .perspective import Perspective
 from .scene import Scene
 from .tension_colours import mark, place, scale, shades
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PARTS = 8  # of a cable, so that it is before one body and behind another
 HIGH, BARS, AIR = 2.7, 0.9, 0.04  # inches, of which title, scale and legend; share of the picture around the robot
@@ -32,7 +28,7 @@ LETTERS = 6.0  # [points]: numbers and tensions of cables
 LETTER, LINE = 0.58, 1.25
 
 
-def draw(scene: Scene, resting: np.ndarray | None = None) -> Figure:
+def draw(scene: Scene, resting: np.ndarray | None = None) -> style.Figure:
     """Draw a robot at the first instant of a scene, and the outline of positions of its platform, `resting` (n, 3)."""
     anchors, attachments, rotors, tensions = scene.anchors[0], scene.attachments[0], scene.rotors[0], scene.tensions[0]
     corners = [np.array(box) for box in scene.boxes]
@@ -102,7 +98,7 @@ def draw(scene: Scene, resting: np.ndarray | None = None) -> Figure:
     return canvas
 
 
-def _number(ax: Axes, starts: np.ndarray, ends: np.ndarray, tensions: np.ndarray) -> None:
+def _number(ax: style.Axes, starts: np.ndarray, ends: np.ndarray, tensions: np.ndarray) -> None:
     """Write number and tension beside each cable near its anchor, where it covers no other."""
     from matplotlib.patheffects import withStroke
 

@@ -6,16 +6,11 @@ Plans without a value are marked by their status.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.figure import Figure
 
 MARKS = {"infeasible": "x", "not-found": "o", "failed": "^"}  # by status; feasible plans have a value
 MOST_TICKS = 6
@@ -38,17 +33,12 @@ class Axis(NamedTuple):
 
 def sweep(
     axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray], lower: Collection[str] = ()
-) -> Figure:
+) -> style.Figure:
     """Draw each quantity over one, two or three varied fields.
 
-    Parameters
-    ----------
-    status
-        Word for each plan, an axis for each varied field.
-    quantities
-        By their labels, shaped like `status`, nan where a plan has none.
-    lower
-        Labels of those of which less is better; of the others more is (default: none). Maps ring the best plan.
+    - `status`: word for each plan, an axis for each varied field.
+    - `quantities`: by their labels, shaped like `status`, nan where a plan has none.
+    - `lower`: labels of those of which less is better; of the others more is (default: none). Maps ring the best plan.
     """
     known = {label: values for label, values in quantities.items() if np.isfinite(values).any()}
     quantities = known or {"no plan is feasible": np.full(status.shape, np.nan)}
@@ -57,7 +47,7 @@ def sweep(
     return canvas
 
 
-def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> Figure:
+def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> style.Figure:
     """Draw panels below each other, with the plans without a value along the bottom."""
     from matplotlib.transforms import blended_transform_factory
 
@@ -87,7 +77,7 @@ def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]
 
 def _maps(
     axes: Sequence[Axis], status: np.ndarray, quantities: Mapping[str, np.ndarray], lower: Collection[str]
-) -> Figure:
+) -> style.Figure:
     """Draw the maps of all quantities side by side; over three fields a row of maps for each quantity."""
     if len(axes) == 2:
         canvas = style.figure(height=0.7 + 2.0 * len(quantities))
@@ -106,7 +96,7 @@ def _maps(
     canvas.suptitle(f"titles: {third.label}", fontsize=style.TEXT)
     canvas.supylabel(axes[1].label, fontsize=style.TEXT)  # once, since the label is longer than a map is high
     for number, (label, values) in enumerate(quantities.items()):
-        drawn: dict[Axes, ScalarMappable] = {}
+        drawn: dict[style.Axes, style.ScalarMappable] = {}
         for place, text in enumerate(third.texts):
             row, column = divmod(place, columns)
             leftmost, lowest = column == 0, number + 1 == len(quantities) and place + columns >= len(third.texts)
@@ -128,8 +118,8 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 
 
 def _map(
-    ax: Axes, axes: Sequence[Axis], values: np.ndarray, status: np.ndarray, ends: tuple[float, float]
-) -> ScalarMappable:
+    ax: style.Axes, axes: Sequence[Axis], values: np.ndarray, status: np.ndarray, ends: tuple[float, float]
+) -> style.ScalarMappable:
     """Draw a cell for each plan, all of one size, since values need not be evenly spaced."""
     ax.set_facecolor(NOTHING)
     ax.grid(False)
@@ -144,7 +134,7 @@ def _map(
     return image
 
 
-def _number(ax: Axes, image: ScalarMappable, values: np.ndarray) -> None:
+def _number(ax: style.Axes, image: style.ScalarMappable, values: np.ndarray) -> None:
     """Write the values into the cells of a map that are large enough."""
     if values.shape[0] > MOST_NUMBERS[0] or values.shape[1] > MOST_NUMBERS[1]:
         return
@@ -154,7 +144,7 @@ def _number(ax: Axes, image: ScalarMappable, values: np.ndarray) -> None:
             ax.text(x, y, f"{value:.3g}", color="w" if dark else "k", fontsize=SMALL, ha="center", va="center")
 
 
-def _ring_best(ax: Axes, values: np.ndarray) -> None:
+def _ring_best(ax: style.Axes, values: np.ndarray) -> None:
     """Draw a frame around the cell of the smallest value, unless several have it."""
     known = np.isfinite(values)
     if known.any() and (values[known] == values[known].min()).sum() == 1:
@@ -163,7 +153,7 @@ def _ring_best(ax: Axes, values: np.ndarray) -> None:
         ax.plot(*corners.T, color=style.colour(1), linewidth=1.5, label="best")
 
 
-def _mark(ax: Axes, x: np.ndarray, y: np.ndarray, word: str, mark: str, **options: Any) -> None:
+def _mark(ax: style.Axes, x: np.ndarray, y: np.ndarray, word: str, mark: str, **options: Any) -> None:
     """Mark plans of one status, with marks small enough for many of them."""
     if not len(x):
         return

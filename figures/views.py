@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from . import style
 from .hull import outline
 from .projection import ABOVE, FRONT, views_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from .scene import Scene
+from .scene import Scene
 
 SWEPT = 15  # instants at which rotors are drawn
 NEAR = 0.3  # of the robot's extent
@@ -22,7 +15,7 @@ FORBIDDEN = {"facecolor": "#e8e8e8", "edgecolor": "#666666", "hatch": "////", "l
 REACH = {"facecolor": "none", "edgecolor": "#666666", "linestyle": "--", "linewidth": 0.8}
 
 
-def views(scene: Scene) -> Figure:
+def views(scene: Scene) -> style.Figure:
     """Draw a scene of a few instants, from start to end, in two views of equal scale."""
     robot = np.vstack(
         [
@@ -48,7 +41,7 @@ def views(scene: Scene) -> Figure:
     return canvas
 
 
-def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
+def _view(ax: style.Axes, scene: Scene, axes: list[int]) -> None:
     from matplotlib.patches import Polygon
 
     for index, lines in enumerate(scene.obstacles):
@@ -82,7 +75,7 @@ def _view(ax: Axes, scene: Scene, axes: list[int]) -> None:
     ax.plot(*scene.path[0, axes], "o", color=style.colour(0), markersize=4, label="start")
 
 
-def _rotors(ax: Axes, circles: np.ndarray) -> None:
+def _rotors(ax: style.Axes, circles: np.ndarray) -> None:
     """Draw the circles of rotors (k, r, p, 2) at some instants, so that what they sweep shows."""
     from matplotlib.collections import LineCollection
 
@@ -92,7 +85,7 @@ def _rotors(ax: Axes, circles: np.ndarray) -> None:
         ax.add_collection(LineCollection(lines, colors="#999999", linewidths=0.4, label="rotors"))
 
 
-def _body(ax: Axes, corners: np.ndarray, inside: str, edge: str) -> None:
+def _body(ax: style.Axes, corners: np.ndarray, inside: str, edge: str) -> None:
     """Draw a body as the convex hull of its points (k, 2); two points have a line between them, one point has none."""
     from matplotlib.patches import Polygon
 

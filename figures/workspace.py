@@ -12,8 +12,6 @@ from .projection import ABOVE, FRONT, SIDE, views_of
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 VIEWS = (ABOVE, FRONT, SIDE)
 SHARES = (0.1, 0.5, 0.9)  # of the samples along the line of sight: contours
@@ -21,7 +19,7 @@ SMOOTH = 0.8  # [cells]
 MOST_POINTS = 20_000  # of a series in a panel: more are not visible, and files grow
 
 
-def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) -> Figure:
+def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) -> style.Figure:
     """Draw points of {G} from above and from two sides, at equal scales.
 
     - `points`: (n, 3) [m] by label, drawn in their order.
@@ -35,7 +33,7 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
     return canvas
 
 
-def cross_sections(points: np.ndarray, heights: list[float], thickness: float) -> Figure:
+def cross_sections(points: np.ndarray, heights: list[float], thickness: float) -> style.Figure:
     """Draw the points of {G} that lie within `thickness` / 2 of each of some heights, from above, at one scale.
 
     - `points`: (n, 3) [m].
@@ -64,7 +62,7 @@ def cross_sections(points: np.ndarray, heights: list[float], thickness: float) -
     return canvas
 
 
-def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> Figure:
+def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> style.Figure:
     """Draw where samples were accepted: from above, from the front and from the side.
 
     Darker areas are those where a larger share of the samples along the line of sight was accepted. Axes along which
@@ -97,7 +95,7 @@ def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> Figure:
     return canvas
 
 
-def _contours(ax: Axes, result: xr.Dataset, behind: str, across: str, up: str) -> None:
+def _contours(ax: style.Axes, result: xr.Dataset, behind: str, across: str, up: str) -> None:
     """Fill the areas of `SHARES`, of counts averaged with those of the neighbouring cells, which few samples need."""
     from scipy.ndimage import gaussian_filter
 
@@ -116,7 +114,7 @@ def _contours(ax: Axes, result: xr.Dataset, behind: str, across: str, up: str) -
         ax.fill([], [], color=colour, label=f"{label} accepted".replace("%", " %"))
 
 
-def _panel(ax: Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) -> None:
+def _panel(ax: style.Axes, points: dict[str, np.ndarray], marks: np.ndarray | None) -> None:
     for index, (label, some) in enumerate(points.items()):
         shown = some[:: -(-len(some) // MOST_POINTS)] if len(some) else some
         # Raster images inside: tens of thousands of shapes make files that are slow to view.

@@ -31,25 +31,12 @@ LONGEST = 100  # letters of a text of the file
 class Replay:
     """A plan that `Plan.save` wrote, or a simulation that `Simulation.save` wrote.
 
-    Parameters
-    ----------
-    dataset
-        The contents of the file.
-    where
-        The file name, for errors.
-
-    Attributes
-    ----------
-    dataset
-        The contents of the file.
-    robot, title, times
-        Times of the saved instants (n,) [s].
-    tensions
-        (n, m) [N], nan where there are none.
-    reference
-        Origin of the platform's frame (n, 3) in {G} [m] where a simulation should have it; None for a plan.
-    obstacles
-        Lines (k, 3) in {G} [m] that outline each of the regions to keep out of.
+    - `dataset`: the contents of the file; `where`: its name, for errors.
+    - `robot`, `title`: the robot, and a title of one line.
+    - `times`: times of the saved instants, (n,) [s].
+    - `tensions`: (n, m) [N], nan where there are none.
+    - `reference`: origin of the platform's frame (n, 3) in {G} [m] where a simulation should have it; None for a plan.
+    - `obstacles`: lines (k, 3) in {G} [m] that outline each of the regions to keep out of.
 
     Raises `InputError` if a variable of a plan is missing, or does not fit its robot.
     """

@@ -25,54 +25,28 @@ from .tensions import INDEPENDENT, TOLERANCE, scaled
 
 @dataclass(frozen=True)
 class Audit(Displayed):
-    """The dense evaluation of a motion.
+    """The dense evaluation of a motion."""
 
-    Attributes
-    ----------
-    rate
-        Instants per second [Hz].
-    times, motion, carriers, tensions
-        The dense grid, the motion in {G} on it and the audited tensions (n, m) [N], nan where none exist.
-    tensions_unlimited
-        The tensions of least norm without limits, (n, m) [N]. Negative: the cable would have to push.
-    violation
-        Distance of the required wrench from the available wrench set [N], the largest from each time to the
-        next; rounding errors where tensions exist.
-    tolerance
-        The largest violation that passes [N].
-    tracking_error
-        Distance from the path at each time [m].
-    excess
-        Other limits that are exceeded (`limits`, ends, fixed lengths, ...); may be empty.
-    soft_excess
-        Soft limits that are exceeded; may be empty.
-    limited
-        Values of the scenario's limited quantities, (n, k) in the unit of each limit, in their order.
-    certificate
-        The certificate with the largest shortfall, with its time, and its wind if the task has a box of winds, or None.
-    drift
-        Error of an open-loop simulation with the planned tensions; None for robots that can follow any motion exactly,
-        for motions with loads or on the ground, and where no tensions exist.
-    supports
-        Ground forces at each support point, (n, s) [N], zero while the platform hangs; None for a task without
-        ground.
-    """
-
-    rate: float
-    times: np.ndarray  # (n,)
-    motion: Motion
-    carriers: Motion
-    tensions: np.ndarray  # (n, m)
-    tensions_unlimited: np.ndarray  # (n, m)
-    violation: np.ndarray  # (n,)
-    tolerance: float
-    tracking_error: np.ndarray  # (n,)
-    excess: list[Excess] = field(default_factory=list)
-    soft_excess: list[Excess] = field(default_factory=list)
-    limited: list[np.ndarray] = field(default_factory=list)
+    rate: float  # instants per second [Hz]
+    times: np.ndarray  # the dense grid, (n,)
+    motion: Motion  # of the platform in {G}, at `times`
+    carriers: Motion  # likewise
+    tensions: np.ndarray  # the audited ones, (n, m) [N], nan where none exist
+    tensions_unlimited: np.ndarray  # those of least norm without limits, (n, m) [N]; negative: the cable would push
+    # Distance of the required wrench from the available wrench set, (n,) [N], the largest from each time to the next;
+    # rounding errors where tensions exist.
+    violation: np.ndarray
+    tolerance: float  # the largest violation that passes [N]
+    tracking_error: np.ndarray  # distance from the path at each time, (n,) [m]
+    excess: list[Excess] = field(default_factory=list)  # other hard limits that are exceeded (`limits`, ends, ...)
+    soft_excess: list[Excess] = field(default_factory=list)  # soft limits that are exceeded
+    limited: list[np.ndarray] = field(default_factory=list)  # what each limit bounds, (n, k) in its unit
+    # The one with the largest shortfall, with its time, and its wind if the task has a box of winds; None if all exist.
     certificate: Certificate | None = None
+    # Error of an open-loop simulation with the planned tensions; None for robots that can follow any motion exactly,
+    # for motions with loads or on the ground, and where no tensions exist.
     drift: Drift | None = None
-    supports: np.ndarray | None = None  # (n, s)
+    supports: np.ndarray | None = None  # forces of the ground, (n, s) [N], zero while it hangs; None without ground
 
     @property
     def passed(self) -> bool:

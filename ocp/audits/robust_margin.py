@@ -11,27 +11,13 @@ from .tensions import TOLERANCE
 
 @dataclass(frozen=True)
 class RobustMargin(Displayed):
-    """The first-order spread of tensions along a plan due to geometric uncertainty.
+    """The first-order spread of tensions along a plan due to geometric uncertainty."""
 
-    Attributes
-    ----------
-    share
-        Fraction of the robots that must have tensions inside their limits at all times.
-    factor
-        Number of standard deviations for this fraction (`robust.motion_factor`).
-    reach
-        Tension spread: largest deviation of the tensions of these robots at each audited time, (n, m) [N].
-    tightened
-        Reduction of the limits in the program, (m,) [N].
-    violation
-        Violation of the limits by tensions and their spread, (n, m) [N]; 0: at least the task's margin inside.
-    """
-
-    share: float
-    factor: float
-    reach: np.ndarray
-    tightened: np.ndarray
-    violation: np.ndarray
+    share: float  # fraction of the robots that must have tensions inside their limits at all times
+    factor: float  # number of standard deviations for this fraction (`robust.motion_factor`)
+    reach: np.ndarray  # largest deviation of the tensions of these robots at each audited time, (n, m) [N]
+    tightened: np.ndarray  # reduction of the limits in the program, (m,) [N]
+    violation: np.ndarray  # of the limits by tensions and their spread, (n, m) [N]; 0: inside by the margin or more
 
     @property
     def holds(self) -> bool:

@@ -114,14 +114,9 @@ class Limit(ABC):
         return None
 
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
-        """Return the limit as rows of a program, in units of `scale`.
+        """Return the limit as rows of a program, in units of `scale`, from its values (k, 1).
 
-        Parameters
-        ----------
-        values
-            (k, 1).
-        shrink
-            Part of `scale` by which the bounds move inwards, if the limit `tightens`. It does not change the values.
+        If the limit `tightens`, its bounds move inwards by the part `shrink` of `scale`. The values do not change.
         """
         reserve = shrink * self.scale if self.tightens else 0.0
         return Rows(values / self.scale, (self.low + reserve) / self.scale, (self.high - reserve) / self.scale)

@@ -170,14 +170,9 @@ class Limits(Displayed):
     ) -> list[np.ndarray]:
         """Return the values of each limit along a motion in {G}, (n, k).
 
-        Parameters
-        ----------
-        platform, carriers
-            Pose, velocity and acceleration, (n, 6) each and (n, c, 6) each.
-        tensions
-            (n, m) [N]; where they are nan, so are the values that depend on them. Default: zeros.
-        off_path
-            Offset of the platform from its path, (n, 6) [m, rad]. Default: zeros.
+        - `platform`, `carriers`: pose, velocity and acceleration, (n, 6) each and (n, c, 6) each.
+        - `tensions`: (n, m) [N]; where they are nan, so are the values that depend on them. Default: zeros.
+        - `off_path`: offset of the platform from its path, (n, 6) [m, rad]. Default: zeros.
         """
         if not self.all:
             return []

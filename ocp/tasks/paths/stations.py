@@ -9,21 +9,11 @@ import numpy as np
 
 
 class Stations(NamedTuple):
-    """The waypoints of a path, in order.
+    """The waypoints of a path, in order."""
 
-    Attributes
-    ----------
-    names
-        Names as in the path's file: `points[2]`.
-    times
-        Time at which the path passes each, or the arrival time with dwell, (n,) [s]; nan if unknown.
-    poses
-        (n, 6) in the frame of the path [m, rad].
-    """
-
-    names: tuple[str, ...] = ()
-    times: np.ndarray = np.zeros(0)
-    poses: np.ndarray = np.zeros((0, 6))
+    names: tuple[str, ...] = ()  # as in the path's file: `points[2]`
+    times: np.ndarray = np.zeros(0)  # when the path passes each, or arrives to dwell, (n,) [s]; nan if unknown
+    poses: np.ndarray = np.zeros((0, 6))  # in the frame of the path [m, rad]
 
     @classmethod
     def joined(cls, parts: Iterable[tuple[str, float, Stations]]) -> Stations:
