@@ -7,7 +7,16 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending, one_of
-from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters, print_result, schema_option
+from .options import (
+    FormatOption,
+    JsonOption,
+    ReportOption,
+    RobotArgument,
+    parameters,
+    print_result,
+    schema_option,
+    usual_file,
+)
 from .outputs import check_outputs
 from .stopping import requested, unlisten
 from .watching import progress_bar
@@ -53,7 +62,7 @@ def design(
     changed = {key: value for key, value in given.items() if value is not None}
     if changed:
         read = validate(read.model_dump() | changed, Requirements, "--seconds or --seed")
-    target = out if out is not None else Path(f"{loaded.name}-{read.name}.yaml")
+    target = out if out is not None else usual_file(loaded.name, f"{read.name}.yaml")
     check_ending("--out", target, ".yaml", ".yml")
     check_outputs({"--out": target, "--report": report, "--figures": figures and figures / f"before.{form}"})
     unlisten()  # an interrupt ends the search, not the command

@@ -102,6 +102,11 @@ SpeedOption = Annotated[float, typer.Option(help="With --animate: speed of the f
 FpsOption = Annotated[float, typer.Option(help="With --animate: frames per second of the film.")]
 
 
+def usual_file(*names: str) -> Path:
+    """Return the file that a command writes by default, named by `names`, without the spaces that a task's may have."""
+    return Path("-".join(names).replace(" ", "-"))
+
+
 def check_animation(animate: Path | None, speed: float, fps: float) -> None:
     """Raise InputError if the film cannot be written, or if its options are given but no film is."""
     if animate is not None:

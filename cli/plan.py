@@ -20,6 +20,7 @@ from .options import (
     parameters,
     print_result,
     schema_option,
+    usual_file,
 )
 from .outputs import check_outputs
 from .resuming import check_unused, checkpoint_of, long_run
@@ -92,14 +93,13 @@ def plan(
     from ..ocp import read_task
 
     loaded, read = load(robot), read_task(task)
-    usual = f"{loaded.name}-{read.name}"
-    target = check_ending("--out", out or Path(f"{usual}.nc"), ".nc", ".mcap")
+    target = check_ending("--out", out or usual_file(loaded.name, f"{read.name}.nc"), ".nc", ".mcap")
     drawn = figures and figures / f"path.{form}"
     check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": drawn})
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         planned = plan_motion(loaded, read, watch, robust=robust)
         if out is None and not planned.feasible:  # it replaces no plan that is
-            target = Path(f"{usual}-{planned.status}.nc")
+            target = usual_file(loaded.name, read.name, f"{planned.status}.nc")
         written = {"file": planned.save(target)}
         if not planned.feasible:
             watch.now("searching for feasible tasks near this one")

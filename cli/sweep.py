@@ -8,7 +8,7 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending
 from ..base.processors import one_thread_each
-from .options import print_result
+from .options import print_result, usual_file
 from .outputs import check_outputs
 from .resuming import resumable
 from .stopping import add_to_message
@@ -36,7 +36,7 @@ def sweep(
 
     loaded, read = load(robot), read_task(task)
     varied = read_option(vary)
-    target = out if out is not None else Path(f"{loaded.name}-{read.name}-sweep.nc")
+    target = out if out is not None else usual_file(loaded.name, read.name, "sweep.nc")
     if target.suffix == ".csv":
         raise InputError(f"--out must be a NetCDF file (.nc), got {target}")
     check_ending("--out", target, ".nc")

@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, ReportOption, RobotArgument, parameters, print_result
+from .options import JsonOption, ReportOption, RobotArgument, parameters, print_result, usual_file
 from .outputs import check_outputs
 
 
@@ -37,7 +37,7 @@ def time(
     from ..ocp import read_task, time_along
 
     loaded, read = load(robot), read_task(task)
-    target = out if out is not None else Path(f"{loaded.name}-{read.name}-timed.yaml")
+    target = out if out is not None else usual_file(loaded.name, read.name, "timed.yaml")
     check_outputs({"--out": check_ending("--out", target, ".yaml", ".yml"), "--report": report})
     found = time_along(loaded, read, grid=grid)
     written = {}

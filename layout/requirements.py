@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from ..base.inputs import file_path
 from ..models import Robot
 from ..models.parsing import read_yaml, validate
-from ..models.part import Box, Name, NonNegative, Part, Pose, Positive, Rows, Vector3, Whole
+from ..models.part import Box, NonNegative, Part, Pose, Positive, Rows, Title, Vector3, Whole
 from ..models.ranges import PositiveRange, Range
 from ..ocp.tasks.task import Task
 from ..ocp.tasks.task_limits import AnyKeepOut
@@ -171,7 +171,7 @@ class Prices(Part):
 class Requirements(Part):
     """Requirements of a design: what is free, poses and wrenches. In a file: YAML with these keys."""
 
-    name: Name = Field(default="design", description="name of the requirements, for reports and file names")
+    name: Title = Field(default="design", description="name of the requirements, for reports and file names")
     free: Annotated[tuple[Free, ...], Field(min_length=1, max_length=200)] = Field(
         description="numbers of the robot that the design chooses; all others keep the values of its file"
     )

@@ -25,6 +25,7 @@ ENDINGS = (".yaml", ".yml")
 MOST_BRACKETS = 50  # inside each other; no file of towline needs more than three
 MOST_ITEMS = 30_000  # values and keys, some 50 us each; a file with the covariance of 24 cables has 29 200
 NAMES = 'must have only letters, digits, ".", "_" and "-", and begin with a letter or digit'  # `part.Name`
+TITLES = NAMES.replace('"_" and "-"', '"_", "-" and spaces inside')  # `part.Title`
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -136,7 +137,9 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         message = f"must be a mapping with {_keys(node)}, got {shown(value)}"
     else:
-        message = NAMES if kind == "string_pattern_mismatch" else detail["msg"]
+        message = detail["msg"]
+        if kind == "string_pattern_mismatch":
+            message = TITLES if " " in context["pattern"] else NAMES
         if kind != "value_error" or not isinstance(value, dict):
             message += f", got {shown(value)}"
     if not field:

@@ -36,6 +36,8 @@ Item = TypeVar("Item")
 # A long list of rows of numbers. Its first wrong row is the only one reported: to collect all takes minutes.
 Rows: TypeAlias = Annotated[tuple[Item, ...], Field(min_length=1, max_length=MOST_ROWS, fail_fast=True)]
 Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")]
+# What nothing else refers to by its name may have spaces in it.
+Title = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9]([A-Za-z0-9_. -]*[A-Za-z0-9_.-])?$")]
 
 Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")

@@ -261,6 +261,21 @@ def test_plan_that_is_infeasible_exits_1(tmp_path):
     assert (tmp_path / "far.nc").exists()
 
 
+def test_a_task_whose_name_has_spaces_is_written_to_a_file_without(tmp_path):
+    (tmp_path / "task.yaml").write_text(re.sub("name: .*", "name: round the hall", TASK))
+    run("plan", "wang-flying", "task.yaml", cwd=tmp_path)
+    assert (
+        xr.load_dataset(tmp_path / "wang-flying-round-the-hall.nc")
+        .attrs["title"]
+        .startswith("wang-flying, round the hall:")
+    )
+    for name in (" hall", "hall ", "hall/"):
+        (tmp_path / "task.yaml").write_text(re.sub("name: .*", f"name: '{name}'", TASK))
+        done = run("plan", "wang-flying", "task.yaml", cwd=tmp_path, code=2)
+        assert '"_", "-" and spaces inside, and begin with a letter' in done.stderr
+        assert f"got '{name}'" in done.stderr
+
+
 WRONG_FILES = {
     "missing mass": (lambda text: text.replace("  mass: 1.2\n", "", 1), "platform.mass"),
     "negative inertia": (lambda text: text.replace("0.81, 0.81", "-0.81, 0.81"), "platform.inertia"),

@@ -15,7 +15,7 @@ from typing_extensions import override
 from ...base.errors import InputError
 from ...base.inputs import file_path, number
 from ...models.parsing import read_yaml, save_yaml, validate
-from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Vector3, Whole
+from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Title, Vector3, Whole
 from ...models.ranges import PositiveRange
 from ..costs.cost import Cost
 from .initial import Final, Initial
@@ -163,7 +163,7 @@ class Task(Part):
 
     model_config = ConfigDict(json_schema_extra=_or_phases)
 
-    name: Name = Field(default="task", description="name of the task, for reports and file names")
+    name: Title = Field(default="task", description="name of the task, for reports and file names")
     path: AnyPath = Field(
         default=cast(Any, None), description="path of the platform; with phases: the sequence of their paths"
     )
