@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -22,6 +22,11 @@ class Panel(NamedTuple):
     bounds: Mapping[str, float] = {}  # values of dashed lines, by their labels
     dots: Mapping[str, np.ndarray] = {}  # as `curves`, drawn as dots, for points that should lie on a curve
     logarithmic: bool = False  # use a logarithmic vertical axis
+
+    @classmethod
+    def of_cables(cls, label: str, values: np.ndarray, bounds: Mapping[str, float] | None = None) -> Self:
+        """Return a panel with the values (n, m) of all cables."""
+        return cls(label, {f"cable {i + 1}": column for i, column in enumerate(values.T)}, bounds or {})
 
 
 def curves(

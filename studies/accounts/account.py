@@ -8,12 +8,11 @@ complete.
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
 from ...base.errors import SolverError
-from ...figures.drawing import Drawing
-from .claim import Claim, Verdict
+from .claim import Chapter, Claim, Verdict
 
 Progress: TypeAlias = Callable[[str, int, int], None]  # what is being computed, chapters done, all of them
 
@@ -23,14 +22,6 @@ class Paper(NamedTuple):
 
     name: str
     source: str
-
-
-@dataclass(frozen=True)
-class Chapter:
-    """Claims that belong together, and figures by name."""
-
-    claims: list[Claim]
-    drawings: dict[str, Drawing] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

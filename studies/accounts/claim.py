@@ -8,7 +8,7 @@ its own.
 
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from ruamel.yaml import YAML
 
 from ...base.text import quantity, quantity_row
+from ...figures.drawing import Drawing
 
 Value: TypeAlias = float | tuple[float, ...] | str | None
 FIELD = re.compile(r"\{(?P<name>[a-z]\w*)(:(?P<format>[^}]*))?\}")  # {G} is a frame
@@ -65,6 +66,14 @@ class Claim:
     def to_dict(self) -> dict[str, Any]:
         """Return all fields for JSON."""
         return asdict(self)
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """Claims that belong together, and figures by name."""
+
+    claims: list[Claim]
+    drawings: dict[str, Drawing] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -121,8 +130,11 @@ class Statement:
     def _claim(
         self, computed: ArrayLike, printed: ArrayLike | None, verdict: Verdict, why: str, fields: Mapping[str, Any]
     ) -> Claim:
+        def filled(field: re.Match[str]) -> str:
+            return format(fields[field["name"]], field["format"] or "")
+
         texts = (self.id, self.place, self.statement, why, self.unit, self.figure or "")
-        id, place, statement, why, unit, figure = (FIELD.sub(lambda at: _filled(at, fields), text) for text in texts)
+        id, place, statement, why, unit, figure = (FIELD.sub(filled, text) for text in texts)
         expected = self.printed if printed is None else printed
         return Claim(id, place, statement, _value(expected), _value(computed), verdict, why, unit, figure or None)
 
@@ -132,10 +144,6 @@ def _value(given: ArrayLike | None) -> Value:
         return given
     numbers: float | list[float] = np.asarray(given, dtype=float).tolist()
     return tuple(numbers) if isinstance(numbers, list) else numbers
-
-
-def _filled(field: re.Match[str], fields: Mapping[str, Any]) -> str:
-    return format(fields[field["name"]], field["format"] or "")
 
 
 @cache

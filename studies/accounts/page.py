@@ -17,30 +17,24 @@ def page(account: Account) -> str:
     word, colour = ("complete", style.colour(0)) if account.complete else ("incomplete", style.colour(1))
     chapters = [(title, f"chapter-{number}") for number, title in enumerate(account.chapters, 1)]
     links = [html.link(NOT_REPRODUCED, "errata"), *(html.link(*chapter) for chapter in chapters)]
-    parts = [html.contents(links), _counts(account, chapters), *_errata(account)]
+    counts = [Counter(claim.verdict for claim in chapter.claims) for chapter in account.chapters.values()]
+    rows = [
+        (html.link(*link), *(str(count[verdict] or "–") for verdict in Verdict))
+        for link, count in zip(chapters, counts, strict=True)
+    ]
+    heads = ("chapter", *(verdict.value for verdict in Verdict))
+    # What was not reproduced: where, what the paper states, and why; each row links to its claim.
+    errata = [
+        (html.link(claim.place, _anchor(claim)), claim.statement, claim.verdict.value, claim.why)
+        for claim in account.errata
+    ]
+    table = html.columns(NOT_REPRODUCED, ("where", "the paper states", "verdict", "why"), errata)
+    parts = [html.contents(links), html.columns("Summary", heads, rows)]
+    parts += ['<div id="errata">', table, html.paragraph(f"{MEANING} {READ}"), "</div>"]
     for (title, anchor), chapter in zip(chapters, account.chapters.values(), strict=True):
         parts += [html.heading(title, anchor=anchor), *_chapter(chapter)]
     parts += [html.heading(f"{title}: not computed") + html.paragraph(why) for title, why in account.broken.items()]
     return html.page(account.paper.source, word, summary, colour, parts)
-
-
-def _counts(account: Account, chapters: list[tuple[str, str]]) -> str:
-    """Return a table with the number of claims of each chapter by verdict."""
-    rows: list[list[str | html.Link]] = []
-    for link, chapter in zip(chapters, account.chapters.values(), strict=True):
-        counts = Counter(claim.verdict for claim in chapter.claims)
-        rows.append([html.link(*link), *(str(counts[verdict] or "–") for verdict in Verdict)])
-    return html.columns("Summary", ("chapter", *(verdict.value for verdict in Verdict)), rows)
-
-
-def _errata(account: Account) -> list[str]:
-    """Return what was not reproduced: where, what the paper states, and why; each row links to its claim."""
-    rows = [
-        (html.link(claim.place, _anchor(claim)), claim.statement, claim.verdict.value, claim.why)
-        for claim in account.errata
-    ]
-    table = html.columns(NOT_REPRODUCED, ("where", "the paper states", "verdict", "why"), rows)
-    return ['<div id="errata">', table, html.paragraph(f"{MEANING} {READ}"), "</div>"]
 
 
 def _chapter(chapter: Chapter) -> list[str]:

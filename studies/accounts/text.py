@@ -23,7 +23,14 @@ def report(account: Account, form: str = "png") -> str:
     lines = [f"# {account.paper.source}", "", f"{account.summary()}. Computed in {account.seconds:.0f} s."]
     for title, chapter in account.chapters.items():
         heads = ("claim", "where", "the paper states", BY_THE_PAPER, "computed", "verdict", "why")
-        rows = [(*_row(claim)[:-1], f"**{claim.verdict}**", claim.why) for claim in chapter.claims]
+        rows = [
+            (
+                *(claim.id, claim.place, claim.statement),
+                *(value_text(value, claim.unit) for value in (claim.printed, claim.computed)),
+                *(f"**{claim.verdict}**", claim.why),
+            )
+            for claim in chapter.claims
+        ]
         lines += ["", f"## {title}", "", *_table(heads, rows)]
         for name, drawing in chapter.drawings.items():
             shows = [claim.id for claim in chapter.claims if claim.figure == name]
@@ -66,11 +73,6 @@ def _entry(claim: Claim) -> str:
     parts = [f"- **{claim.place}** (`{claim.id}`): {statement}", " ".join([*about, *numbers]), claim.why]
     safe = [part.replace("<", "&lt;").replace("\n", " ") for part in parts]
     return "\n" + "\n\n    ".join(safe)
-
-
-def _row(claim: Claim) -> tuple[str, ...]:
-    printed, computed = value_text(claim.printed, claim.unit), value_text(claim.computed, claim.unit)
-    return claim.id, claim.place, claim.statement, printed, computed, claim.why
 
 
 def _table(heads: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> list[str]:

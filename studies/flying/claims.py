@@ -1,10 +1,7 @@
-"""`claim`: a statement of paper F, from `claims.yaml`."""
+"""`claim`: a statement of paper F by its name in `claims.yaml`."""
 
 from pathlib import Path
 
-from ..accounts.claim import Statement, statements
+from ..accounts.claim import statements
 
-
-def claim(name: str) -> Statement:
-    """Return what the paper states, by its name in the file."""
-    return statements(Path(__file__).with_name("claims.yaml"))[name]
+claim = statements(Path(__file__).with_name("claims.yaml")).__getitem__

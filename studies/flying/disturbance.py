@@ -13,7 +13,7 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...ocp.tasks.paths import Motion
-from ..accounts.account import Chapter
+from ..accounts.claim import Chapter
 from .claims import claim
 from .helix import flight
 from .motion import FEASIBLE, TIMES, circle, steady_tensions

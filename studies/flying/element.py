@@ -13,8 +13,7 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import load
 from ...models.cables import ElementChain
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .cable import STRETCH, chain
 from .claims import claim
 
@@ -26,8 +25,7 @@ UNDEFINED = "undefined"
 
 def chapter() -> Chapter:
     """Check signs and sizes of the equations of one element, and the nodes of figure 3."""
-    claims = [_nodes(), _increment(), _winding(), _in_world(), _brackets(), *_sizes()]
-    return Chapter(claims, {"elements": _figure()})
+    return Chapter([*_forces(), *_sizes()], {"elements": _figure()})
 
 
 @cache
@@ -56,51 +54,32 @@ def product(*shapes: tuple[int, int]) -> str:
         return UNDEFINED
 
 
-def _nodes() -> Claim:
-    """List the nodes j - 1 and j of the elements 1 to n, which Eqs. 12, 13 and 21 use."""
-    used = {node for j in range(1, ELEMENTS + 1) for node in (j - 1, j)}
-    return claim("fig-3").compared((min(used), max(used)), printed=(1, ELEMENTS + 1), elements=ELEMENTS)
-
-
-def _increment() -> Claim:
-    """Compare d tau of Eq. 12 with d tau of Eq. 13 at the same offsets."""
+def _forces() -> list[Claim]:
+    """Compare d tau of Eq. 12, k_l of Eq. 15 with E A / e for its size, and k_n dx + k_l de with Eq. 13."""
+    used = {node for j in range(1, ELEMENTS + 1) for node in (j - 1, j)}  # which Eqs. 12, 13 and 21 use
     before, after = OFFSETS
-    by_12 = stiffness() * (after - before + WOUND)
     energy = stiffness() / 2 * (np.array([after - before + WOUND + step for step in (STRETCH, -STRETCH)]) ** 2)
     pull = (energy[0] - energy[1]) / (2 * STRETCH)  # the derivative of the strain energy by the elongation
-    return claim("eq-12-13-sign").compared(by_13(OFFSETS, WOUND)[0], printed=by_12, pull=pull)
-
-
-def _winding() -> Claim:
-    """Compare k_l of Eq. 15, with E A / e for its size, with Eqs. 13 and 18 for winding alone."""
-    printed = stiffness() * np.array([1.0, -1.0]) * WOUND
+    along, wound = by_13(OFFSETS, WOUND), by_13(np.zeros(2), WOUND)
+    by_15 = stiffness() * np.array([1.0, -1.0]) * WOUND
     by_18 = stiffness() * np.array([-1.0, 1.0]) * WOUND  # k_5 = -S u, k_6 = S u
-    forces = by_13(np.zeros(2), WOUND)
-    return claim("eq-15-sign").compared(forces, printed=printed, apart=np.abs(by_18 - forces).max())
-
-
-def _in_world() -> Claim:
-    """Compare k_n dx + k_l de in {G}, from the blocks of Eqs. 18 and 19, with Eq. 13 along the cable."""
     u = cable_1().direction
     k_1 = stiffness() * np.outer(u, u)
     k_n = np.block([[k_1, -k_1], [-k_1, k_1]])
-    k_l = stiffness() * np.concatenate([-u, u])
-    given = k_n @ np.concatenate([OFFSETS[0] * u, OFFSETS[1] * u]) + k_l * WOUND
-    along = by_13(OFFSETS, WOUND)
-    return claim("eq-20").compared(np.abs(given - np.concatenate([along[0] * u, along[1] * u])).max())
-
-
-def _brackets() -> Claim:
-    """Form [k_5 k_6]^T of Eq. 18 from its two columns; 6 x 1 is printed beside the bracket."""
-    column = np.zeros((3, 1))
-    size = "{} x {}".format(*np.concatenate([column, column]).shape)
-    return claim("eq-18-size").stated(size, size == "6 x 1")
+    in_G = k_n @ np.concatenate([before * u, after * u]) + stiffness() * np.concatenate([-u, u]) * WOUND
+    return [
+        claim("fig-3").compared((min(used), max(used)), printed=(1, ELEMENTS + 1), elements=ELEMENTS),
+        claim("eq-12-13-sign").compared(along[0], printed=stiffness() * (after - before + WOUND), pull=pull),
+        claim("eq-15-sign").compared(wound, printed=by_15, apart=np.abs(by_18 - wound).max()),
+        claim("eq-20").compared(np.abs(in_G - np.concatenate([along[0] * u, along[1] * u])).max()),
+    ]
 
 
 def _sizes() -> list[Claim]:
-    """Form the products of Eqs. 14, 20 and 21 with the printed sizes."""
-    nodes = 3 * (ELEMENTS + 1)
-    claims = []
+    """Form [k_5 k_6]^T of Eq. 18 and the products of Eqs. 14, 20 and 21 with the printed sizes."""
+    nodes, column = 3 * (ELEMENTS + 1), np.zeros((3, 1))
+    bracket = "{} x {}".format(*np.concatenate([column, column]).shape)
+    claims = [claim("eq-18-size").stated(bracket, bracket == "6 x 1")]
     for name, size, meant in (
         ("eq-14-size", (2, 1), ((2, 1), (1, 1))),
         ("eq-20-size", (6, 1), ((6, 1), (1, 1))),

@@ -21,8 +21,7 @@ from ...models import Dynamics, Robot, load
 from ...models.air import trapezoid
 from ...ocp.tasks.paths import CirclePath, Motion
 from ...simulation import Simulation, simulate
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .claims import claim
 from .motion import FEASIBLE, TIMES, solved
 from .plans import BELOW, NOT_READ, RATE, SECONDS, Name, planned
@@ -68,9 +67,9 @@ def chapter() -> Chapter:
         _own_drag(robot, flown["helix"]),
         _stability(*hovering),
     ]
-    drawings = {f"flown-{name}": _drawing(name, part.stays, part.gives) for name, part in flown.items()}
-    drawings["flown-hovering"] = _drawing("hovering", *hovering)
-    return Chapter(claims, drawings)
+    drawings = {f"flown-{name}": _drawing(WHAT[name], part.stays, part.gives) for name, part in flown.items()}
+    small = f"the circle of radius {FEASIBLE:g} m under a hovering quadrotor"
+    return Chapter(claims, drawings | {"flown-hovering": _drawing(small, *hovering)})
 
 
 def gust(times: np.ndarray, seed: int) -> np.ndarray:
@@ -116,8 +115,7 @@ def accelerated(flight: Simulation) -> float:
 
 
 def _lengths(flown: dict[Name, Flown]) -> Claim:
-    errors = [(part.calm.states.pose - part.body.pose)[:, :3] for part in flown.values()]
-    off = np.linalg.norm(errors, axis=-1).max(axis=-1)
+    off = [np.linalg.norm((part.calm.states.pose - part.body.pose)[:, :3], axis=-1).max() for part in flown.values()]
     return claim("eq-6-flown").compared(off, printed=0.0, within=ON_CIRCLE, near=1000.0 * ON_CIRCLE)
 
 
@@ -199,15 +197,12 @@ def _stability(stays: Simulation, gives: Simulation) -> Claim:
     )
 
 
-def _drawing(name: str, stays: Simulation, gives: Simulation) -> Drawing:
-    robot = stays.robot
-    errors = {STAYS: 1e3 * stays.error[SHOWN], GIVES: 1e3 * gives.error[SHOWN]}
+def _drawing(what: str, stays: Simulation, gives: Simulation) -> Drawing:
+    flights, t_min = {STAYS: stays, GIVES: gives}, float(stays.robot.t_min.min())
+    errors = {label: 1e3 * flight.error[SHOWN] for label, flight in flights.items()}
     panels = [Panel("error [mm]", errors, logarithmic=True)]
-    for label, flight in ((STAYS, stays), (GIVES, gives)):
+    for label, flight in flights.items():
         tensions = flight.record.tensions[SHOWN]
-        lines = {f"cable {index + 1}": tensions[:, index] for index in range(robot.m)}
-        panels.append(Panel(f"tension [N],\n{label}", lines, {"t_min": float(robot.t_min.min())}))
-    what = WHAT.get(name, f"the circle of radius {FEASIBLE:g} m under a hovering quadrotor")
-    return Drawing(
-        f"Flights in the wind of figure 5, {what}: errors and tensions", curves(stays.times[SHOWN], "time [s]", panels)
-    )
+        panels.append(Panel.of_cables(f"tension [N],\n{label}", tensions, {"t_min": t_min}))
+    about = f"Flights in the wind of figure 5, {what}: errors and tensions"
+    return Drawing(about, curves(stays.times[SHOWN], "time [s]", panels))

@@ -8,8 +8,7 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...ocp.tasks.paths import Motion
 from ...solvers import TensionProblem, solve
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 from .every_pairing import PAIRINGS, TURN, at_centre, pull_inward
 from .every_pairing import tensions as tensions_of
@@ -27,14 +26,25 @@ def chapter() -> Chapter:
     world = Motion(*dynamics.relative.motion_in_world(*body, *base))
     lengths = dynamics.cable_lengths(world.pose, base.pose[:, None])
     tensions = steady_tensions(dynamics, body, base)
+    arm = world.pose[:, :3] - base.pose[:, :3]  # about the line of the flight
+    angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
+    radius_and_turns = np.linalg.norm(arm[:, :2], axis=1).mean(), np.ptp(angle) / (2 * np.pi)
+    change = _change_with_attitude(dynamics)
+    # Lengths beside a sine; the printed pairing has lengths though its J has no inverse.
+    printed = Dynamics(load("wang-flying-printed")).cable_lengths(body.pose)
+    off, others = (off_sine(TIMES, each).max() for each in (printed, lengths))
+    # Tensions beside a sine, of every pairing that holds the platform at the centre.
+    held = tensions_of(circle(RADIUS, TURN), PAIRINGS[at_centre().taut])
+    most = off_sine(TURN, held.reshape(len(TURN), -1)).reshape(held.shape[1:]).max(axis=1)
     claims = [
-        _turns(world, base),
-        _independent(dynamics),
-        _sine_of_lengths(lengths),
-        _sine_of_tensions(),
+        claim("fig-6").compared(radius_and_turns, printed=(1.0, 0.2 * SECONDS / 2)),
+        claim("eq-5").stated(f"{change:.0e} m", change > 1e-9),
+        claim("fig-7-lengths").undetermined(off, others=others),
+        claim("fig-7-tensions").stated(most.min(), most.min() <= LIKE_A_SINE, like_a_sine=LIKE_A_SINE, count=len(most)),
         claim("VI.A-flight").compared(np.abs(steady_tensions(dynamics, body) - tensions).max()),
         _positive(dynamics, world, base, tensions),
     ]
+    from_quadrotor = Panel("from the quadrotor [m]", dict(zip("xyz", arm.T, strict=True)))
     drawings = {
         "helix": Drawing(
             "Figure 6: the quadrotor's straight flight and the platform's helix in {G}",
@@ -42,11 +52,15 @@ def chapter() -> Chapter:
         ),
         "helix-arm": Drawing(
             "Figure 6, enlarged: the platform's position relative to the quadrotor, along the axes of {G}",
-            curves(TIMES, "time [s]", [_arm(world, base)]),
+            curves(TIMES, "time [s]", [from_quadrotor]),
         ),
         "helix-cables": Drawing(
             "Figure 7: lengths, and the tensions that the motion requires; below 0 N a cable would have to push",
-            curves(TIMES, "time [s]", [_panel("length [m]", lengths), _panel("tension [N]", tensions, {"0 N": 0.0})]),
+            curves(
+                TIMES,
+                "time [s]",
+                [Panel.of_cables("length [m]", lengths), Panel.of_cables("tension [N]", tensions, {"0 N": 0.0})],
+            ),
         ),
     }
     return Chapter(claims, drawings)
@@ -57,32 +71,12 @@ def flight() -> Motion:
     return LINE.at(TIMES, SECONDS)
 
 
-def _arm(world: Motion, base: Motion) -> Panel:
-    arm = world.pose[:, :3] - base.pose[:, :3]
-    return Panel("from the quadrotor [m]", {name: arm[:, axis] for axis, name in enumerate("xyz")})
-
-
-def _panel(label: str, values: np.ndarray, bounds: dict[str, float] | None = None) -> Panel:
-    return Panel(label, {f"cable {index + 1}": values[:, index] for index in range(6)}, bounds or {})
-
-
-def _turns(world: Motion, base: Motion) -> Claim:
-    """Check the radius about the line of the flight, and the number of turns."""
-    arm = world.pose[:, :2] - base.pose[:, :2]
-    angle = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
-    return claim("fig-6").compared(
-        (np.linalg.norm(arm, axis=1).mean(), np.ptp(angle) / (2 * np.pi)), printed=(1.0, 0.2 * SECONDS / 2)
-    )
-
-
-def _independent(dynamics: Dynamics) -> Claim:
-    """Compare lengths at one relative pose under quadrotors of different attitudes."""
+def _change_with_attitude(dynamics: Dynamics) -> float:
+    """Return how much lengths at one relative pose differ under quadrotors of different attitudes [m]."""
     samples = instants()
     body, zero = np.tile(circle(RADIUS).pose[0], (len(samples.base.pose), 1)), np.zeros_like(samples.base.pose)
     world = dynamics.relative.motion_in_world(body, zero, zero, samples.base.pose, zero, zero)[0]
-    lengths = dynamics.cable_lengths(world, samples.base.pose[:, None])
-    change = np.ptp(lengths, axis=0).max()
-    return claim("eq-5").stated(f"{change:.0e} m", change > 1e-9)
+    return np.ptp(dynamics.cable_lengths(world, samples.base.pose[:, None]), axis=0).max()
 
 
 def off_sine(times: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -90,22 +84,6 @@ def off_sine(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     basis = np.stack([np.ones_like(times), np.cos(RATE * times), np.sin(RATE * times)], axis=1)
     fit = np.linalg.lstsq(basis, values)[0]
     return np.abs(values - basis @ fit).max(axis=0) / np.hypot(fit[1], fit[2])
-
-
-def _sine_of_lengths(crossed: np.ndarray) -> Claim:
-    """Compare lengths with a sine, of the printed pairing, which has lengths though its J has no inverse."""
-    printed = Dynamics(load("wang-flying-printed")).cable_lengths(circle(RADIUS).pose)
-    off, others = (off_sine(TIMES, lengths).max() for lengths in (printed, crossed))
-    return claim("fig-7-lengths").undetermined(off, others=others)
-
-
-def _sine_of_tensions() -> Claim:
-    """Compare tensions with a sine, of every pairing that holds the platform at the centre."""
-    held = tensions_of(circle(RADIUS, TURN), PAIRINGS[at_centre().taut])
-    most = off_sine(TURN, held.reshape(len(TURN), -1)).reshape(held.shape[1:]).max(axis=1)
-    return claim("fig-7-tensions").stated(
-        most.min(), most.min() <= LIKE_A_SINE, like_a_sine=LIKE_A_SINE, count=len(most)
-    )
 
 
 def _positive(dynamics: Dynamics, world: Motion, base: Motion, tensions: np.ndarray) -> Claim:

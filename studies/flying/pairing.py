@@ -16,8 +16,7 @@ from ...figures import style
 from ...figures.drawing import Drawing
 from ...models import load
 from ...models.diagnosis import diagnose
-from ..accounts.account import Chapter
-from ..accounts.claim import Verdict
+from ..accounts.claim import Chapter, Verdict
 from .claims import claim
 
 if TYPE_CHECKING:

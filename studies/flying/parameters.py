@@ -3,8 +3,7 @@
 import numpy as np
 
 from ...models import Robot, load
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .cable import constants
 from .claims import claim
 from .plans import BELOW
@@ -36,9 +35,25 @@ CENTRE = 1.0  # z of the circle's centre in {A}, as sections VI.A and VI.B print
 def chapter() -> Chapter:
     """Compare Table 1 with the robot that this run uses, and check its consistency."""
     robot = load("wang-flying-printed")
-    others = PRINTED["I_x"] + PRINTED["I_y"]
-    rigid = claim("table-1-rigid").stated(others, PRINTED["I_z"] <= others, printed=PRINTED["I_z"])
-    return Chapter([*_used(robot), rigid, _gyration(), _height(robot)])
+    others, I_z, m_B = PRINTED["I_x"] + PRINTED["I_y"], PRINTED["I_z"], PRINTED["m_B"]
+    # m r^2 is the largest I_z that a body within the radius r can have.
+    reach = max(PRINTED["r_B"], float(np.sqrt(PRINTED["S"] / np.pi)))
+    most = m_B * reach**2
+    # The signs of z in {A} beside the heights in {G}.
+    centre = CIRCLE - QUADROTOR
+    claims = [
+        claim("table-1-rigid").stated(others, I_z <= others, printed=I_z),
+        claim("table-1-gyration").stated(most, I_z <= most, printed=I_z, reach=reach, radius=float(np.sqrt(I_z / m_B))),
+        claim("eq-2-height").compared(
+            (np.sign(centre) * PRINTED["H_1"], centre),
+            printed=(PRINTED["H_1"], CENTRE),
+            circle=CIRCLE,
+            quadrotor=QUADROTOR,
+            anchor=robot.anchors[0, 2],
+            below=-BELOW,
+        ),
+    ]
+    return Chapter([*_used(robot), *claims])
 
 
 def _used(robot: Robot) -> list[Claim]:
@@ -79,26 +94,3 @@ def _ring(points: np.ndarray) -> tuple[float, float, float]:
     angles = np.sort(np.arctan2(points[:, 1], points[:, 0]))
     radii = np.hypot(points[:, 0], points[:, 1])
     return radii.mean(), np.degrees(np.diff(angles)).mean(), np.abs(points[:, 2]).mean()
-
-
-def _gyration() -> Claim:
-    """Compare I_z with m r^2, the largest that a body within the radius r can have."""
-    reach = max(PRINTED["r_B"], float(np.sqrt(PRINTED["S"] / np.pi)))
-    most = PRINTED["m_B"] * reach**2
-    radius = float(np.sqrt(PRINTED["I_z"] / PRINTED["m_B"]))
-    return claim("table-1-gyration").stated(
-        most, PRINTED["I_z"] <= most, printed=PRINTED["I_z"], reach=reach, radius=radius
-    )
-
-
-def _height(robot: Robot) -> Claim:
-    """Compare the signs of z in {A} with the heights in {G}."""
-    centre = CIRCLE - QUADROTOR
-    return claim("eq-2-height").compared(
-        (np.sign(centre) * PRINTED["H_1"], centre),
-        printed=(PRINTED["H_1"], CENTRE),
-        circle=CIRCLE,
-        quadrotor=QUADROTOR,
-        anchor=robot.anchors[0, 2],
-        below=-BELOW,
-    )

@@ -14,12 +14,11 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...models.cables import ElementChain
-from ...models.cables.driving_force import DrivingForce, driving_force
+from ...models.cables.driving_force import driving_force
 from ...models.diagnosis import diagnose
 from ...models.points import rotations
 from ...ocp.tasks.paths import Motion
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from .cable import constants
 from .claims import claim
 from .instants import turn
@@ -49,19 +48,30 @@ def chapter() -> Chapter:
     run = steps(robot, motion, shake[ROWS])
     own = driving_force(robot, *motion, shake[ROWS], STEP, ELEMENTS)
     rank = diagnose(load("wang-flying-printed")).rank_level
+    dT = run.dT_C + run.dT_K
+    # The balance in {G} with F = T + dT on the platform, and its error if T' is the time derivative of T.
+    A, w = Dynamics(robot).wrench_matrix(motion.pose), Dynamics(robot).required_wrench(*motion)
+    slope = np.gradient(run.T, run.times, axis=0)
+    meant, literal = (np.abs(turn(A, run.T + part) - w).max() for part in (dT, slope))
     claims = [
         claim("step-1").undetermined(f"dt = {STEP:g} s, n = {ELEMENTS}, amplitude {AMPLITUDE * 1e6:g} um"),
-        _same("step-2", "2", "cable lengths l_i(t), Eq. 5", run.lengths, own.lengths, "m"),
-        _same("step-3", "3", "element lengths e_i(t) = l_i(t) / n", run.elements, own.lengths / ELEMENTS, "m"),
-        _same("step-4", "4", "damping increments dT_C, Eqs. 10 and 11", run.dT_C, own.dT_C, "N"),
-        _same("step-5", "5", "elastic increments dT_K, Eq. 21 as corrected", run.dT_K, own.dT_K, "N"),
-        _same("step-6", "6", "increments dT = dT_C + dT_K, Eq. 23", run.dT_C + run.dT_K, own.dT, "N"),
-        _traction(robot, motion, run),
+        _same(2, "cable lengths l_i(t), Eq. 5", run.lengths, own.lengths, "m"),
+        _same(3, "element lengths e_i(t) = l_i(t) / n", run.elements, own.lengths / ELEMENTS, "m"),
+        _same(4, "damping increments dT_C, Eqs. 10 and 11", run.dT_C, own.dT_C, "N"),
+        _same(5, "elastic increments dT_K, Eq. 21 as corrected", run.dT_K, own.dT_K, "N"),
+        _same(6, "increments dT = dT_C + dT_K, Eq. 23", dT, own.dT, "N"),
+        claim("step-7").compared(literal, within=SAME, meant=meant),
         claim("step-7-inverse").stated(rank, rank == 6, otherwise=Verdict.IMPOSSIBLE),
         # Times of t = t + k dt for k = 1, 2, 3, ..., and those of a constant step.
         claim("step-8").compared(STEP * np.arange(4), printed=np.cumsum(STEP * np.arange(4))),
     ]
-    return Chapter(claims, {"procedure": _figure(run, own)})
+    labels = {"lengths": "length [m]", "dT_C": "dT_C [N]", "dT_K": "dT_K [N]", "T": "T [N]"}
+    panels = [
+        Panel(label, {"in one pass": getattr(own, name)[:, 0]}, dots={"step by step": getattr(run, name)[:, 0]})
+        for name, label in labels.items()
+    ]
+    about = f"Section V for cable 1: circle of radius {FEASIBLE:g} m, vibration of {AMPLITUDE * 1e6:g} um"
+    return Chapter(claims, {"procedure": Drawing(about, curves(run.times, "time [s]", panels))})
 
 
 def steps(robot: Robot, motion: Motion, shake: np.ndarray) -> Run:
@@ -87,32 +97,10 @@ def _instant(robot: Robot, pose: np.ndarray, shake: np.ndarray) -> tuple[np.ndar
     return tuple(np.array(column) for column in zip(*rows, strict=True))
 
 
-def _same(name: str, step: str, what: str, run: np.ndarray, own: np.ndarray, unit: str) -> Claim:
+def _same(step: int, what: str, run: np.ndarray, own: np.ndarray, unit: str) -> Claim:
     """Report how far one step and `driving_force` are apart, which is no verdict on the paper."""
     off = np.abs(run - own).max()
     agree = f"agree to {off:.0e} {unit}" if off <= SAME else f"differ by up to {off:.2g} {unit}"
     return claim("one-step").undetermined(
-        np.abs(run).max(), name=name, step=step, what=what, feasible=FEASIBLE, unit=unit, agree=agree
-    )
-
-
-def _traction(robot: Robot, motion: Motion, run: Run) -> Claim:
-    """Check the balance in {G} with F = T + dT on the platform, and its error if T' is the time derivative of T."""
-    dynamics = Dynamics(robot)
-    A, w = dynamics.wrench_matrix(motion.pose), dynamics.required_wrench(*motion)
-    dT = run.dT_C + run.dT_K
-    slope = np.gradient(run.T, run.times, axis=0)
-    meant, literal = (np.abs(turn(A, run.T + part) - w).max() for part in (dT, slope))
-    return claim("step-7").compared(literal, within=SAME, meant=meant)
-
-
-def _figure(run: Run, own: DrivingForce) -> Drawing:
-    labels = {"lengths": "length [m]", "dT_C": "dT_C [N]", "dT_K": "dT_K [N]", "T": "T [N]"}
-    panels = [
-        Panel(label, {"in one pass": getattr(own, name)[:, 0]}, dots={"step by step": getattr(run, name)[:, 0]})
-        for name, label in labels.items()
-    ]
-    return Drawing(
-        f"Section V for cable 1: circle of radius {FEASIBLE:g} m, vibration of {AMPLITUDE * 1e6:g} um",
-        curves(run.times, "time [s]", panels),
+        np.abs(run).max(), step=step, what=what, feasible=FEASIBLE, unit=unit, agree=agree
     )

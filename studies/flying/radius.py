@@ -13,8 +13,7 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...solvers import solve_batch
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 from .every_pairing import PAIRINGS, at_centre, hold, pull_inward
 from .motion import RADIUS, TIMES, circle, steady_tensions
@@ -58,13 +57,8 @@ def chapter() -> Chapter:
     floor = float(dynamics.robot.t_min.max())
     taut, kept = largest_radius(dynamics), largest_radius(dynamics, floor)
     best = largest_radius_of_any(taut - PRECISION)
-    drawings = {"radius": _against_radius(dynamics, taut), "depth": _against_depth(dynamics, floor)}
-    return Chapter([_largest(best, taut, f"{kept:.3f} m with at least {floor:g} N"), _inward()], drawings)
-
-
-def _largest(best: float, crossed: float, kept: str) -> Claim:
     beyond = [radius for radius in (*BEYOND, RADIUS) if radius > best]
-    return claim("radius").stated(
+    largest = claim("radius").stated(
         best,
         best >= RADIUS or any(len(hold(radius)) for radius in beyond),
         printed=RADIUS,
@@ -72,9 +66,11 @@ def _largest(best: float, crossed: float, kept: str) -> Claim:
         pairings=len(PAIRINGS),
         taut=at_centre().taut.sum(),
         beyond=", ".join(f"{radius:g}" for radius in beyond),
-        crossed=crossed,
-        kept=kept,
+        crossed=taut,
+        kept=f"{kept:.3f} m with at least {floor:g} N",
     )
+    drawings = {"radius": _against_radius(dynamics, taut), "depth": _against_depth(dynamics, floor)}
+    return Chapter([largest, _inward()], drawings)
 
 
 def _inward() -> Claim:

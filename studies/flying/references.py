@@ -7,8 +7,7 @@ VI.B refer to figures by numbers that are one less than those of the captions, e
 import numpy as np
 
 from ...models import load
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter
 from .claims import claim
 from .element import ELEMENTS
 from .motion import RADIUS, circle
@@ -33,14 +32,20 @@ def chapter() -> Chapter:
     """Look references up, and form what frames and letters state."""
     captions, shown = zip(*FIGURES.values(), strict=True)
     last = {"tags": len(TAGS), "last": TAGS[-1], "in_steps": IN_STEPS[-1]}
+    robot, places = load("wang-flying-printed"), circle(RADIUS).pose[:, :3]
+    in_own = places - places  # O_B from O_B; the level platform's axes are those of {A}
+    # How far B_2 moves with alpha_A, by b_i with alpha_B and by the printed b_i.
+    r_B, alpha_B = np.hypot(*robot.attachments[0, :2]), np.radians(60)
+    B_2 = [r_B * np.array([np.cos(angle), np.sin(angle)]) for angle in (alpha_B, alpha_B + 0.0, alpha_B + TURN)]
+    own, by_printed = (float(np.linalg.norm(place - B_2[0]) / TURN) for place in B_2[1:])
     return Chapter(
         [
             claim("section-V-references").compared(by_order(IN_STEPS), printed=IN_STEPS, **last),
             claim("section-II-IV-references").compared(by_order(OUTSIDE), printed=OUTSIDE),
             claim("section-VI-references").compared(captions, printed=shown),
-            _frames(),
-            _angle(),
-            claim("eq-23-cables").compared(load("wang-flying-printed").m, printed=ELEMENTS + 1, elements=ELEMENTS),
+            claim("frames").compared(np.linalg.norm(in_own, axis=1).max(), printed=RADIUS),
+            claim("eq-3-alpha").compared(own, printed=by_printed),
+            claim("eq-23-cables").compared(robot.m, printed=ELEMENTS + 1, elements=ELEMENTS),
         ]
     )
 
@@ -48,22 +53,3 @@ def chapter() -> Chapter:
 def by_order(references: tuple[int, ...]) -> list[int]:
     """Return the numbers of the equations at these places among all displayed ones, the second Eq. 2 included."""
     return [TAGS[place - 1] for place in references]
-
-
-def _frames() -> Claim:
-    """Transform the platform's circle into its own frame."""
-    motion = circle(RADIUS)
-    in_own = motion.pose[:, :3] - motion.pose[:, :3]  # O_B from O_B; the level platform's axes are those of {A}
-    return claim("frames").compared(np.linalg.norm(in_own, axis=1).max(), printed=RADIUS)
-
-
-def _angle() -> Claim:
-    """Compute how far B_2 moves with alpha_A, by the printed b_i and by b_i with alpha_B."""
-    r_B = np.hypot(*load("wang-flying-printed").attachments[0, :2])
-
-    def moved(of_b: float) -> float:
-        alpha_B = np.radians(60)
-        before, after = (r_B * np.array([np.cos(angle), np.sin(angle)]) for angle in (alpha_B, alpha_B + of_b))
-        return float(np.linalg.norm(after - before) / TURN)
-
-    return claim("eq-3-alpha").compared(moved(0.0), printed=moved(TURN))

@@ -9,8 +9,7 @@ from ...figures import plan as figures
 from ...figures.drawing import Drawing
 from ...models import load
 from ...ocp import Plan, plan
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from . import plans
 from .circle import tasks
 from .claims import claim

@@ -6,8 +6,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import rotation
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .claims import claim
 from .instants import Instants, instants, relative_error, turn
 
@@ -18,20 +17,7 @@ SMALL = 1e-4  # [rad], a small rotation for Eq. 9
 def chapter() -> Chapter:
     """Check the equations that give angular velocity and acceleration from angles."""
     samples = instants()
-    rate = body_rates(samples.base.pose, samples.base.velocity[:, 3:])
-    whole, own = samples.R_A.then(samples.R_B), samples.R_B  # {B} in {G} and in {A}; both accelerations are in {B}
-    off = relative_error(own.acceleration, whole.acceleration)
-    return Chapter(
-        [
-            _matrix(samples),
-            _small_angle(),
-            _small_turn(),
-            claim("eq-27-28").compared(np.abs(rate - samples.R_A.rate).max(), within=ROUNDING),
-            _acceleration(samples),
-            _composed(samples),
-            claim("eq-32-frame").compared(np.median(off), within=ROUNDING),
-        ]
-    )
+    return Chapter([_matrix(samples), *_small_angles(), *_rates(samples)])
 
 
 def _matrix(samples: Instants) -> Claim:
@@ -45,23 +31,19 @@ def _matrix(samples: Instants) -> Claim:
     return claim("eq-1").stated(off, off < ROUNDING, ours=np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max())
 
 
-def _small_angle() -> Claim:
-    """Form R - 1 of Rz Ry Rx with the sines and cosines that are printed for small angles, and with sin u = u."""
+def _small_angles() -> list[Claim]:
+    """Form R - 1 with the sines and cosines that are printed for small angles, and check R = 1 + [dTheta]x."""
     angles = SMALL * np.array([0.6, -0.8, 1.0])
     sizes = []
     for sines in (np.zeros(3), angles):  # as printed, and as Eq. 9 has them
         Rx, Ry, Rz = (np.eye(3) + ca.skew(ca.DM(about_axis)).full() for about_axis in np.diag(sines))
         sizes.append(np.abs(Rz @ Ry @ Rx - np.eye(3)).max())
-    printed, meant = sizes
-    return claim("eq-9-small").compared(meant, printed=printed, within=SMALL**2, small=SMALL)
-
-
-def _small_turn() -> Claim:
-    """Check R = 1 + [dTheta]x + O(dTheta^2)."""
-    angles = SMALL * np.array([0.6, -0.8, 1.0])
     turned = rotation.rotation(ca.DM(angles)).full()
     off = np.abs(turned - np.eye(3) - ca.skew(ca.DM(angles)).full()).max()
-    return claim("eq-9").stated(off, off < SMALL**2, small=SMALL)
+    return [
+        claim("eq-9-small").compared(sizes[1], printed=sizes[0], within=SMALL**2, small=SMALL),
+        claim("eq-9").stated(off, off < SMALL**2, small=SMALL),
+    ]
 
 
 def printed_acceleration(pose: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
@@ -75,27 +57,27 @@ def body_rates(pose: np.ndarray, rates: np.ndarray) -> np.ndarray:
     return _each(rotation.body_rate, pose, rates)
 
 
-def _acceleration(samples: Instants) -> Claim:
-    (pose, _, acceleration), true = samples.base, samples.R_A.acceleration
+def _rates(samples: Instants) -> list[Claim]:
+    A, B, (pose, velocity, acceleration) = samples.R_A, samples.R_B, samples.base
     printed = printed_acceleration(*samples.base)
     ours = printed - acceleration[:, 3:] + body_rates(pose, acceleration[:, 3:])
-    off = relative_error(printed, true)
-    return claim("eq-31-32").compared(
-        np.median(off),
-        within=ROUNDING,
-        rounding=relative_error(ours, true).max(),
-        angle=np.abs(pose[:, 3:]).max(),
-        off=off.max(),
-    )
-
-
-def _composed(samples: Instants) -> Claim:
-    """Compare R_A (alpha_A + R alpha_B + omega_A x R Omega) with the second derivative of R_A R."""
-    A, B = samples.R_A, samples.R_B
-    whole = A.then(B)
+    off = relative_error(printed, A.acceleration)
+    # R_A (alpha_A + R alpha_B + omega_A x R Omega) beside the second derivative of R_A R.
+    whole = A.then(B)  # {B} in {G}; both accelerations of Eq. 32 are in {B}
     inner = A.acceleration + turn(B.R, B.acceleration) + np.cross(A.rate, turn(B.R, B.rate))
-    off = np.abs(turn(A.R, inner) - turn(whole.R, whole.acceleration)).max()
-    return claim("eq-30").compared(off, within=ROUNDING)
+    composed = np.abs(turn(A.R, inner) - turn(whole.R, whole.acceleration)).max()
+    return [
+        claim("eq-27-28").compared(np.abs(body_rates(pose, velocity[:, 3:]) - A.rate).max(), within=ROUNDING),
+        claim("eq-31-32").compared(
+            np.median(off),
+            within=ROUNDING,
+            rounding=relative_error(ours, A.acceleration).max(),
+            angle=np.abs(pose[:, 3:]).max(),
+            off=off.max(),
+        ),
+        claim("eq-30").compared(composed, within=ROUNDING),
+        claim("eq-32-frame").compared(np.median(relative_error(B.acceleration, whole.acceleration)), within=ROUNDING),
+    ]
 
 
 def _each(function, pose: np.ndarray, rates: np.ndarray) -> np.ndarray:

@@ -20,8 +20,7 @@ from ...models.air import trapezoid
 from ...models.cables.driving_force import DrivingForce, driving_force
 from ...models.part import COORDINATES
 from ...plant import Plant
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .cable import constants
 from .claims import claim
 from .motion import FEASIBLE, circle
@@ -57,21 +56,31 @@ def chapter() -> Chapter:
     robot = load("wang-flying")
     seen = shake(robot)
     displaced = {step: procedure(robot, seen.vibration, step) for step in STEPS}
-    stepped = {step: procedure(robot, _of_one_step(seen.vibration, step), step) for step in STEPS}
     free, (strongest, ratios) = release(robot), blow(robot)
-    off = np.abs(seen.dT - seen.elastic - seen.damping)[BEGUN].max()
-    elastic = _rms(displaced[USED].dT_K[:, 0]) / _rms(seen.dT - seen.damping)
+    left = seen.dT - seen.damping
+    off = np.abs(left - seen.elastic)[BEGUN].max()
+    paper = driving_force(robot, *circle(FEASIBLE, SHAKEN), seen.vibration, USED * PERIOD, ELEMENTS)
+    slack = claim("eq-16-plant").compared(
+        left[BEGUN].min(), paper.dT_K[BEGUN, 0].min(), within=SAME * np.abs(seen.elastic[BEGUN]).max()
+    )
+    noise = ", ".join(f"{values[0]:.1%} with {name}" for name, values in strongest.items())
+    others = max(values.max() for values in strongest.values())
     claims = [
         claim("eq-7-plant").compared(off / np.abs(seen.dT)[BEGUN].max()),
-        claim("eq-21-plant").compared(elastic),
-        _switch(robot, seen),
-        *_by_step(seen, displaced, stepped),
+        claim("eq-21-plant").compared(_rms(displaced[USED].dT_K[:, 0]) / _rms(left)),
+        slack,
+        *_by_step(robot, seen, displaced),
         _slow(free),
-        _noise(strongest),
+        claim("fig-11-wind").undetermined(noise, printed=f"{RATIO:.2%}", others=others),
     ]
+    shown = slice(0, round(0.8 / PERIOD))
+    lines: dict[str, np.ndarray] = dict(zip(COORDINATES, free[:, shown], strict=True))
     drawings = {
         "shaken": _shaken(seen, displaced[USED]),
-        "released": _released(free),
+        "released": Drawing(
+            "The elastic plant after a push along each coordinate, over the largest value",
+            curves(PERIOD * np.arange(shown.stop), "time [s]", [Panel("displacement [-]", lines)]),
+        ),
         "blown": Drawing(
             "Cable 1 in the wind of figure 5, platform at rest 1 m below a hovering quadrotor: dT by the noise over T",
             curves(FLIGHT[::10], "time [s]", [Panel("dT / T [%]", ratios, {"12.47 %": 100 * RATIO})]),
@@ -127,37 +136,27 @@ def blow(robot: Robot) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     return largest, {name: 100 * ratio[::10, 0] for name, ratio in ratios.items()}
 
 
-def _of_one_step(vibration: np.ndarray, step: int) -> np.ndarray:
-    """Return what each time step of so many periods adds to the vibration."""
-    change = np.zeros_like(vibration)
-    change[step:] = vibration[step:] - vibration[:-step]
-    return change
-
-
 def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values[BEGUN] ** 2)))
 
 
-def _switch(robot: Robot, seen: Shaken) -> Claim:
-    paper = driving_force(robot, *circle(FEASIBLE, SHAKEN), seen.vibration, USED * PERIOD, ELEMENTS)
-    return claim("eq-16-plant").compared(
-        (seen.dT - seen.damping)[BEGUN].min(),
-        printed=paper.dT_K[BEGUN, 0].min(),
-        within=SAME * np.abs(seen.elastic[BEGUN]).max(),
-    )
+def _by_step(robot: Robot, seen: Shaken, displaced: dict[int, DrivingForce]) -> list[Claim]:
+    """Compare increments with those of the plant for each time step of the procedure.
 
-
-def _by_step(seen: Shaken, displaced: dict[int, DrivingForce], stepped: dict[int, DrivingForce]) -> list[Claim]:
-    """Compare increments with those of the plant for each time step of the procedure."""
-    by_displacement, by_step = (
-        [_rms(given.dT_C[:, 0]) / _rms(seen.damping) for given in each.values()] for each in (displaced, stepped)
-    )
-    elastic = [_rms(given.dT_K[:, 0]) / _rms(seen.elastic) for given in stepped.values()]
+    The procedure receives the displacement itself, or what each time step adds to it.
+    """
+    by_displacement = [_rms(given.dT_C[:, 0]) / _rms(seen.damping) for given in displaced.values()]
+    damping, elastic = [], []
+    for step in STEPS:
+        change = np.zeros_like(seen.vibration)
+        change[step:] = seen.vibration[step:] - seen.vibration[:-step]
+        given = procedure(robot, change, step)
+        damping.append(f"{_rms(given.dT_C[:, 0]) / _rms(seen.damping):.2f}")
+        elastic.append(_rms(given.dT_K[:, 0]) / _rms(seen.elastic))
     milliseconds = ", ".join(f"{step * PERIOD * 1e3:g}" for step in STEPS)
-    damping = ", ".join(f"{ratio:.2f}" for ratio in by_step)
     return [
         claim("eq-11-plant").compared(by_displacement, printed=1.0, milliseconds=milliseconds),
-        claim("eq-10-plant").compared(elastic, printed=1.0, milliseconds=milliseconds, damping=damping),
+        claim("eq-10-plant").compared(elastic, printed=1.0, milliseconds=milliseconds, damping=", ".join(damping)),
     ]
 
 
@@ -177,12 +176,6 @@ def _slow(free: np.ndarray) -> Claim:
     )
 
 
-def _noise(strongest: dict[str, np.ndarray]) -> Claim:
-    given = ", ".join(f"{values[0]:.1%} with {name}" for name, values in strongest.items())
-    others = max(values.max() for values in strongest.values())
-    return claim("fig-11-wind").undetermined(given, printed=f"{RATIO:.2%}", others=others)
-
-
 def _shaken(seen: Shaken, given: DrivingForce) -> Drawing:
     dots = np.where(np.arange(len(SHAKEN)) % 20 == 0, seen.elastic + seen.damping, np.nan)
     panels = [
@@ -195,14 +188,4 @@ def _shaken(seen: Shaken, given: DrivingForce) -> Drawing:
         "Cable 1 while the platform vibrates: elastic plant, E A dl / l + C d(dl)/dt (linear), and section V with "
         f"dt = {USED * PERIOD * 1e3:g} ms",
         curves(SHAKEN[SHOWN], "time [s]", panels),
-    )
-
-
-def _released(free: np.ndarray) -> Drawing:
-    rows = slice(0, round(0.8 / PERIOD))
-    lines: dict[str, np.ndarray] = dict(zip(COORDINATES, free[:, rows], strict=True))
-    times = PERIOD * np.arange(free.shape[1])
-    return Drawing(
-        "The elastic plant after a push along each coordinate, over the largest value",
-        curves(times[rows], "time [s]", [Panel("displacement [-]", lines)]),
     )

@@ -9,8 +9,7 @@ from ...figures.robot import draw
 from ...models import Dynamics, load
 from ...models.points import rotations
 from ...statics.scene import scene_at
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .claims import claim
 from .instants import Instants, instants, relative_error
 
@@ -24,9 +23,7 @@ AXES = 0.25 * np.array([[1, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 1]]) 
 
 def chapter() -> Chapter:
     """Check how the robot is put together."""
-    samples = instants()
-    drawings = {"structure": _structure(), "frames": _frames()}
-    return Chapter([_suspended(), _points(samples), _loop(samples), _displaced(samples)], drawings)
+    return Chapter([_suspended(), *_points(instants())], {"structure": _structure(), "frames": _frames()})
 
 
 def _suspended() -> Claim:
@@ -41,47 +38,31 @@ def _suspended() -> Claim:
     return claim("fig-1").stated(pulls, min(pulls) > 0 and max(left) < ROUNDING)
 
 
-def _points(samples: Instants) -> Claim:
-    """Compare A_i and B_i by Eqs. 2 and 3 with the points of the model at the world poses."""
-    dynamics = Dynamics(load("wang-flying"))
-    world, _, _ = dynamics.relative.motion_in_world(*samples.body, *samples.base)
-    own = np.concatenate(dynamics.points(world, samples.base.pose[:, None]), axis=1)
-    off = np.abs(np.concatenate(_anchors_and_ends(samples), axis=1) - own).max()
-    return claim("eq-3").compared(off, within=ROUNDING)
-
-
-def _anchors_and_ends(samples: Instants) -> tuple[np.ndarray, np.ndarray]:
-    """Return A_i and B_i in {G} by Eqs. 2 and 3, (n, 6, 3) each [m]."""
-    robot = load("wang-flying")
+def _points(samples: Instants) -> list[Claim]:
+    dynamics, robot = Dynamics(load("wang-flying")), load("wang-flying")
     x_A, x_b = samples.base.pose[:, None, :3], samples.body.pose[:, None, :3]
     R_A, R_B = samples.R_A.R.transpose(0, 2, 1), samples.R_B.R.transpose(0, 2, 1)  # of rows, from the right
-    return robot.anchors @ R_A + x_A, x_b @ R_A + robot.attachments @ R_B @ R_A + x_A
-
-
-def _loop(samples: Instants) -> Claim:
-    """Close the loop from O over O_A and A_i, and over O_A, O_B and B_i, with L_i = R_A (a_i - x_b - R_B b_i)."""
-    robot = load("wang-flying")
-    anchors, ends = _anchors_and_ends(samples)
-    R_A, R_B = samples.R_A.R.transpose(0, 2, 1), samples.R_B.R.transpose(0, 2, 1)
-    L = (robot.anchors - samples.body.pose[:, None, :3] - robot.attachments @ R_B) @ R_A
-    return claim("fig-2").compared(np.linalg.norm(ends + L - anchors, axis=-1).max(), within=ROUNDING)
-
-
-def _displaced(samples: Instants) -> Claim:
-    """Compare B + dB with the attachments of a platform that was moved and turned by little, at tilted poses."""
-    robot, small = load("wang-flying"), SMALL * np.array([0.6, -0.8, 0.5, 0.3, 0.9, -0.7])
-    _, ends = _anchors_and_ends(samples)
-    centre = samples.body.pose[:, None, :3] @ samples.R_A.R.transpose(0, 2, 1) + samples.base.pose[:, None, :3]
-    arms = ends - centre
-    turned = arms @ Rotation.from_rotvec(small[3:]).as_matrix().T
-    moved = small[:3] + turned - arms
+    # A_i and B_i in {G} by Eqs. 2 and 3, (n, 6, 3) each [m], beside the points of the model at the world poses.
+    anchors, ends = robot.anchors @ R_A + x_A, x_b @ R_A + robot.attachments @ R_B @ R_A + x_A
+    world, _, _ = dynamics.relative.motion_in_world(*samples.body, *samples.base)
+    own = np.concatenate(dynamics.points(world, samples.base.pose[:, None]), axis=1)
+    # The loop from O over O_A and A_i, and over O_A, O_B and B_i, with L_i = R_A (a_i - x_b - R_B b_i).
+    L = (robot.anchors - x_b - robot.attachments @ R_B) @ R_A
+    # B + dB, and the attachments of a platform that was moved and turned by little, at tilted poses.
+    small = SMALL * np.array([0.6, -0.8, 0.5, 0.3, 0.9, -0.7])
+    arms = ends - (x_b @ R_A + x_A)
+    moved = small[:3] + arms @ Rotation.from_rotvec(small[3:]).as_matrix().T - arms
     linear = small[:3] + np.cross(small[3:], arms)  # Eq. 10
     angles = samples.base.pose[:, 3:]
     change = rotations(angles + small[3:]) - rotations(angles)
     by_angles = small[:3] + np.einsum("nij,mj->nmi", change, robot.attachments)
-    by_vector = small[:3] + np.cross(small[3:], robot.attachments @ samples.R_A.R.transpose(0, 2, 1))
+    by_vector = small[:3] + np.cross(small[3:], robot.attachments @ R_A)
     share = relative_error(by_vector, by_angles).max()
-    return claim("eq-8").stated(share, share < SMALL, apart=np.linalg.norm(moved - linear, axis=-1).max(), small=SMALL)
+    return [
+        claim("eq-3").compared(np.abs(np.concatenate([anchors, ends], axis=1) - own).max(), within=ROUNDING),
+        claim("fig-2").compared(np.linalg.norm(ends + L - anchors, axis=-1).max(), within=ROUNDING),
+        claim("eq-8").stated(share, share < SMALL, apart=np.linalg.norm(moved - linear, axis=-1).max(), small=SMALL),
+    ]
 
 
 def _structure() -> Drawing:

@@ -18,8 +18,7 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...models.cables.driving_force import DrivingForce, driving_force
 from ...ocp.tasks.paths import Motion
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .cable import constants
 from .claims import claim
 from .every_pairing import PAIRINGS, at_centre, hold, printed
@@ -47,17 +46,31 @@ def chapter() -> Chapter:
     tensions = {name: steady_tensions(dynamics, motion)[:, 0] for name, motion in motions.items()}
     large = next(iter(motions))
     amplitudes = {step: amplitude_of(robot, RATIO, step) for step in STEPS}
+    # Every start of the turn: where half a turn later the cable is longer, and the share of such starts.
+    turn = lengths[large][:-1]
+    opposite, start = np.roll(turn, -(len(turn) // 2)), int(turn.argmin())
+    # Eq. 13, taken literally, on the printed circle without vibration.
+    still, span = np.zeros(6), float(np.ptp(tensions[large]))
+    literal, paid_out = (
+        driving_force(robot, *motions[large], still, STEP, ELEMENTS, winding=how).dT_K[:, 0].max() for how in WINDINGS
+    )
+    steps = ", ".join(f"{amplitude * 1e6:.3g} um at {step * 1e3:g} ms" for step, amplitude in amplitudes.items())
+    ratio = float(largest_ratios(robot, np.array([amplitudes[STEP]]))[0])
     claims = [
-        _length(lengths[large]),
+        claim("fig-9-length").undetermined(
+            f"{turn[start]:.3f} m, {opposite[start]:.3f} m, {turn[start]:.3f} m", share=(opposite > turn).mean()
+        ),
         _tension(),
-        _winding(robot, float(np.ptp(tensions[large]))),
+        claim("eq-13").compared(paid_out, printed=literal, within=0.01 * span, step=STEP * 1000.0, span=span),
         claim("fig-8").undetermined(HERTZ),
         _no_ratio(tensions[large]),
-        _ratio(robot, amplitudes),
+        claim("fig-11").undetermined(
+            f"{ratio:.2%} at {amplitudes[STEP] * 1e6:.2f} um", printed=f"{RATIO:.2%}", feasible=FEASIBLE, steps=steps
+        ),
     ]
     panels = [Panel("length [m]", lengths), Panel("tension [N]", tensions, {"0 N": 0.0})]
-    turn = Drawing("Figures 9 and 10: cable 1 over a turn, without vibration", curves(TIMES, "time [s]", panels))
-    drawings = {"turn": turn, "vibration": _curves(robot, amplitudes[STEP]), "ratio": _against_amplitude(robot)}
+    drawn = Drawing("Figures 9 and 10: cable 1 over a turn, without vibration", curves(TIMES, "time [s]", panels))
+    drawings = {"turn": drawn, "vibration": _curves(robot, amplitudes[STEP]), "ratio": _against_amplitude(robot)}
     return Chapter(claims, drawings)
 
 
@@ -90,16 +103,6 @@ def amplitude_of(robot: Robot, ratio: float, step: float = STEP) -> float:
     return float(root_scalar(above, bracket=(NEAR_ZERO, FAR), method="brentq", xtol=1e-10).root)
 
 
-def _length(lengths: np.ndarray) -> Claim:
-    """Try every start of the turn: where half a turn later the cable is longer, and the share of such starts."""
-    turn = lengths[:-1]
-    opposite = np.roll(turn, -(len(turn) // 2))
-    start = int(turn.argmin())
-    return claim("fig-9-length").undetermined(
-        f"{turn[start]:.3f} m, {opposite[start]:.3f} m, {turn[start]:.3f} m", share=(opposite > turn).mean()
-    )
-
-
 def together(pairs: np.ndarray, radius: float) -> np.ndarray:
     """Return the correlations of length and tension of cable 1 over a turn, of pairings (k, 6), (k,)."""
     robot, motion = printed(), circle(radius, COARSE)
@@ -116,15 +119,6 @@ def _tension() -> Claim:
     return claim("fig-10-tension").stated(ends, ends[0] > 0, feasible=FEASIBLE, flying=len(flying))
 
 
-def _winding(robot: Robot, span: float) -> Claim:
-    """Compare Eq. 13, taken literally, on the printed circle without vibration."""
-    still, motion = np.zeros(6), circle(RADIUS)
-    literal, paid_out = (
-        driving_force(robot, *motion, still, STEP, ELEMENTS, winding=how).dT_K[:, 0].max() for how in WINDINGS
-    )
-    return claim("eq-13").compared(paid_out, printed=literal, within=0.01 * span, step=STEP * 1000.0, span=span)
-
-
 def _no_ratio(tensions: np.ndarray) -> Claim:
     """Count the pairings with an inverse whose T_1 changes its sign, where dT / T has no bound."""
     crossing = TIMES[np.flatnonzero(np.diff(np.sign(tensions)))]
@@ -134,14 +128,6 @@ def _no_ratio(tensions: np.ndarray) -> Claim:
         f"{pulls.shape[1] - changing} of {pulls.shape[1]}",
         radius=RADIUS,
         crossing=", ".join(f"{time:.1f} s" for time in crossing),
-    )
-
-
-def _ratio(robot: Robot, amplitudes: dict[float, float]) -> Claim:
-    steps = ", ".join(f"{amplitude * 1e6:.3g} um at {step * 1e3:g} ms" for step, amplitude in amplitudes.items())
-    ratio = float(largest_ratios(robot, np.array([amplitudes[STEP]]))[0])
-    return claim("fig-11").undetermined(
-        f"{ratio:.2%} at {amplitudes[STEP] * 1e6:.2f} um", printed=f"{RATIO:.2%}", feasible=FEASIBLE, steps=steps
     )
 
 

@@ -8,8 +8,7 @@ from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...models import Dynamics, load
 from ...models.air import trapezoid
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .claims import claim
 from .motion import TIMES
 
@@ -24,24 +23,22 @@ def chapter() -> Chapter:
     """Check figure 5 as drawn by this run, and the force of the printed formula."""
     dynamics = Dynamics(load("wang-flying"))
     wind, calm = trapezoid(TIMES, PEAK, noise=NOISE), trapezoid(TIMES, PEAK, noise=0.0)
-    still = np.zeros((len(TIMES), 6))
-    force = dynamics.aerodynamic_wrench(still, still, wind)[:, :3]
-    shape = claim("fig-5-shape").undetermined(TIMES[-1] * np.array([0.1, 0.3, 0.7, 0.9]))
-    claims = [_top(wind), _noise(wind - calm), shape, *_force(dynamics)]
-    return Chapter(claims, {"wind": _figure(wind, force)})
-
-
-def _top(wind: np.ndarray) -> Claim:
     share = TIMES / TIMES[-1]
     top = wind[(share > STEADY[0]) & (share < STEADY[1])].mean(axis=0)
-    return claim("fig-5-peak").undetermined(top, printed=PEAK)
-
-
-def _noise(noise: np.ndarray) -> Claim:
-    """Report how many samples of a Gaussian sequence with this deviation are outside of the printed amplitudes."""
-    deviation = NOISE / DEVIATIONS
-    outside = erfc(NOISE / deviation / sqrt(2))
-    return claim("fig-5-noise").undetermined(np.abs(noise).max(), printed=NOISE, outside=outside)
+    # Samples of a Gaussian sequence with this deviation that are outside of the printed amplitudes.
+    outside = erfc(NOISE / (NOISE / DEVIATIONS) / sqrt(2))
+    claims = [
+        claim("fig-5-peak").undetermined(top, printed=PEAK),
+        claim("fig-5-noise").undetermined(np.abs(wind - calm).max(), printed=NOISE, outside=outside),
+        claim("fig-5-shape").undetermined(TIMES[-1] * np.array([0.1, 0.3, 0.7, 0.9])),
+        *_force(dynamics),
+    ]
+    still = np.zeros((len(TIMES), 6))
+    force = dynamics.aerodynamic_wrench(still, still, wind)[:, :3]
+    given = {"wind [m/s]": wind, "force [N]": force}
+    panels = [Panel(label, dict(zip("xyz", values.T, strict=True))) for label, values in given.items()]
+    about = "Figure 5: the wind along x, y and z, and its force on a platform at rest"
+    return Chapter(claims, {"wind": Drawing(about, curves(TIMES, "time [s]", panels))})
 
 
 def _force(dynamics: Dynamics) -> list[Claim]:
@@ -61,12 +58,3 @@ def _force(dynamics: Dynamics) -> list[Claim]:
         claim("eq-25-drag").compared(against[0], printed=drag, against=AGAINST[0]),
         claim("eq-25-lift").undetermined(strongest[2], printed=lift, used=used),
     ]
-
-
-def _figure(wind: np.ndarray, force: np.ndarray) -> Drawing:
-    winds = {name: wind[:, axis] for axis, name in enumerate("xyz")}
-    forces = {name: force[:, axis] for axis, name in enumerate("xyz")}
-    panels = [Panel("wind [m/s]", winds), Panel("force [N]", forces)]
-    return Drawing(
-        "Figure 5: the wind along x, y and z, and its force on a platform at rest", curves(TIMES, "time [s]", panels)
-    )

@@ -4,8 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...models import Dynamics, Robot, load
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 
 ANGLES = np.array([0.3, -0.4, 0.5])  # roll, pitch, yaw [rad], inside the paper's (-1, 1)
@@ -19,10 +18,10 @@ SIZES = {3: "wang-ctmrts", 4: "wang-ctmrts-4", 5: "wang-ctmrts-5", 6: "wang-ctmr
 
 def chapter() -> Chapter:
     """Check each equation of section 3 that can be tested."""
-    claims = [_rotation(), _rigid(), _inertia(), _weight(), _gyroscopic(), _direction(), _second_form(), _shape()]
+    ranks = [rank(Dynamics(load(SIZES[m])).wrench_matrix(turned_home())) for m in FEWER]
     dynamic = MEANT["the dynamic equations"]
     references = claim("equation-references").compared((dynamic, dynamic))
-    return Chapter([*claims, _summed(), _angular_acceleration(), _inverse(), _symbols(), references])
+    return Chapter([*_body(), *_forces(), has_rank_6("eq-13-inverse", ranks), _symbols(), references])
 
 
 def turned_home() -> np.ndarray:
@@ -40,19 +39,6 @@ def lines(robot: Robot, pose: np.ndarray, ends: np.ndarray | None = None) -> tup
     return (robot.carrier_home[:, :3] if ends is None else ends) - pose[..., None, :3] - arms, arms
 
 
-def _rotation() -> Claim:
-    """Compare the cable lengths of Eq. 1 with distances of the attachments by scipy's rotation."""
-    robot, pose = load("wang-ctmrts"), turned_home()
-    printed = np.linalg.norm(lines(robot, pose)[0], axis=1)
-    return claim("eq-3-rotation").compared(Dynamics(robot).cable_lengths(pose), printed=printed)
-
-
-def _rigid() -> Claim:
-    moments = np.sort(np.diag(load("wang-ctmrts").inertia))
-    others = moments[:2].sum()
-    return claim("section-5-rigid").stated(others, moments[2] <= others + 1e-12, printed=moments[2])
-
-
 def masses() -> np.ndarray:
     """Return six points, (6, 3) [m] in {P}, each with a sixth of the load's mass, that have its inertia."""
     robot = load("wang-ctmrts")
@@ -62,26 +48,29 @@ def masses() -> np.ndarray:
     return np.vstack([arms, -arms])
 
 
-def _inertia() -> Claim:
-    """Compare R I R^T with the inertia of rotated point masses."""
-    robot, turn = load("wang-ctmrts"), TURN.as_matrix()
+def _body() -> list[Claim]:
+    robot, pose, turn = load("wang-ctmrts"), turned_home(), TURN.as_matrix()
+    # Eq. 1: the distances of the attachments by scipy's rotation.
+    distances = np.linalg.norm(lines(robot, pose)[0], axis=1)
+    moments = np.sort(np.diag(robot.inertia))
+    others = moments[:2].sum()
+    # R I R^T beside the inertia of rotated point masses.
     points = masses() @ turn.T
-    summed = (points**2).sum() * np.eye(3) - points.T @ points
-    off = np.abs(turn @ robot.inertia @ turn.T - robot.platform.mass / len(points) * summed).max()
-    return claim("eq-10").compared(off)
-
-
-def _weight() -> Claim:
-    """Compare G with minus the slope of the potential energy of point masses, by position and by rotation."""
-    robot = load("wang-ctmrts")
-    share, step = robot.platform.mass / 6, 1e-4
+    share, step = robot.platform.mass / len(points), 1e-4
+    summed = share * ((points**2).sum() * np.eye(3) - points.T @ points)
 
     def energy(move: np.ndarray) -> float:
         places = move[:3] + (Rotation.from_rotvec(move[3:]) * TURN).apply(masses())
         return float(-share * (places @ np.array(robot.gravity)).sum())
 
+    # G beside minus the slope of the potential energy of point masses, by position and by rotation.
     slope = [(energy(-row) - energy(row)) / (2 * step) for row in step * np.eye(6)]
-    return claim("eq-8").compared(slope, printed=(0.0, 0.0, -robot.weight, 0.0, 0.0, 0.0))
+    return [
+        claim("eq-3-rotation").compared(Dynamics(robot).cable_lengths(pose), printed=distances),
+        claim("section-5-rigid").stated(others, moments[2] <= others + 1e-12, printed=moments[2]),
+        claim("eq-10").compared(np.abs(turn @ robot.inertia @ turn.T - summed).max()),
+        claim("eq-8").compared(slope, printed=(0.0, 0.0, -robot.weight, 0.0, 0.0, 0.0)),
+    ]
 
 
 def _turning() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -100,47 +89,38 @@ def _turning() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return velocity(0.0), acceleration, moment
 
 
-def _gyroscopic() -> Claim:
+def _forces() -> list[Claim]:
+    robot, pose, turn = load("wang-ctmrts"), turned_home(), TURN.as_matrix()
+    dynamics = Dynamics(robot)
     omega, alpha, moment = _turning()
-    turn = TURN.as_matrix()
-    inertia = turn @ load("wang-ctmrts").inertia @ turn.T
+    inertia = turn @ robot.inertia @ turn.T
     left_out = moment - inertia @ alpha
     apart = np.abs(left_out - np.cross(omega, inertia @ omega)).max()
-    return claim("eq-4-gyroscopic").compared(np.linalg.norm(left_out), apart=apart)
-
-
-def _direction() -> Claim:
-    """Compute static tensions at home with the printed e_i, which point from the robot to the load."""
-    robot = load("wang-ctmrts")
-    A = Dynamics(robot).wrench_matrix(robot.home)[:3]
-    tensions = np.linalg.solve(-A, [0.0, 0.0, robot.weight])
-    return claim("eq-6-direction").stated(tensions, (tensions > 0).all())
-
-
-def _second_form() -> Claim:
-    """Compare R_p (P_i - b_i) / |L_i|, the second form without P_i in {P}, with the moment of the first form."""
-    vectors, arms = lines(load("wang-ctmrts"), turned_home())
+    # Static tensions at home with the printed e_i, which point from the robot to the load.
+    tensions = np.linalg.solve(-dynamics.wrench_matrix(robot.home)[:3], [0.0, 0.0, robot.weight])
+    # R_p (P_i - b_i) / |L_i|, the second form without P_i in {P}, beside the moment of the first form.
+    vectors, arms = lines(robot, pose)
     e = -vectors / np.linalg.norm(vectors, axis=1)[:, None]  # along P_i - b_i
     first, second = (np.linalg.norm(moments, axis=1).max() for moments in (np.cross(arms, e), TURN.apply(e)))
-    return claim("eq-6-second").compared(first, printed=second)
-
-
-def _shape() -> Claim:
-    A = Dynamics(load("wang-ctmrts")).wrench_matrix(turned_home())
+    A = dynamics.wrench_matrix(pose)
     size, printed = ("{} x {}".format(*matrix.shape) for matrix in (A, A.T))
-    return claim("eq-5-shape").stated(size, size == printed, printed=printed)
+    return [
+        claim("eq-4-gyroscopic").compared(np.linalg.norm(left_out), apart=apart),
+        claim("eq-6-direction").stated(tensions, (tensions > 0).all()),
+        claim("eq-6-second").compared(first, printed=second),
+        claim("eq-5-shape").stated(size, size == printed, printed=printed),
+        claim("eq-7").compared(max(_off_sum(m) for m in SIZES)),
+        claim("eq-12-angular-acceleration").compared(alpha, printed=SECOND),
+    ]
 
 
-def _summed() -> Claim:
-    """Compare J T, with the tensions as a column, with the sum of each cable's force and moment, for every m."""
-    off = []
-    for m, name in SIZES.items():
-        robot, pose = load(name), turned_home()
-        vectors, arms = lines(robot, pose)
-        pulls = np.arange(1.0, m + 1)[:, None] * vectors / np.linalg.norm(vectors, axis=1)[:, None]
-        summed = np.concatenate([pulls.sum(axis=0), np.cross(arms, pulls).sum(axis=0)])
-        off.append(np.abs(Dynamics(robot).wrench_matrix(pose) @ np.arange(1.0, m + 1) - summed).max())
-    return claim("eq-7").compared(max(off))
+def _off_sum(m: int) -> float:
+    """Compare J T, with the tensions as a column, with the sum of each cable's force and moment [N, N m]."""
+    robot, pose = load(SIZES[m]), turned_home()
+    vectors, arms = lines(robot, pose)
+    pulls = np.arange(1.0, m + 1)[:, None] * vectors / np.linalg.norm(vectors, axis=1)[:, None]
+    summed = np.concatenate([pulls.sum(axis=0), np.cross(arms, pulls).sum(axis=0)])
+    return np.abs(Dynamics(robot).wrench_matrix(pose) @ np.arange(1.0, m + 1) - summed).max()
 
 
 def _symbols() -> Claim:
@@ -151,16 +131,6 @@ def _symbols() -> Claim:
     change = np.linalg.norm(end - (place + shift + arm)) - before
     inside = np.linalg.norm((end - place + place + shift) - (place + shift + arm)) - before  # b_1 moves too
     return claim("table-1").compared(change, printed=inside)
-
-
-def _angular_acceleration() -> Claim:
-    _, alpha, _ = _turning()
-    return claim("eq-12-angular-acceleration").compared(alpha, printed=SECOND)
-
-
-def _inverse() -> Claim:
-    ranks = [rank(Dynamics(load(SIZES[m])).wrench_matrix(turned_home())) for m in FEWER]
-    return has_rank_6("eq-13-inverse", ranks)
 
 
 def has_rank_6(name: str, ranks: list[int]) -> Claim:

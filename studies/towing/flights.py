@@ -7,8 +7,7 @@ the plant keeps them and the robot-ends alone move the load; otherwise the winch
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...simulation import Simulation, simulate
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim
+from ..accounts.claim import Chapter, Claim
 from .claims import claim
 from .equations import SIZES
 from .modes import CHANGES, SECTIONS
@@ -25,10 +24,8 @@ def chapter() -> Chapter:
     """Fly every drive and every m."""
     flights: dict[Drive, dict[int, Simulation]] = {drive: {m: fly(drive, m) for m in SIZES} for drive in DRIVES}
     claims = [_towed(drive, by_m) for drive, by_m in flights.items()]
-    return Chapter(
-        [*claims, _positive(flights)],
-        {f"towed-{drive}": _drawing(drive, by_m[PAPERS]) for drive, by_m in flights.items()},
-    )
+    drawings = {f"towed-{drive}": _drawing(drive, by_m[PAPERS]) for drive, by_m in flights.items()}
+    return Chapter([*claims, _positive(flights)], drawings)
 
 
 def fly(drive: Drive, m: int) -> Simulation:
@@ -70,11 +67,10 @@ def _positive(flights: dict[Drive, dict[int, Simulation]]) -> Claim:
 
 
 def _drawing(drive: Drive, flight: Simulation) -> Drawing:
-    tensions = flight.record.tensions[SHOWN]
-    lines = {f"cable {index + 1}": tensions[:, index] for index in range(flight.robot.m)}
-    panels = [Panel("error [mm]", {"": 1e3 * flight.error[SHOWN]}), Panel("tension [N]", lines)]
+    error = Panel("error [mm]", {"": 1e3 * flight.error[SHOWN]})
+    tensions = Panel.of_cables("tension [N]", flight.record.tensions[SHOWN])
     return Drawing(
         f"Three robots tow 10 kg in a simulation of {SECONDS:g} s, drive {drive}: distance of the load from its "
         "plan, tensions",
-        curves(flight.times[SHOWN], "time [s]", panels),
+        curves(flight.times[SHOWN], "time [s]", [error, tensions]),
     )

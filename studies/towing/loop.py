@@ -14,8 +14,7 @@ from ...models import Dynamics, load
 from ...statics.equilibria import Equilibrium, equilibria
 from ...statics.scene import scene_at
 from ...workspace import ForceBalance, Places
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 from .equations import MEANT, SIZES, lines, rank
 from .plans import DRIVES, FIXED, robot
@@ -30,21 +29,21 @@ AT_REST = 1e-6  # of the weight: the largest residual of a balance
 
 def chapter() -> Chapter:
     """Check the configuration, the constraints and the steps."""
-    rests = {m: rest(m) for m in SIZES}
+    found, mover = rest(3), robot("wang-ctmrts", "both")
     poses, forces = around_the_ends()
-    low, high = reach(robot("wang-ctmrts", "both"))
+    low, high = reach(mover)
     claims = [
-        _suspended(rests),
-        _dimension(rests[3]),
+        _suspended({m: rest(m) for m in SIZES}),
+        _dimension(found),
         _beside(poses, forces),
         _heights(),
         claim("step-a").undetermined((high - low).max(axis=0) / 2),
-        _drawn(),
-        _placed(),
-        _solved(),
+        *_steps(found.pose),
         *_bounded(poses, forces),
     ]
-    return Chapter(claims, {"configuration": _figure(rests[3])})
+    scene = scene_at(mover, found.pose, found.tensions, "three robots, cables of 1.2 m, at rest")
+    about = "Figure 1: robot-ends in their boxes (widths inferred), cables and load"
+    return Chapter(claims, {"configuration": Drawing(about, draw(scene))})
 
 
 @cache
@@ -128,30 +127,25 @@ def _heights() -> Claim:
     )
 
 
-def _drawn() -> Claim:
-    """Count, by drive, the coordinates of robot-ends and load that neither step (b) nor the lengths determine."""
-    mover = robot("wang-ctmrts", "both")
-    pose, steps = rest(3).pose, STEP * np.eye(6)
+def _steps(pose: np.ndarray) -> list[Claim]:
+    """Count the coordinates that steps (b) and (c) determine at a pose, and check the matrix of step (e)."""
+    mover, steps = robot("wang-ctmrts", "both"), STEP * np.eye(6)
     ahead, behind = (np.linalg.norm(lines(mover, pose + sign * steps)[0], axis=-1) for sign in (1, -1))
     fixed_by_lengths = rank((ahead - behind).T[:, :3] / (2 * STEP))  # of the position, where lengths are given
     given = [robot("wang-ctmrts", drive).fixed_lengths is not None for drive in DRIVES]
-    return claim("step-b").compared([3 - fixed_by_lengths if known else 3 for known in given])
-
-
-def _placed() -> Claim:
-    """Compute the lengths at the places of the loops of W1."""
+    # The lengths at the places of the loops of W1.
     samples = loops("fixed-length", count=SAMPLES)
     met = np.isfinite(samples.places.pose[:, 0])
     vectors, _ = lines(samples.robot, samples.places.pose[met], samples.places.carriers[met, :, :3])
     off = np.abs(np.linalg.norm(vectors, axis=-1) - FIXED).max()
-    return claim("step-c").compared(off, fixed=FIXED, met=met.mean())
-
-
-def _solved() -> Claim:
-    J = Dynamics(robot("wang-ctmrts", "both")).wrench_matrix(rest(3).pose)
+    J = Dynamics(mover).wrench_matrix(pose)
     rows, columns = J.shape
     fields = {"rank": rank(J), "equations": EQUATIONS}
-    return claim("step-e").stated(f"{rows} x {columns}", rows == columns, otherwise=Verdict.IMPOSSIBLE, **fields)
+    return [
+        claim("step-b").compared([3 - fixed_by_lengths if known else 3 for known in given]),
+        claim("step-c").compared(off, fixed=FIXED, met=met.mean()),
+        claim("step-e").stated(f"{rows} x {columns}", rows == columns, otherwise=Verdict.IMPOSSIBLE, **fields),
+    ]
 
 
 def _bounded(poses: np.ndarray, forces: np.ndarray) -> list[Claim]:
@@ -163,9 +157,3 @@ def _bounded(poses: np.ndarray, forces: np.ndarray) -> list[Claim]:
         claim("step-f").compared(MEANT["the bounds of the tensions"]),
         claim("step-f-bounds").compared((meets == recorded).mean(), too_much=1 - meets[pulling].mean()),
     ]
-
-
-def _figure(found: Equilibrium) -> Drawing:
-    title = "three robots, cables of 1.2 m, at rest"
-    scene = scene_at(robot("wang-ctmrts", "both"), found.pose, found.tensions, title)
-    return Drawing("Figure 1: robot-ends in their boxes (widths inferred), cables and load", draw(scene))

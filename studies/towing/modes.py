@@ -5,8 +5,7 @@ import numpy as np
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...ocp import Plan
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 from .equations import SIZES
 from .plans import DRIVES, FIXED, Drive, planned
@@ -52,11 +51,10 @@ def _carried(drive: Drive, plans: dict[int, Plan]) -> Claim:
 def _drawing(drive: Drive, planned: Plan) -> Drawing:
     t = planned.trajectory
     moved = np.linalg.norm(t["carrier_pose"].values[:, :, :3] - t["carrier_pose"].values[0, :, :3], axis=2)
-    names = [f"cable {i + 1}" for i in range(t.sizes["cable"])]
     panels = [
-        Panel("tension [N]", dict(zip(names, t["tensions"].values.T, strict=True)), {"0 N": 0.0}),
-        Panel("length [m]", dict(zip(names, t["cable_lengths"].values.T, strict=True))),
-        Panel("robot-end moved [m]", dict(zip(names, moved.T, strict=True))),
+        Panel.of_cables("tension [N]", t["tensions"].values, {"0 N": 0.0}),
+        Panel.of_cables("length [m]", t["cable_lengths"].values),
+        Panel.of_cables("robot-end moved [m]", moved),
     ]
     return Drawing(
         f"Three robots carry 10 kg in 2 s with least effort, drive {drive}. Robot i holds cable i.",

@@ -9,8 +9,7 @@ from ...figures import workspace as figures
 from ...figures.drawing import Drawing
 from ...statics.equilibria import equilibria
 from ...workspace import ExistsPlacement, ForceBalance, Places
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict, value_text
+from ..accounts.claim import Chapter, Claim, Verdict, value_text
 from .claims import claim
 from .plans import DRIVES, FIXED, Drive, robot
 from .workspace import PRINTED, SECTIONS, Loops, in_prism, loops, placed_as_both, reach, volume_of
@@ -26,16 +25,25 @@ TRIANGLE, RECTANGLE = 0.5, 1.0  # share of the smallest rectangle about it that 
 def chapter() -> Chapter:
     """Check ranges, sections and inclusion with 60 000 loops of each type, and volumes."""
     samples = {drive: loops(drive) for drive in DRIVES}
-    low, high = reach(samples["both"].robot)
+    both, variable = samples["both"].robot, samples["variable-length"]
+    low, high = reach(both)
+    inside = in_prism(variable.robot, variable.points).mean()
+    sizes = [volume_of(drive, samples=8000) for drive in DRIVES]
+    volumes = "; ".join(f"{NAMES[drive]} {size} m^3" for drive, size in zip(DRIVES, sizes, strict=True))
+    rising = sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low
+    others = [samples[drive] for drive in ("fixed-length", "variable-length")]
+    shares = [placed_as_both(system.places.only(system.held)).mean() for system in others]
     claims = [
         claim("figure-2").undetermined((high - low).max(axis=0)[:2] / 2),
         *(claim for drive in DRIVES for claim in _ranges(drive, samples[drive])),
         _least_height(),
         _greatest_height(),
         *_sections(samples["fixed-length"]),
-        _prism(samples["variable-length"]),
-        _volumes(),
-        _inside_both(samples),
+        claim("section-5-prism").stated(
+            inside, inside == 1.0, arm=np.linalg.norm(variable.robot.attachments, axis=1).max()
+        ),
+        claim("volumes").stated([size.value for size in sizes], rising, volumes=volumes),
+        claim("inclusion-W3").stated(shares, min(shares) == 1.0),
         _fixed_inside_variable(),
         _repeated(samples),
     ]
@@ -49,15 +57,10 @@ def chapter() -> Chapter:
     drawings["figure-4"] = Drawing(
         "Cross sections of W1", figures.cross_sections(samples["fixed-length"].points, SECTIONS, THICKNESS)
     )
-    drawings["figure-2"] = _drawn_boxes(samples["both"])
-    return Chapter(claims, drawings)
-
-
-def _drawn_boxes(both: Loops) -> Drawing:
     rng = np.random.default_rng(0)
-    low, high = reach(both.robot)
     points = {f"robot-end {i + 1}": rng.uniform(low[i], high[i], (3000, 3)) for i in range(len(low))}
-    return Drawing("Inferred boxes of the robot-ends", figures.projections(points, both.robot.home_anchors))
+    boxes = figures.projections(points, both.home_anchors)
+    return Chapter(claims, drawings | {"figure-2": Drawing("Inferred boxes of the robot-ends", boxes)})
 
 
 def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
@@ -169,27 +172,6 @@ def share_of_rectangle(points: np.ndarray) -> float:
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
         areas.append(np.prod(np.ptp(corners @ turn.T, axis=0)))
     return float(hull.volume / min(areas))
-
-
-def _prism(variable: Loops) -> Claim:
-    inside = in_prism(variable.robot, variable.points).mean()
-    arm = np.linalg.norm(variable.robot.attachments, axis=1).max()
-    return claim("section-5-prism").stated(inside, inside == 1.0, arm=arm)
-
-
-def _volumes() -> Claim:
-    sizes = [volume_of(drive, samples=8000) for drive in DRIVES]
-    volumes = "; ".join(f"{NAMES[drive]} {size} m^3" for drive, size in zip(DRIVES, sizes, strict=True))
-    rising = sizes[0].high < sizes[1].low and sizes[1].high < sizes[2].low
-    return claim("volumes").stated([size.value for size in sizes], rising, volumes=volumes)
-
-
-def _inside_both(samples: Mapping[Drive, Loops]) -> Claim:
-    shares = []
-    for drive in ("fixed-length", "variable-length"):
-        places = samples[drive].places.only(samples[drive].held)
-        shares.append(placed_as_both(places).mean())
-    return claim("inclusion-W3").stated(shares, min(shares) == 1.0)
 
 
 def _fixed_inside_variable() -> Claim:

@@ -7,8 +7,7 @@ from ...figures.drawing import Drawing
 from ...models import Dynamics, Robot, load
 from ...solvers import TensionProblem, solve
 from ...workspace import EquilibriumPosture
-from ..accounts.account import Chapter
-from ..accounts.claim import Claim, Verdict
+from ..accounts.claim import Chapter, Claim, Verdict
 from .claims import claim
 from .equations import FEWER, SIZES, has_rank_6, rank, six_cables, turned_home
 from .workspace import in_prism, loops
@@ -21,19 +20,29 @@ POSITIONS = 400  # of the load, at which all lambda in (0, 1) are tried
 def chapter() -> Chapter:
     """Check least norm, null space and the rank test of step (d)."""
     most = load("wang-ctmrts").t_max.max()
-    limit = claim("eq-11-limit").undetermined(most * np.array(SAFETY), printed=most)
-    ranks = [rank(J @ J.T) for J in (Dynamics(load(SIZES[m])).wrench_matrix(turned_home()) for m in FEWER)]
+    J = {m: Dynamics(load(SIZES[m])).wrench_matrix(turned_home()) for m in FEWER}
+    left = [m - rank(J[m]) for m in FEWER]
+    of_forces = {m: m - rank(forces(load(name)).A) for m, name in SIZES.items()}
+    at, _, low, high = _choices()
     claims = [
-        limit,
-        has_rank_6("eq-16-inverse", ranks),
+        claim("eq-11-limit").undetermined(most * np.array(SAFETY), printed=most),
+        has_rank_6("eq-16-inverse", [rank(J[m] @ J[m].T) for m in FEWER]),
         _least_norm(),
-        _freedom(),
-        _scalar(),
+        claim("eq-17-null-space").stated(
+            left,
+            all(size > 0 for size in left[1:]),
+            six=six_cables(),
+            of_forces=", ".join(map(str, of_forces.values())),
+        ),
+        claim("eq-17-lambda").stated((low, high), low <= 0 and high >= 1, at=", ".join(f"{T:.1f}" for T in at)),
         _scalar_elsewhere(),
-        _general(),
+        # Directions along which one scalar moves the tensions, and those of all solutions.
+        claim("eq-17-general").compared([free for m, free in of_forces.items() if m > 3], printed=1.0),
         _cases(),
+        _rank_test(),
+        _postures(),
     ]
-    return Chapter([*claims, _rank_test(), _postures()], {"null-space": _along_null_space()})
+    return Chapter(claims, {"null-space": _along_null_space()})
 
 
 def forces(robot: Robot, pose: np.ndarray | None = None) -> TensionProblem:
@@ -54,19 +63,6 @@ def _least_norm() -> Claim:
         norms.append(np.linalg.norm(np.linalg.pinv(problem.A) @ problem.w))
         own.append(np.linalg.norm(solution.tensions))
     return claim("eq-16-least-norm").compared(own, printed=norms, within=1e-09 * max(norms))
-
-
-def _freedom() -> Claim:
-    left = [m - rank(Dynamics(load(SIZES[m])).wrench_matrix(turned_home())) for m in FEWER]
-    of_forces = [m - rank(forces(load(name)).A) for m, name in SIZES.items()]
-    return claim("eq-17-null-space").stated(
-        left, all(size > 0 for size in left[1:]), six=six_cables(), of_forces=", ".join(map(str, of_forces))
-    )
-
-
-def _scalar() -> Claim:
-    at, _, low, high = _choices()
-    return claim("eq-17-lambda").stated((low, high), low <= 0 and high >= 1, at=", ".join(f"{T:.1f}" for T in at))
 
 
 def _scalar_elsewhere() -> Claim:
@@ -90,12 +86,6 @@ def _scalar_elsewhere() -> Claim:
     return claim("eq-17-workspace").stated(kept / held, kept == held, lost=held - kept, held=held)
 
 
-def _general() -> Claim:
-    """Compare the number of directions along which one scalar moves the tensions with that of all solutions."""
-    free = [m - rank(forces(load(name)).A) for m, name in SIZES.items() if m > 3]
-    return claim("eq-17-general").compared(free, printed=1.0)
-
-
 def _choices() -> tuple[np.ndarray, np.ndarray, float, float]:
     """Return T', the null vector of length one, and the range of lambda inside the limits, m = 4."""
     problem = forces(load(SIZES[4]))
@@ -114,11 +104,10 @@ def _null_space(problem: TensionProblem) -> tuple[np.ndarray, np.ndarray]:
 def _along_null_space() -> Drawing:
     special, null, low, high = _choices()
     choices = np.linspace(1.3 * low - 0.3 * high, 1.3 * high - 0.3 * low, 101)
-    lines = {f"cable {i + 1}": special[i] + choices * null[i] for i in range(4)}
-    panel, marks = Panel("tension [N]", lines, {"0 N": 0.0}), {"smallest": low, "largest": high}
+    panel = Panel.of_cables("tension [N]", special + choices[:, None] * null, {"0 N": 0.0})
     return Drawing(
         "Tensions T' + lambda Null(J) of four cables at home, forces alone; inside the limits between the dotted lines",
-        curves(choices, "lambda [N]", [panel], marks=marks),
+        curves(choices, "lambda [N]", [panel], marks={"smallest": low, "largest": high}),
     )
 
 
