@@ -25,6 +25,8 @@ ROOT = Path(__file__).parent.parent
 # Parameters that share a description, in a docstring.
 SHARED = re.compile(r"^( +)(\w+(?:, \w+)+)( :[^\n]*)?\n((?:\1    [^\n]*\n)+)", re.MULTILINE)
 SOURCES = ROOT / "build" / "docs"
+# A field of a part, which the extension for pydantic knows as a `Field`.
+OPTIONAL = re.compile(r"= optional\(\s*")
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 
 
@@ -37,6 +39,7 @@ def on_startup(**_: object) -> None:
         folder.mkdir(parents=True)
         for source in ROOT.joinpath(*package.split(".")[1:]).glob("*.py"):
             text = SHARED.sub(_each, source.read_text(encoding="utf-8"))
+            text = OPTIONAL.sub("= Field(default=None, description=", text)
             (folder / source.name).write_text(text, encoding="utf-8")
 
 

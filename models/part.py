@@ -45,6 +45,11 @@ COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
 AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+def optional(description: str, **constraints: Any) -> Any:
+    """Return a field that may be left out: it is None then. The keyword arguments are those of pydantic's `Field`."""
+    return Field(default=None, description=description, **constraints)
+
+
 class Part(Displayed, BaseModel):
     """The base of all parts: they are frozen, and an unknown key is an error."""
 

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field
 
 from ...base.errors import InputError
 from ...models import Robot
-from ...models.part import Finite, Part, Pose, Vector3
+from ...models.part import Finite, Part, Pose, Vector3, optional
 from .paths import PoseOrPosition
 
 STILL: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -42,47 +42,37 @@ class Initial(_State):
 
     pose: PoseOrPosition = Field(description="pose of the platform, (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
     velocity: PoseOrPosition = Field(default=STILL, description="time derivative of the pose [m/s, rad/s]")
-    acceleration: PoseOrPosition | None = Field(
-        default=None, description="second time derivative [m/s^2, rad/s^2]; default: chosen by the planner"
+    acceleration: PoseOrPosition | None = optional(
+        "second time derivative [m/s^2, rad/s^2]; default: chosen by the planner"
     )
-    carrier_pose: tuple[Pose, ...] | None = Field(
-        default=None, description="pose of each carrier [m, rad]; default: as base.ends requires"
+    carrier_pose: tuple[Pose, ...] | None = optional("pose of each carrier [m, rad]; default: as base.ends requires")
+    carrier_velocity: tuple[Pose, ...] | None = optional(
+        "velocity of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
     )
-    carrier_velocity: tuple[Pose, ...] | None = Field(
-        default=None, description="velocity of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
-    )
-    tensions: tuple[Finite, ...] | None = Field(
-        default=None,
-        description="tension of each cable, clipped to the limits [N]; they determine the acceleration at the start; "
-        "default: chosen by the planner",
+    tensions: tuple[Finite, ...] | None = optional(
+        "tension of each cable, clipped to the limits [N]; they determine the acceleration at the start; "
+        "default: chosen by the planner"
     )
 
 
 class Final(_State):
     """The state at the end of a motion, in {G}; given fields override `tube.ends` and `base.ends`."""
 
-    pose: PoseOrPosition | None = Field(
-        default=None,
-        description="pose of the platform [m, rad]; default: anywhere in the tube if velocity is given, else as "
-        "tube.ends requires",
+    pose: PoseOrPosition | None = optional(
+        "pose of the platform [m, rad]; default: anywhere in the tube if velocity is given, else as tube.ends requires"
     )
-    velocity: OrZero | None = Field(
-        default=None,
-        description="time derivative of the pose [m/s, rad/s], or 0: at rest; default: at rest, if pose is given",
+    velocity: OrZero | None = optional(
+        "time derivative of the pose [m/s, rad/s], or 0: at rest; default: at rest, if pose is given"
     )
-    acceleration: OrZero | None = Field(
-        default=None,
-        description="second time derivative [m/s^2, rad/s^2], or 0; default: 0 at rest without a pose, else chosen by "
-        "the planner",
+    acceleration: OrZero | None = optional(
+        "second time derivative [m/s^2, rad/s^2], or 0; default: 0 at rest without a pose, else chosen by the planner"
     )
-    carrier_pose: tuple[Pose, ...] | None = Field(
-        default=None, description="pose of each carrier [m, rad]; default: as base.ends requires"
+    carrier_pose: tuple[Pose, ...] | None = optional("pose of each carrier [m, rad]; default: as base.ends requires")
+    carrier_velocity: tuple[Pose, ...] | None = optional(
+        "velocity of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
     )
-    carrier_velocity: tuple[Pose, ...] | None = Field(
-        default=None, description="velocity of each carrier [m/s, rad/s]; default: at rest, if carrier_pose is given"
-    )
-    carrier_acceleration: tuple[Pose, ...] | None = Field(
-        default=None, description="acceleration of each carrier [m/s^2, rad/s^2]; default: chosen by the planner"
+    carrier_acceleration: tuple[Pose, ...] | None = optional(
+        "acceleration of each carrier [m/s^2, rad/s^2]; default: chosen by the planner"
     )
 
     @property

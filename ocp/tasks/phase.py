@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from ...models.body import AnyBody
-from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3
+from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3, optional
 from ...models.ranges import PositiveRange
 from ...models.rigid_load import RigidLoad
 from .paths import RestPath, SequencePath, SinglePath
@@ -29,10 +29,9 @@ class Load(RigidLoad):
         description="distance by which the CoM may differ along each axis of the platform [m]: tensions exist for "
         "every CoM in this box",
     )
-    body: AnyBody | None = Field(
-        default=None,
-        description="convex body in the platform frame, which the plan keeps above the floor, in the room and out of "
-        "regions while the load is carried; default: none",
+    body: AnyBody | None = optional(
+        "convex body in the platform frame, which the plan keeps above the floor, in the room and out of "
+        "regions while the load is carried; default: none"
     )
 
     @property
@@ -61,11 +60,10 @@ class Load(RigidLoad):
 class Ground(Part):
     """Ground under the platform or its load: vertical forces that only push, without friction."""
 
-    support: tuple[Vector3, ...] | None = Field(
-        default=None,
-        min_length=1,
-        description="points at which the ground pushes, in the platform frame [m]; default: one below each attachment, "
+    support: tuple[Vector3, ...] | None = optional(
+        "points at which the ground pushes, in the platform frame [m]; default: one below each attachment, "
         "level with the lowest",
+        min_length=1,
     )
     slack: bool = Field(
         default=False, description="true if cables may be slack: their tensions then have the lower limit 0"
@@ -76,18 +74,13 @@ class Phase(Part):
     """A part of a task: a path, the load, and the ground."""
 
     name: Name = Field(description="name of the phase, for reports")
-    path: SinglePath | None = Field(
-        default=None, description="path of the platform; default: rest at the end of the previous phase"
+    path: SinglePath | None = optional("path of the platform; default: rest at the end of the previous phase")
+    duration: Positive | PositiveRange | None = optional(
+        "duration [s], at least 0.01; or a range {min, max}, from which the planner takes the shortest "
+        "feasible duration; default: the path's own"
     )
-    duration: Positive | PositiveRange | None = Field(
-        default=None,
-        description="duration [s], at least 0.01; or a range {min, max}, from which the planner takes the shortest "
-        "feasible duration; default: the path's own",
-    )
-    load: Load | None = Field(default=None, description="load fixed to the platform; default: none")
-    ground: Ground | None = Field(
-        default=None, description="contact of the platform or its load with the ground; default: none, it hangs"
-    )
+    load: Load | None = optional("load fixed to the platform; default: none")
+    ground: Ground | None = optional("contact of the platform or its load with the ground; default: none, it hangs")
 
 
 def path_of(phases: Sequence[Phase]) -> SequencePath:

@@ -15,7 +15,7 @@ from typing_extensions import override
 from ...base.errors import InputError
 from ...base.inputs import file_path, number
 from ...models.parsing import read_yaml, save_yaml, validate
-from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Title, Vector3, Whole
+from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Title, Vector3, Whole, optional
 from ...models.ranges import PositiveRange
 from ..costs.cost import Cost
 from .initial import Final, Initial
@@ -39,13 +39,12 @@ class Tube(Part):
         default=0.0,
         description="range of each of roll, pitch, yaw about the path [rad]; 0: followed exactly; free: 1.2 rad",
     )
-    ends: Literal["free", "rest", "periodic", "exact"] | None = Field(
-        default=None,
-        description="free: anywhere in the tube; periodic: the end equals the start, without a stop, for a path that "
+    ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
+        "free: anywhere in the tube; periodic: the end equals the start, without a stop, for a path that "
         "ends where it starts; rest: position on the path at start and end, without speed and "
         "acceleration (with few cables or fixed lengths angular acceleration is free); exact: no deviation of "
         "position and velocity there, with free acceleration; default: rest if the path (other than kind rest) starts "
-        "and ends at rest and no carrier moves as given, otherwise free",
+        "and ends at rest and no carrier moves as given, otherwise free"
     )
     waypoints: Literal["free", "exact"] = Field(
         default="free",
@@ -89,8 +88,8 @@ class FreeBase(Part):
     around: dict[Name, AnyPath] = Field(
         default={}, description="reference motion of each carrier by its name, in {G}; default: rest at home"
     )
-    acceleration_max: Positive | None = Field(default=None, description="largest acceleration [m/s^2]")
-    speed_max: Positive | None = Field(default=None, description="largest speed [m/s]")
+    acceleration_max: Positive | None = optional("largest acceleration [m/s^2]")
+    speed_max: Positive | None = optional("largest speed [m/s]")
     tilt_max: float = Field(
         default=0.0,
         ge=0,
@@ -98,14 +97,11 @@ class FreeBase(Part):
         description="largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have "
         "the limit of the robot's file",
     )
-    turn_acceleration_max: Positive | None = Field(
-        default=None, description="largest second derivative of each Euler angle [rad/s^2]"
-    )
-    ends: Literal["free", "rest", "periodic", "exact"] | None = Field(
-        default=None,
-        description="free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
+    turn_acceleration_max: Positive | None = optional("largest second derivative of each Euler angle [rad/s^2]")
+    ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
+        "free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
         "cables or fixed lengths it is free); periodic: the end equals the start; exact: start and end as in "
-        "`around`; default: as `tube.ends` if that is rest or periodic, else free",
+        "`around`; default: as `tube.ends` if that is rest or periodic, else free"
     )
 
 
@@ -121,25 +117,18 @@ class Objective(Part):
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
-    tension: Positive | None = Field(
-        default=None, description="tension of each cable [N]; default: the platform's weight"
-    )
-    deviation: Positive | None = Field(
-        default=None,
-        description="distance from the path [m], angles times `Robot.length`; default: a tenth of the tube",
+    tension: Positive | None = optional("tension of each cable [N]; default: the platform's weight")
+    deviation: Positive | None = optional(
+        "distance from the path [m], angles times `Robot.length`; default: a tenth of the tube"
     )
     carrier_acceleration: Positive = Field(default=1.0, description="acceleration of carriers [m/s^2, rad/s^2]")
     carrier_offset: Positive = Field(default=10.0, description="distance of carriers from `around` or home [m, rad]")
     jerk: Positive = Field(
         default=10.0, description="jerk of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth"
     )
-    tension_rate: Positive | None = Field(default=None, description="rate of each tension [N/s]; default: no cost")
-    time: Positive | None = Field(
-        default=None, description="duration that adds 1 to the cost, not squared [s]; default: no cost"
-    )
-    margin: Positive | None = Field(
-        default=None, description="tension margin that lowers the cost by 1, not squared [N]; default: no reward"
-    )
+    tension_rate: Positive | None = optional("rate of each tension [N/s]; default: no cost")
+    time: Positive | None = optional("duration that adds 1 to the cost, not squared [s]; default: no cost")
+    margin: Positive | None = optional("tension margin that lowers the cost by 1, not squared [N]; default: no reward")
     own: SkipJsonSchema[tuple[Cost, ...]] = Field(
         default=(), exclude=True, description="costs of your own, in Python alone (docs/adding-a-cost.md)"
     )
@@ -167,48 +156,42 @@ class Task(Part):
     path: AnyPath = Field(
         default=cast(Any, None), description="path of the platform; with phases: the sequence of their paths"
     )
-    phases: tuple[Phase, ...] | None = Field(
-        default=None, min_length=1, description="instead of path and duration: parts of the motion, with their loads"
+    phases: tuple[Phase, ...] | None = optional(
+        "instead of path and duration: parts of the motion, with their loads", min_length=1
     )
-    duration: Positive | PositiveRange | None = Field(
-        default=None, description="duration [s], or a range from which the planner chooses; default: the path's own"
+    duration: Positive | PositiveRange | None = optional(
+        "duration [s], or a range from which the planner chooses; default: the path's own"
     )
     base: AnyBase = Field(
         default=HoldBase(kind="hold"),
         description="motion of the carriers: hold (stay), given (follow paths) or free (the planner chooses)",
     )
     tube: Tube = Tube()
-    initial: Initial | None = Field(
-        default=None, description="measured initial state of a moving robot; default: as `ends` require"
-    )
-    final: Final | None = Field(default=None, description="state in which the motion ends; default: as `ends` require")
+    initial: Initial | None = optional("measured initial state of a moving robot; default: as `ends` require")
+    final: Final | None = optional("state in which the motion ends; default: as `ends` require")
     margin: NonNegative = Field(default=0.0, description="smallest distance of every tension from its limits [N]")
-    robust: Share | None = Field(
-        default=None,
-        description="fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, whose tensions "
+    robust: Share | None = optional(
+        "fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, whose tensions "
         "must stay inside their limits, reduced by the margin, to first order; default: the nominal robot "
-        "only",
+        "only"
     )
-    stop_within: Positive | None = Field(
-        default=None,
-        description="time in which the robot must be able to stop on its path, inside the tension limits, from every "
+    stop_within: Positive | None = optional(
+        "time in which the robot must be able to stop on its path, inside the tension limits, from every "
         "instant of the plan [s]; checked every 0.02 s, or at 200 instants of plans of more than 4 s; default: not "
-        "checked",
+        "checked"
     )
-    wind: Vector3 | WindBox | WindDisc | None = Field(
-        default=None,
-        description="wind on the platform in {G} [m/s]: one velocity; or a range {min, max}, or {speed} for every "
+    wind: Vector3 | WindBox | WindDisc | None = optional(
+        "wind on the platform in {G} [m/s]: one velocity; or a range {min, max}, or {speed} for every "
         "horizontal wind up to a speed. Tensions then exist in each of these winds, and the planned tensions are those "
         "in the middle of the range, for {speed} in still air; default: no aerodynamic forces; [0, 0, 0] is still air, "
-        "with drag on a moving platform",
+        "with drag on a moving platform"
     )
     limits: TaskLimits = TaskLimits()
     steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")
-    scheme: SchemeName | None = Field(
-        default=None,
-        description="acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
+    scheme: SchemeName | None = optional(
+        "acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
         "spline: a smooth cubic B-spline; default: linear, or hermite if with linear the audit reports that carriers "
-        "cannot follow the motion between the nodes",
+        "cannot follow the motion between the nodes"
     )
     objective: Objective = Objective()
     time_limit: Positive = Field(

@@ -11,7 +11,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
 from ...models.body import THINNEST
-from ...models.part import Box, NonNegative, Part, Positive, Vector3
+from ...models.part import Box, NonNegative, Part, Positive, Vector3, optional
 from ...models.ranges import Range
 from ..limits.limit import Limit
 
@@ -112,65 +112,43 @@ class TaskLimits(Part):
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
-    cable_speed: Positive | None = Field(
-        default=None, description="rate of every cable's length, the speed of its winch [m/s]"
+    cable_speed: Positive | None = optional("rate of every cable's length, the speed of its winch [m/s]")
+    cable_acceleration: Positive | None = optional(
+        "second derivative of every cable's length, the acceleration of its winch [m/s^2]"
     )
-    cable_acceleration: Positive | None = Field(
-        default=None, description="second derivative of every cable's length, the acceleration of its winch [m/s^2]"
+    cable_jerk: Positive | None = optional("third derivative of every cable's length, the jerk of its winch [m/s^3]")
+    winch_power: Positive | None = optional("mechanical power of every winch, tension times rate of the length [W]")
+    cable_length: Range | None = optional("range of every cable's length [m]")
+    natural_frequency: Positive | None = optional(
+        "lowest natural frequency of the platform on elastic cables, with the planned tensions and fixed "
+        "unstrained lengths; always hard [Hz]"
     )
-    cable_jerk: Positive | None = Field(
-        default=None, description="third derivative of every cable's length, the jerk of its winch [m/s^3]"
-    )
-    winch_power: Positive | None = Field(
-        default=None, description="mechanical power of every winch, tension times rate of the length [W]"
-    )
-    cable_length: Range | None = Field(default=None, description="range of every cable's length [m]")
-    natural_frequency: Positive | None = Field(
-        default=None,
-        description="lowest natural frequency of the platform on elastic cables, with the planned tensions and fixed "
-        "unstrained lengths; always hard [Hz]",
-    )
-    tension_rate: Positive | None = Field(default=None, description="rate of every tension [N/s]")
-    platform_speed: Positive | None = Field(default=None, description="speed of the platform frame's origin [m/s]")
+    tension_rate: Positive | None = optional("rate of every tension [N/s]")
+    platform_speed: Positive | None = optional("speed of the platform frame's origin [m/s]")
     zone_speed: tuple[SpeedZone, ...] = Field(
         default=(), description="balls with a speed limit, which rises by 10 m/s per metre of distance from the ball"
     )
-    platform_acceleration: Positive | None = Field(
-        default=None, description="acceleration of the platform frame's origin [m/s^2]"
+    platform_acceleration: Positive | None = optional("acceleration of the platform frame's origin [m/s^2]")
+    platform_lateral_acceleration: Positive | None = optional(
+        "acceleration minus gravity along the platform's x and y axes, which makes an open cup spill [m/s^2]"
     )
-    platform_lateral_acceleration: Positive | None = Field(
-        default=None,
-        description="acceleration minus gravity along the platform's x and y axes, which makes an open cup spill "
-        "[m/s^2]",
+    platform_turn: Positive | None = optional("angular velocity of the platform [rad/s]")
+    platform_tilt: Positive | None = optional("angle of the platform's z axis to the vertical [rad]", le=np.pi)
+    platform_box: Box | None = optional("box in {G} in which the platform frame's origin stays [m]")
+    carrier_speed: Positive | None = optional(
+        "speed of every moving carrier, in addition to the robot file's limit [m/s]"
     )
-    platform_turn: Positive | None = Field(default=None, description="angular velocity of the platform [rad/s]")
-    platform_tilt: Positive | None = Field(
-        default=None, le=np.pi, description="angle of the platform's z axis to the vertical [rad]"
+    carrier_acceleration: Positive | None = optional(
+        "acceleration of every moving carrier, in addition to the robot file's limit [m/s^2]"
     )
-    platform_box: Box | None = Field(
-        default=None, description="box in {G} in which the platform frame's origin stays [m]"
+    cable_clearance: Positive | None = optional("least distance of cables that share neither anchor nor attachment [m]")
+    carrier_separation: Positive | Literal["radius"] | None = optional(
+        "least distance of the origins of carriers [m]; radius: the sum of the radii of both bodies, such as quadrotors"
     )
-    carrier_speed: Positive | None = Field(
-        default=None, description="speed of every moving carrier, in addition to the robot file's limit [m/s]"
-    )
-    carrier_acceleration: Positive | None = Field(
-        default=None, description="acceleration of every moving carrier, in addition to the robot file's limit [m/s^2]"
-    )
-    cable_clearance: Positive | None = Field(
-        default=None, description="least distance of cables that share neither anchor nor attachment [m]"
-    )
-    carrier_separation: Positive | Literal["radius"] | None = Field(
-        default=None,
-        description="least distance of the origins of carriers [m]; radius: the sum of the radii of both bodies, such "
-        "as quadrotors",
-    )
-    cable_platform_clearance: Distance = Field(
-        default=None, description="least distance of cables from the bodies of platform and load [m]"
-    )
-    carrier_platform_clearance: NonNegative | Literal["radius"] | None = Field(
-        default=None,
-        description="least distance of the origins of moving carriers from the bodies of platform and load [m]; "
-        "radius: the radius of each carrier's body",
+    cable_platform_clearance: Distance = optional("least distance of cables from the bodies of platform and load [m]")
+    carrier_platform_clearance: NonNegative | Literal["radius"] | None = optional(
+        "least distance of the origins of moving carriers from the bodies of platform and load [m]; "
+        "radius: the radius of each carrier's body"
     )
     keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="keep-out regions")
     soft: dict[str, Positive] = Field(

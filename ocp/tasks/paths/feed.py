@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
 from ....base.text import quantity
-from ....models.part import NonNegative, Positive
+from ....models.part import NonNegative, Positive, optional
 from .base import PathBase, PoseOrPosition, or_file, or_number, with_points_of_file
 from .motion import Motion
 from .rounded_corners import CELLS, RoundedCorners
@@ -35,16 +35,15 @@ class FeedPath(PathBase):
         description="two positions or more [m], or poses with one attitude [m, rad]; in a task also the name of a file "
         "of them, .csv with units in its header or .gcode, relative to the task file",
     )
-    feed: Positive | None = Field(default=None, description="speed [m/s]; default: that of each line of a .gcode file")
+    feed: Positive | None = optional("speed [m/s]; default: that of each line of a .gcode file")
     acceleration: Positive = Field(description="largest acceleration, along the path and across it in corners [m/s^2]")
     tolerance: NonNegative = Field(
         default=1e-3, description="largest distance at which the path passes a corner [m]; 0: stop at each corner"
     )
-    feeds: tuple[Positive, ...] | None = Field(default=None, description="speed of each line, instead of `feed` [m/s]")
-    dwell: tuple[NonNegative, ...] | None = Field(
-        default=None,
+    feeds: tuple[Positive, ...] | None = optional("speed of each line, instead of `feed` [m/s]")
+    dwell: tuple[NonNegative, ...] | None = optional(
+        "duration of the stop at each point, a number or one for each [s]; default: no stop",
         json_schema_extra=or_number,
-        description="duration of the stop at each point, a number or one for each [s]; default: no stop",
     )
     ignored: tuple[str, ...] = Field(default=(), description="words of the .gcode file that were not used")
 

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import override
 
+from ....models.part import optional
 from .base import PathBase, PoseOrPosition
 from .motion import Motion
 from .rest_to_rest import rest_to_rest, smoother_rest_to_rest
@@ -17,11 +18,10 @@ class LinePath(PathBase):
     kind: Literal["line"]
     start: PoseOrPosition = Field(description="first pose, (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
     end: PoseOrPosition = Field(description="last pose, (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
-    timing: Literal["smooth", "smoother", "uniform"] | None = Field(
-        default=None,
-        description="smooth: from rest to rest, acceleration and jerk zero there; smoother: the next two derivatives "
+    timing: Literal["smooth", "smoother", "uniform"] | None = optional(
+        "smooth: from rest to rest, acceleration and jerk zero there; smoother: the next two derivatives "
         "zero too; uniform: constant speed; default: smoother if quadrotors could otherwise not rest at the ends "
-        "(an exact path of a platform under fewer than six cables), else smooth",
+        "(an exact path of a platform under fewer than six cables), else smooth"
     )
 
     @override

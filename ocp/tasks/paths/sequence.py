@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import override
 
-from ....models.part import Part, Positive
+from ....models.part import Part, Positive, optional
 from .base import PathBase
 from .circle import CirclePath
 from .feed import FeedPath
@@ -32,7 +32,7 @@ class Piece(Part):
     """One path of a sequence."""
 
     path: SinglePath = Field(description="path in the frame of the sequence")
-    duration: Positive | None = Field(default=None, description="duration [s]; default: the path's own")
+    duration: Positive | None = optional("duration [s]; default: the path's own")
 
     @property
     def seconds(self) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import override
 
-from ....models.part import Finite, NonNegative, Positive
+from ....models.part import Finite, NonNegative, Positive, optional
 from .base import PathBase
 from .circle import CirclePath
 from .line import LinePath
@@ -34,18 +34,15 @@ class TimedPath(PathBase):
 
     kind: Literal["timed"]
     along: Curve = Field(description="the path; s is the fraction of its own time, or for straight legs of its length")
-    until: Positive | None = Field(
-        default=None, description="end of the path by its own time [s]; default: its natural duration"
-    )
+    until: Positive | None = optional("end of the path by its own time [s]; default: its natural duration")
     s: tuple[Finite, ...] = Field(min_length=2, description="grid of s, increasing from 0 to 1")
     speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
-    dwell: tuple[NonNegative, ...] | None = Field(
-        default=None, description="duration of the stop at each s [s]; 0 wherever the speed is not 0; default: no stop"
+    dwell: tuple[NonNegative, ...] | None = optional(
+        "duration of the stop at each s [s]; 0 wherever the speed is not 0; default: no stop"
     )
-    smoothing: Positive | None = Field(
-        default=None,
-        description="time over which the time law is averaged, so that the acceleration does not jump and is zero at "
-        "rest [s]; the motion then has the duration of the task; default: no smoothing",
+    smoothing: Positive | None = optional(
+        "time over which the time law is averaged, so that the acceleration does not jump and is zero at "
+        "rest [s]; the motion then has the duration of the task; default: no smoothing"
     )
 
     @model_validator(mode="after")

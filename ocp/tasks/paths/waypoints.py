@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
-from ....models.part import Finite, NonNegative
+from ....models.part import Finite, NonNegative, optional
 from .base import PathBase, PoseOrPosition, check_times, or_file, or_number, with_points_of_file
 from .legs import Legs
 from .motion import Motion
@@ -49,31 +49,25 @@ class WaypointPath(PathBase):
     shape: Literal["legs", "spline"] = Field(
         default="legs", description="legs: straight, rounded at the points; spline: a smooth curve of degree 5"
     )
-    blend: NonNegative | None = Field(
-        default=None,
-        description="for legs: largest distance from the points [m]; 0: stop at each; default: 1 % of the span of the "
-        "points",
+    blend: NonNegative | None = optional(
+        "for legs: largest distance from the points [m]; 0: stop at each; default: 1 % of the span of the points"
     )
     order: Literal["given", "free"] = Field(
         default="given",
         description="free: the points between the first and the last, at most 12, in the order of the shortest path",
     )
-    times: tuple[Finite, ...] | None = Field(
-        default=None,
-        description="time at which the path passes each point, from 0 on, increasing [s]; default: spread over the "
+    times: tuple[Finite, ...] | None = optional(
+        "time at which the path passes each point, from 0 on, increasing [s]; default: spread over the "
         "duration so that all legs have the same peak acceleration; for a spline by the square roots of "
-        "the distances",
+        "the distances"
     )
-    shares: tuple[Finite, ...] | None = Field(
-        default=None,
-        description="instead of times: share of the duration after which the path passes each point, from 0 to 1, "
-        "increasing",
+    shares: tuple[Finite, ...] | None = optional(
+        "instead of times: share of the duration after which the path passes each point, from 0 to 1, increasing"
     )
-    dwell: tuple[NonNegative, ...] | None = Field(
-        default=None,
-        json_schema_extra=or_number,
-        description="for legs: duration of the stop at each point, a number or one for each [s]; included in the "
+    dwell: tuple[NonNegative, ...] | None = optional(
+        "for legs: duration of the stop at each point, a number or one for each [s]; included in the "
         "duration; default: no stop",
+        json_schema_extra=or_number,
     )
 
     @model_validator(mode="before")
