@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ..base.inputs import check_ending
-from .options import JsonOption, RobotArgument, parameters, print_result
+from .options import JsonOption, RobotArgument, left_out, parameters, print_result
 from .outputs import check_outputs
 
 
@@ -40,15 +40,10 @@ def export(
 
     if mjcf + c_code + (step is not None) + (fmu is not None) != 1:
         raise InputError("export requires exactly one of --mjcf, --c, --step and --fmu")
-    if single and step is None:
-        raise InputError("--float must be left out without --step")
-    for option, value in (
-        ("--fmu-of", None if part == "plant" else part),
-        ("--drive", drive),
-        ("--reference", reference),
-    ):
-        if value is not None and fmu is None:
-            raise InputError(f"{option} must be left out without --fmu")
+    if step is None:
+        left_out({"--float": single}, "without --step", got=False)
+    if fmu is None:
+        left_out({"--fmu-of": part != "plant", "--drive": drive, "--reference": reference}, "without --fmu", got=False)
     if out is not None and (step is not None or fmu is not None):
         raise InputError(f"--out must be left out with {'--step, which names the folder' if step else '--fmu'}")
     loaded = load(robot)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from inspect import signature
 from pathlib import Path
@@ -114,9 +114,17 @@ def check_animation(animate: Path | None, speed: float, fps: float) -> None:
 
         check_film(animate, speed, fps)
         return
-    for name, value, default in (("--speed", speed, SPEED), ("--fps", fps, FPS)):
-        if value != default:
-            raise InputError(f"{name} must be left out without --animate, got {value:g}")
+    options = (("--speed", speed, SPEED), ("--fps", fps, FPS))
+    left_out({name: f"{value:g}" for name, value, default in options if value != default}, "without --animate")
+
+
+def left_out(options: Mapping[str, object], when: str, got: bool = True) -> None:
+    """Raise InputError if one of the options is given, by its value, that must be left out `when`."""
+    from ..base.inputs import printable
+
+    for name, value in options.items():
+        if value not in (None, False):
+            raise InputError(f"{name} must be left out {when}{f', got {printable(str(value))}' * got}")
 
 
 def schema_option(files: str, package: str, model: str) -> Any:

@@ -17,13 +17,14 @@ from .options import (
     RobotArgument,
     SpeedOption,
     check_animation,
+    left_out,
     parameters,
     print_result,
     schema_option,
     usual_file,
 )
 from .outputs import check_outputs
-from .resuming import check_unused, checkpoint_of, long_run
+from .resuming import checkpoint_of, long_run
 from .sweep import sweep
 from .watching import watching
 
@@ -87,7 +88,8 @@ def plan(
         sweep(robot, task, vary, where, out, figures and figures / f"sweep.{form}", as_json)
         return
     many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
-    check_unused({**many, "--resume": resume, "--keep": keep}, "--vary", "plans")
+    when = "without --vary: it is an option for many plans"
+    left_out({**many, "--resume": resume, "--keep": keep}, when, got=False)
     from ..models import load
     from ..ocp import plan as plan_motion
     from ..ocp import read_task

@@ -16,6 +16,7 @@ from .options import (
     FormatOption,
     JsonOption,
     RobotArgument,
+    left_out,
     numbers,
     parameters,
     print_json,
@@ -67,16 +68,10 @@ def pose(
     loaded = load(robot)
     if (lengths is None) == (log is None):
         raise InputError("one of --lengths and --log must be given, got " + ("none" if log is None else "both"))
-    for name, value, wrong in (
-        ("--start", start, log),
-        ("--carrier-pose", carrier_pose, log),
-        ("--out", out, lengths),
-        ("--figures", figures, lengths),
-        ("--fields", fields, lengths),
-    ):
-        if value is not None and wrong is not None:
-            raise InputError(f"{name} must be left out with {'--log' if wrong is log else '--lengths'}, got {value}")
-    if log is not None:
+    if log is None:
+        left_out({"--out": out, "--figures": figures, "--fields": fields}, "with --lengths")
+    else:
+        left_out({"--start": start, "--carrier-pose": carrier_pose}, "with --log")
         _of_log(loaded, log, fields, sigma, out or Path(f"{log.stem}-poses.csv"), figures, form, as_json)
         return
     assert lengths is not None

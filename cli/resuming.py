@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 from ..base.errors import InputError
@@ -22,13 +22,6 @@ def long_run(when: str = "") -> str:
         "resume FILE": f"{when}checkpoint to continue, or to create if it does not exist.",
     }
     return "\n".join(f"    --{name}: {text[0].upper()}{text[1:]}" for name, text in entries.items())
-
-
-def check_unused(options: Mapping[str, object], without: str, many: str) -> None:
-    """Raise InputError if an option is given, by its value, that is for `many` things and needs `without`."""
-    for name, given in options.items():
-        if given:
-            raise InputError(f"{name} must be left out without {without}: it is an option for many {many}")
 
 
 def checkpoint_of(checkpoint: Path | None, resume: Path | None) -> Path | None:

@@ -27,13 +27,14 @@ from .options import (
     RobotArgument,
     SpeedOption,
     check_animation,
+    left_out,
     numbers,
     parameters,
     print_result,
 )
 from .outputs import check_outputs
 from .replay import replay_log
-from .resuming import check_unused, checkpoint_of, long_run, resumable
+from .resuming import checkpoint_of, long_run, resumable
 from .stopping import add_to_message
 from .watching import counting, watching
 
@@ -125,7 +126,7 @@ def simulate(
     check_animation(animate, speed, fps)
     if runs is None:
         many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}
-        check_unused(many, "--runs", "runs")
+        left_out(many, "without --runs: it is an option for many runs", got=False)
     of_log = {"--replay": replay, "--poses": poses, "--fields": fields, "--drive": drive, "--fit": fit}
     of_log |= {"--delay": delay, "--window": window != WINDOW}
     from ..estimation.logs.opening import is_recording
@@ -139,20 +140,15 @@ def simulate(
             "--mismatch": mismatch,
         }
         of_plan |= {"--event": event, "--duration": duration, "--seed": seed, "--runs": runs, "--animate": animate}
-        for name, value in of_plan.items():
-            if value:
-                raise InputError(f"{name} must be left out with a recording, got {printable(str(value))}")
+        left_out(of_plan, "with a recording")
         options = {"poses": poses, "fields": fields, "drive": drive, "delay": delay, "window": window}
         outputs = {"--out": out, "--fit": fit, "--report": report}
         replay_log(robot, plan, options | {"tolerance": tolerance}, outputs, figures, form, as_json)
         return
-    for name, value in of_log.items():
-        if value:
-            raise InputError(f"{name} must be left out without a recording, got {printable(str(value))}")
+    left_out(of_log, "without a recording")
     stored = checkpoint_of(checkpoint, resume)
-    for name, file in (("--animate", animate), ("--report", report)):
-        if runs is not None and file is not None:
-            raise InputError(f"{name} must be left out with --runs, got {file}")
+    if runs is not None:
+        left_out({"--animate": animate, "--report": report}, "with --runs")
     # Before libraries load: the processes of --workers share the processors.
     with one_thread_each(), _named(event or []):
         from ..control import ComputedTorque, FaultTolerant, LengthControl, OpenLoop, Predictive

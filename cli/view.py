@@ -7,7 +7,7 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending
-from .options import JsonOption, parameters, print_result, robot_names
+from .options import JsonOption, left_out, parameters, print_result, robot_names
 from .outputs import check_outputs
 from .stopping import end_at_once, requested, unlisten
 
@@ -47,9 +47,8 @@ def view(
     from ..viewer import read, save_page, serve
 
     if html is not None:
-        for name, differs in (("--host", host != HOST), ("--port", port != PORT)):
-            if differs:
-                raise InputError(f"{name} must be left out with --html: a page needs no server")
+        when = "with --html: a page needs no server"
+        left_out({"--host": host != HOST, "--port": port != PORT}, when, got=False)
         check_ending("--html", html, ".html", ".htm")
     if target is None:
         if html is not None or robot is not None:

@@ -75,9 +75,7 @@ class _Stage:
         self._figure = style.figure(*SIZE)
         self._figure.set_dpi(DPI)
         self._canvas = FigureCanvasAgg(self._figure)
-        corners = [np.array(box) for box in scene.boxes]
-        parts = (scene.anchors, scene.attachments, scene.platform, scene.path, scene.carriers, scene.rotors, *corners)
-        self._seen = Perspective(np.vstack([np.reshape(part, (-1, 3)) for part in parts]), standing=not scene.names)
+        self._seen = Perspective(scene.points, standing=not scene.names)
         self._ax = style.axes(self._figure, "x [m]", "z [m]") if self._seen.flat else self._figure.add_subplot()
         self._draw_surroundings()
         self._make_actors()

@@ -38,6 +38,12 @@ class Scene:
         return self.attachments if self.surface is None else self.surface
 
     @property
+    def points(self) -> np.ndarray:
+        """Return all points of the robot and of its path at all instants, (n, 3)."""
+        parts = (self.anchors, self.attachments, self.platform, self.path, self.carriers, self.rotors, *self.boxes)
+        return np.vstack([np.reshape(part, (-1, 3)) for part in parts])
+
+    @property
     def standing(self) -> np.ndarray:
         """Return the indices of the cables whose anchors never move."""
         return np.setdiff1d(np.arange(self.anchors.shape[1]), np.concatenate([np.zeros(0, int), *self.bodies]))

@@ -17,20 +17,7 @@ REACH = {"facecolor": "none", "edgecolor": "#666666", "linestyle": "--", "linewi
 
 def views(scene: Scene) -> style.Figure:
     """Draw a scene of a few instants, from start to end, in two views of equal scale."""
-    robot = np.vstack(
-        [
-            np.reshape(part, (-1, 3))
-            for part in (
-                scene.anchors,
-                scene.attachments,
-                scene.platform,
-                scene.path,
-                scene.carriers,
-                scene.rotors,
-                *scene.boxes,
-            )
-        ]
-    )
+    robot = scene.points
     near = NEAR * np.ptp(robot, axis=0).max()  # only this part of walls much larger than the robot is drawn
     lines = [line for outline_of in scene.obstacles for line in outline_of]
     outlines = [np.clip(line, robot.min(axis=0) - near, robot.max(axis=0) + near) for line in lines]

@@ -2,38 +2,33 @@
 
 from __future__ import annotations
 
+import tempfile
 import threading
 from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from ..base.errors import InputError, TowlineError
+from ..figures.animation import FASTEST, draw, timing
+from ..statics.scene import scene
 from ..workspace.surface import Surface
 from ..workspace.surface import surface as surface_of
 from . import labels
 from .frames import Frames
-from .geometry import FARTHEST
+from .geometry import FARTHEST, Geometry
 from .posing import Posing
+from .replay import Replay
 from .sliders import whole_steps
-from .stage import VIEWS
+from .snapshot import Snapshot
+from .stage import VIEWS, Stage
+from .subject import Subject
 from .timeline import TimeLine
 
 if TYPE_CHECKING:
     import viser
-
-    from .geometry import Geometry
-    from .replay import Replay
-    from .snapshot import Snapshot
-    from .stage import Stage
-    from .subject import Subject
-import tempfile
-from contextlib import nullcontext
-from pathlib import Path
-
-from ..figures.animation import FASTEST, draw, timing
-from ..statics.scene import scene
-from .replay import Replay
 
 PATIENCE = 60.0  # [s] for a browser to draw a picture
 FINE = 2.0  # times the size in the browser: of a saved picture

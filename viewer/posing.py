@@ -12,11 +12,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..base.errors import InputError, TowlineError
-from ..models import Dynamics, points
+from ..models import Dynamics, Robot, points
 from ..statics.equilibria import rest_near
 from ..workspace import StaticEquilibrium
 from ..workspace.nearest import nearest_feasible
 from .feasible_ranges import Strips
+from .frames import Frames
 from .geometry import Geometry
 from .labels import link
 from .sliders import Slider, sliders
@@ -25,9 +26,6 @@ from .stage import move
 
 if TYPE_CHECKING:
     import viser
-
-    from ..models import Robot
-    from .frames import Frames
 
 HANDLE = 0.13  # of the robot's size
 NOTHING = "nothing"

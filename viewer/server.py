@@ -23,13 +23,12 @@ from .geometry import Geometry
 from .live_page import live_page
 from .live_view import Live
 from .page import aside, camera
+from .replay import Replay
 from .stage import Stage
 from .subject import Subject
 
 if TYPE_CHECKING:
     import viser
-
-    from .replay import Replay
 
 LOOPBACK = "127.0.0.1"
 PORT = 8080

@@ -22,11 +22,10 @@ from . import labels
 from .geometry import FIELD_OF_VIEW, Extent, Geometry
 from .shapes import posts, rotors, sheaves
 from .snapshot import Snapshot, arrow
+from .subject import Subject
 
 if TYPE_CHECKING:
     import viser
-
-    from .subject import Subject
 
 WIDE = 1.4  # width over height of a picture
 CABLE_WIDTH = 4.0  # [pixels]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import xarray as xr
 
 from ..base.declared import check_zarr
 from ..base.display import Displayed
@@ -13,13 +14,9 @@ from ..base.errors import InputError
 from ..base.inputs import file_path, printable, required, shown
 from ..base.netcdf import load_netcdf
 from ..models import Robot, available, load
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from .cloud import Cloud
-    from .replay import Replay
-    from .snapshot import Snapshot
+from .cloud import Cloud, cloud
+from .replay import Replay
+from .snapshot import Snapshot
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how NetCDF files begin
 ACCEPTED = "a robot, or a file that `towline plan`, `towline simulate` or `towline workspace` wrote"
@@ -53,9 +50,9 @@ class Subject(Displayed):
         """Raise InputError for a subject that cannot be shown."""
         required("title", self.title, str)
         required("robot", self.robot, Robot)
-        for name, has in (("replay", "frames"), ("cloud", "positions"), ("other", "frames")):
-            part = getattr(self, name)  # their classes take a second to import
-            if part is not None and not hasattr(part, has):
+        for name, kind in (("replay", Replay), ("cloud", Cloud), ("other", Replay)):
+            part = getattr(self, name)
+            if part is not None and not isinstance(part, kind):
                 raise InputError(f"{name} must be that of a subject from `read`, or None, got {shown(part)}")
 
     @property
@@ -120,8 +117,6 @@ def _compared(first: Subject, second: Subject, where: str) -> Subject:
 
 def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
     if "pose" in dataset and "time" in dataset.variables:
-        from .replay import Replay
-
         if robot is not None:
             raise InputError(
                 f"--robot must be left out for a plan, which has its robot, got {shown(robot)} for {where}"
@@ -130,8 +125,6 @@ def _of_dataset(dataset: xr.Dataset, where: str, robot: str | None) -> Subject:
         return Subject(replay.title, replay.robot, replay=replay)
     if "reached" not in dataset and "position" not in dataset:
         raise InputError(f"{where} must be {ACCEPTED}, got a dataset that is neither a plan nor a workspace")
-    from .cloud import cloud
-
     name = printable(str(dataset.attrs.get("robot")), 64)
     # A workspace names its robot: as a path, the name would make this program read any file.
     if robot is None and name not in available():
@@ -153,8 +146,6 @@ def _is_netcdf(path: Path) -> bool:
 
 
 def _open(path: Path) -> xr.Dataset:
-    import xarray as xr
-
     if not path.exists():
         raise InputError(f"{printable(str(path))} does not exist; it must be {ACCEPTED}")
     if path.is_dir() and path.suffix != ".zarr":

@@ -13,13 +13,12 @@ import numpy as np
 from ..figures import style
 from .charts import Charts
 from .curves import curves
+from .frames import Frames
+from .replay import Replay
 from .snapshot import Snapshot
 
 if TYPE_CHECKING:
     import viser
-
-    from .frames import Frames
-    from .replay import Replay
 
 RATE = 25.0  # [1/s] of playing
 TICK = 0.01  # [s] of the time line
