@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from towline import Robot, load, plan
+from towline import Robot, load, plan, tensions
 from towline.ocp.reports.report import sections
 
 WAYS = {
@@ -100,6 +100,39 @@ def test_a_rotation_ends_at_a_smaller_angle():
     for factor, possible in ((0.999, True), (1.01, False)):
         end = [0, 0, 2.5, 1.4 * share * factor, 0, 0]
         assert plan("ipanema-2", {"path": path | {"end": end}, "duration": 4}).feasible == possible
+
+
+@pytest.mark.parametrize(
+    ("start", "yaws", "wrong"),
+    [([-1, 0, 2], [0, 0.9, 0, 0.1], [1]), ([-1, 0, 2], [0.2, 0.9, -1.0, 0], [1, 2]), ([-1, 0.2, 2.2], [0, 1.4], [1])],
+)
+def test_points_whose_yaw_cannot_be_held_are_named_with_the_nearest_that_can(start, yaws, wrong):
+    """Statics by itself shows which points are wrong, and that a yaw a little nearer to the given one is wrong too."""
+    points = [[start[0] + 0.6 * k, start[1] + 0.2 * (k % 2), start[2], 0, 0, yaw] for k, yaw in enumerate(yaws)]
+    held = [tensions("ipanema-2", point).feasible for point in points]
+    assert [k for k, possible in enumerate(held) if not possible] == wrong
+    line = len(points) == 2
+
+    def task(points):
+        path = {"kind": "line", "start": points[0], "end": points[1]}
+        return {"path": path if line else {"kind": "waypoints", "points": points}, "duration": 12}
+
+    found = plan("ipanema-2", task(points))
+    offer = next(each for each in found.relaxations if each.name.startswith("yaw"))
+    assert offer.name == f"yaw at path.{'end' if line else f'points[{wrong[0]}]'}"
+    assert (offer.requested, offer.unit) == (yaws[wrong[0]], "rad")
+    assert all(f"path.points[{k}]" in offer.detail for k in wrong[1:])
+    path = offer.plan.scenario.task.path
+    offered = [list(pose) for pose in ((path.start, path.end) if line else path.points)]
+    assert offered[wrong[0]][5] == pytest.approx(offer.possible, abs=1e-3)
+    assert plan("ipanema-2", task(offered)).feasible
+    for k, (old, new) in enumerate(zip(points, offered, strict=True)):
+        assert old[:5] == new[:5]
+        assert (old[5] != new[5]) == (k in wrong)
+    for k in wrong:
+        nearer = offered[k].copy()
+        nearer[5] += 0.15 * (yaws[k] - nearer[5])
+        assert not tensions("ipanema-2", nearer).feasible
 
 
 def test_no_change_is_offered_that_a_task_cannot_have():

@@ -1,4 +1,4 @@
-"""What else would make a motion feasible: a nearer end, less wind, a lighter platform or load, other cables."""
+"""What else would make a motion feasible: a nearer end, another yaw, less wind, less mass, other cables."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,13 +9,15 @@ import numpy as np
 from ...base.text import quantity
 from ...models import Robot
 from ...solvers import solve_batch
+from ...solvers.margins import margins
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
+from ..audits.tensions import scaled
 from ..plan import Plan
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
-from ..tasks.paths import LinePath
+from ..tasks.paths import LinePath, WaypointPath
 from ..tasks.phase import Load
 from ..tasks.scenario import AUDIT_RATE, MOST_SAMPLES, Scenario
 from ..tasks.status import MotionStatus
@@ -26,6 +28,7 @@ from .search import Search
 INSTANTS = 120  # at which tensions are asked for before a motion is audited
 HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of what has tensions at these instants, one after the other until the audit passes
+YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 
 Variation: TypeAlias = tuple[Scenario, float, str]
@@ -63,7 +66,15 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
         return []
     found = list[Relaxed]()
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
-    for make in (_nearer_end, _less_wind, _lighter_load, _lighter_platform, _stronger_cables, _slacker_cables):
+    for make in (
+        _nearer_end,
+        _other_yaws,
+        _less_wind,
+        _lighter_load,
+        _lighter_platform,
+        _stronger_cables,
+        _slacker_cables,
+    ):
         its = make(search, scenario)
         if not its and others and seconds * AUDIT_RATE <= MOST_SAMPLES:
             longer = lay_out(scenario.robot, task.model_copy(update={"duration": seconds}))
@@ -93,6 +104,51 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
     return (
         _largest(search, to, "part of the rotation", "%") if turns else _largest(search, to, "length of the line", "m")
     )
+
+
+def _other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return feasible yaws for the points of the path at which no tensions hold the platform at rest.
+
+    Each lies between the given yaw and the one with the largest capacity margin there, as near to the given one as
+    tensions at rest permit, or by one factor less.
+    """
+    path, robot = scenario.task.path, scenario.robot
+    if not isinstance(path, LinePath | WaypointPath) or scenario.relative or not robot.dof_mask[5]:
+        return []
+    line = isinstance(path, LinePath)
+    points = np.array([path.start, path.end] if line else path.points)
+    names = ["path.start", "path.end"] if line else [f"path.points[{i}]" for i in range(len(points))]
+    wrong = np.flatnonzero(_margins_at_yaws(scenario, points, points[:, 5:])[:, 0] < 0)
+    given, held = points[wrong, 5], _margins_at_yaws(scenario, points[wrong], np.tile(YAWS, (len(wrong), 1)))
+    if not len(wrong) or held.max(axis=1).min() < 0:
+        return []
+    back = np.angle(np.exp(1j * (YAWS[held.argmax(axis=1)] - given)))
+    shares = np.linspace(0.0, 1.0, len(YAWS))
+    between = given[:, None] + back[:, None] * (1 - shares)
+    nearest = shares[np.argmax(_margins_at_yaws(scenario, points[wrong], between) < 0, axis=1) - 1]
+
+    def with_yaws(share: float) -> Variation:
+        turned, yaws = points.copy(), given + (1 - share * nearest) * back
+        turned[wrong, 5] = yaws
+        rows = tuple(map(tuple, turned.tolist()))
+        path_with_yaws = path.model_copy(update={"start": rows[0], "end": rows[-1]} if line else {"points": rows})
+        others = [f"{quantity(yaw, 'rad')} at {names[i]}" for i, yaw in zip(wrong[1:], yaws[1:], strict=True)]
+        detail = ", ".join([f"instead of {quantity(given[0], 'rad')}", *others])
+        return lay_out(robot, scenario.task.model_copy(update={"path": path_with_yaws})), float(yaws[0]), detail
+
+    found = _largest(search, with_yaws, f"yaw at {names[wrong[0]]}", "rad", up=bool(back[0] > 0))
+    return [replace(each, requested=float(given[0])) for each in found]
+
+
+def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -> np.ndarray:
+    """Return the capacity margins at rest at points (n, 6) with yaws (n, k), carriers as at the start, (n, k) [N]."""
+    poses = np.repeat(points, yaws.shape[1], axis=0)
+    poses[:, 5] = yaws.ravel()
+    still, axes = np.zeros_like(poses), np.flatnonzero(scenario.robot.dof_mask)
+    carriers = np.vstack([carrier.pose for carrier in scenario.references(np.zeros(1))[1]])
+    A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, carriers))[:, axes]
+    w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still, wind=scenario.wind))[:, axes]
+    return margins(A, w, *scenario.bounds()).reshape(yaws.shape)
 
 
 def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
