@@ -17,7 +17,7 @@ from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import WindBox, WindSet, as_wind, decisive_winds_at, possible_winds_at
 
-TOLERANCE = 1e-6  # [N]
+TOLERANCE = 1e-6  # [N], and of the characteristic force of robots below 1 N
 UNDERACTUATED_TOLERANCE = 1e-3  # of the weight, for robots with fewer independent cables than degrees of freedom
 INDEPENDENT = 1e-3  # of the largest singular value: along less the cables give nothing worth counting on
 RANK = 1e-9  # the same, below which nothing is given
@@ -62,7 +62,9 @@ class Distribution:
         self._bounds = scenario.bounds() if bounds is None else bounds
         self._scaled_A = scaled(scenario, A)
         self.few, self._inverse = _few_and_inverse(self._scaled_A, dof)  # (n, m, 6)
-        self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if self.few and scenario.count else TOLERANCE
+        self.tolerance = TOLERANCE * min(robot.force_scale, 1.0)
+        if self.few and scenario.count:
+            self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale
 
     def unlimited(self, w: np.ndarray) -> np.ndarray:
         """Return the tensions of least norm for the wrenches w (n, 6), whatever the limits, (n, m) [N]."""
@@ -91,7 +93,7 @@ class Distribution:
                 impossible = rows[proven]
                 closest, away = _nearest(scaled_A[impossible], scaled_w[impossible], low, high)
                 violation[impossible] = np.fmax(away, batch.shortfall[proven])
-                tensions[impossible] = closest if few else np.nan
+                tensions[impossible] = np.where((few | (away <= tolerance))[:, None], closest, np.nan)
                 short = violation[impossible]
                 if few:
                     in_range = _short_in_range(scaled_A[impossible], scaled_w[impossible], low, high)
@@ -116,7 +118,7 @@ class Distribution:
         closest = certificate.closest
         violation = float(np.linalg.norm(problem.scaled_A @ closest - problem.scaled_w))
         if not self.few:
-            return np.full(problem.m, np.nan), violation, certificate
+            return closest if violation <= self.tolerance else np.full(problem.m, np.nan), violation, certificate
         within = _in_span(problem.scaled_A[None], problem.scaled_w[None])[0] / problem.row_scale
         in_range = TensionProblem(problem.A, within, problem.t_min, problem.t_max, length=problem.length)
         return closest, violation, certify(in_range) or certificate

@@ -18,7 +18,6 @@ from ...models import Robot
 from ...models.files import as_robot
 from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS
-from ..audits.tensions import TOLERANCE
 from ..limits.limits import Limits
 from ..limits.platform import ZoneSpeed
 from ..plan import Plan
@@ -235,7 +234,7 @@ class _Stretches(NamedTuple):
 def _missing(law: FastestLaw, audited: Audit) -> _Stretches:
     """Return where an audit found no tensions, and all of s for tensions beyond their limits, if they are too few."""
     beyond = [abs(each.value - each.bound) for each in audited.excess if each.limit == TENSIONS]
-    rows = np.flatnonzero(audited.violation > TOLERANCE)
+    rows = np.flatnonzero(audited.violation > audited.tolerance)
     at = law.path.law(audited.times)[0]
     first, last = np.searchsorted(law.s, [at[rows], at[np.minimum(rows + 1, len(at) - 1)]])
     start, end = law.s[(first - 2).clip(0)], law.s[(last + 1).clip(max=len(law.s) - 1)]
