@@ -1,9 +1,8 @@
 """`Noise`: errors, resolution, rate and delay of the sensors of a robot, as data."""
 
 import numpy as np
-from pydantic import Field
 
-from ..models.part import Part
+from ..models.part import Part, optional
 
 
 class Noise(Part):
@@ -13,38 +12,23 @@ class Noise(Part):
     its beginning.
     """
 
-    position: float = Field(default=0.0, ge=0, le=1e3, description="standard deviation of the platform's position [m]")
-    attitude: float = Field(default=0.0, ge=0, le=10, description="standard deviation of roll, pitch and yaw [rad]")
-    velocity: float = Field(default=0.0, ge=0, le=1e3, description="standard deviation of the velocity [m/s]")
-    attitude_rate: float = Field(
-        default=0.0, ge=0, le=1e3, description="standard deviation of the rates of roll, pitch and yaw [rad/s]"
+    position: float = optional("standard deviation of the platform's position [m]", 0.0, ge=0, le=1e3)
+    attitude: float = optional("standard deviation of roll, pitch and yaw [rad]", 0.0, ge=0, le=10)
+    velocity: float = optional("standard deviation of the velocity [m/s]", 0.0, ge=0, le=1e3)
+    attitude_rate: float = optional("standard deviation of the rates of roll, pitch and yaw [rad/s]", 0.0, ge=0, le=1e3)
+    tension: float = optional("standard deviation of the tensions [N]", 0.0, ge=0, le=1e9)
+    position_bias: float = optional("standard deviation of the bias of the position [m]", 0.0, ge=0, le=1e3)
+    attitude_bias: float = optional("standard deviation of the bias of roll, pitch and yaw [rad]", 0.0, ge=0, le=10)
+    tension_bias: float = optional("standard deviation of the bias of the tensions [N]", 0.0, ge=0, le=1e9)
+    resolution: float = optional("steps of the measured position [m]", 0.0, ge=0, le=1e3)
+    attitude_resolution: float = optional("steps of roll, pitch and yaw [rad]", 0.0, ge=0, le=10)
+    tension_resolution: float = optional("steps of the measured tensions [N]", 0.0, ge=0, le=1e9)
+    differenced: bool = optional("true: velocities are differences of the measured poses", False)
+    rate: float | None = optional(
+        "rate of all sensors [1/s]; between readings the last one is held; default: each period", ge=0.1, le=1e6
     )
-    tension: float = Field(default=0.0, ge=0, le=1e9, description="standard deviation of the tensions [N]")
-    position_bias: float = Field(
-        default=0.0, ge=0, le=1e3, description="standard deviation of the bias of the position [m]"
-    )
-    attitude_bias: float = Field(
-        default=0.0, ge=0, le=10, description="standard deviation of the bias of roll, pitch and yaw [rad]"
-    )
-    tension_bias: float = Field(
-        default=0.0, ge=0, le=1e9, description="standard deviation of the bias of the tensions [N]"
-    )
-    resolution: float = Field(default=0.0, ge=0, le=1e3, description="steps of the measured position [m]")
-    attitude_resolution: float = Field(default=0.0, ge=0, le=10, description="steps of roll, pitch and yaw [rad]")
-    tension_resolution: float = Field(default=0.0, ge=0, le=1e9, description="steps of the measured tensions [N]")
-    differenced: bool = Field(default=False, description="true: velocities are differences of the measured poses")
-    rate: float | None = Field(
-        default=None,
-        ge=0.1,
-        le=1e6,
-        description="rate of all sensors [1/s]; between readings the last one is held; default: each period",
-    )
-    delay: float = Field(
-        default=0.0, ge=0, le=10, description="delay of all sensors [s]; rounded to whole control periods"
-    )
-    stamped: bool = Field(
-        default=False, description="true: states have the time of their measurement, from which controllers predict"
-    )
+    delay: float = optional("delay of all sensors [s]; rounded to whole control periods", 0.0, ge=0, le=10)
+    stamped: bool = optional("true: states have the time of their measurement, from which controllers predict", False)
 
     @property
     def of_motion(self) -> np.ndarray:

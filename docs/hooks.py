@@ -10,6 +10,7 @@ mkdocstrings looks for sources in a folder called `towline`. The repository's ro
 is called, so the sources are copied to build/docs/towline.
 """
 
+import ast
 import html
 import re
 import shutil
@@ -25,8 +26,6 @@ ROOT = Path(__file__).parent.parent
 # Parameters that share a description, in a docstring.
 SHARED = re.compile(r"^( +)(\w+(?:, \w+)+)( :[^\n]*)?\n((?:\1    [^\n]*\n)+)", re.MULTILINE)
 SOURCES = ROOT / "build" / "docs"
-# A field of a part, which the extension for pydantic knows as a `Field`.
-OPTIONAL = re.compile(r"= optional\(\s*")
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 
 
@@ -38,8 +37,7 @@ def on_startup(**_: object) -> None:
         folder = SOURCES.joinpath(*package.split("."))
         folder.mkdir(parents=True)
         for source in ROOT.joinpath(*package.split(".")[1:]).glob("*.py"):
-            text = SHARED.sub(_each, source.read_text(encoding="utf-8"))
-            text = OPTIONAL.sub("= Field(default=None, description=", text)
+            text = _with_fields(SHARED.sub(_each, source.read_text(encoding="utf-8")))
             (folder / source.name).write_text(text, encoding="utf-8")
 
 
@@ -47,6 +45,19 @@ def _each(shared: re.Match[str]) -> str:
     """Describe each parameter apart: mkdocstrings gives those of one line the type of the first, and no defaults."""
     indent, names, kind, description = shared.groups(default="")
     return "".join(f"{indent}{name}{kind}\n{description}" for name in names.split(", "))
+
+
+def _with_fields(text: str) -> str:
+    """Write `optional` fields of parts as the `Field` that the extension for pydantic knows."""
+    written = text
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "optional":
+            description, *default = node.args
+            known = {"default": default[0] if default else ast.Constant(None), "description": description}
+            keywords = [ast.keyword(name, value) for name, value in known.items()]
+            field = ast.Call(ast.Name("Field"), [], [*keywords, *node.keywords])
+            written = written.replace(ast.get_source_segment(text, node) or "", ast.unparse(field))
+    return written
 
 
 def on_files(files: Files, config: MkDocsConfig, **_: object) -> Files:

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from ..base.inputs import file_path
 from ..models import Robot
 from ..models.parsing import read_yaml, validate
-from ..models.part import Box, NonNegative, Part, Pose, Positive, Rows, Title, Vector3, Whole
+from ..models.part import Box, NonNegative, Part, Pose, Positive, Rows, Title, Vector3, Whole, optional
 from ..models.ranges import PositiveRange, Range
 from ..ocp.tasks.task import Task
 from ..ocp.tasks.task_limits import AnyKeepOut
@@ -30,29 +30,22 @@ class Free(Part):
     """Numbers of some cables that a design chooses: points in a box, or tension limits in a range."""
 
     part: Literal["anchor", "attachment", "t_min", "t_max"] = Field(description="kind of the numbers")
-    cables: tuple[CableNumber, ...] | None = Field(
-        default=None, min_length=1, description="cables, counted from 1; default: all"
+    cables: tuple[CableNumber, ...] | None = optional("cables, counted from 1; default: all", min_length=1)
+    box: Box | None = optional(
+        "for anchor and attachment: box of allowed points in the frame of carrier or platform [m]; equal "
+        "bounds make it a face, a line or a point"
     )
-    box: Box | None = Field(
-        default=None,
-        description="for anchor and attachment: box of allowed points in the frame of carrier or platform [m]; equal "
-        "bounds make it a face, a line or a point",
-    )
-    range: Range | None = Field(default=None, description="for t_min and t_max: smallest and largest value [N]")
-    equal: bool = Field(default=False, description="true: the cables have one point or value in common")
-    pairing: bool = Field(
-        default=False,
-        description="true: for attachment, instead of a box: the cables exchange their attachments, and every pairing "
+    range: Range | None = optional("for t_min and t_max: smallest and largest value [N]")
+    equal: bool = optional("true: the cables have one point or value in common", False)
+    pairing: bool = optional(
+        "true: for attachment, instead of a box: the cables exchange their attachments, and every pairing "
         "is compared; nothing else is free, and there are at most 8 cables",
+        False,
     )
-    copy_of: tuple[CableNumber, ...] | None = Field(
-        default=None,
-        min_length=1,
-        description="instead of box or range: one cable for each of `cables`, whose point or value is copied",
+    copy_of: tuple[CableNumber, ...] | None = optional(
+        "instead of box or range: one cable for each of `cables`, whose point or value is copied", min_length=1
     )
-    mirrored: Axis | None = Field(
-        default=None, description="with copy_of: the coordinate of the points whose sign is reversed; default: none"
-    )
+    mirrored: Axis | None = optional("with copy_of: the coordinate of the points whose sign is reversed; default: none")
 
     @model_validator(mode="after")
     def _where(self) -> Self:
@@ -91,24 +84,21 @@ class Free(Part):
 class Requirement(Part):
     """Poses at which the cables must balance wrenches; every combination of the lists is required."""
 
-    box: Box | None = Field(default=None, description="box of positions of the platform in {G} [m]")
-    grid: tuple[Count, Count, Count] = Field(default=(7, 7, 5), description="with a box: positions along x, y and z")
-    attitudes: Rows[Vector3] = Field(
-        default=((0.0, 0.0, 0.0),), description="with a box: roll, pitch, yaw of the platform [rad]; default: level"
+    box: Box | None = optional("box of positions of the platform in {G} [m]")
+    grid: tuple[Count, Count, Count] = optional("with a box: positions along x, y and z", (7, 7, 5))
+    attitudes: Rows[Vector3] = optional(
+        "with a box: roll, pitch, yaw of the platform [rad]; default: level", ((0.0, 0.0, 0.0),)
     )
-    poses: Rows[Pose] | None = Field(default=None, description="instead of a box: poses of the platform [m, rad]")
-    wrenches: Rows[Wrench] = Field(
-        default=(NO_WRENCH,),
-        description="wrenches (fx, fy, fz, mx, my, mz) on the platform in addition to its weight, about its CoM "
+    poses: Rows[Pose] | None = optional("instead of a box: poses of the platform [m, rad]")
+    wrenches: Rows[Wrench] = optional(
+        "wrenches (fx, fy, fz, mx, my, mz) on the platform in addition to its weight, about its CoM "
         "[N, N m]; default: none",
+        (NO_WRENCH,),
     )
-    accelerations: Rows[Wrench] = Field(
-        default=(NO_WRENCH,),
-        description="accelerations of the platform: second derivatives of its pose [m/s^2, rad/s^2]; default: rest",
+    accelerations: Rows[Wrench] = optional(
+        "accelerations of the platform: second derivatives of its pose [m/s^2, rad/s^2]; default: rest", (NO_WRENCH,)
     )
-    winds: Rows[Vector3] | None = Field(
-        default=None, description="velocities of the air in {G} [m/s]; default: no aerodynamic forces"
-    )
+    winds: Rows[Vector3] | None = optional("velocities of the air in {G} [m/s]; default: no aerodynamic forces")
 
     @model_validator(mode="after")
     def _where(self) -> Self:
@@ -157,11 +147,10 @@ class Requirement(Part):
 class Prices(Part):
     """Prices of cables and winches, in any currency."""
 
-    cable: NonNegative = Field(
-        default=0.0,
-        description="price of a metre of cable; the length of a cable is its largest one at the required positions",
+    cable: NonNegative = optional(
+        "price of a metre of cable; the length of a cable is its largest one at the required positions", 0.0
     )
-    t_max: NonNegative = Field(default=0.0, description="price of a newton of the t_max of one cable")
+    t_max: NonNegative = optional("price of a newton of the t_max of one cable", 0.0)
 
     def cost(self, robot: Robot, cable: float) -> float:
         """Return what the winches of a robot and a length of cable [m] cost."""
@@ -171,61 +160,58 @@ class Prices(Part):
 class Requirements(Part):
     """Requirements of a design: what is free, poses and wrenches. In a file: YAML with these keys."""
 
-    name: Title = Field(default="design", description="name of the requirements, for reports and file names")
+    name: Title = optional("name of the requirements, for reports and file names", "design")
     free: Annotated[tuple[Free, ...], Field(min_length=1, max_length=200)] = Field(
         description="numbers of the robot that the design chooses; all others keep the values of its file"
     )
     require: Annotated[tuple[Requirement, ...], Field(min_length=1, max_length=200)] = Field(
         description="poses and the wrenches to balance there"
     )
-    tasks: Annotated[tuple[Task, ...], Field(max_length=20)] = Field(
-        default=(),
-        description="tasks, with the keys of task files, for each of which the resulting robot must have a feasible "
+    tasks: Annotated[tuple[Task, ...], Field(max_length=20)] = optional(
+        "tasks, with the keys of task files, for each of which the resulting robot must have a feasible "
         "plan; default: none",
+        (),
     )
-    margin: Positive = Field(
-        default=LEAST_MARGIN,
+    margin: Positive = optional(
+        "smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]",
+        LEAST_MARGIN,
         ge=LEAST_MARGIN,
-        description="smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]",
     )
-    clearance: NonNegative = Field(default=0.0, description="smallest distance between two cables [m]; 0: no limit")
-    keep_out: Annotated[tuple[AnyKeepOut, ...], Field(max_length=20)] = Field(
-        default=(),
-        description="regions, with the keys of task files, from which the cables keep the distance `cables` at the "
+    clearance: NonNegative = optional("smallest distance between two cables [m]; 0: no limit", 0.0)
+    keep_out: Annotated[tuple[AnyKeepOut, ...], Field(max_length=20)] = optional(
+        "regions, with the keys of task files, from which the cables keep the distance `cables` at the "
         "required positions; default: none",
+        (),
     )
-    cable_platform_clearance: Positive | None = Field(
-        default=None, description="smallest distance of cables from the platform's body [m]; default: no limit"
+    cable_platform_clearance: Positive | None = optional(
+        "smallest distance of cables from the platform's body [m]; default: no limit"
     )
-    cable_floor_clearance: NonNegative | None = Field(
-        default=None, description="smallest height of cables above the robot's floor [m]; default: no limit"
+    cable_floor_clearance: NonNegative | None = optional(
+        "smallest height of cables above the robot's floor [m]; default: no limit"
     )
-    natural_frequency: Positive | None = Field(
-        default=None,
-        description="smallest accepted natural frequency of the platform on elastic cables, with the tensions of least "
-        "norm that balance each required wrench [Hz]; default: no limit",
+    natural_frequency: Positive | None = optional(
+        "smallest accepted natural frequency of the platform on elastic cables, with the tensions of least "
+        "norm that balance each required wrench [Hz]; default: no limit"
     )
-    cable_length: PositiveRange | None = Field(
-        default=None,
-        description="shortest and longest length that the winches can give a cable, at the required positions [m]; "
-        "default: no limit",
+    cable_length: PositiveRange | None = optional(
+        "shortest and longest length that the winches can give a cable, at the required positions [m]; "
+        "default: no limit"
     )
-    maximise: Literal["margin", "natural_frequency", "volume"] = Field(
-        default="margin",
-        description="objective: the smallest capacity margin; or, with at least the margin `margin`, the lowest "
+    maximise: Literal["margin", "natural_frequency", "volume"] = optional(
+        "objective: the smallest capacity margin; or, with at least the margin `margin`, the lowest "
         "natural frequency, or the volume of the required boxes, which grow about their centres",
+        "margin",
     )
-    minimise: Literal["t_max", "cost"] | None = Field(
-        default=None,
-        description="objective instead, with at least the margin `margin`: the mean t_max of the cables, which must be "
-        "free, or the cost of cables and winches",
+    minimise: Literal["t_max", "cost"] | None = optional(
+        "objective instead, with at least the margin `margin`: the mean t_max of the cables, which must be "
+        "free, or the cost of cables and winches"
     )
-    prices: Prices | None = Field(default=None, description="for minimise: cost, the prices of cables and winches")
-    start: Literal["robot", "random"] = Field(
-        default="robot", description="first layout: the robot's own, moved into the boxes, or a random one"
+    prices: Prices | None = optional("for minimise: cost, the prices of cables and winches")
+    start: Literal["robot", "random"] = optional(
+        "first layout: the robot's own, moved into the boxes, or a random one", "robot"
     )
-    time_limit: Positive = Field(default=10.0, description="time of the search [s]; the last audit is finished first")
-    seed: Annotated[Whole, Field(ge=0, le=2**32 - 1)] = Field(default=0, description="seed of the random numbers")
+    time_limit: Positive = optional("time of the search [s]; the last audit is finished first", 10.0)
+    seed: Annotated[Whole, Field(ge=0, le=2**32 - 1)] = optional("seed of the random numbers", 0)
 
     @model_validator(mode="after")
     def _not_too_many(self) -> Self:

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import AfterValidator, Field
 from typing_extensions import override
 
-from .part import NonNegative
+from .part import NonNegative, optional
 from .shapes import Block, Capsule, ConvexMesh, Shape, Sphere
 
 THINNEST = 1e-5  # [m] of a body or place: distances are rounded by a tenth of it where things touch
@@ -30,9 +30,7 @@ class BodyBox(Block):
 class BodyHull(ConvexMesh):
     """A convex body with plane faces that is fixed in a frame, with sharp or round edges."""
 
-    radius: NonNegative = Field(
-        default=0.0, description="distance by which the body extends beyond the hull on all sides [m]"
-    )
+    radius: NonNegative = optional("distance by which the body extends beyond the hull on all sides [m]", 0.0)
 
     @property
     @override

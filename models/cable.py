@@ -5,7 +5,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from .part import Finite, Name, NonNegative, Part, Positive, Vector3
+from .part import Finite, Name, NonNegative, Part, Positive, Vector3, optional
 
 
 class Pulley(Part):
@@ -15,7 +15,7 @@ class Pulley(Part):
     """
 
     radius: Positive = Field(description="radius of the sheave [m]")
-    axis: Vector3 = Field(default=(0.0, 0.0, 1.0), description="swivel axis in the carrier frame, of any length")
+    axis: Vector3 = optional("swivel axis in the carrier frame, of any length", (0.0, 0.0, 1.0))
 
     @field_validator("axis")
     @classmethod
@@ -29,7 +29,7 @@ class Winch(Part):
     """A winch reduced to its cable: an inertia that the motor's force and the tension accelerate, inside limits."""
 
     inertia: Positive = Field(description="inertia of rotor, gear and drum, as an equivalent mass on the cable [kg]")
-    friction: NonNegative = Field(default=0.0, description="dry friction, as a force on the cable [N]")
+    friction: NonNegative = optional("dry friction, as a force on the cable [N]", 0.0)
     speed_max: Positive = Field(description="largest speed of the cable [m/s]")
     force_max: Positive = Field(description="largest force of the motor on the cable [N]")
 
@@ -37,11 +37,9 @@ class Winch(Part):
 class Encoder(Part):
     """The reading y of a winch: the unstrained length of the cable is offset + scale * y + build_up * y^2."""
 
-    offset: Finite = Field(default=0.0, description="length of the cable at reading 0 [m]")
-    scale: Finite = Field(default=1.0, description="metres of cable per unit of the reading, not 0")
-    build_up: Finite = Field(
-        default=0.0, description="growth by layers of cable on the drum, per square of the reading [1/m]"
-    )
+    offset: Finite = optional("length of the cable at reading 0 [m]", 0.0)
+    scale: Finite = optional("metres of cable per unit of the reading, not 0", 1.0)
+    build_up: Finite = optional("growth by layers of cable on the drum, per square of the reading [1/m]", 0.0)
 
     @field_validator("scale")
     @classmethod
@@ -59,22 +57,15 @@ class Cable(Part):
     attachment: Vector3 = Field(description="point B_i on the platform, in its frame [m]")
     t_min: NonNegative = Field(description="smallest tension [N]; above zero keeps the cable taut")
     t_max: Positive = Field(description="largest tension [N]")
-    stiffness: Positive | None = Field(default=None, description="axial stiffness E A [N]; default: inextensible")
-    damping: NonNegative | None = Field(
-        default=None, description="damping C of an elastic cable [N s/m]; default: none"
+    stiffness: Positive | None = optional("axial stiffness E A [N]; default: inextensible")
+    damping: NonNegative | None = optional("damping C of an elastic cable [N s/m]; default: none")
+    length: Positive | None = optional(
+        "constant length, for the drive fixed-length [m]; default: from anchor to attachment at home"
     )
-    length: Positive | None = Field(
-        default=None,
-        description="constant length, for the drive fixed-length [m]; default: from anchor to attachment at home",
-    )
-    pulley: Pulley | None = Field(
-        default=None, description="swivelling pulley at the anchor; default: none, the anchor is a point"
-    )
-    winch: Winch | None = Field(
-        default=None, description="winch of the cable, for simulation; default: its length follows commands exactly"
-    )
-    encoder: Encoder | None = Field(
-        default=None, description="relation between the reading of the winch and the length; default: they are equal"
+    pulley: Pulley | None = optional("swivelling pulley at the anchor; default: none, the anchor is a point")
+    winch: Winch | None = optional("winch of the cable, for simulation; default: its length follows commands exactly")
+    encoder: Encoder | None = optional(
+        "relation between the reading of the winch and the length; default: they are equal"
     )
 
     @model_validator(mode="after")

@@ -15,7 +15,20 @@ from pydantic_core import CoreSchema, core_schema
 
 from ..base.errors import InputError
 from .parsing import json_schema
-from .part import AT_ORIGIN, BodyInertia, Box, Finite, Inertia, Name, NonNegative, Part, Pose, Positive, inertia_matrix
+from .part import (
+    AT_ORIGIN,
+    BodyInertia,
+    Box,
+    Finite,
+    Inertia,
+    Name,
+    NonNegative,
+    Part,
+    Pose,
+    Positive,
+    inertia_matrix,
+    optional,
+)
 from .rotation import Matrix
 
 __all__ = [
@@ -96,7 +109,7 @@ class Carrier(Part):
     efforts: ClassVar[tuple[str, ...]] = ()  # names of what must hold it, against gravity and the pull of its cables
 
     name: Name = Field(description="name by which cables and tasks refer to the carrier")
-    home: Pose = Field(default=AT_ORIGIN, description="pose of the carrier frame in {G} at rest [m, rad]")
+    home: Pose = optional("pose of the carrier frame in {G} at rest [m, rad]", AT_ORIGIN)
     kind: Any  # a Literal in each class
 
     @classmethod
@@ -270,19 +283,16 @@ class QuadrotorCarrier(Carrier):
     kind: Literal["quadrotor"]
     mass: Positive = Field(description="mass [kg]")
     inertia: BodyInertia = Field(description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM [kg m^2]")
-    thrust_min: NonNegative = Field(default=0.0, description="smallest total thrust [N]")
+    thrust_min: NonNegative = optional("smallest total thrust [N]", 0.0)
     thrust_max: Positive = Field(description="largest total thrust [N]")
     torque_max: tuple[Positive, Positive, Positive] = Field(description="largest torque about each axis [N m]")
-    tilt_max: Positive = Field(
-        default=0.6, description="largest angle between its z axis and the vertical in plans [rad]"
-    )
-    speed_max: Positive = Field(default=10.0, description="largest speed in plans [m/s]")
-    acceleration_max: Positive = Field(default=10.0, description="largest acceleration in plans [m/s^2]")
-    radius: Positive | None = Field(
-        default=None,
-        description="radius of the ball about its CoM that contains its rotors [m]; default: 0.3 m times the square "
+    tilt_max: Positive = optional("largest angle between its z axis and the vertical in plans [rad]", 0.6)
+    speed_max: Positive = optional("largest speed in plans [m/s]", 10.0)
+    acceleration_max: Positive = optional("largest acceleration in plans [m/s^2]", 10.0)
+    radius: Positive | None = optional(
+        "radius of the ball about its CoM that contains its rotors [m]; default: 0.3 m times the square "
         "root of its mass in kg (common disc loading), but at least the distance of its anchors from its "
-        "z axis",
+        "z axis"
     )
 
     @model_validator(mode="after")

@@ -45,9 +45,9 @@ COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
 AT_ORIGIN: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def optional(description: str, **constraints: Any) -> Any:
-    """Return a field that may be left out: it is None then. The keyword arguments are those of pydantic's `Field`."""
-    return Field(default=None, description=description, **constraints)
+def optional(description: str, default: Any = None, **constraints: Any) -> Any:
+    """Return a field that may be left out. The keyword arguments are those of pydantic's `Field`."""
+    return Field(default=default, description=description, **constraints)
 
 
 class Part(Displayed, BaseModel):

@@ -5,7 +5,7 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from .body import AnyBody
-from .part import COORDINATES, BodyInertia, Coordinate, NonNegative, Part, Pose, Positive, Vector3
+from .part import COORDINATES, BodyInertia, Coordinate, NonNegative, Part, Pose, Positive, Vector3, optional
 
 # Sets with angles for which the wrench rows about the CoM are the equations of these coordinates. About a fixed pivot,
 # or with fewer axes, the reactions of what is locked would enter them.
@@ -29,9 +29,8 @@ class Aero(Part):
     drag: NonNegative = Field(description="drag coefficient C_d [-]")
     lift: NonNegative = Field(description="lift coefficient C_l [-]")
     area: Positive = Field(description="largest cross-section S of the platform [m^2]")
-    form: Literal["signed", "printed"] = Field(
-        default="signed",
-        description="signed: V abs(V), the direction of real drag; printed: V^2, never negative, as in paper F",
+    form: Literal["signed", "printed"] = optional(
+        "signed: V abs(V), the direction of real drag; printed: V^2, never negative, as in paper F", "signed"
     )
 
 
@@ -39,27 +38,24 @@ class Platform(Part):
     """The rigid body that the cables pull."""
 
     mass: Positive = Field(description="mass [kg]")
-    inertia: BodyInertia | None = Field(
-        default=None,
-        description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
-        "required unless the platform cannot turn",
+    inertia: BodyInertia | None = optional(
+        "inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM in platform axes, tensor signs [kg m^2]; "
+        "required unless the platform cannot turn"
     )
-    com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM in the platform frame [m]")
-    home: Pose | None = Field(
-        default=None,
-        description="initial and reference pose in {G} [m, rad]; default: level, between or below the anchors",
+    com: Vector3 = optional("CoM in the platform frame [m]", (0.0, 0.0, 0.0))
+    home: Pose | None = optional(
+        "initial and reference pose in {G} [m, rad]; default: level, between or below the anchors"
     )
-    dof: tuple[Coordinate, ...] = Field(
-        default=COORDINATES,
+    dof: tuple[Coordinate, ...] = optional(
+        "coordinates that can move; a point mass has x, y, z. The cables balance the wrench only in these",
+        COORDINATES,
         min_length=1,
-        description="coordinates that can move; a point mass has x, y, z. The cables balance the wrench only in these",
     )
-    body: AnyBody | None = Field(
-        default=None,
-        description="convex body in the platform frame, which plans keep above the floor, in the room and out of "
-        "regions; default: the CoM and the attachments",
+    body: AnyBody | None = optional(
+        "convex body in the platform frame, which plans keep above the floor, in the room and out of "
+        "regions; default: the CoM and the attachments"
     )
-    aero: Aero | None = Field(default=None, description="aerodynamic data of the platform; required for wind")
+    aero: Aero | None = optional("aerodynamic data of the platform; required for wind")
 
     @field_validator("dof")
     @classmethod

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from .part import AT_ORIGIN, Inertia, NonNegative, Part, Vector3, inertia_matrix
+from .part import AT_ORIGIN, Inertia, NonNegative, Part, Vector3, inertia_matrix, optional
 from .robot import Robot
 
 ROUNDING = 1e-12  # of the largest moment of inertia
@@ -22,11 +22,10 @@ class RigidLoad(Part):
     """A rigid body that is fixed to the platform, in addition to the platform of the robot's file."""
 
     mass: NonNegative = Field(description="mass of the load [kg]; 0: none")
-    com: Vector3 = Field(default=(0.0, 0.0, 0.0), description="CoM of the load in the platform frame [m]")
-    inertia: Annotated[Inertia, AfterValidator(_check_positive_semidefinite)] = Field(
-        default=AT_ORIGIN,
-        description="inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs "
-        "[kg m^2]",
+    com: Vector3 = optional("CoM of the load in the platform frame [m]", (0.0, 0.0, 0.0))
+    inertia: Annotated[Inertia, AfterValidator(_check_positive_semidefinite)] = optional(
+        "inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the CoM of the load in platform axes, tensor signs [kg m^2]",
+        AT_ORIGIN,
     )
 
     def on(self, robot: Robot) -> Robot:

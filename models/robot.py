@@ -24,7 +24,7 @@ from ..base.text import quantity, quantity_range, quantity_row
 from . import parameters, points
 from .cable import Cable
 from .carriers import AnyCarrier, Carrier, Drive
-from .part import COORDINATES, LARGEST, Box, Finite, Name, Part, Vector3, inertia_matrix
+from .part import COORDINATES, LARGEST, Box, Finite, Name, Part, Vector3, inertia_matrix, optional
 from .platform import Platform
 from .uncertainty import Uncertainty
 
@@ -80,27 +80,25 @@ class Robot(DisplayedRobot):
 
     name: Name = Field(description="name of the robot, for reports and file names")
     source: str = Field(min_length=1, description="source of the numbers, and which of them are assumed")
-    gravity: Vector3 = Field(default=(0.0, 0.0, -9.81), description="acceleration of gravity in {G} [m/s^2]")
-    drive: Drive = Field(
-        default=cast(Any, None),
-        json_schema_extra=_without_default,
-        description="drives that move the platform (paper C). fixed-length: carriers, with cables of constant length; "
+    gravity: Vector3 = optional("acceleration of gravity in {G} [m/s^2]", (0.0, 0.0, -9.81))
+    drive: Drive = optional(
+        "drives that move the platform (paper C). fixed-length: carriers, with cables of constant length; "
         "variable-length: winches, with mobile carriers at home; both: carriers and winches. Default: "
         "fixed-length "
         "if all cables hang from quadrotors or mobile carriers and none has a winch, an encoder or a pulley; else both",
+        cast(Any, None),
+        json_schema_extra=_without_default,
     )
     platform: Platform
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1, description="bodies from which the cables hang")
     cables: tuple[Cable, ...] = Field(min_length=1, description="cables; results number them in this order")
-    uncertainty: Uncertainty | None = Field(
-        default=None, description="uncertainty of anchors, attachments and pulley radii; default: exact"
-    )
+    uncertainty: Uncertainty | None = optional("uncertainty of anchors, attachments and pulley radii; default: exact")
 
-    floor: Finite | None = Field(
-        default=None, description="height z in {G} below which no part of platform and load may be [m]; default: none"
+    floor: Finite | None = optional(
+        "height z in {G} below which no part of platform and load may be [m]; default: none"
     )
-    workspace_box: Box | None = Field(
-        default=None, description="box in {G} in which the bodies of platform and load stay [m]; default: no walls"
+    workspace_box: Box | None = optional(
+        "box in {G} in which the bodies of platform and load stay [m]; default: no walls"
     )
 
     @model_validator(mode="after")

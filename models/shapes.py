@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from ..base.errors import InputError
 from ..base.inputs import shown
-from .part import AT_ORIGIN, Part, Pose, Positive, Vector3
+from .part import AT_ORIGIN, Part, Pose, Positive, Vector3, optional
 from .points import placed, rotations
 from .polyhedron import Polyhedron, convex_hull, polyhedron
 from .stl import read_stl
@@ -55,9 +55,7 @@ class Block(Part):
     kind: Literal["box"]
     min: Vector3 = Field(description="lowest corner before the rotation [m]")
     max: Vector3 = Field(description="highest corner before the rotation [m]")
-    attitude: Vector3 | None = Field(
-        default=None, description="rotation about its centre: roll, pitch, yaw [rad]; default: none"
-    )
+    attitude: Vector3 | None = optional("rotation about its centre: roll, pitch, yaw [rad]; default: none")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -99,22 +97,18 @@ class ConvexMesh(Part):
     """
 
     kind: Literal["mesh"]
-    file: str | None = Field(
-        default=None,
-        description="STL file, binary or text, instead of vertices; its path is relative to the robot or task file",
+    file: str | None = optional(
+        "STL file, binary or text, instead of vertices; its path is relative to the robot or task file"
     )
-    hull: bool = Field(
-        default=False, description="true: accept an STL surface that is not convex, and use its convex hull"
+    hull: bool = optional("true: accept an STL surface that is not convex, and use its convex hull", False)
+    vertices: tuple[Vector3, ...] = optional(
+        "points whose convex hull is the body, in its own axes and in units of `scale`", ()
     )
-    vertices: tuple[Vector3, ...] = Field(
-        default=(), description="points whose convex hull is the body, in its own axes and in units of `scale`"
+    scale: Positive = optional(
+        "length of a unit of vertices or file [m]: 0.001 for millimetres; required for a file, since STL has no unit",
+        1.0,
     )
-    scale: Positive = Field(
-        default=1.0,
-        description="length of a unit of vertices or file [m]: 0.001 for millimetres; required for a file, since STL "
-        "has no unit",
-    )
-    pose: Pose = Field(default=AT_ORIGIN, description="pose of the body's axes: x, y, z, roll, pitch, yaw [m, rad]")
+    pose: Pose = optional("pose of the body's axes: x, y, z, roll, pitch, yaw [m, rad]", AT_ORIGIN)
 
     @model_validator(mode="before")
     @classmethod

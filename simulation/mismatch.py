@@ -3,11 +3,11 @@
 from typing import Annotated, NamedTuple, TypeAlias
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 
 from ..base.errors import InputError
 from ..base.text import quantity_range, quantity_row
-from ..models.part import Part
+from ..models.part import Part, optional
 from ..models.robot import Robot
 
 BODIES = ("mass", "com", "stiffness")  # fields of the robot itself
@@ -40,15 +40,15 @@ class Mismatch(Part):
     carrier; the numbers of a run depend on its seed.
     """
 
-    geometry: bool = Field(default=False, description="true: each run draws a robot from the file's `uncertainty`")
-    mass: Factor = Field(default=1.0, description="factor of the platform's mass and inertia")
-    com: Offset = Field(default=0.0, description="distance of the CoM from that of the file, along each axis [m]")
-    stiffness: Factor = Field(default=1.0, description="factor of the stiffness of cables")
-    tension_gain: Factor = Field(default=1.0, description="tension that a winch gives, as a factor of the command")
-    friction: Force = Field(default=0.0, description="dry friction of winches and pulleys, as a force on a cable [N]")
-    winch_lag: Lag = Field(default=0.0, description="time constant with which winches follow commands [s]")
-    rotor_lag: Lag = Field(default=0.0, description="time constant of the actuators of flying carriers [s]")
-    carrier_lag: Lag = Field(default=0.0, description="time constant of carriers whose motion is commanded [s]")
+    geometry: bool = optional("true: each run draws a robot from the file's `uncertainty`", False)
+    mass: Factor = optional("factor of the platform's mass and inertia", 1.0)
+    com: Offset = optional("distance of the CoM from that of the file, along each axis [m]", 0.0)
+    stiffness: Factor = optional("factor of the stiffness of cables", 1.0)
+    tension_gain: Factor = optional("tension that a winch gives, as a factor of the command", 1.0)
+    friction: Force = optional("dry friction of winches and pulleys, as a force on a cable [N]", 0.0)
+    winch_lag: Lag = optional("time constant with which winches follow commands [s]", 0.0)
+    rotor_lag: Lag = optional("time constant of the actuators of flying carriers [s]", 0.0)
+    carrier_lag: Lag = optional("time constant of carriers whose motion is commanded [s]", 0.0)
 
     def check(self, robot: Robot) -> None:
         """Check that the robot has what should differ.

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, SerializeAsAny
 from ..base.errors import InputError
 from ..base.inputs import number, required, shown
 from ..models import Robot
-from ..models.part import Part, Share
+from ..models.part import Part, Share, optional
 from .feasibility import too_few_cables
 from .places import Places, check_places
 
@@ -132,11 +132,10 @@ AnyCondition = Annotated[SerializeAsAny[Condition], BeforeValidator(condition_fr
 class TensionCondition(Condition, ABC):
     """A condition about tension limits, which can be required for uncertain robots."""
 
-    robust: Share | None = Field(
-        default=None,
-        description="fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the "
+    robust: Share | None = optional(
+        "fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the "
         "condition must hold, to first order, at all accepted configurations simultaneously; default: the "
-        "nominal robot only",
+        "nominal robot only"
     )
 
 

@@ -3,10 +3,10 @@
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ..models import Robot
-from ..models.part import Box, Name, Part, Vector3
+from ..models.part import Box, Name, Part, Vector3, optional
 from ..models.ranges import PositiveRange
 
 
@@ -30,21 +30,18 @@ class Region(Part):
     Samples are uniform and independent in each varying quantity.
     """
 
-    position: Box | None = Field(
-        default=None,
-        description="box of positions of the platform frame in {G} [m]; default: a box about home and anchors",
+    position: Box | None = optional(
+        "box of positions of the platform frame in {G} [m]; default: a box about home and anchors"
     )
-    attitude: Vector3 | AngleBox | None = Field(
-        default=None, description="(roll, pitch, yaw) or a box of them [rad]; default: the attitude at home"
+    attitude: Vector3 | AngleBox | None = optional(
+        "(roll, pitch, yaw) or a box of them [rad]; default: the attitude at home"
     )
-    carriers: Literal["home", "reach"] | dict[Name, Box] = Field(
-        default="home",
-        description="home; reach: mobile carriers anywhere in their reach boxes; or boxes in {G} [m] by name",
+    carriers: Literal["home", "reach"] | dict[Name, Box] = optional(
+        "home; reach: mobile carriers anywhere in their reach boxes; or boxes in {G} [m] by name", "home"
     )
-    lengths: PositiveRange | None = Field(
-        default=None,
-        description="range of the lengths of each of three cables [m]; the position then follows from carriers, "
-        "attitude and lengths: the lower of the two points where the cables meet",
+    lengths: PositiveRange | None = optional(
+        "range of the lengths of each of three cables [m]; the position then follows from carriers, "
+        "attitude and lengths: the lower of the two points where the cables meet"
     )
 
     @model_validator(mode="after")

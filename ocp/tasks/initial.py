@@ -41,7 +41,7 @@ class Initial(_State):
     """The state at the start of a motion, in {G}; it overrides `tube.ends` and `base.ends` there."""
 
     pose: PoseOrPosition = Field(description="pose of the platform, (x, y, z) or (x, y, z, roll, pitch, yaw) [m, rad]")
-    velocity: PoseOrPosition = Field(default=STILL, description="time derivative of the pose [m/s, rad/s]")
+    velocity: PoseOrPosition = optional("time derivative of the pose [m/s, rad/s]", STILL)
     acceleration: PoseOrPosition | None = optional(
         "second time derivative [m/s^2, rad/s^2]; default: chosen by the planner"
     )

@@ -18,16 +18,13 @@ class Load(RigidLoad):
     """A rigid body that is fixed to the platform, in addition to the platform of the robot's file."""
 
     mass: Positive = Field(description="mass [kg]")
-    mass_tolerance: float = Field(
-        default=0.0,
-        ge=0,
-        lt=1,
-        description="relative tolerance of the mass, such as 0.1: tensions exist for every mass in between",
+    mass_tolerance: float = optional(
+        "relative tolerance of the mass, such as 0.1: tensions exist for every mass in between", 0.0, ge=0, lt=1
     )
-    com_tolerance: tuple[NonNegative, NonNegative, NonNegative] = Field(
-        default=(0.0, 0.0, 0.0),
-        description="distance by which the CoM may differ along each axis of the platform [m]: tensions exist for "
+    com_tolerance: tuple[NonNegative, NonNegative, NonNegative] = optional(
+        "distance by which the CoM may differ along each axis of the platform [m]: tensions exist for "
         "every CoM in this box",
+        (0.0, 0.0, 0.0),
     )
     body: AnyBody | None = optional(
         "convex body in the platform frame, which the plan keeps above the floor, in the room and out of "
@@ -65,9 +62,7 @@ class Ground(Part):
         "level with the lowest",
         min_length=1,
     )
-    slack: bool = Field(
-        default=False, description="true if cables may be slack: their tensions then have the lower limit 0"
-    )
+    slack: bool = optional("true if cables may be slack: their tensions then have the lower limit 0", False)
 
 
 class Phase(Part):

@@ -31,13 +31,11 @@ FREE_TURN = 1.2  # [rad], from the path's angles, short of where Euler angles lo
 class Tube(Part):
     """The permitted distance of the platform from its path."""
 
-    position: NonNegative | Literal["free"] = Field(
-        default=0.0,
-        description="radius about the path [m]; 0: followed exactly; free: the path is only an initial guess",
+    position: NonNegative | Literal["free"] = optional(
+        "radius about the path [m]; 0: followed exactly; free: the path is only an initial guess", 0.0
     )
-    attitude: NonNegative | Literal["free"] = Field(
-        default=0.0,
-        description="range of each of roll, pitch, yaw about the path [rad]; 0: followed exactly; free: 1.2 rad",
+    attitude: NonNegative | Literal["free"] = optional(
+        "range of each of roll, pitch, yaw about the path [rad]; 0: followed exactly; free: 1.2 rad", 0.0
     )
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
         "free: anywhere in the tube; periodic: the end equals the start, without a stop, for a path that "
@@ -46,10 +44,9 @@ class Tube(Part):
         "position and velocity there, with free acceleration; default: rest if the path (other than kind rest) starts "
         "and ends at rest and no carrier moves as given, otherwise free"
     )
-    waypoints: Literal["free", "exact"] = Field(
-        default="free",
-        description="exact: the platform passes through the points of a path of kind waypoints, even if the path "
-        "rounds them",
+    waypoints: Literal["free", "exact"] = optional(
+        "exact: the platform passes through the points of a path of kind waypoints, even if the path rounds them",
+        "free",
     )
 
     @property
@@ -67,9 +64,7 @@ class HoldBase(Part):
     """Carriers that hold their positions."""
 
     kind: Literal["hold"]
-    poses: dict[Name, Pose] = Field(
-        default={}, description="pose of each carrier by its name, in {G} [m, rad]; others at home"
-    )
+    poses: dict[Name, Pose] = optional("pose of each carrier by its name, in {G} [m, rad]; others at home", {})
 
 
 class GivenBase(Part):
@@ -85,17 +80,17 @@ class FreeBase(Part):
     """Carriers whose motion the planner chooses, inside these limits and those of the robot's file."""
 
     kind: Literal["free"]
-    around: dict[Name, AnyPath] = Field(
-        default={}, description="reference motion of each carrier by its name, in {G}; default: rest at home"
+    around: dict[Name, AnyPath] = optional(
+        "reference motion of each carrier by its name, in {G}; default: rest at home", {}
     )
     acceleration_max: Positive | None = optional("largest acceleration [m/s^2]")
     speed_max: Positive | None = optional("largest speed [m/s]")
-    tilt_max: float = Field(
-        default=0.0,
+    tilt_max: float = optional(
+        "largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have "
+        "the limit of the robot's file",
+        0.0,
         ge=0,
         lt=1.5,
-        description="largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have "
-        "the limit of the robot's file",
     )
     turn_acceleration_max: Positive | None = optional("largest second derivative of each Euler angle [rad/s^2]")
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
@@ -121,11 +116,9 @@ class Objective(Part):
     deviation: Positive | None = optional(
         "distance from the path [m], angles times `Robot.length`; default: a tenth of the tube"
     )
-    carrier_acceleration: Positive = Field(default=1.0, description="acceleration of carriers [m/s^2, rad/s^2]")
-    carrier_offset: Positive = Field(default=10.0, description="distance of carriers from `around` or home [m, rad]")
-    jerk: Positive = Field(
-        default=10.0, description="jerk of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth"
-    )
+    carrier_acceleration: Positive = optional("acceleration of carriers [m/s^2, rad/s^2]", 1.0)
+    carrier_offset: Positive = optional("distance of carriers from `around` or home [m, rad]", 10.0)
+    jerk: Positive = optional("jerk of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth", 10.0)
     tension_rate: Positive | None = optional("rate of each tension [N/s]; default: no cost")
     time: Positive | None = optional("duration that adds 1 to the cost, not squared [s]; default: no cost")
     margin: Positive | None = optional("tension margin that lowers the cost by 1, not squared [N]; default: no reward")
@@ -152,24 +145,21 @@ class Task(Part):
 
     model_config = ConfigDict(json_schema_extra=_or_phases)
 
-    name: Title = Field(default="task", description="name of the task, for reports and file names")
-    path: AnyPath = Field(
-        default=cast(Any, None), description="path of the platform; with phases: the sequence of their paths"
-    )
+    name: Title = optional("name of the task, for reports and file names", "task")
+    path: AnyPath = optional("path of the platform; with phases: the sequence of their paths", cast(Any, None))
     phases: tuple[Phase, ...] | None = optional(
         "instead of path and duration: parts of the motion, with their loads", min_length=1
     )
     duration: Positive | PositiveRange | None = optional(
         "duration [s], or a range from which the planner chooses; default: the path's own"
     )
-    base: AnyBase = Field(
-        default=HoldBase(kind="hold"),
-        description="motion of the carriers: hold (stay), given (follow paths) or free (the planner chooses)",
+    base: AnyBase = optional(
+        "motion of the carriers: hold (stay), given (follow paths) or free (the planner chooses)", HoldBase(kind="hold")
     )
     tube: Tube = Tube()
     initial: Initial | None = optional("measured initial state of a moving robot; default: as `ends` require")
     final: Final | None = optional("state in which the motion ends; default: as `ends` require")
-    margin: NonNegative = Field(default=0.0, description="smallest distance of every tension from its limits [N]")
+    margin: NonNegative = optional("smallest distance of every tension from its limits [N]", 0.0)
     robust: Share | None = optional(
         "fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, whose tensions "
         "must stay inside their limits, reduced by the margin, to first order; default: the nominal robot "
@@ -187,21 +177,19 @@ class Task(Part):
         "with drag on a moving platform"
     )
     limits: TaskLimits = TaskLimits()
-    steps: Whole = Field(default=100, ge=4, le=20_000, description="number of intervals of the transcription")
+    steps: Whole = optional("number of intervals of the transcription", 100, ge=4, le=20_000)
     scheme: SchemeName | None = optional(
         "acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
         "spline: a smooth cubic B-spline; default: linear, or hermite if with linear the audit reports that carriers "
         "cannot follow the motion between the nodes"
     )
     objective: Objective = Objective()
-    time_limit: Positive = Field(
-        default=600.0,
-        description="time for the whole search [s]; the best motion so far is then audited and returned. An operation "
+    time_limit: Positive = optional(
+        "time for the whole search [s]; the best motion so far is then audited and returned. An operation "
         "in progress is finished first",
+        600.0,
     )
-    output_rate: Positive = Field(
-        default=100.0, description="samples per second of the saved trajectory, all of them audited [1/s]"
-    )
+    output_rate: Positive = optional("samples per second of the saved trajectory, all of them audited [1/s]", 100.0)
 
     @model_validator(mode="before")
     @classmethod

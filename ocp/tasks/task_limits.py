@@ -44,16 +44,15 @@ class KeepOut(Part):
     carrier_platform_clearance do the same. Cables end at their attachments, so such a region must not contain these.
     """
 
-    name: str = Field(default="obstacle", min_length=1, max_length=60, description="name for reports and figures")
-    frame: Literal["world", "platform"] = Field(
-        default="world",
-        description="world: fixed in {G}; platform: it moves with the platform, and cables and carriers keep out of it",
+    name: str = optional("name for reports and figures", "obstacle", min_length=1, max_length=60)
+    frame: Literal["world", "platform"] = optional(
+        "world: fixed in {G}; platform: it moves with the platform, and cables and carriers keep out of it", "world"
     )
     platform: Distance = 0.0
-    carriers: NonNegative | Literal["radius"] | None = Field(
-        default="radius",
-        description="least distance of the origins of moving carriers [m]; radius: the radius of each body, such as a "
+    carriers: NonNegative | Literal["radius"] | None = optional(
+        "least distance of the origins of moving carriers [m]; radius: the radius of each body, such as a "
         "quadrotor with its rotors; null: no limit",
+        "radius",
     )
     cables: Distance = 0.0
 
@@ -93,7 +92,7 @@ AnyKeepOut = Annotated[Sphere | Capsule | Block | ConvexMesh, Field(discriminato
 class SpeedZone(Part):
     """A ball in which the speed of the platform is limited."""
 
-    name: str = Field(default="zone", min_length=1, max_length=60, description="name for reports and figures")
+    name: str = optional("name for reports and figures", "zone", min_length=1, max_length=60)
     centre: Vector3 = Field(description="centre in {G} [m]")
     radius: Positive = Field(description="radius [m]")
     speed: Positive = Field(description="largest speed of the platform frame's origin inside [m/s]")
@@ -125,8 +124,8 @@ class TaskLimits(Part):
     )
     tension_rate: Positive | None = optional("rate of every tension [N/s]")
     platform_speed: Positive | None = optional("speed of the platform frame's origin [m/s]")
-    zone_speed: tuple[SpeedZone, ...] = Field(
-        default=(), description="balls with a speed limit, which rises by 10 m/s per metre of distance from the ball"
+    zone_speed: tuple[SpeedZone, ...] = optional(
+        "balls with a speed limit, which rises by 10 m/s per metre of distance from the ball", ()
     )
     platform_acceleration: Positive | None = optional("acceleration of the platform frame's origin [m/s^2]")
     platform_lateral_acceleration: Positive | None = optional(
@@ -150,10 +149,9 @@ class TaskLimits(Part):
         "least distance of the origins of moving carriers from the bodies of platform and load [m]; "
         "radius: the radius of each carrier's body"
     )
-    keep_out: tuple[AnyKeepOut, ...] = Field(default=(), description="keep-out regions")
-    soft: dict[str, Positive] = Field(
-        default={},
-        description="by the name of a limit, the excess that adds 1 to the objective; twice the excess adds 4",
+    keep_out: tuple[AnyKeepOut, ...] = optional("keep-out regions", ())
+    soft: dict[str, Positive] = optional(
+        "by the name of a limit, the excess that adds 1 to the objective; twice the excess adds 4", {}
     )
     own: SkipJsonSchema[tuple[Limit, ...]] = Field(
         default=(), exclude=True, description="limits of your own, in Python alone (docs/adding-a-limit.md)"

@@ -11,7 +11,7 @@ from typing_extensions import override
 from ...base.errors import InputError
 from ...base.inputs import shown
 from ...base.text import quantity
-from ...models.part import NonNegative, Positive, Vector3
+from ...models.part import NonNegative, Positive, Vector3, optional
 from ...models.robot import Robot
 from .event import Event, Running, Seconds, number_in
 
@@ -19,7 +19,7 @@ from .event import Event, Running, Seconds, number_in
 class Lasting(Event, ABC):
     """An event that acts for some time."""
 
-    duration: Seconds | None = Field(default=None, description="how long it acts [s]; default: until the end")
+    duration: Seconds | None = optional("how long it acts [s]; default: until the end")
 
     @property
     @override
@@ -33,9 +33,9 @@ class Push(Lasting):
 
     kind: Literal["push"] = "push"
     short: ClassVar[str] = "push [CARRIER] FX FY FZ [MX MY MZ]"
-    carrier: str | None = Field(default=None, description="name of the carrier on which it acts; default: the platform")
-    force: Vector3 = Field(default=(0.0, 0.0, 0.0), description="force in {G} [N]")
-    moment: Vector3 = Field(default=(0.0, 0.0, 0.0), description="moment about the CoM in {G} [N m]")
+    carrier: str | None = optional("name of the carrier on which it acts; default: the platform")
+    force: Vector3 = optional("force in {G} [N]", (0.0, 0.0, 0.0))
+    moment: Vector3 = optional("moment about the CoM in {G} [N m]", (0.0, 0.0, 0.0))
     _body: int = PrivateAttr(default=0)  # on which it acts
 
     @override
@@ -98,8 +98,8 @@ class Wall(Lasting):
     point: Vector3 = Field(description="a point of the plane in {G} [m]")
     normal: Vector3 = Field(description="direction in {G} towards the robot, of any length")
     stiffness: Positive = Field(description="force per depth [N/m]")
-    damping: NonNegative = Field(default=0.0, description="force per speed into the wall [N s/m]")
-    radius: NonNegative = Field(default=0.0, description="radius of the ball that touches the wall [m]")
+    damping: NonNegative = optional("force per speed into the wall [N s/m]", 0.0)
+    radius: NonNegative = optional("radius of the ball that touches the wall [m]", 0.0)
 
     @model_validator(mode="after")
     def _has_normal(self) -> Self:

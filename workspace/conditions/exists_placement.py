@@ -14,7 +14,7 @@ from pydantic import Field
 
 from ...base.errors import InputError
 from ...models import Robot
-from ...models.part import NonNegative
+from ...models.part import NonNegative, optional
 from ...models.points import anchors, attachments
 from ..condition import AnyCondition, Condition
 from ..places import Places
@@ -34,13 +34,9 @@ class ExistsPlacement(Condition):
 
     kind: Literal["exists-placement"] = "exists-placement"
     condition: AnyCondition = Field(description="condition that must hold for a placement")
-    tries: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
-        default=32, description="number of placements that are tried"
-    )
-    turn: NonNegative = Field(
-        default=0.0, description="maximum change of roll, pitch and yaw, which are tried too [rad]; default: none"
-    )
-    seed: Annotated[int, Field(ge=0)] = Field(default=0, description="seed of the placements")
+    tries: Annotated[int, Field(ge=1, le=1_000_000)] = optional("number of placements that are tried", 32)
+    turn: NonNegative = optional("maximum change of roll, pitch and yaw, which are tried too [rad]; default: none", 0.0)
+    seed: Annotated[int, Field(ge=0)] = optional("seed of the placements", 0)
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         boxes = reach_boxes(robot)

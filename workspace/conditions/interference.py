@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from ...models import Robot
-from ...models.part import Box, NonNegative, Positive
+from ...models.part import Box, NonNegative, Positive, optional
 from ...models.points import anchors, attachments, in_frame
 from ...models.polyhedron import Polyhedron
 from ...models.shapes import Block, Capsule, ConvexMesh, Sphere
@@ -32,15 +32,12 @@ class Interference(Condition):
     """
 
     kind: Literal["interference"] = "interference"
-    between_cables: Positive | None = Field(
-        default=None, description="minimum distance between two cables [m]; default: not checked"
+    between_cables: Positive | None = optional("minimum distance between two cables [m]; default: not checked")
+    platform: Box | None = optional(
+        "the platform's body in its own frame, which no cable may enter [m]; default: not checked"
     )
-    platform: Box | None = Field(
-        default=None,
-        description="the platform's body in its own frame, which no cable may enter [m]; default: not checked",
-    )
-    obstacles: tuple[Obstacle, ...] = Field(default=(), description="spheres, capsules, boxes and convex meshes in {G}")
-    clearance: NonNegative = Field(default=0.0, description="minimum distance between cables and obstacles [m]")
+    obstacles: tuple[Obstacle, ...] = optional("spheres, capsules, boxes and convex meshes in {G}", ())
+    clearance: NonNegative = optional("minimum distance between cables and obstacles [m]", 0.0)
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         with np.errstate(over="ignore", invalid="ignore"):  # of places that are far too far away

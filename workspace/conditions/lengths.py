@@ -3,12 +3,12 @@
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ...base.errors import InputError
 from ...models import Robot
 from ...models.dynamics import dynamics_of
-from ...models.part import NonNegative, Positive
+from ...models.part import NonNegative, Positive, optional
 from ..condition import Condition
 from ..places import Places
 
@@ -17,10 +17,8 @@ class Lengths(Condition):
     """Each cable's length lies between a minimum and a maximum."""
 
     kind: Literal["lengths"] = "lengths"
-    min: NonNegative | tuple[NonNegative, ...] = Field(default=0.0, description="minimum of all cables or of each [m]")
-    max: Positive | tuple[Positive, ...] | None = Field(
-        default=None, description="maximum of all cables or of each [m]; default: unlimited"
-    )
+    min: NonNegative | tuple[NonNegative, ...] = optional("minimum of all cables or of each [m]", 0.0)
+    max: Positive | tuple[Positive, ...] | None = optional("maximum of all cables or of each [m]; default: unlimited")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

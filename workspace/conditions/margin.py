@@ -3,10 +3,9 @@
 from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
 
 from ...models import Robot
-from ...models.part import Finite
+from ...models.part import Finite, optional
 from ...solvers.margins import margins
 from ..condition import Condition
 from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
@@ -19,7 +18,7 @@ class Margin(Condition):
     takes_every_row: ClassVar[bool] = True
 
     kind: Literal["margin"] = "margin"
-    above: Finite = Field(default=0.0, description="minimum of the margin [N]")
+    above: Finite = optional("minimum of the margin [N]", 0.0)
 
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         return self.margins(robot, places) >= self.above

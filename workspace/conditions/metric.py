@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ...models import Robot
-from ...models.part import Finite
+from ...models.part import Finite, optional
 from ..condition import Condition
 from ..metrics import METRICS, metric_values
 from ..places import Places
@@ -17,8 +17,8 @@ class MetricInRange(Condition):
 
     kind: Literal["metric"] = "metric"
     metric: str = Field(description=f"one of {', '.join(METRICS)}")
-    min: Finite | None = Field(default=None, description="minimum, in the unit of the metric; default: none")
-    max: Finite | None = Field(default=None, description="maximum, in the unit of the metric; default: none")
+    min: Finite | None = optional("minimum, in the unit of the metric; default: none")
+    max: Finite | None = optional("maximum, in the unit of the metric; default: none")
 
     @field_validator("metric")
     @classmethod

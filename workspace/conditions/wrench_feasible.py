@@ -8,10 +8,10 @@ from itertools import product
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ...models import Robot
-from ...models.part import Finite, Rows
+from ...models.part import Finite, Rows, optional
 from ..condition import TensionCondition
 from ..feasibility import feasible, rest_wrench, shortfall
 from ..places import Places
@@ -25,11 +25,10 @@ class WrenchFeasible(TensionCondition):
     takes_every_row: ClassVar[bool] = True
 
     kind: Literal["wrench-feasible"] = "wrench-feasible"
-    box: tuple[Wrench, Wrench] | None = Field(
-        default=None,
-        description="minimum and maximum of (fx, fy, fz, mx, my, mz) on the platform, about the CoM [N, N m]",
+    box: tuple[Wrench, Wrench] | None = optional(
+        "minimum and maximum of (fx, fy, fz, mx, my, mz) on the platform, about the CoM [N, N m]"
     )
-    vertices: Rows[Wrench] | None = Field(default=None, description="corners of a polytope of such wrenches [N, N m]")
+    vertices: Rows[Wrench] | None = optional("corners of a polytope of such wrenches [N, N m]")
 
     @model_validator(mode="after")
     def _one_set(self) -> Self:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationInfo
+from pydantic import BeforeValidator, ValidationInfo
 
-from ....models.part import Part, Pose, Vector3
+from ....models.part import Part, Pose, Vector3, optional
 from .motion import Motion
 from .stations import Stations
 
@@ -54,7 +54,7 @@ PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude, json_sche
 class PathBase(Part):
     """The base of all paths."""
 
-    frame: str = Field(default="world", description="frame of the path: world, or the name of the only carrier")
+    frame: str = optional("frame of the path: world, or the name of the only carrier", "world")
 
     @property
     def natural_duration(self) -> float | None:

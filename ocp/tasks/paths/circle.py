@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import override
 
-from ....models.part import Finite, NonNegative, Vector3
+from ....models.part import Finite, NonNegative, Vector3, optional
 from .base import PathBase
 from .motion import Motion
 
@@ -18,9 +18,9 @@ class CirclePath(PathBase):
     centre: Vector3 = Field(description="centre at the start [m]")
     radius: NonNegative = Field(description="radius [m]")
     rate: Finite = Field(description="angular velocity [rad/s]; positive: counter-clockwise from above")
-    phase: Finite = Field(default=0.0, description="angle at the start, from the x axis [rad]")
-    drift: Vector3 = Field(default=(0.0, 0.0, 0.0), description="velocity of the centre [m/s]")
-    attitude: Vector3 = Field(default=(0.0, 0.0, 0.0), description="constant attitude (roll, pitch, yaw) [rad]")
+    phase: Finite = optional("angle at the start, from the x axis [rad]", 0.0)
+    drift: Vector3 = optional("velocity of the centre [m/s]", (0.0, 0.0, 0.0))
+    attitude: Vector3 = optional("constant attitude (roll, pitch, yaw) [rad]", (0.0, 0.0, 0.0))
 
     @property
     @override

@@ -37,15 +37,15 @@ class FeedPath(PathBase):
     )
     feed: Positive | None = optional("speed [m/s]; default: that of each line of a .gcode file")
     acceleration: Positive = Field(description="largest acceleration, along the path and across it in corners [m/s^2]")
-    tolerance: NonNegative = Field(
-        default=1e-3, description="largest distance at which the path passes a corner [m]; 0: stop at each corner"
+    tolerance: NonNegative = optional(
+        "largest distance at which the path passes a corner [m]; 0: stop at each corner", 1e-3
     )
     feeds: tuple[Positive, ...] | None = optional("speed of each line, instead of `feed` [m/s]")
     dwell: tuple[NonNegative, ...] | None = optional(
         "duration of the stop at each point, a number or one for each [s]; default: no stop",
         json_schema_extra=or_number,
     )
-    ignored: tuple[str, ...] = Field(default=(), description="words of the .gcode file that were not used")
+    ignored: tuple[str, ...] = optional("words of the .gcode file that were not used", ())
 
     @model_validator(mode="before")
     @classmethod

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import override
 
-from ....models.part import AT_ORIGIN, NonNegative, Pose, Positive
+from ....models.part import AT_ORIGIN, NonNegative, Pose, Positive, optional
 from .. import bernstein
 from .base import PathBase
 from .motion import Motion
@@ -25,12 +25,10 @@ class ReturnPath(PathBase):
     duration: Positive = Field(description="duration of the whole path [s]")
     start: NonNegative = Field(description="time on the whole path at which the remainder starts [s]")
     settle: Positive = Field(description="time after which the offset is zero [s]")
-    offset: Pose = Field(default=AT_ORIGIN, description="offset from the path at the start [m, rad]")
-    offset_velocity: Pose = Field(
-        default=AT_ORIGIN, description="time derivative of the offset at the start [m/s, rad/s]"
-    )
-    offset_acceleration: Pose = Field(
-        default=AT_ORIGIN, description="second time derivative of the offset at the start [m/s^2, rad/s^2]"
+    offset: Pose = optional("offset from the path at the start [m, rad]", AT_ORIGIN)
+    offset_velocity: Pose = optional("time derivative of the offset at the start [m/s, rad/s]", AT_ORIGIN)
+    offset_acceleration: Pose = optional(
+        "second time derivative of the offset at the start [m/s^2, rad/s^2]", AT_ORIGIN
     )
 
     @model_validator(mode="after")

@@ -46,15 +46,14 @@ class WaypointPath(PathBase):
         description="two poses or positions or more [m, rad]; in a task also the name of a file of them, .csv with "
         "units in its header or .gcode, relative to the task file",
     )
-    shape: Literal["legs", "spline"] = Field(
-        default="legs", description="legs: straight, rounded at the points; spline: a smooth curve of degree 5"
+    shape: Literal["legs", "spline"] = optional(
+        "legs: straight, rounded at the points; spline: a smooth curve of degree 5", "legs"
     )
     blend: NonNegative | None = optional(
         "for legs: largest distance from the points [m]; 0: stop at each; default: 1 % of the span of the points"
     )
-    order: Literal["given", "free"] = Field(
-        default="given",
-        description="free: the points between the first and the last, at most 12, in the order of the shortest path",
+    order: Literal["given", "free"] = optional(
+        "free: the points between the first and the last, at most 12, in the order of the shortest path", "given"
     )
     times: tuple[Finite, ...] | None = optional(
         "time at which the path passes each point, from 0 on, increasing [s]; default: spread over the "
