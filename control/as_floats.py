@@ -6,7 +6,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.inputs import FLOAT, float64, shown
+from ..base.inputs import FLOAT, float64, required, shown
+from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from .reference import Reference
 from .state import State
@@ -57,7 +58,9 @@ def as_floats(given: Given, robot: Robot, rows: int | None) -> Given:
     kind, shape = type(given).__name__.lower(), {"tensions": (robot.m,), "carrier": (len(robot.carriers), 6)}
     arrays: dict[str, Any] = {}
     for name, value in zip(given._fields, given, strict=True):
-        if name != "time" and not (name == "tensions" and value is None):
+        if name == "load" and value is not None:
+            required("reference.load", value, RigidLoad)
+        elif name not in ("time", "load") and not (name == "tensions" and value is None):
             core = shape.get(name.partition("_")[0], (6,))
             array = arrays[name] = _array(f"{kind}.{name}", value, core)
             if array.ndim > len(core) and (rows is None or array.shape[: -len(core)] != (rows,)):

@@ -18,6 +18,7 @@ from ..solvers.status import OPTIMAL
 from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
 from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
 from .boxes import boxes, stay_inside
+from .carried_load import CarriedLoad
 from .command import HOLD, NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
 from .controller import Controller
@@ -132,17 +133,9 @@ class ComputedTorque(Controller):
         if carrier_bandwidth is None:
             steady = not few and any(carrier.efforts for carrier in self.robot.carriers)
             carrier_bandwidth = held / 4 if steady else QUICK
-        gains = (
-            loops.bandwidth,
-            damping,
-            integral,
-            loops.observer,
-            carrier_bandwidth,
-            carrier_acceleration,
-            held,
-            patience,
-        )
-        self._settings = settings_of(self.robot, self._limits, *gains)
+        gains = loops.bandwidth, damping, integral, loops.observer
+        of_carriers = carrier_bandwidth, carrier_acceleration, held
+        self._settings = settings_of(self.robot, self._limits, *gains, *of_carriers, patience)
         far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
         self._settings["attitude"] = self._attitude = loops.attitude
@@ -152,7 +145,7 @@ class ComputedTorque(Controller):
         self._loop = TensionLoop(loop, 0.0 if has_lead else WINCHES_KEEP, *self._limits) if loop else None
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None
-        self._robot = record_of(self.robot)
+        self._robot, self._carried = record_of(self.robot), CarriedLoad(self.robot)
         self._flies = bool(self._settings["by_wrench"].any())
         self._moves_carriers = self._flies or bool(far.any())
         self._lead = rotor_lead(self.robot, rotors) if rotors else None
@@ -197,7 +190,9 @@ class ComputedTorque(Controller):
         """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
-        self._seen, self._sent_lately = 0.0, LateStates(self._robot, rows * m)
+        self._carried.reset()
+        self._robot = record_of(self.robot)
+        self._seen, self._sent_lately = 0.0, LateStates(rows * m)
         self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
         self._last = bytes(8 * rows * m)  # tensions that were commanded last
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
@@ -277,6 +272,8 @@ class ComputedTorque(Controller):
             raise InputError(
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
+        if reference.load is not self._carried.load:
+            self._carry(reference.load, -np.inf if self._time is None else time)
         self._senses = state.tensions is not None
         seen = time if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
@@ -284,7 +281,8 @@ class ComputedTorque(Controller):
         if self._ahead is not None:
             self._ahead.pass_time(dt, self._cables["last"])
             self._last = self._cables["last"].tobytes()
-        if time - seen <= ROUNDING and since == dt:
+        observes = self._carried.is_later(seen)
+        if time - seen <= ROUNDING and since == dt and observes:
             fixed = dt, since, self._problems.length, solves
             try:
                 done = control_step(*fixed, state, reference, *own, None, *self._arrays)
@@ -293,17 +291,28 @@ class ComputedTorque(Controller):
                 done = control_step(*fixed, state, reference, *own, None, *self._arrays)
             self._sent_lately.remember(self._last, dt)
         else:
-            state, reference = self._take(state, reference)
+            state, reference = self._as_floats(state, reference)
+            control_take(state, reference, *self._inputs)
             cables, age = self._cables, time - seen
             otherwise = cables["known"] - cables["then"]
             self._sent_lately.remember(self._last, dt)
             self._sent_lately.commanded(cables, age, since, dt, self._senses)
-            memory = otherwise, self._platform["disturbance"], self._accelerations
-            late = self._sent_lately.move_on(age, self._measured, *memory)
-            done = control_step(dt, since, self._problems.length, solves, None, None, *own, late, *self._arrays)
+            models = self._carried.records_between(seen, time)
+            memory = self._measured, otherwise, self._platform["disturbance"], self._accelerations
+            late = self._sent_lately.move_on(age, models, *memory)
+            seen_so = self._measured.copy() if late is None else late
+            fixed = dt, since if observes else 0.0, self._problems.length, solves
+            done = control_step(*fixed, None, None, *own, late if observes else seen_so, *self._arrays)
+            if not observes:
+                self._carried.continue_observer(self._platform, float(self._settings["observer"]), seen_so[:, 0])
         self._is_missing, self._optimal = done[0] > 0, done[1]  # whether cables or their sensors are missing
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
+
+    def _carry(self, load: Any, time: float) -> None:
+        """Use the model of the robot with a load from a time on [s]."""
+        self._robot = self._carried.change(load, time)
+        self._inputs = self._robot, *self._inputs[1:]
 
     def _command(
         self,
@@ -364,15 +373,6 @@ class ComputedTorque(Controller):
             return wanted
         reports = self._cables["measured"] if self._senses else None
         return self._loop.sent(self._elapsed, wanted, self._cables["then"], reports, self.cut)
-
-    def _take(self, state: State, reference: Reference) -> tuple[State, Reference]:
-        """Copy a state and a reference to the memory of the core, and return them as arrays."""
-        try:
-            control_take(state, reference, *self._inputs)
-        except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
-            state, reference = self._as_floats(state, reference)
-            control_take(state, reference, *self._inputs)
-        return state, reference
 
     def _as_floats(self, state: State, reference: Reference) -> tuple[State, Reference]:
         rows = len(self._wanted)

@@ -189,8 +189,8 @@ class FaultTolerant(Controller):
         if s < 1.0:
             for order, (pose, velocity) in enumerate(zip(FADES[0], FADES[1], strict=True)):
                 motion[order] += (pose(s) * self._off[0] + BLENDED * velocity(s) * self._off[1]) / BLENDED**order
-        (pose, velocity, acceleration), carriers = motion[:, 0], motion[:, 1:]
-        return Reference(pose, velocity, acceleration, carriers[0], carriers[1], carriers[2], rest.tensions)
+        (pose, velocity, acceleration), others = motion[:, 0], motion[:, 1:]
+        return Reference(pose, velocity, acceleration, others[0], others[1], others[2], rest.tensions, reference.load)
 
     def _alone(self, rest: Rest, time: float, state: State, reference: Reference) -> Command:
         """Return the command of the others, as one of the team."""

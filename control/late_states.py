@@ -1,5 +1,6 @@
 """`LateStates`: current states from older ones and the commands that were sent since."""
 
+from collections.abc import Sequence
 from math import ceil
 
 import numpy as np
@@ -17,12 +18,11 @@ class LateStates:
     Observers use the measured states. With predicted ones they would correct their own prediction and be unstable for
     delays beyond the inverse of their bandwidth.
 
-    - `robot`: record of the robot.
     - `count`: number of tensions of all robots, N m.
     """
 
-    def __init__(self, robot: np.ndarray, count: int):
-        self._robot, self._commanded, self._begun = robot, Pending(2 * OLDEST), False
+    def __init__(self, count: int):
+        self._commanded, self._begun = Pending(2 * OLDEST), False
         self._commanded.reset(count)
 
     def remember(self, tensions: bytes, dt: float) -> None:
@@ -49,11 +49,18 @@ class LateStates:
             cables["measured"] = cables["then"]
 
     def move_on(
-        self, age: float, motions: np.ndarray, otherwise: np.ndarray, disturbance: np.ndarray, accelerations: bytes
+        self,
+        age: float,
+        models: Sequence[tuple[np.ndarray, float]],
+        motions: np.ndarray,
+        otherwise: np.ndarray,
+        disturbance: np.ndarray,
+        accelerations: bytes,
     ) -> np.ndarray | None:
         """Predict motions, (N, 1 + c, 12), over their `age` [s]; return them as measured if they are late.
 
         - `age`, `motions`: motions that are too old become nan.
+        - `models`: records of the robot, and how long each describes it [s], `age` in all.
         - `otherwise`: differences of tensions from their commands, (N, m) [N].
         - `disturbance`: estimated wrench of the disturbance, (N, 6) [N, N m].
         - `accelerations`: commanded accelerations of the carriers, (N, c, 6).
@@ -63,9 +70,11 @@ class LateStates:
         late = motions.copy()
         if age > OLDEST:
             motions[:] = np.nan
-        else:
-            parts = ceil(age / PART)
-            tensions = self._commanded.means(age, parts, age / parts).reshape(parts, *otherwise.shape) + otherwise
+            return late
+        for robot, lasting in models:
+            parts = ceil(lasting / PART)
+            tensions = self._commanded.means(age, parts, lasting / parts).reshape(parts, *otherwise.shape) + otherwise
             given = disturbance.copy(), np.maximum(tensions, 0.0), np.frombuffer(accelerations)
-            control_move_on(age / parts, self._robot, *given, motions)
+            control_move_on(lasting / parts, robot, *given, motions)
+            age -= lasting
         return late

@@ -73,7 +73,8 @@ def references_at(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> li
     """Return a reference for each of the times (n,) [s]."""
     platform, carriers = trajectory.at(times)
     tensions = trajectory.tensions(times) if trajectory.tensions else _tensions_along(robot, platform, carriers)
-    rows = zip(*platform, *carriers, tensions, strict=True)
+    loads = [trajectory.load_at(time) for time in times.tolist()] if trajectory.loads else [None] * len(times)
+    rows = zip(*platform, *carriers, tensions, loads, strict=True)
     return [Reference(*row) for row in rows]
 
 

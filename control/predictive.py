@@ -105,6 +105,7 @@ class Predictive(ComputedTorque):
     """
 
     batches = False
+    handed_over: HandOver | None
 
     def __init__(
         self,
@@ -160,19 +161,16 @@ class Predictive(ComputedTorque):
         self._moved, reaches = self._mobility(far, flies)
         self._sizes = count, 12 + 2 * self._moved.count, self.robot.m + self._moved.count
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
-        # How far rates let tensions go until the end of each stage.
-        self._room = self._limits.rate * self._times[1:, None]
-        unknown = 0 * self._statics if self._has_winches else self._statics
-        self._preview = Preview(self.robot, self._steps, self._moved, unknown)
+        self._room = self._limits.rate * self._times[1:, None]  # for tensions, until the end of each stage
+        self._preview = Preview(self.robot, self._steps, self._moved, self._statics * (not self._has_winches))
         self._surroundings = Surroundings(self.robot, tube, keep_out)
         self._horizon = self._program(reaches, returning)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
         usual = self.robot.force_scale / self.robot.platform.mass
-        noise = noise_of_velocity(self.robot, sensors)
         loud = None if correct else ripple(self.robot, self._limits, 2 * self._bandwidth + self._settings["observer"])
-        self._watch = Watch(scale, usual, noise, loud, BLIND if self._has_winches else QUICK)
+        blind, noise = BLIND if self._has_winches else QUICK, noise_of_velocity(self.robot, sensors)
+        self._watch = Watch(scale, usual, noise, loud, blind)
         self._from_the_start: HandOver | None = None
-        self.handed_over: HandOver | None
         self.reset()
         if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
             self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
@@ -291,8 +289,8 @@ class Predictive(ComputedTorque):
         """Compare the motion with the prediction, and hand over if they differ."""
         if not np.isfinite(self._problems.w).all():
             return
-        known, last = self._cables["known"][0], self._cables["last"][0]
-        otherwise = known - last if self._has_winches else np.zeros_like(last)
+        cables, m = self._cables[0], self.robot.m
+        otherwise = cables["known"] - cables["then"] if self._has_winches else np.zeros(m)
         self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
         if self.handed_over is not None and self._beside._settings["reacts"]:
             carriers = np.stack(reference[3:6], axis=1)
@@ -321,15 +319,17 @@ class Predictive(ComputedTorque):
         if not all(np.isfinite(part).all() for part in (self._problems.w, *now)):
             self._solved = np.nan
             return None
-        wanted, carriers, planned, ramps = self._preview.at(time, now, self._measured[0, 0, 3:6])
         start = np.concatenate([self._measured[0, 0], *placed])
+        wanted, carriers, planned, ramps, loads = self._preview.at(time, now, start[3:6], reference.load)
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
         # Carriers that fly are where they are, not where they should be.
         for which in self._followed:
             carriers[:, which, :3] += self._measured[0, 1 + which, :3] - carriers[0, which, :3]
-        about = self._platform["disturbance"][0], carriers, states, controls
-        control_stages(self._robot, self._moved.freed, self._moved.tethers, self._steps, *about, h.A, h.B, h.c)
+        of_carriers, disturbance = (self._moved.freed, self._moved.tethers), self._platform["disturbance"][0]
+        for load, own in loads:
+            about = self._steps[own], disturbance, carriers[own], states[own], controls[own]
+            control_stages(self._carried.record(load), *of_carriers, *about, h.A[own], h.B[own], h.c[own])
         h.c += ramps
         # The model knows what the reference does not, the estimated disturbance: a solution would be off by a balance
         # of errors and tensions for as long as it stays.

@@ -1,11 +1,13 @@
 """The future references of a predictive controller: `Preview`, one for each stage; `rows_at` interpolates."""
 
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..base.inputs import number, shown
+from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from .as_floats import as_floats
 from .carrier_references import Moved
@@ -32,7 +34,7 @@ class Preview:
 
     def reset(self) -> None:
         """Forget the announced references."""
-        self._announced: tuple[float, float, tuple[np.ndarray, np.ndarray]] | None = None
+        self._announced: tuple[float, float, tuple[np.ndarray, np.ndarray], list[RigidLoad | None]] | None = None
 
     def follow(self, references: Sequence[Reference], period: float, start: float) -> None:
         """Receive references, one for each period, from `start` [s] on.
@@ -47,7 +49,8 @@ class Preview:
             raise InputError(f"references must be a list of References, got {shown(references)}")
         period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
         with np.errstate(invalid="ignore"):  # of angles that are infinite: the step holds what it has
-            self._announced = start, period, self.rows([as_floats(each, self._robot, None) for each in references])
+            rows = self.rows([as_floats(each, self._robot, None) for each in references])
+        self._announced = start, period, rows, [each.load for each in references]
 
     def rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, np.ndarray]:
         """Return motions (K, 3, 6 + 6 c + f) and tensions (K, m).
@@ -72,17 +75,21 @@ class Preview:
         return rows[0][0, :, rows[0].shape[2] - self._moved.count :]
 
     def at(
-        self, time: float, now: tuple[np.ndarray, np.ndarray], attitude: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        self, time: float, now: tuple[np.ndarray, np.ndarray], attitude: np.ndarray, load: RigidLoad | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[tuple[RigidLoad | None, slice]]]:
         """Return states (N + 1, n), carriers (N + 1, c, 12) and controls (N + 1, u) of the reference at all stages.
 
-        The announced reference is used if it agrees with the current one; after its end accelerations are constant. The
-        last result is the effect of the change of its acceleration on the states within each stage, (N, n): the model
-        holds a control for a whole stage, the robot only for a period, so without it the control would be the mean over
-        the stage, half a stage early.
+        The announced reference is used if it agrees with the current one, which has the `load`; after its end
+        accelerations are constant. The fourth result is the effect of the change of its acceleration on the states
+        within each stage, (N, n): the model holds a control for a whole stage, the robot only for a period, so without
+        it the control would be the mean over the stage, half a stage early. The last are the loads, each with stages.
         """
-        first = np.zeros(len(self._times), dtype=int)
-        motions, tensions = self._announced_at(time, now) or rows_at(*now, self._times, first, 1.0)
+        count = len(self._half)
+        first, loads = np.zeros(count + 1, dtype=int), [(load, slice(0, count))]
+        if (announced := self._announced_at(time, now)) is None:
+            motions, tensions = rows_at(*now, self._times, first, 1.0)
+        else:
+            (motions, tensions), loads = announced
         place, rate, acceleration = motions.swapaxes(0, 1)
         moved = motions.shape[2] - self._moved.count
         states = np.concatenate([place[:, :6], rate[:, :6], place[:, moved:], rate[:, moved:]], axis=1)
@@ -92,19 +99,24 @@ class Preview:
         ramps = np.concatenate([further[:, :6], faster[:, :6], further[:, moved:], faster[:, moved:]], axis=1)
         controls = np.concatenate([tensions, acceleration[:, moved:]], axis=1)
         carriers = motions[:, :2, 6:moved].reshape(len(states), 2, -1, 6)
-        return states, carriers.swapaxes(1, 2).reshape(len(states), -1, 12), controls, ramps
+        return states, carriers.swapaxes(1, 2).reshape(len(states), -1, 12), controls, ramps, loads
 
-    def _announced_at(self, time: float, now: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the announced motions and tensions at all stages, or None if the current reference differs."""
+    def _announced_at(
+        self, time: float, now: tuple[np.ndarray, np.ndarray]
+    ) -> tuple[tuple[np.ndarray, np.ndarray], list[tuple[RigidLoad | None, slice]]] | None:
+        """Return the announced motions, tensions and loads at all stages, or None if the current reference differs."""
         if self._announced is None:
             return None
-        start, period, (motions, tensions) = self._announced
+        start, period, (motions, tensions), loads = self._announced
         steps = (time + self._times - start) / period
         before = np.clip(np.floor(steps + ROUNDING), 0, len(motions) - 1).astype(int)
         announced = rows_at(motions, tensions, period * (steps - before), before, period)
         off = announced[0][0, 0, :6] - now[0][0, 0, :6]
         off[3:] -= turns(off[3:])
-        return announced if np.abs(off).max() <= CLOSE else None
+        if np.abs(off).max() > CLOSE:
+            return None
+        runs = [list(run) for _, run in groupby(range(len(before) - 1), lambda stage: id(loads[before[stage]]))]
+        return announced, [(loads[before[run[0]]], slice(run[0], run[-1] + 1)) for run in runs]
 
 
 def turns(off: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.display import record
+from ..models.rigid_load import RigidLoad
 
 
 class Reference(NamedTuple):
@@ -18,6 +19,8 @@ class Reference(NamedTuple):
         Pose of each carrier's frame in {G}, (..., c, 6), and its time derivatives.
     tensions
         Planned tensions [N], (..., m); None if none are planned; the smallest tensions are then preferred.
+    load
+        `RigidLoad` that the platform carries from this time on; None for no load.
     """
 
     pose: np.ndarray
@@ -27,5 +30,6 @@ class Reference(NamedTuple):
     carrier_velocity: np.ndarray
     carrier_acceleration: np.ndarray
     tensions: np.ndarray | None = None
+    load: RigidLoad | None = None
 
     __repr__ = record

@@ -13,6 +13,7 @@ from ..control.command import OTHERWISE
 from ..models.robot import Robot
 from .experiment import Experiment
 from .record import Record
+from .room import LEAST, room_of
 
 TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_max
 
@@ -95,6 +96,12 @@ class SimulationData(Displayed):
         robot = self.robot
         return self.record.tensions[: self._recorded] - robot.t_max - TENSION_TOLERANCE * (robot.t_max - robot.t_min)
 
+    @cached_property
+    def outside(self) -> np.ndarray:
+        """Return how far the platform is beyond each side of its room [m], (n, 6); negative inside, see `Room`."""
+        poses, room = self.record.motions[: self._recorded, 0, :6], room_of(self.robot)
+        return np.full(poses.shape, -np.inf) if room is None else np.nan_to_num(room.beyond(poses), nan=-np.inf)
+
     @property
     def passed(self) -> bool:
         """Return whether the run meets all pass criteria: it ended near its reference, within limits, without slack."""
@@ -114,6 +121,11 @@ class SimulationData(Displayed):
                 f"error of {quantity(1e3 * self.error[at], 'mm')} at t = {self.times[at]:.3f} s "
                 f"(tolerance {quantity(1e3 * self.tolerance, 'mm')})"
             )
+        room = room_of(self.robot)
+        row, side = np.unravel_index(self.outside.argmax(), self.outside.shape)
+        if room is not None and room.is_known and self.outside[row, side] > LEAST:
+            deep = quantity(self.outside[row, side], "m")
+            lines.append(f"the platform was {deep} {room.names[side]} at t = {self.times[row]:.3f} s")
         tensions = self.record.tensions[: self._recorded]
         row, cable = np.unravel_index(np.nanargmax(self.above), self.above.shape)
         if self.above[row, cable] > 0:

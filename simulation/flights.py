@@ -24,6 +24,7 @@ from ..plant import Plant
 from .data import TENSION_TOLERANCE
 from .experiment import Experiment
 from .flying import fly
+from .room import LEAST
 from .run_statistics import PARTS, Extremes
 
 if TYPE_CHECKING:
@@ -31,7 +32,13 @@ if TYPE_CHECKING:
 
 QUANTILES = (0.0, 0.05, 0.5, 0.95, 1.0)
 ROUNDING = 1e-9  # of the duration
-FAILED = {"error": "position error", "tension": "tension", "slack": "slack", "diverged": "divergence"}
+FAILED = {
+    "error": "position error",
+    "tension": "tension",
+    "slack": "slack",
+    "room": "leaving the room",
+    "diverged": "divergence",
+}
 
 
 def copies(controller: Controller, count: int) -> list[Controller]:
@@ -67,8 +74,8 @@ def fly_block(plant: Plant, controller: Controller, conditions: Experiment, seed
 
 
 def passed(of: np.ndarray, periods: int, tolerance: float) -> np.ndarray:
-    """Return which runs passed, (N,), from their statistics: complete, near the reference, with tensions in range."""
-    lasted_near = (of["lasted"] == periods) & (of["error_max"] <= tolerance)
+    """Return which runs passed, (N,), from their statistics: all conditions of `SimulationData.failures` hold."""
+    lasted_near = (of["lasted"] == periods) & (of["error_max"] <= tolerance) & (of["outside"] <= LEAST)
     return lasted_near & (of["exceeded"] <= TENSION_TOLERANCE) & (of["slack"] == 0)
 
 
@@ -76,13 +83,16 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
     """Return the statistics of all runs, (N,) of `FIGURES`, as a dataset indexed by their seeds."""
     periods, period = len(conditions.references), conditions.period
     variables = {
-        "passed": Variable(("seed",), passed(of, periods, tolerance), {"long_name": "error, tensions and slack hold"}),
+        "passed": Variable(
+            ("seed",), passed(of, periods, tolerance), {"long_name": "error, tensions, slack and room hold"}
+        ),
         "duration": over(("seed",), of["lasted"] * period, "s", "simulated time"),
         "error_rms": over(("seed",), of["error_rms"], "m", "rms position error"),
         "error_max": over(("seed",), of["error_max"], "m", "largest position error"),
         "tension_min": over(("seed",), of["tension_min"], "N", "smallest tension"),
         "tension_max": over(("seed",), of["tension_max"], "N", "largest tension"),
         "tension_excess": over(("seed",), of["exceeded"], "1", "largest excess over t_max, of the cable's range"),
+        "outside": over(("seed",), of["outside"], "m", "largest distance out of the room or below the floor"),
         "slack_s": over(("seed",), of["slack"] * period, "s", "time with a slack cable whose t_min is above zero"),
         "answered": Variable(
             ("seed", "answer"), of["answered"], {"long_name": "number of control steps with each status"}
@@ -138,6 +148,7 @@ def _failed(dataset: xr.Dataset) -> dict[str, int]:
         "error": dataset["error_max"].values <= float(dataset.attrs["tolerance_m"]),
         "tension": dataset["tension_excess"].values <= TENSION_TOLERANCE,
         "slack": dataset["slack_s"].values == 0,
+        "room": dataset["outside"].values <= LEAST,
         "diverged": ended,
     }
     return {name: int((~rows).sum()) for name, rows in holds.items()}

@@ -7,16 +7,17 @@ from ..control.command import PLANNED
 from ..models.robot import Robot
 from .experiment import Experiment
 from .record import Period
+from .room import room_of
 
 # The statistics of a run: its number of periods, errors [m], tensions [N] of cables that are not cut, their excess over
-# t_max relative to the cable's range, the number of periods that begin with a slack cable whose t_min is above zero,
-# the number of periods with each status, and of each part of the time the largest error [m], smallest tension and
-# largest tension [N]: nan in parts that it does not have.
+# t_max relative to the cable's range, how far the platform was out of its room [m], the number of periods that begin
+# with a slack cable whose t_min is above zero, the number of periods with each status, and of each part of the time the
+# largest error [m], smallest tension and largest tension [N]: nan in parts that it does not have.
 PARTS = 100  # of the time
 FIGURES = np.dtype(
     [
         ("lasted", "<i8"),
-        *((name, "<f8") for name in ("error_rms", "error_max", "tension_min", "tension_max", "exceeded")),
+        *((name, "<f8") for name in ("error_rms", "error_max", "tension_min", "tension_max", "exceeded", "outside")),
         ("slack", "<i8"),
         ("answered", "<i8", (len(ANSWERS),)),
         ("over_time", "<f4", (PARTS, 3)),
@@ -38,6 +39,8 @@ class Extremes:
         self._slack, self._answers = np.zeros(flights, dtype=int), np.zeros((flights, len(ANSWERS)), dtype=int)
         # Squared error, negative tension and tension, of which the largest count.
         self._over_time = np.full((flights, PARTS, 3), np.nan, dtype="f4")
+        room = room_of(robot)
+        self._room, self._outside = room if room and room.is_known else None, np.zeros(flights)
         self._least, self._most = np.full((flights, robot.m), np.inf), np.full((flights, robot.m), -np.inf)
 
     def take(self, period: Period) -> None:
@@ -50,6 +53,9 @@ class Extremes:
         square = off[:, 0] + off[:, 1] + off[:, 2]
         self._squares[rows] += square
         self._largest[rows] = np.maximum(self._largest[rows], square)
+        if self._room is not None:
+            beyond = self._room.beyond(period.motions[rows, 0, :6]).max(axis=1)
+            self._outside[rows] = np.fmax(self._outside[rows], beyond)
         whole, taut = ~self._cut[period.number], self._taut[period.number]
         if command.released is not None:
             kept = ~np.broadcast_to(np.asarray(command.released, dtype=bool), period.tensions.shape)
@@ -75,7 +81,7 @@ class Extremes:
         result = np.zeros(len(lasted), dtype=FIGURES)
         result["lasted"], result["slack"], result["answered"] = lasted, self._slack, self._answers
         result["error_rms"] = np.sqrt(self._squares / np.maximum(lasted, 1))
-        result["error_max"] = np.sqrt(self._largest)
+        result["error_max"], result["outside"] = np.sqrt(self._largest), self._outside
         for name, each in (("tension_min", self._least.min(axis=1)), ("tension_max", self._most.max(axis=1))):
             result[name] = np.where(np.isinf(each), 0.0, each)
         # Of fewer periods than parts, some have none and keep the values before.

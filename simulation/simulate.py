@@ -277,10 +277,10 @@ def _references(robot: Robot, parts: Sequence[tuple[float, Trajectory]], times: 
     ]
     for reference in result:
         for part in reference:
-            if part is not None:
-                part.flags.writeable = (
-                    False  # a controller that changes them would change what errors are measured from
-                )
+            if isinstance(
+                part, np.ndarray
+            ):  # a controller that changes them would change what errors are measured from
+                part.flags.writeable = False
     return result
 
 

@@ -22,6 +22,7 @@ from ..figures.report import Report, Reported, Section
 from ..models.motion_file import dimensions, motion_variables, over, save_motion
 from ..models.parsing import to_yaml
 from .data import SimulationData
+from .room import LEAST, room_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -225,7 +226,7 @@ class Simulation(SimulationData, Filmed, Reported):
 class Occurrence(NamedTuple):
     """An event, or the first excess of a limit, at a time [s].
 
-    Its kind is "fault" (also of a stop, a push and any other event), "slack", "tension", "error" or "end".
+    Its kind is "fault" (also of a stop, a push and any other event), "slack", "tension", "error", "room" or "end".
     """
 
     at: float
@@ -255,6 +256,10 @@ def occurrences(flight: SimulationData) -> list[Occurrence]:
     if (beyond := ~(flight.error <= flight.tolerance)).any():
         within = quantity(1e3 * flight.tolerance, "mm")
         found.append(Occurrence(float(flight.times[np.argmax(beyond)]), "error", f"the error exceeded {within}"))
+    if (room := room_of(flight.robot)) is not None and (beyond := flight.outside > LEAST).any():
+        row, side = np.argwhere(beyond)[0]
+        words = f"the platform went {room.names[side]} (by {quantity(flight.outside[:, side].max(), 'm')} at most)"
+        found.append(Occurrence(float(flight.times[row]), "room", words))
     if flight.lasted < len(flight.references):
         found.append(Occurrence(flight.lasted * flight.period, "end", "the simulation diverged"))
     shown = [event for event in found if event.at <= max(flight.lasted, 1) * flight.period]

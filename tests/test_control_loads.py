@@ -1,0 +1,123 @@
+"""Controllers know the load that a plan has at each time: it is carried from its phase on, not found by an observer."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from towline import InputError, load, plan, simulate
+from towline.control import ComputedTorque, Controller, Predictive, Reference, State, references
+from towline.models.rigid_load import RigidLoad
+
+COGIRO = load("cogiro")
+BAG = {"mass": 150.0, "com": [0.1, 0.05, -0.3], "inertia": [8, 9, 6, 0, 0.5, 0]}
+PICKED, RELEASED = 1.5, 3.0  # [s]
+LATE = {"delay": 0.03, "stamped": True}
+
+
+@pytest.fixture(scope="module")
+def carries():
+    """A plan that picks up 150 kg at 1.5 s and releases them at 3 s, where the platform is at rest."""
+    at = [COGIRO.home[:3] + np.array(step) for step in ([0, 0, 0], [0.6, 0, 0.2], [-0.4, 0.6, 0.2], [0, 0, 0])]
+    lines = [{"kind": "line", "start": a.tolist(), "end": b.tolist()} for a, b in itertools.pairwise(at)]
+    phases = [{"name": f"phase-{k}", "path": line, "duration": 1.5} for k, line in enumerate(lines)]
+    phases[1]["load"] = BAG
+    return plan(COGIRO, {"phases": phases})
+
+
+class Unaware(Controller):
+    """A controller whose references name no load."""
+
+    def __init__(self, controller):
+        self.controller = controller
+
+    def step(self, time, state, reference):
+        return self.controller.step(time, state, reference._replace(load=None))
+
+    def follow(self, references, period, start=0.0):
+        self.controller.follow([each._replace(load=None) for each in references], period, start)
+
+    def reset(self):
+        self.controller.reset()
+
+
+def test_references_of_a_plan_name_its_load(carries):
+    of = references(carries, 0.5)
+    assert [0.0 if each.load is None else each.load.mass for each in of] == [0, 0, 0, 150, 150, 150, 0, 0, 0, 0]
+    assert of[3].load == RigidLoad.model_validate(BAG)
+
+
+@pytest.mark.parametrize("noise", [None, LATE], ids=["now", "30 ms late"])
+@pytest.mark.parametrize(
+    "controller",
+    [ComputedTorque(COGIRO), ComputedTorque(COGIRO, observer=0), Predictive(COGIRO)],
+    ids=["computed torque", "without observer", "predictive"],
+)
+def test_a_planned_load_is_carried_within_a_millimetre(carries, controller, noise):
+    """The plant carries it as the symbolic model says (test_simulation_own_events.py); unaware, 40 mm are missed."""
+    run = simulate(COGIRO, carries, controller, noise=noise)
+    assert run.error.max() < 3e-4
+    assert run.to_dict()["answered"]["as planned"] == len(run.error)
+    unaware = simulate(COGIRO, carries, Unaware(controller), noise=noise, duration=1.8)
+    assert unaware.error.max() > 0.03
+
+
+def balance_of_bodies(pose, tensions, bodies):
+    """Force and moment about the origin of {G} on bodies at rest, from cables and weights, (6,)."""
+    anchors = np.array([cable.anchor for cable in COGIRO.cables])
+    attachments = pose[:3] + np.array([cable.attachment for cable in COGIRO.cables])  # level
+    units = (anchors - attachments) / np.linalg.norm(anchors - attachments, axis=1, keepdims=True)
+    pulls, masses = tensions[:, None] * units, np.array([mass for mass, _ in bodies])
+    centres = pose[:3] + np.array([com for _, com in bodies])
+    weights = masses[:, None] * np.array(COGIRO.gravity)
+    forces, points = np.vstack([pulls, weights]), np.vstack([attachments, centres])
+    return np.r_[forces.sum(axis=0), np.cross(points, forces).sum(axis=0)]
+
+
+@pytest.mark.parametrize(("kind", "rows"), [(ComputedTorque, None), (ComputedTorque, 2), (Predictive, None)])
+def test_the_first_command_with_a_load_balances_both_weights(kind, rows):
+    """At rest, in the very step in which the reference names it; again without it, and after a reset."""
+    controller, still = kind(COGIRO), np.zeros(6)
+    pose = COGIRO.home + np.array([0.4, -0.3, 0.2, 0, 0, 0])
+    bare, bag = (COGIRO.platform.mass, COGIRO.platform.com), RigidLoad.model_validate(BAG)
+    carriers, rest = COGIRO.carrier_home, np.zeros_like(COGIRO.carrier_home)
+    plain = Reference(pose, still, still, carriers, rest, rest)
+    state = State(pose, still, carriers, rest)
+    if rows:
+        state = State(*(np.tile(part, (rows, *[1] * part.ndim)) for part in state[:4]))
+    for _ in range(2):
+        for k, carried in enumerate((None, None, bag, bag.model_copy(), None, bag)):
+            command = controller.step(1e-3 * k, state, plain._replace(load=carried))
+            bodies = [bare] if carried is None else [bare, (bag.mass, bag.com)]
+            for tensions in np.atleast_2d(command.tensions):
+                missing = balance_of_bodies(pose, tensions, bodies)
+                np.testing.assert_allclose(missing, 0, atol=1e-3 * COGIRO.weight)
+        controller.reset()
+
+
+@pytest.mark.parametrize("noise", [None, LATE], ids=["now", "30 ms late"])
+def test_an_estimated_push_stays_as_it_was_when_a_load_comes_and_goes(carries, noise):
+    """A constant force of 100 N is known before; a load moves its moment, by the CoM, and nothing else."""
+    push = np.array([60.0, -80.0, 0, 0, 0, 0])
+    seen = []
+
+    class Watched(ComputedTorque):
+        def step(self, time, state, reference):
+            command = super().step(time, state, reference)
+            seen.append(self.disturbance[0])
+            return command
+
+    run = simulate(COGIRO, carries, Watched(COGIRO), disturbance=push, noise=noise)
+    estimates = np.array(seen)
+    assert run.error.max() < 0.02  # until the push is known
+    for time in (PICKED, RELEASED):
+        near = estimates[round(1e3 * time) - 1 : round(1e3 * time) + 500]
+        assert np.abs(near[:, :3] - push[:3]).max() < 2.0
+        assert np.abs(near[:, 2]).max() < 1e-3 * BAG["mass"] * 9.81
+
+
+def test_a_load_that_is_none_is_refused():
+    carriers, rest, still = COGIRO.carrier_home, np.zeros_like(COGIRO.carrier_home), np.zeros(6)
+    reference = Reference(COGIRO.home, still, still, carriers, rest, rest, load=150.0)
+    with pytest.raises(InputError, match=r"reference\.load must be a RigidLoad, got 150"):
+        ComputedTorque(COGIRO).step(0.0, State(COGIRO.home, still, carriers, rest), reference)
