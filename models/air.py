@@ -25,17 +25,11 @@ def trapezoid(
 ) -> np.ndarray:
     """Compute paper F's gust, (n, 3) [m/s]: rising, steady, falling, with Gaussian noise cut at +- `noise`.
 
-    Parameters
-    ----------
-    times
-        (n,), rising [s]; the trapezoid stretches over all of them.
-    peak
-        The steady wind [m/s]: (5, 6, 2) in paper F, section VI.
-    corners
-        Fractions of the time, in [0, 1], at which the wind begins to rise, is steady, begins to fall and is zero. They
-        are assumed: the paper does not give them.
-    noise
-        Half-width of the noise [m/s]; its standard deviation is a third of it, so that few samples are cut.
+    - `times`: (n,), rising [s]; the trapezoid stretches over all of them.
+    - `peak`: the steady wind [m/s]: (5, 6, 2) in paper F, section VI.
+    - `corners`: fractions of the time, in [0, 1], at which the wind begins to rise, is steady, begins to fall and is
+      zero. They are assumed: the paper does not give them.
+    - `noise`: half-width of the noise [m/s]; its standard deviation is a third of it, so that few samples are cut.
     """
     times, places = _numbers("times", times, None), _numbers("corners", corners, 4, 0.0)
     if (np.diff(places) < 0).any() or places[-1] > 1:
@@ -64,16 +58,10 @@ def dryden(
 
     with T = L / V. "Along" is the direction of the mean wind's horizontal part, "up" is z, the third is across both.
 
-    Parameters
-    ----------
-    times
-        (n,), rising in equal steps [s].
-    mean
-        Mean wind in {G} [m/s], of speed V > 0.
-    intensity
-        sigma along, across and up [m/s].
-    scale
-        Scale lengths L along, across and up [m].
+    - `times`: (n,), rising in equal steps [s].
+    - `mean`: mean wind in {G} [m/s], of speed V > 0.
+    - `intensity`: sigma along, across and up [m/s].
+    - `scale`: scale lengths L along, across and up [m].
 
     Raises `InputError` if the mean wind has no horizontal part, or the times do not rise in equal steps.
     """

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 Symbol = TypeVar("Symbol", "ca.SX", "ca.MX")
 Array: TypeAlias = Any  # an array with leading batch dimensions, or a CasADi expression
+Matrix: TypeAlias = Any  # CasADi SX, MX or DM: what goes in comes out
 Others = ParamSpec("Others")
 
 

@@ -26,15 +26,10 @@ def is_symbolic(value: Any) -> bool:
 def call(function: ca.Function, arguments: dict[str, Any], matrices: tuple[str, ...] = ()) -> dict[str, Any]:
     """Evaluate `function` on named arguments; the outputs, in order, have the common leading dimensions of the inputs.
 
-    Parameters
-    ----------
-    function
-        Its input names are the keys of `arguments`; an input that is not among them has the Function's default.
-    arguments
-        Arrays of shape (..., *shape of the input), where a column (n, 1) counts as (n,); they broadcast as in NumPy.
-        If one is a CasADi expression all are taken as they are and the outputs are expressions too.
-    matrices
-        Outputs that are matrices also when they happen to have one column, as the wrench matrix of one cable.
+    - `function`: its input names are the keys of `arguments`; one that is not among them has the Function's default.
+    - `arguments`: arrays of shape (..., *shape of the input), where a column (n, 1) counts as (n,); they broadcast as
+      in NumPy. If one is a CasADi expression all are taken as they are and the outputs are expressions too.
+    - `matrices`: outputs that are matrices also when they happen to have one column, as A of one cable.
 
     Raises `InputError` that names the argument whose shape or value does not fit; `SolverError` if CasADi cannot
     evaluate the Function, which happens only with external or iterative functions.

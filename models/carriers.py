@@ -14,6 +14,7 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdap
 from pydantic_core import CoreSchema, core_schema
 
 from ..base.errors import InputError
+from .arrays import Matrix
 from .parsing import json_schema
 from .part import (
     AT_ORIGIN,
@@ -29,7 +30,6 @@ from .part import (
     inertia_matrix,
     optional,
 )
-from .rotation import Matrix
 
 __all__ = [
     "Actuator",
@@ -177,28 +177,18 @@ class Carrier(Part):
     ) -> tuple[Effort, ...]:
         """Return the efforts that a motion requires of it; none if its motion is imposed.
 
-        Parameters
-        ----------
-        pose, velocity, acceleration
-            (6, 1) each, of its frame in {G}.
-        pull
-            Force in {G} [N] and moment about its CoM in its own axes [N m] of its cables, (6, 1).
-        gravity
-            (3,) in {G} [m/s^2].
+        - `pose`, `velocity`, `acceleration`: (6, 1) each, of its frame in {G}.
+        - `pull`: force in {G} [N] and moment about its CoM in its own axes [N m] of its cables, (6, 1).
+        - `gravity`: (3,) in {G} [m/s^2].
         """
         return ()
 
     def acceleration(
         self, pose: Matrix, velocity: Matrix, thrust: Matrix, torque: Matrix, pull: Matrix, gravity: np.ndarray
     ) -> Matrix | None:
-        """Return the acceleration of its pose, (6, 1), that thrust and torque give it, or None if it is imposed.
+        """Return the acceleration of its pose, (6, 1), or None if it is imposed; arguments as in `required_effort`.
 
-        Parameters
-        ----------
-        pose, velocity, pull, gravity
-            As in `required_effort`.
-        thrust, torque
-            (1, 1) along its z axis, and (3, 1) about its axes.
+        It is that by `thrust` (1, 1) along its z axis [N] and `torque` (3, 1) about its axes [N m].
         """
         return None
 
@@ -207,14 +197,9 @@ class Carrier(Part):
     ) -> np.ndarray | None:
         """Return roll and pitch, (n, 2) [rad], with which its efforts balance a motion, or None if any tilt does.
 
-        Parameters
-        ----------
-        pose, acceleration
-            (n, 6) each, of its frame in {G}.
-        pull
-            Force of its cables in {G}, (n, 3) [N].
-        gravity
-            (3,) in {G} [m/s^2].
+        - `pose`, `acceleration`: (n, 6) each, of its frame in {G}.
+        - `pull`: force of its cables in {G}, (n, 3) [N].
+        - `gravity`: (3,) in {G} [m/s^2].
         """
         return None
 
@@ -276,6 +261,9 @@ class QuadrotorCarrier(Carrier):
 
     Its frame has its origin at the CoM. Its motion follows from thrust, torque, weight and the pull of its cables.
     """
+
+    # With thrust f, torque tau and the pull (F, M) of its cables, F in {G}, M in its own axes:
+    # m (ddx - g) = f R e_z + F, and in its own axes I alpha + omega x I omega = tau + M.
 
     tows: ClassVar[bool] = True
     efforts: ClassVar[tuple[str, ...]] = ("thrust", "torque", "force across the thrust")
@@ -346,11 +334,13 @@ class QuadrotorCarrier(Carrier):
         self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray
     ) -> tuple[Effort, ...]:
         """Return thrust and torque, and the force across the thrust, of which it has none."""
-        from . import rigid_motion  # loads CasADi
+        import casadi as ca  # as below: robots are read without it, faster
 
-        force, torque = rigid_motion.required_wrench(
-            self.mass, inertia_matrix(self.inertia), pose, velocity, acceleration, pull, gravity
-        )
+        from .rotation import turning
+
+        (R, Omega, alpha), inertia = turning(pose, velocity, acceleration), ca.DM(inertia_matrix(self.inertia))
+        force = R.T @ (self.mass * (acceleration[:3] - ca.DM(gravity)) - pull[:3])
+        torque = inertia @ alpha + ca.cross(Omega, inertia @ Omega) - pull[3:6]
         return (
             Effort("thrust", "N", force[2], self.thrust_min, self.thrust_max, scale=self.thrust_max),
             Effort("force across the thrust", "N", force[:2], 0.0, 0.0, ("x", "y")),
@@ -364,11 +354,16 @@ class QuadrotorCarrier(Carrier):
         self, pose: Matrix, velocity: Matrix, thrust: Matrix, torque: Matrix, pull: Matrix, gravity: np.ndarray
     ) -> Matrix:
         """Return the acceleration of its pose, (6, 1), that thrust [N] and torque [N m] give it."""
-        from . import rigid_motion  # loads CasADi
+        import casadi as ca
 
-        return rigid_motion.acceleration(
-            self.mass, inertia_matrix(self.inertia), pose, velocity, thrust, torque, pull, gravity
-        )
+        from .rotation import inverse_rate_matrix, rate_matrix, rate_matrix_derivative, rotation
+
+        angles, rates, inertia = pose[3:6], velocity[3:6], inertia_matrix(self.inertia)
+        linear = ca.DM(gravity) + (rotation(angles)[:, 2] * thrust + pull[0:3]) / self.mass
+        Omega = rate_matrix(angles) @ rates
+        alpha = ca.DM(np.linalg.inv(inertia)) @ (torque + pull[3:6] - ca.cross(Omega, ca.DM(inertia) @ Omega))
+        angular = inverse_rate_matrix(angles) @ (alpha - rate_matrix_derivative(angles, rates) @ rates)
+        return ca.vertcat(linear, angular)
 
     def balanced_tilt(
         self, pose: np.ndarray, acceleration: np.ndarray, pull: np.ndarray, gravity: np.ndarray

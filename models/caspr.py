@@ -19,7 +19,6 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -83,7 +82,13 @@ def read_caspr(folder: str | os.PathLike[str], cable_set: str | None = None) -> 
     bodies = _read(_file(place, "_bodies.xml"), "bodies_system", notes)
     cables = _read(_file(place, "_cables.xml"), "cables", notes)
     name = place.resolve().name
-    link = _only_link(bodies)
+    links = bodies.child("links").children()
+    for each in links:
+        if each.element.tag != "link_rigid":
+            raise each.wrong("be a link_rigid", shown(each.element.tag))
+    if len(links) != 1:
+        raise bodies.wrong("have one link, because towline's robots have one platform", str(len(links)))
+    link = links[0]
     platform, com = _platform(link, notes)
     chosen, ids = _choose(cables, cable_set)
     wires = [_cable(node, com, notes) for node in chosen.children()]
@@ -151,6 +156,16 @@ class _Node:
             raise self.wrong(f"have the attribute {name}", "none")
         return value
 
+    def about_com(self, name: str) -> bool:
+        """Return whether the attribute is "com", not "joint"."""
+        value = self.attribute(name)
+        if value not in ("com", "joint"):
+            raise self.wrong("be com or joint", shown(value), name)
+        return value == "com"
+
+    def number(self, tag: str) -> float:
+        return self.child(tag).numbers(1)[0]
+
     def numbers(self, count: int, attribute: str | None = None) -> list[float]:
         """Return the element's text, or one of its attributes, as `count` finite numbers."""
         text = self.attribute(attribute) if attribute else self.element.text or ""
@@ -195,27 +210,11 @@ def _read(file: Path, root: str, notes: Counter[str]) -> _Node:
         raise InputError(f"{file} must be XML in UTF-8, got an unknown encoding") from None
     if element.tag != root:
         raise InputError(f"{file} must have the root element {root}, got {shown(element.tag)}")
-    for holder in _with_stray_text(element):
-        notes[f"{file.name}: text beside the elements of {shown(holder)[1:-1]} is left out"] += 1
+    for holder in element.iter():
+        text = [holder.text or ""] if len(holder) else []
+        if any(part.strip() for part in (*text, *(child.tail or "" for child in holder))):
+            notes[f"{file.name}: text beside the elements of {shown(holder.tag)[1:-1]} is left out"] += 1
     return _Node(element, str(file))
-
-
-def _with_stray_text(root: Element) -> Iterator[str]:
-    """Yield the tags of the elements that hold text beside other elements."""
-    for element in root.iter():
-        text = [element.text or ""] if len(element) else []
-        if any(part.strip() for part in (*text, *(child.tail or "" for child in element))):
-            yield element.tag
-
-
-def _only_link(bodies: _Node) -> _Node:
-    links = bodies.child("links").children()
-    for link in links:
-        if link.element.tag != "link_rigid":
-            raise link.wrong("be a link_rigid", shown(link.element.tag))
-    if len(links) != 1:
-        raise bodies.wrong("have one link, because towline's robots have one platform", str(len(links)))
-    return links[0]
 
 
 def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
@@ -226,7 +225,7 @@ def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
         raise joint.wrong(f"be one of {', '.join(JOINTS)}", shown(kind), "type")
     if joint.element.get("actuated") == "true":
         raise joint.wrong("be a joint that only the cables move", "one with a motor")
-    mass = physical.child("mass").numbers(1)[0]
+    mass = physical.number("mass")
     com = np.array(physical.child("com_location").numbers(3))
     if joint.element.get("q_min") or joint.element.get("q_max"):
         notes["the joint's range, q_min to q_max, is left out"] += 1
@@ -244,12 +243,9 @@ def _platform(link: _Node, notes: Counter[str]) -> tuple[Platform, np.ndarray]:
 
 def _inertia(node: _Node, mass: float, com: np.ndarray) -> tuple[float, float, float, float, float, float]:
     """Return (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about the centre of mass [kg m^2]."""
-    xx, yy, zz, xy, xz, yz = (node.child(name).numbers(1)[0] for name in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"))
-    reference = node.attribute("ref")
-    if reference not in ("com", "joint"):
-        raise node.wrong("be com or joint", shown(reference), "ref")
+    xx, yy, zz, xy, xz, yz = (node.number(name) for name in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz"))
     matrix = inertia_matrix((xx, yy, zz, xy, xz, yz))
-    if reference == "joint":
+    if not node.about_com("ref"):
         matrix = matrix - mass * (com @ com * np.eye(3) - np.outer(com, com))
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = matrix.tolist()
     return xx, yy, zz, xy, xz, yz
@@ -266,20 +262,16 @@ def _home(link: _Node, joint: _Node, kind: str) -> list[float]:
     q = np.array(joint.numbers(7 if kind == "SPATIAL_QUATERNION" else len(dof), "q_initial"))
     if len(dof) == len(COORDINATES):
         pose[:3] += q[:3]
-        quaternion = kind == "SPATIAL_QUATERNION"
-        turned = _from_quaternion(joint, q[3:]) if quaternion else Rotation.from_euler("XYZ", q[3:])
+        if kind == "SPATIAL_QUATERNION":  # (e0, e1, e2, e3) with the real part e0
+            if not 0.999 < (norm := np.linalg.norm(q[3:])) < 1.001:
+                raise joint.wrong("have a quaternion of norm 1", f"a norm of {norm:g}", "q_initial")
+            turned = Rotation.from_quat(q[3:], scalar_first=True)
+        else:
+            turned = Rotation.from_euler("XYZ", q[3:])
         pose[3:] = points.angles(turned.as_matrix()) + 0.0  # -0 would only puzzle a reader
     else:
         pose[[COORDINATES.index(name) for name in dof]] += q
     return pose.tolist()
-
-
-def _from_quaternion(joint: _Node, quaternion: np.ndarray) -> Rotation:
-    """Return the rotation of the quaternion (e0, e1, e2, e3) with the real part e0."""
-    norm = np.linalg.norm(quaternion)
-    if not 0.999 < norm < 1.001:
-        raise joint.wrong("have a quaternion of norm 1", f"a norm of {norm:g}", "q_initial")
-    return Rotation.from_quat(quaternion, scalar_first=True)
 
 
 def _choose(cables: _Node, requested: str | None) -> tuple[_Node, list[str]]:
@@ -300,14 +292,12 @@ def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
     kind = node.element.tag
     if kind not in CABLES:
         raise node.wrong(f"be one of {', '.join(CABLES)}", shown(kind))
-    reference = node.attribute("attachment_reference")
-    if reference not in ("com", "joint"):
-        raise node.wrong("be com or joint", shown(reference), "attachment_reference")
+    origin = com if node.about_com("attachment_reference") else np.zeros(3)
     properties = node.child("properties")
     lower = properties.find("force_min")
     if lower is None:
         notes["force_min is missing, taken as 0 N"] += 1
-    upper = properties.child("force_max").numbers(1)[0]
+    upper = properties.number("force_max")
     if upper > LARGEST:
         notes[f"force_max {upper:g} N, which stands for no limit, is taken as {LARGEST:g} N"] += 1
     data: dict[str, Any] = {
@@ -317,14 +307,14 @@ def _cable(node: _Node, com: np.ndarray, notes: Counter[str]) -> Cable:
     }
     used = {"force_min", "force_max"}
     if kind == "cable_linear_spring":
-        data["stiffness"] = properties.child("K").numbers(1)[0]  # CASPR divides it by the length: it is E A
+        data["stiffness"] = properties.number("K")  # CASPR divides it by the length: it is E A
         used |= {"K"}
     if kind in VARIABLE_STIFFNESS:
         notes[f"the variable stiffness of {kind} is left out"] += 1
     for extra in properties.children():
         if extra.element.tag not in used:
             notes[f"the property {shown(extra.element.tag)[1:-1]} of {kind} is left out"] += 1
-    return validate(data | _ends(node, com if reference == "com" else np.zeros(3), notes), Cable, node.where)
+    return validate(data | _ends(node, origin, notes), Cable, node.where)
 
 
 def _ends(node: _Node, origin: np.ndarray, notes: Counter[str]) -> dict[str, Any]:
@@ -344,10 +334,7 @@ def _ends(node: _Node, origin: np.ndarray, notes: Counter[str]) -> dict[str, Any
     ends: dict[str, Any] = {"attachment": (np.array(attachment.child("location").numbers(3)) + origin).tolist()}
     if anchor.element.tag == "attachment":
         return ends | {"anchor": anchor.child("location").numbers(3)}
-    pulley = {
-        "radius": anchor.child("pulley_radius").numbers(1)[0],
-        "axis": anchor.child("cable_entry_vector").numbers(3),
-    }
+    pulley = {"radius": anchor.number("pulley_radius"), "axis": anchor.child("cable_entry_vector").numbers(3)}
     return ends | {"anchor": anchor.child("fixed_location").numbers(3), "pulley": pulley}
 
 
@@ -357,7 +344,7 @@ def _link(point: _Node) -> int:
         return 0
     if point.element.tag != "attachment":
         raise point.wrong("be an attachment or a base_rotating_pulley", shown(point.element.tag))
-    number = point.child("link").numbers(1)[0]
+    number = point.number("link")
     if not number.is_integer():
         raise point.child("link").wrong("be 0 or 1", f"{number:g}")
     return int(number)

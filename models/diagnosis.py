@@ -38,9 +38,15 @@ def diagnose(robot: Robot | str | os.PathLike[str]) -> Diagnosis:
     A = dynamics.wrench_matrix(robot.home) * scale * rows
     lengths = dynamics.cable_lengths(robot.home)
     singular_values = np.linalg.svd(A, compute_uv=False)[: len(robot.platform.dof)]
+    rng = np.random.default_rng(0)
+    levels = np.tile(robot.home, (LEVEL_POSES, 1))
+    levels[:, :3] += robot.dof_mask[:3] * rng.uniform(-0.2, 0.2, size=(LEVEL_POSES, 3)) * lengths.min()
+    levels[:, 3:] = 0
+    turned = levels.copy()
+    turned[:, 3:] = robot.dof_mask[3:] * rng.uniform(-0.3, 0.3, size=(LEVEL_POSES, 3))
     rank, level, tilted = (
         int(np.linalg.matrix_rank(dynamics.wrench_matrix(poses) * scale * rows, rtol=RANK_TOLERANCE).max())
-        for poses in (robot.home, *_poses_about_home(robot, lengths))
+        for poses in (robot.home, levels, turned)
     )
     return Diagnosis(
         rank=rank,
@@ -51,16 +57,6 @@ def diagnose(robot: Robot | str | os.PathLike[str]) -> Diagnosis:
         reason=_why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else "",
         warnings=_implausible(robot),
     )
-
-
-def _poses_about_home(robot: Robot, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(0)
-    level = np.tile(robot.home, (LEVEL_POSES, 1))
-    level[:, :3] += robot.dof_mask[:3] * rng.uniform(-0.2, 0.2, size=(LEVEL_POSES, 3)) * lengths.min()
-    level[:, 3:] = 0
-    tilted = level.copy()
-    tilted[:, 3:] = robot.dof_mask[3:] * rng.uniform(-0.3, 0.3, size=(LEVEL_POSES, 3))
-    return level, tilted
 
 
 def _why(robot: Robot, A: np.ndarray, rank: int, lengths: np.ndarray) -> str:

@@ -43,15 +43,8 @@ class Dynamics(Displayed):
 
     The numeric core evaluates arrays if it supports the quantity and the size of the robot, otherwise CasADi.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-
-    Raises
-    ------
-    InputError
-        If `robot` is none of these. Every method raises it, in one line, for an argument of a wrong shape or value.
+    `robot` is a `Robot`, the name of one in the library, or the path of a robot file. Raises `InputError` if it is none
+    of these. Every method raises it, in one line, for an argument of a wrong shape or value.
     """
 
     def __init__(self, robot: Robot | str | os.PathLike[str]):
@@ -73,12 +66,8 @@ class Dynamics(Displayed):
 
         Each column is the force [N per N] and the moment about the platform's CoM [N m per N] of one cable.
 
-        Parameters
-        ----------
-        pose
-            (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6).
-        carrier_pose
-            The same of each carrier, (..., c, 6); default: at home.
+        - `pose`: (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6).
+        - `carrier_pose`: the same of each carrier, (..., c, 6); default: at home.
         """
         if numeric := self._numeric(pose, carrier_pose):
             return numeric.wrench_matrix(pose, carrier_pose)
@@ -153,19 +142,12 @@ class Dynamics(Displayed):
         wind. The carrier motion does not enter w; the argument exists for symmetry with `relative`, where it causes the
         disturbance D_B.
 
-        Parameters
-        ----------
-        pose, velocity, acceleration
-            (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivatives, (..., 6).
-        carrier_pose, carrier_velocity, carrier_acceleration
-            The same of each carrier, (..., c, 6); default: at home and at rest.
-        wind
-            Velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag.
-
-        Raises
-        ------
-        InputError
-            If an argument has a wrong shape or value, or wind is given and the robot's file has no `platform.aero`.
+        - `pose`, `velocity`, `acceleration`: (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time
+          derivatives, (..., 6).
+        - `carrier_pose`, `carrier_velocity`, `carrier_acceleration`: the same of each carrier, (..., c, 6); default: at
+          home and at rest.
+        - `wind`: velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag. Raises `InputError` if
+          the robot's file has no `platform.aero`.
         """
         motion = Motion(pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)
         if (wind is None or self.robot.platform.aero) and (numeric := self._numeric(*motion, wind)):
@@ -176,15 +158,9 @@ class Dynamics(Displayed):
     def carried_wrench(self, pose: Array, velocity: Array, acceleration: Array, load: Array) -> Array:
         """Return the wrench that a load fixed to the platform needs in addition to `required_wrench`, (..., 6), in {G}.
 
-        It is force [N] and moment about the platform's CoM [N m], weight included.
-
-        Parameters
-        ----------
-        pose, velocity, acceleration
-            As in `required_wrench`.
-        load
-            (..., 10): mass [kg], CoM in the platform frame (3) [m], and the inertia about that CoM in platform axes
-            (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2].
+        It is force [N] and moment about the platform's CoM [N m], weight included. Arguments as in
+        `required_wrench`. The `load` is (..., 10): mass [kg], CoM in the platform frame (3) [m], and the inertia about
+        that CoM in platform axes (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) [kg m^2].
         """
         motion = {"pose": pose, "velocity": velocity, "acceleration": acceleration}
         return self._call("carried_wrench", load=load, **motion)["w"]
@@ -224,24 +200,14 @@ class Dynamics(Displayed):
         thrust: Array,
         torque: Array,
     ) -> tuple[Array, Array]:
-        """Compute the accelerations of platform and quadrotor carriers as one system: a cable pulls at both its ends.
+        """Return the accelerations of platform, (..., 6), and quadrotor carriers, (..., c, 6), as one system.
 
-        Parameters
-        ----------
-        pose, velocity
-            Of the platform frame in {G}, (..., 6).
-        carrier_pose, carrier_velocity
-            Of the carriers in {G}, (..., c, 6).
-        tensions
-            (..., m) [N].
-        thrust
-            Of each carrier along its z axis, (..., c) [N].
-        torque
-            Of each carrier about its axes, (..., c, 3) [N m].
+        A cable pulls at both its ends. Carriers of other kinds have zero.
 
-        Returns
-        -------
-        Accelerations of the platform, (..., 6), and of the carriers, (..., c, 6); carriers of other kinds have zero.
+        - `pose`, `velocity`: of the platform frame in {G}, (..., 6).
+        - `carrier_pose`, `carrier_velocity`: of the carriers in {G}, (..., c, 6).
+        - `tensions`: (..., m) [N].
+        - `thrust`, `torque`: of each carrier along its z axis, (..., c) [N], and about its axes, (..., c, 3) [N m].
         """
         carriers = {"carrier_pose": carrier_pose, "carrier_velocity": carrier_velocity}
         given = {"tensions": tensions, "thrust": thrust, "torque": torque}
@@ -254,12 +220,8 @@ class Dynamics(Displayed):
     ) -> tuple[Array, Array]:
         """Linearise the dynamics, d(dx)/dt = A dx + B dt, about a state x = (pose, velocity) and tensions.
 
-        Arguments as in `acceleration`.
-
-        Returns
-        -------
-        A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2 per N]. The tensions are constant when
-        the platform moves; for elastic cables see `stiffness`.
+        Arguments as in `acceleration`. Returns A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2
+        per N]. The tensions are constant when the platform moves; for elastic cables see `stiffness`.
         """
         state = {"pose": pose, "velocity": velocity, "tensions": tensions, "carrier_pose": carrier_pose}
         result = self._call("linearisation", **state)
@@ -272,14 +234,10 @@ class Dynamics(Displayed):
         A small displacement delta, the translation of the CoM [m] and a rotation vector [rad], makes the wrench
         -K delta.
 
-        Parameters
-        ----------
-        pose, carrier_pose
-            As in `wrench_matrix`.
-        tensions
-            (..., m) [N].
-        elastic
-            True: elastic cables, each with its `stiffness`; False: constant tensions, only the geometry changes.
+        - `pose`, `carrier_pose`: as in `wrench_matrix`.
+        - `tensions`: (..., m) [N].
+        - `elastic`: True: elastic cables, each with its `stiffness`; False: constant tensions, only the geometry
+          changes.
 
         Raises
         ------
@@ -303,22 +261,17 @@ class Dynamics(Displayed):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute the natural frequencies of small undamped motions about an equilibrium.
 
-        Parameters
-        ----------
-        pose, tensions, carrier_pose
-            An equilibrium: (6,), (m,) [N] and (c, 6). Cables with zero tension are slack and are ignored.
-        elastic
-            False: inextensible cables, which permit 6 - rank motions, or none.
+        Returns frequencies, ascending (k,) [Hz], negative where the motion is unstable, and modes (6, k): twists of
+        translation of the CoM [m] and rotation vector [rad] in {G}.
+
+        - `pose`, `tensions`, `carrier_pose`: an equilibrium: (6,), (m,) [N] and (c, 6). Cables with zero tension are
+          slack and are ignored.
+        - `elastic`: False: inextensible cables, which permit 6 - rank motions, or none.
 
         Raises
         ------
         InputError
             If an argument has a wrong shape or value, or `elastic` and a cable has no stiffness.
-
-        Returns
-        -------
-        Frequencies, ascending (k,) [Hz], negative where the motion is unstable, and modes (6, k): twists of
-        translation of the CoM [m] and rotation vector [rad] in {G}.
         """
         home = self.robot.carrier_home
         places = home if carrier_pose is None else carrier_pose

@@ -6,7 +6,7 @@ The wrench that a motion needs is affine in the accelerations, w = M(q) ddq + h(
     carrier    F = - sum_i t_i u_i,   M = - sum_i (c_i x R_Q^T u_i) t_i       (M in its own axes)
 
 for the pull (F, M) of the cables i that a carrier holds, which leave it at c_i: what pulls the platform pulls the
-carrier back (`rigid_motion` has how a quadrotor moves with it). Coordinates are (x, y, z, roll, pitch, yaw) and their
+carrier back (`carriers` has how a quadrotor moves with it). Coordinates are (x, y, z, roll, pitch, yaw) and their
 derivatives. Source: Newton and Euler.
 """
 

@@ -5,7 +5,7 @@ Cable i runs from its anchor A_i on a carrier to its attachment B_i on the platf
     l_i = A_i - B_i,   u_i = l_i / |l_i|   (the direction in which it pulls the platform)
     A = [ u_1 ... u_m ; r_1 x u_1 ... r_m x u_m ],   r_i = R (b_i - c)   (about the CoM, c in the platform frame)
 
-Poses and points are CasADi SX, MX or DM; geometry is NumPy arrays with one row per cable. Source: paper F, Eqs. 2 to 5;
+Poses and points are CasADi SX, MX or DM. Source: paper F, Eqs. 2 to 5;
 paper C, Eqs. 1, 2, 5, 6 as corrected.
 """
 
@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from .cables.pulley import Exit, exit_points
+from .robot import Robot
 from .rotation import Matrix, rotation
 
 
@@ -23,39 +24,35 @@ def transform(pose: Matrix, points: np.ndarray) -> Matrix:
     return rotation(pose[3:6]) @ ca.DM(points.T) + pose[0:3]
 
 
-def anchors(points: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
-    """Place anchors `points` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), in {G}: (3, m) [m]."""
-    return _by_carrier(points, carrier_of_cable, carrier_pose, transform)
+def anchors(robot: Robot, carrier_pose: Matrix) -> Matrix:
+    """Place the anchors of a robot with carriers at `carrier_pose` (c, 6) in {G}: (3, m) [m]."""
+    return _by_carrier(robot, robot.anchors, carrier_pose, transform)
 
 
-def axes(directions: np.ndarray, carrier_of_cable: np.ndarray, carrier_pose: Matrix) -> Matrix:
-    """Turn axes `directions` (m, 3), given in the frames of carriers at `carrier_pose` (c, 6), into {G}: (3, m) [-]."""
-    return _by_carrier(directions, carrier_of_cable, carrier_pose, lambda pose, its: rotation(pose[3:6]) @ ca.DM(its.T))
+def axes(robot: Robot, carrier_pose: Matrix) -> Matrix:
+    """Turn the swivel axes of a robot's pulleys, with carriers at `carrier_pose` (c, 6), into {G}: (3, m) [-]."""
+    return _by_carrier(robot, robot.pulley_axes, carrier_pose, lambda pose, its: rotation(pose[3:6]) @ ca.DM(its.T))
 
 
 def _by_carrier(
-    vectors: np.ndarray,
-    carrier_of_cable: np.ndarray,
-    carrier_pose: Matrix,
-    move: Callable[[Matrix, np.ndarray], Matrix],
+    robot: Robot, vectors: np.ndarray, carrier_pose: Matrix, move: Callable[[Matrix, np.ndarray], Matrix]
 ) -> Matrix:
     """Return what a carrier's pose makes of the vectors of its cables, (3, m): one rotation a carrier."""
     columns: dict[int, Matrix] = {}
-    for carrier in np.unique(carrier_of_cable).tolist():
-        its = np.flatnonzero(carrier_of_cable == carrier)
+    owner = robot.carrier_of_cable
+    for carrier in np.unique(owner).tolist():
+        its = np.flatnonzero(owner == carrier)
         moved = move(carrier_pose[carrier, :].T, vectors[its])
         columns |= dict(zip(its.tolist(), ca.horzsplit(moved), strict=True))
     return ca.horzcat(*(columns[i] for i in range(len(vectors))))
 
 
-def cables(
-    attachments: np.ndarray, pose: Matrix, anchor_points: Matrix, axis_directions: Matrix, radii: np.ndarray
-) -> Exit:
+def cables(robot: Robot, pose: Matrix, anchor_points: Matrix, axis_directions: Matrix) -> Exit:
     """Return the `Exit` of the cables, in the frame of `pose` (6, 1), anchors (3, m) and axes (3, m)."""
-    return exit_points(anchor_points, axis_directions, radii, transform(pose, attachments))
+    return exit_points(anchor_points, axis_directions, robot.pulley_radii, transform(pose, robot.attachments))
 
 
-def wrench_matrix(attachments: np.ndarray, com: np.ndarray, pose: Matrix, directions: Matrix) -> Matrix:
+def wrench_matrix(robot: Robot, pose: Matrix, directions: Matrix) -> Matrix:
     """Return A, (6, m): force [N per N] and moment about the CoM [N m per N] of each cable, in the frame of `pose`."""
-    arms = rotation(pose[3:6]) @ ca.DM((attachments - com).T)  # (3, m)
+    arms = rotation(pose[3:6]) @ ca.DM((robot.attachments - np.array(robot.platform.com)).T)  # (3, m)
     return ca.vertcat(directions, ca.cross(arms, directions, 1))

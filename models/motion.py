@@ -14,18 +14,13 @@ from .arrays import Array
 class Motion(NamedTuple):
     """Coordinates (x, y, z, roll, pitch, yaw) of platform and carriers and their first two time derivatives.
 
-    Attributes
-    ----------
-    pose, velocity, acceleration
-        Of the platform frame, (..., 6) [m, rad].
-    carrier_pose, carrier_velocity, carrier_acceleration
-        Of the carriers, (..., c, 6), or (..., 6) of a single one; those that are None are at home and at rest.
+    Those of carriers that are None are at home and at rest.
     """
 
-    pose: Array
+    pose: Array  # of the platform frame, (..., 6) [m, rad]
     velocity: Array = None
     acceleration: Array = None
-    carrier_pose: Array = None
+    carrier_pose: Array = None  # of the carriers, (..., c, 6), or (..., 6) of a single one
     carrier_velocity: Array = None
     carrier_acceleration: Array = None
 

@@ -93,14 +93,9 @@ def _messages(robot: Robot, contents: Contents) -> Iterator[tuple[int, str, str,
         nanoseconds = max(round(1e9 * float(time)), 0)
         stamp = {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}
         placed = [(_of("xyz", row[:3]), _of("xyzw", q)) for row, q in zip(frames[k], turned[k], strict=True)]
+        parent = {"timestamp": stamp, "parent_frame_id": WORLD}
         transforms = [
-            {
-                "timestamp": stamp,
-                "parent_frame_id": WORLD,
-                "child_frame_id": name,
-                "translation": position,
-                "rotation": orientation,
-            }
+            {**parent, "child_frame_id": name, "translation": position, "rotation": orientation}
             for name, (position, orientation) in zip(names, placed, strict=True)
         ]
         yield nanoseconds, "/tf", "FrameTransforms", {"transforms": transforms}
@@ -119,26 +114,11 @@ def _messages(robot: Robot, contents: Contents) -> Iterator[tuple[int, str, str,
 def _cables(stamp: dict[str, int], ends: np.ndarray) -> dict[str, Any]:
     """Return the cables between their ends (m, 2, 3) as an entity of a scene."""
     identity = {"position": _of("xyz", np.zeros(3)), "orientation": _of("xyzw", np.array([0.0, 0.0, 0.0, 1.0]))}
-    lines = {
-        "type": LINE_LIST,
-        "pose": identity,
-        "thickness": 2.0,
-        "scale_invariant": True,
-        "points": [_of("xyz", point) for point in ends.reshape(-1, 3)],
-        "color": {"r": 0.2, "g": 0.4, "b": 0.7, "a": 1.0},
-        "colors": [],
-        "indices": [],
-    }
-    lifetime = {"sec": 0, "nsec": 0}
-    return {
-        "timestamp": stamp,
-        "frame_id": WORLD,
-        "id": "cables",
-        "lifetime": lifetime,
-        "frame_locked": True,
-        "metadata": [],
-        "lines": [lines],
-    }
+    points, colour = [_of("xyz", point) for point in ends.reshape(-1, 3)], {"r": 0.2, "g": 0.4, "b": 0.7, "a": 1.0}
+    look = {"thickness": 2.0, "scale_invariant": True, "points": points, "color": colour, "colors": [], "indices": []}
+    lasting = {"lifetime": {"sec": 0, "nsec": 0}, "frame_locked": True, "metadata": []}
+    lines = {"type": LINE_LIST, "pose": identity, **look}
+    return {"timestamp": stamp, "frame_id": WORLD, "id": "cables", **lasting, "lines": [lines]}
 
 
 def _of(names: str, row: np.ndarray) -> dict[str, float | None]:

@@ -159,23 +159,7 @@ def _misspelt_kind(detail: Any, model: type[BaseModel]) -> Any:
     return detail
 
 
-def _plainly(message: str) -> str:
-    """Return pydantic's message without its preamble, as "must be ..." where it has that form."""
-    message = message.removeprefix("Value error, ")
-    message = (
-        re.sub(r"^Input should ", "must ", message)
-        .replace("a valid tuple", "a list")
-        .replace("a valid dictionary", "a mapping")
-    )
-    return message[:1].lower() + message[1:]
-
-
 _TYPE = re.compile(r"(function-(after|before|plain|wrap)|literal|tuple|constrained-\w+)\[.*\]$")  # as pydantic names it
-
-
-def _type_in(place: tuple[Any, ...]) -> int | None:
-    """Return where pydantic's place of an error names a type first; None if nowhere."""
-    return next((i for i, key in enumerate(place) if _TYPE.match(str(key))), None)
 
 
 def _without_branches(details: list[Any]) -> list[Any]:
@@ -184,8 +168,17 @@ def _without_branches(details: list[Any]) -> list[Any]:
     It names the types in the place. A mapping is meant for a type that takes one, and so is a list; of a plain value
     all types report what they accept.
     """
-    details = [detail | {"msg": _plainly(detail["msg"])} for detail in details]
-    places = {detail["loc"][:at] for detail in details if (at := _type_in(detail["loc"])) is not None}
+    words = {
+        "Value error, ": "",
+        "Input should ": "must ",
+        "a valid tuple": "a list",
+        "a valid dictionary": "a mapping",
+    }
+    for old, new in words.items():
+        details = [detail | {"msg": detail["msg"].replace(old, new)} for detail in details]
+    details = [detail | {"msg": detail["msg"][:1].lower() + detail["msg"][1:]} for detail in details]
+    types = (next((i for i, key in enumerate(detail["loc"]) if _TYPE.match(str(key))), None) for detail in details)
+    places = {detail["loc"][:at] for detail, at in zip(details, types, strict=True) if at is not None}
     groups: dict[Any, list[Any]] = {}  # by the place of the choice, or by number where there is none
     for number, detail in enumerate(details):
         starts = (detail["loc"][:i] for i in range(len(detail["loc"])))

@@ -23,30 +23,16 @@ class RelativeDynamics(Displayed):
     `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.
     Each is (..., 6) [m, rad], since the only carrier needs no dimension of its own.
 
-    Parameters
-    ----------
-    robot
-        A `Robot` with one carrier, the name of one in the library, or the path of a robot file.
-
-    Attributes
-    ----------
-    functions
-        The CasADi Functions by name, with named inputs and outputs.
-
-    Raises
-    ------
-    InputError
-        If `robot` is none of these. Every method raises it, in one line, for an argument of a wrong shape or value.
+    `robot` is a `Robot` with one carrier, the name of one in the library, or the path of a robot file; `functions` are
+    the CasADi Functions by name, with named inputs and outputs. Raises `InputError` if the robot is none of these.
+    Every method raises it, in one line, for an argument of a wrong shape or value.
     """
 
     def __init__(self, robot: Robot | str | os.PathLike[str]):
-        robot = as_robot(robot)
-        if len(robot.carriers) != 1:
-            raise InputError(
-                f"relative must have a robot with one carrier, got {robot.name!r} with {len(robot.carriers)}"
-            )
-        self.robot = robot
-        self.functions: dict[str, ca.Function] = _relative_functions(robot)
+        self.robot = as_robot(robot)
+        if (count := len(self.robot.carriers)) != 1:
+            raise InputError(f"relative must have a robot with one carrier, got {self.robot.name!r} with {count}")
+        self.functions: dict[str, ca.Function] = _relative_functions(self.robot)
 
     @one_array
     def wrench_matrix(self, pose: Array) -> Array:
@@ -125,8 +111,8 @@ class RelativeDynamics(Displayed):
 def _relative_functions(robot: Robot) -> dict[str, ca.Function]:
     motion, names = Motion.symbols(6), list(Motion._fields)
     anchors, axes = ca.SX(robot.anchors.T), ca.SX(robot.pulley_axes.T)
-    run = kinematics.cables(robot.attachments, motion.pose, anchors, axes, robot.pulley_radii)
-    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), motion.pose, run.directions)
+    run = kinematics.cables(robot, motion.pose, anchors, axes)
+    A = kinematics.wrench_matrix(robot, motion.pose, run.directions)
     D_B = relative.base_disturbance(robot, motion)
     w = relative.relative_inertial_wrench(robot, motion) + D_B
     in_world = list(relative.motion_in_world(motion))

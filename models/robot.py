@@ -32,47 +32,12 @@ PLANES = {"x": [[0, 0], [1, 0], [0, 1]], "y": [[1, 0], [0, 0], [0, 1]], "z": [[1
 OBLIQUE = [[0.9, -0.25], [-0.45, -0.45], [0.0, 0.95]]  # (3, 2), from above
 
 
-class DisplayedRobot(Part):
-    """The base of `Robot`, whose numbers its headline, facts and picture show."""
-
-    def _headline(self) -> str:
-        robot: Any = self
-        kinds = [carrier.kind for carrier in robot.carriers]
-        carriers = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-        return f"{robot.name}: {robot.m} cable{'s' * (robot.m != 1)}; carriers: {carriers}"
-
-    def _facts(self) -> Iterable[Fact]:
-        robot: Any = self
-        return [
-            ("mass", quantity(robot.platform.mass, "kg")),
-            ("moves", ", ".join(robot.platform.dof)),
-            ("home", f"({quantity_row(robot.home)}) [m, rad]"),
-            ("cables there", quantity_range(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1), "m")),
-            ("t_min", quantity_range(robot.t_min, "N")),
-            ("t_max", quantity_range(robot.t_max, "N")),
-            ("drive", robot.drive),
-            ("source", printable(robot.source)),
-        ]
-
-    def _picture(self) -> str:
-        """Return cables and platform at home, in the plane of a planar robot, else obliquely from above."""
-        robot: Any = self
-        flat = [plane for name, plane in PLANES.items() if name not in robot.platform.dof]
-        view = np.array(flat[0] if flat else OBLIQUE)
-        anchors, attachments = robot.home_anchors @ view, robot.home_attachments @ view  # (m, 2)
-        rows = [i for pair in combinations(range(robot.m), 2) for i in (*pair, 0)] or [0]
-        body = attachments[rows]
-        body[2::3] = np.nan
-        cables: list[Curve] = [(*np.stack([a, b]).T, BLUE) for a, b in zip(anchors, attachments, strict=True)]
-        return picture([(*body.T, ORANGE), *cables], equal=True)
-
-
 def _without_default(schema: dict[str, Any]) -> None:
     """Remove a default that stands for one that depends on other fields."""
     del schema["default"]
 
 
-class Robot(DisplayedRobot):
+class Robot(Part):
     """A cable robot: one platform, carriers, cables. Frozen; built by `load` or by `Robot.model_validate`.
 
     Computations use the arrays below; each has one row per cable or carrier, in the order of the file.
@@ -219,6 +184,34 @@ class Robot(DisplayedRobot):
     @cached_property
     def _hash(self) -> int:  # a stream of measurements looks up what is known of its robot at each sample
         return hash((self.platform.mass, *self.t_max, *self.anchors.flat, *self.attachments.flat))
+
+    def _headline(self) -> str:
+        kinds = [carrier.kind for carrier in self.carriers]
+        carriers = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
+        return f"{self.name}: {self.m} cable{'s' * (self.m != 1)}; carriers: {carriers}"
+
+    def _facts(self) -> Iterable[Fact]:
+        return [
+            ("mass", quantity(self.platform.mass, "kg")),
+            ("moves", ", ".join(self.platform.dof)),
+            ("home", f"({quantity_row(self.home)}) [m, rad]"),
+            ("cables there", quantity_range(np.linalg.norm(self.home_anchors - self.home_attachments, axis=1), "m")),
+            ("t_min", quantity_range(self.t_min, "N")),
+            ("t_max", quantity_range(self.t_max, "N")),
+            ("drive", self.drive),
+            ("source", printable(self.source)),
+        ]
+
+    def _picture(self) -> str:
+        """Return cables and platform at home, in the plane of a planar robot, else obliquely from above."""
+        flat = [plane for name, plane in PLANES.items() if name not in self.platform.dof]
+        view = np.array(flat[0] if flat else OBLIQUE)
+        anchors, attachments = self.home_anchors @ view, self.home_attachments @ view  # (m, 2)
+        rows = [i for pair in combinations(range(self.m), 2) for i in (*pair, 0)] or [0]
+        body = attachments[rows]
+        body[2::3] = np.nan
+        cables: list[Curve] = [(*np.stack([a, b]).T, BLUE) for a, b in zip(anchors, attachments, strict=True)]
+        return picture([(*body.T, ORANGE), *cables], equal=True)
 
     @property
     def m(self) -> int:

@@ -7,11 +7,9 @@
 Source: paper F, Eqs. 1, 27, 28, 31 as corrected.
 """
 
-from typing import Any, TypeAlias
-
 import casadi as ca
 
-Matrix: TypeAlias = Any  # CasADi SX, MX or DM: what goes in comes out
+from .arrays import Matrix
 
 
 def rotation(angles: Matrix) -> Matrix:
@@ -53,15 +51,11 @@ def body_rate(angles: Matrix, rates: Matrix) -> Matrix:
     return rate_matrix(angles) @ rates
 
 
-def body_acceleration(angles: Matrix, rates: Matrix, accelerations: Matrix) -> Matrix:
-    """Return alpha = dP dTheta + P ddTheta, (3, 1), in the turned frame [rad/s^2]."""
-    return rate_matrix_derivative(angles, rates) @ rates + rate_matrix(angles) @ accelerations
-
-
 def turning(pose: Matrix, velocity: Matrix, acceleration: Matrix) -> tuple[Matrix, Matrix, Matrix]:
     """Return R, Omega and alpha of a frame from its coordinates and their derivatives: (3, 3), (3, 1) and (3, 1)."""
     angles, rates = pose[3:6], velocity[3:6]
-    return rotation(angles), body_rate(angles, rates), body_acceleration(angles, rates, acceleration[3:6])
+    alpha = rate_matrix_derivative(angles, rates) @ rates + rate_matrix(angles) @ acceleration[3:6]
+    return rotation(angles), body_rate(angles, rates), alpha
 
 
 def inverse_rate_matrix(angles: Matrix) -> Matrix:

@@ -14,20 +14,10 @@ _COLUMNS = {"anchor": 0, "attachment": 3, "radius": 6}  # of `Mechanics.columns_
 def derivatives(
     robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray, names: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return how wrenches depend on numbers of the cables, by the names of `Robot.parameter_values`.
+    """Return how wrenches depend on p numbers of the cables, by the `names` of `Robot.parameter_values`.
 
-    Parameters
-    ----------
-    robot
-        At whose numbers the derivatives are taken.
-    pose, carrier_pose
-        Of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
-    names
-        Of the p numbers.
-
-    Returns
-    -------
-    The derivative by each number of the column of its cable, (n, 6, p) [1/m, -], and the index of that cable, (p,).
+    That is the derivative by each number of the column of its cable, (n, 6, p) [1/m, -], and the index of that cable,
+    (p,), at poses of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
 
     Raises `ValueError` if the robot has no such number; `InputError` if the robot has more cables or carriers than
     the numeric core has room for.

@@ -39,24 +39,20 @@ class WorldFunctions:
 
     @cached_property
     def _anchors(self) -> Matrix:
-        return kinematics.anchors(self._robot.anchors, self._robot.carrier_of_cable, self._symbols["carrier_pose"])
+        return kinematics.anchors(self._robot, self._symbols["carrier_pose"])
 
     @cached_property
     def _axes(self) -> Matrix:
-        return kinematics.axes(self._robot.pulley_axes, self._robot.carrier_of_cable, self._symbols["carrier_pose"])
+        return kinematics.axes(self._robot, self._symbols["carrier_pose"])
 
     @cached_property
     def _exit(self) -> Exit:
         """Return how the cables run."""
-        robot = self._robot
-        return kinematics.cables(
-            robot.attachments, self._symbols["pose"], self._anchors, self._axes, robot.pulley_radii
-        )
+        return kinematics.cables(self._robot, self._symbols["pose"], self._anchors, self._axes)
 
     @cached_property
     def _A(self) -> Matrix:
-        com = np.array(self._robot.platform.com)
-        return kinematics.wrench_matrix(self._robot.attachments, com, self._symbols["pose"], self._exit.directions)
+        return kinematics.wrench_matrix(self._robot, self._symbols["pose"], self._exit.directions)
 
     @cached_property
     def _w(self) -> Matrix:

@@ -61,10 +61,10 @@ def _solved(robot: Robot, pose: np.ndarray, carriers: np.ndarray, lengths: np.nd
     c, m, force, gravity = len(robot.carriers), robot.m, robot.force_scale, np.array(robot.gravity)
     tilt, moved, t, missing = ca.SX.sym("tilt", 2), ca.SX.sym("moved", 5, c), ca.SX.sym("t", m), ca.SX.sym("missing", 6)
     at, placed = ca.vertcat(pose[:3], tilt, pose[5]), ca.vertcat(moved, ca.DM(carriers[:, 5]).T).T  # (c, 6)
-    anchors = kinematics.anchors(robot.anchors, robot.carrier_of_cable, placed)
-    axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, placed)
-    run = kinematics.cables(robot.attachments, at, anchors, axes, robot.pulley_radii)
-    A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), at, run.directions)
+    anchors = kinematics.anchors(robot, placed)
+    axes = kinematics.axes(robot, placed)
+    run = kinematics.cables(robot, at, anchors, axes)
+    A = kinematics.wrench_matrix(robot, at, run.directions)
     scale = np.repeat([1.0, 1 / robot.length], 3) / force
     weight = np.append(robot.platform.mass * gravity, np.zeros(3))
     rows = [scale * (A @ t + weight) + missing, (ca.vec(run.lengths) - lengths) / robot.length]

@@ -196,7 +196,8 @@ def test_importing_is_cheap():
     heavy = {"xarray", "qpsolvers", "osqp", "matplotlib.pyplot", "scipy.optimize"}
     for statement in ("import towline", "import towline.models", "import towline.solvers", "import towline.cli.main"):
         assert not heavy & imported_by(statement), statement
-    assert "casadi" not in imported_by("import towline.cli.main")
+    for statement in ("import towline.cli.main", "import towline; towline.load('wang-flying-quadrotor')"):
+        assert "casadi" not in imported_by(statement), statement
 
 
 def test_no_name_hides_a_module():

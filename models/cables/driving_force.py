@@ -3,7 +3,12 @@
     T(t) = A^-1 (M ddX + F + D_B - W_e - A dT)       dT = dT_C + dT_K
 
 T is the steady tension that the motors give, dT what the vibration adds at the end of the cable; the platform feels
-F = T + dT. The cable's part is in `element_chain`, the platform's in `Dynamics.relative`.
+F = T + dT. The platform's part is in `Dynamics.relative`. The cable's is, with B moved by dB = dx_B + [dTheta]x R b,
+
+    dT_C = C (l(B + dB) - l(B)) / dt      dT_K = E A / e (c . (dB - dx_(n-1)) + de)
+
+where the last of the n elements, of length e = l / n, alone holds the attachment and shares the elongation equally;
+`ElementChain` has the matrices of the whole chain.
 
 Source: paper F, section V, steps 1 to 8, where step 7 prints T' for dT; Eqs. 8 to 23 and 38.
 """
@@ -21,30 +26,21 @@ from ..batch import as_array
 from ..dynamics import Dynamics
 from ..points import rotations
 from ..robot import Robot
-from . import element_chain
+from .element_chain import MOST
 
 SINGULAR = 1e-9  # of the largest singular value of A: what is below counts as zero
 
 
 @dataclass(frozen=True)
 class DrivingForce(Displayed):
-    """The result of `driving_force`, at N instants for m cables.
+    """The result of `driving_force`, at N instants for m cables: forces in [N], (N, m).
 
-    Attributes
-    ----------
-    time
-        (N,) [s].
-    lengths
-        Distances from anchor to attachment without vibration [m], (N, m).
-    T
-        Steady tension that the motors give [N], (N, m). It may be outside the limits or below zero.
-    dT_C, dT_K
-        Increments by damping and by elasticity [N], (N, m).
-    residual
-        Norm of A (T + dT) - w, moments over `Robot.length` [N], (N,): above rounding only where the cables cannot
-        give the wrench w at all, because A is singular or there are fewer than six.
-    rank
-        Of A, (N,).
+    - `time`: (N,) [s]. `lengths`: distances from anchor to attachment without vibration [m], (N, m).
+    - `T`: steady tension that the motors give. It may be outside the limits or below zero.
+    - `dT_C`, `dT_K`: increments by damping and by elasticity.
+    - `residual`: norm of A (T + dT) - w, moments over `Robot.length` [N], (N,): above rounding only where the cables
+      cannot give the wrench w at all, because A is singular or there are fewer than six.
+    - `rank`: of A, (N,).
     """
 
     time: np.ndarray
@@ -92,37 +88,28 @@ def driving_force(
     coordinates, T solves the equations in the least-squares sense (moments over `Robot.length`), least norm again, and
     `residual` is the wrench that is missing; nothing is raised.
 
-    Parameters
-    ----------
-    robot
-        With one carrier, point anchors, and stiffness and damping for every cable.
-    pose, velocity, acceleration
-        Of the platform frame relative to {A}, expressed in {A}, (N, 6).
-    vibration
-        (dx_B, dTheta): small displacement of the platform frame's origin [m] and small turn [rad], in {G}, (N, 6).
-        Each row is what one time step adds to the steady pose, as the paper has it: dT_C divides it by `time_step`.
-    time_step
-        Time step dt of the paper [s].
-    elements
-        Number of elements of each cable, n of the paper.
-    base
-        Pose, velocity and acceleration of {A} in {G}, (N, 6) each; default: at home and at rest.
-    wind
-        Velocity of the air in {G} [m/s], (N, 3) or (3,); default: no air.
-    pretension
-        Tension of each cable before the vibration [N], broadcast to (N, m): an element is slack if the vibration takes
-        more than this. 0 is the paper's rule, by which dT_K is never negative; `inf` keeps every cable taut.
-    winding
-        "paid out": the winch pays out what the steady motion takes, so that this adds nothing to dT_K. "printed": the
-        paper's Eq. 13 to the letter, where each element is lengthened by (l(t + dt) - l(t)) / n in every step (the
-        last one repeats); at any usual speed this alone is far more than T.
+    - `robot`: with one carrier, point anchors, and stiffness and damping for every cable.
+    - `pose`, `velocity`, `acceleration`: of the platform frame relative to {A}, expressed in {A}, (N, 6).
+    - `vibration`: (dx_B, dTheta): small displacement of the platform frame's origin [m] and small turn [rad], in {G},
+      (N, 6). Each row is what one time step adds to the steady pose, as the paper has it: dT_C divides it by
+      `time_step`.
+    - `time_step`: time step dt of the paper [s].
+    - `elements`: number of elements of each cable, n of the paper.
+    - `base`: pose, velocity and acceleration of {A} in {G}, (N, 6) each; default: at home and at rest.
+    - `wind`: velocity of the air in {G} [m/s], (N, 3) or (3,); default: no air.
+    - `pretension`: tension of each cable before the vibration [N], broadcast to (N, m): an element is slack if the
+      vibration takes more than this. 0 is the paper's rule, by which dT_K is never negative; `inf` keeps every cable
+      taut.
+    - `winding`: "paid out": the winch pays out what the steady motion takes, so that this adds nothing to dT_K.
+      "printed": the paper's Eq. 13 to the letter, where each element is lengthened by (l(t + dt) - l(t)) / n in every
+      step (the last one repeats); at any usual speed this alone is far more than T.
 
     Raises `InputError` if an argument has a wrong shape or value, or the robot has several carriers, a pulley, or a
     cable without stiffness or damping.
     """
     stiffness, damping = _cable_constants(robot)
     time_step = number("time_step", time_step, TINY, HUGE)
-    elements = whole_number("elements", elements, 1, element_chain.MOST)
+    elements = whole_number("elements", elements, 1, MOST)
     pose = as_array("pose", pose, (6,))
     if pose.ndim != 2:
         raise InputError(f"pose must have the shape (N, 6), one row per instant, got {pose.shape}")
@@ -149,10 +136,15 @@ def driving_force(
     lengths = np.linalg.norm(vectors, axis=-1)
     to_A = rotations(carrier_pose[:, 3:]).transpose(0, 2, 1)
     in_A = np.concatenate([np.einsum("nij,nj->ni", to_A, part) for part in np.split(vibration, 2, axis=1)], axis=1)
-    displacements = element_chain.attachment_displacements(arms, in_A)
-    dT_C = element_chain.damping_increment(vectors, damping, displacements, time_step)
-    share = _unwound(lengths) / elements if winding == "printed" else 0.0
-    dT_K = element_chain.elastic_increment(vectors, stiffness, displacements, elements, share, pretension)
+    dB = in_A[:, None, :3] + np.cross(in_A[:, None, 3:], arms)
+    after = np.linalg.norm(vectors - dB, axis=-1)
+    # l(B + dB) - l(B) without the cancellation of two nearly equal lengths
+    dT_C = damping * (np.einsum("nmi,nmi->nm", dB - 2 * vectors, dB) / (after + lengths)) / time_step
+    end = -np.einsum("nmi,nmi->nm", vectors, dB) / lengths
+    before_end = end * ((elements - 1) / elements)
+    steps = np.diff(lengths, axis=0)
+    unwound = np.concatenate([steps, steps[-1:]]) if len(steps) and winding == "printed" else 0.0
+    dT_K = np.maximum(stiffness * elements / lengths * (end - before_end + unwound / elements), -pretension)
 
     T, residual, rank = _traction(robot, A, w, dT_C + dT_K)
     return DrivingForce(np.arange(instants) * time_step, lengths, T, dT_C, dT_K, residual, rank)
@@ -188,11 +180,6 @@ def _pretension(value: Any, shape: tuple[int, int]) -> np.ndarray:
     if not (array >= 0).all():
         raise InputError(f"pretension must have numbers >= 0, got {array.min():g}")
     return array
-
-
-def _unwound(lengths: np.ndarray) -> np.ndarray:
-    steps = np.diff(lengths, axis=0)
-    return np.concatenate([steps, steps[-1:]]) if len(steps) else np.zeros_like(lengths)
 
 
 def _traction(robot: Robot, A: np.ndarray, w: np.ndarray, dT: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

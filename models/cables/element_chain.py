@@ -16,11 +16,7 @@ with equal elements dx_j = (j / n) dx_n. The chain then equals E A / l times the
 The slack switch: sgn(j) = 1 while the element, with the tension it had before, still pulls. An element that would have
 to push carries nothing, so that its increment is minus what it had. With no tension before, that is the paper's rule.
 
-The damping increment is C times what the vibration adds to the length, over one time step:
-
-    dT_C = C (l(B + dB) - l(B)) / dt      dB = dx_B + [dTheta]x R b
-
-Source: paper F, section III, Eqs. 8 to 23, corrected: k_l has E A / e (Eq. 15 prints E A / de); sgn follows from the
+Source: paper F, section III, Eqs. 12 to 22, corrected: k_l has E A / e (Eq. 15 prints E A / de); sgn follows from the
 elongation of an element (Eq. 16 takes the signs of its nodes' displacements, by which element 1, whose node 0 is
 held, never pulls); increments have a sign (Eq. 22 takes the norm).
 """
@@ -46,28 +42,14 @@ MOST = 1_000_000  # elements
 class ElementChain(Displayed):
     """One cable as n axial elements, straight from its anchor to its attachment, in {G} or any other frame.
 
-    Parameters
-    ----------
-    anchor, attachment
-        A and B, (3,) [m].
-    stiffness
-        E A [N].
-    elements
-        n.
-    pretension
-        Tension of every element before the increments [N]; `inf`: the cable cannot become slack.
-
-    Raises
-    ------
-    InputError
-        If a number is not of its kind, or the cable has no length.
+    Raises `InputError` if a number is not of its kind, or the cable has no length.
     """
 
-    anchor: Any
-    attachment: Any
-    stiffness: float
-    elements: int
-    pretension: float = 0.0
+    anchor: Any  # A, (3,) [m]
+    attachment: Any  # B, (3,) [m]
+    stiffness: float  # E A [N]
+    elements: int  # n
+    pretension: float = 0.0  # of every element before the increments [N]; `inf`: the cable cannot become slack
 
     def __post_init__(self):
         for name in ("anchor", "attachment"):
@@ -121,12 +103,8 @@ class ElementChain(Displayed):
     def node_forces(self, displacements: Any, winding: float = 0.0) -> np.ndarray:
         """Return the increments of the forces that hold each node [N], (n + 1, 3): K_n dX + K_l dE.
 
-        Parameters
-        ----------
-        displacements
-            Of the nodes [m], (n + 1, 3).
-        winding
-            de [m]: additional elongation of each element, its share of the cable that the winch did not pay out.
+        `displacements` are those of the nodes [m], (n + 1, 3); `winding` is de [m], the additional elongation of each
+        element, its share of the cable that the winch did not pay out.
         """
         # An element that would have to push loses what it had.
         carried = np.maximum(self._element_stiffness * self.elongations(displacements, winding), -self.pretension)
@@ -150,56 +128,3 @@ class ElementChain(Displayed):
 
         n = self.elements
         return csr_array(eye_array(n, n + 1, k=1) - eye_array(n, n + 1))
-
-
-def elastic_increment(
-    vectors: np.ndarray,
-    stiffness: np.ndarray,
-    displacements: np.ndarray,
-    elements: int,
-    winding: np.ndarray | float = 0.0,
-    pretension: np.ndarray | float = 0.0,
-) -> np.ndarray:
-    """Return dT_K of many cables [N], (...): `ElementChain.end_increment` without the matrices.
-
-    The attachment is node n, which the last element alone holds, and that one shares the elongation equally.
-
-    - `vectors`: A - B of each cable [m], (..., 3).
-    - `stiffness`: E A of each [N], (...).
-    - `displacements`: of the attachments [m], (..., 3).
-    - `elements`: n.
-    - `winding`: de of each element [m], (...).
-    - `pretension`: tension of each cable before [N], (...); `inf`: it cannot become slack.
-    """
-    lengths = np.linalg.norm(vectors, axis=-1)
-    end = -np.einsum("...i,...i->...", vectors, displacements) / lengths
-    before_end = end * ((elements - 1) / elements)
-    increment = stiffness * elements / lengths * (end - before_end + winding)
-    return np.maximum(increment, -np.asarray(pretension))
-
-
-def damping_increment(
-    vectors: np.ndarray, damping: np.ndarray, displacements: np.ndarray, time_step: float
-) -> np.ndarray:
-    """Return dT_C = C (l(B + dB) - l(B)) / dt of many cables [N], (...).
-
-    - `vectors`: A - B of each cable [m], (..., 3).
-    - `damping`: C of each [N s/m], (...).
-    - `displacements`: dB of the attachments [m], (..., 3).
-    - `time_step`: dt [s].
-    """
-    before = np.linalg.norm(vectors, axis=-1)
-    after = np.linalg.norm(vectors - displacements, axis=-1)
-    # after - before, without the cancellation of two nearly equal lengths
-    change = np.einsum("...i,...i->...", displacements - 2 * vectors, displacements) / (after + before)
-    return damping * change / time_step
-
-
-def attachment_displacements(arms: np.ndarray, vibration: np.ndarray) -> np.ndarray:
-    """Return dB = dx_B + [dTheta]x R b [m], (..., m, 3), for a small change of pose.
-
-    - `arms`: R b of each cable [m], (..., m, 3), in the frame of `vibration`.
-    - `vibration`: (dx_B, dTheta): displacement of the platform's origin [m] and small turn [rad], (..., 6).
-    """
-    shift, turn = vibration[..., None, :3], vibration[..., None, 3:]
-    return shift + np.cross(turn, arms)

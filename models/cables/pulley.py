@@ -34,63 +34,38 @@ from ..rotation import Matrix
 
 
 class Exit(NamedTuple):
-    """The points and directions in which m cables leave their pulleys, in the frame of pulleys and attachments.
+    """The points and directions in which m cables leave their pulleys, in the frame of pulleys and attachments."""
 
-    Attributes
-    ----------
-    points
-        Points C at which the cables leave their sheaves [m], (3, m).
-    directions
-        Unit vectors u along which the cables pull at their attachments, (3, m).
-    lengths
-        Lengths l from the anchors over the sheaves to the attachments [m], (m, 1).
-    wraps
-        Wrap angles theta of the cables on their sheaves [rad], (m, 1), from 0 to 2 pi; 0 for a point anchor.
-    """
-
-    points: Matrix
-    directions: Matrix
-    lengths: Matrix
-    wraps: Matrix
+    points: Matrix  # C, at which the cables leave their sheaves [m], (3, m)
+    directions: Matrix  # unit vectors u along which the cables pull at their attachments, (3, m)
+    lengths: Matrix  # l from the anchors over the sheaves to the attachments [m], (m, 1)
+    wraps: Matrix  # angles theta on the sheaves [rad], (m, 1), from 0 to 2 pi; 0 for a point anchor
 
 
 def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -> Exit:
     """Compute where m cables leave their pulleys, for CasADi SX, MX or DM in any frame that all arguments share.
 
-    Parameters
-    ----------
-    anchor
-        Points A at which the cables come up the swivel axes [m], (3, m).
-    axis
-        Swivel axes k, unit vectors in the direction in which the cables come up, (3, m).
-    radius
-        Radii r of the sheaves [m], numbers, (m,); zero: a point anchor, whose axis has no effect.
-    attachment
-        Attachments B [m], (3, m).
+    - `anchor`: points A at which the cables come up the swivel axes [m], (3, m).
+    - `axis`: swivel axes k, unit vectors in the direction in which the cables come up, (3, m).
+    - `radius`: radii r of the sheaves [m], numbers, (m,); zero: a point anchor, whose axis has no effect.
+    - `attachment`: attachments B [m], (3, m).
 
-    Raises
-    ------
-    InputError
-        If a radius is below zero.
+    Raises `InputError` if a radius is below zero.
     """
     radii = as_array("radius", radius, ()).ravel()
     if not (radii >= 0).all():
         raise InputError(f"radius must have numbers >= 0, got {radii.min():g}")
-    columns = []
-    for i, r in enumerate(np.broadcast_to(radii, attachment.shape[1])):
-        place = _point_anchor if r == 0 else _over_sheave
-        columns.append(place(anchor[:, i], axis[:, i], float(r), attachment[:, i]))
+    ends = zip(*(ca.horzsplit(each) for each in (anchor, axis, attachment)), strict=True)
+    columns = [_exit(*end, float(r)) for end, r in zip(ends, np.broadcast_to(radii, attachment.shape[1]), strict=True)]
     points, directions, lengths, wraps = zip(*columns, strict=True)
     return Exit(ca.horzcat(*points), ca.horzcat(*directions), ca.vertcat(*lengths), ca.vertcat(*wraps))
 
 
-def _point_anchor(anchor: Matrix, axis: Matrix, radius: float, attachment: Matrix) -> Exit:
-    vector = anchor - attachment
-    length = ca.norm_2(vector)
-    return Exit(anchor, vector / length, length, 0 * length)
-
-
-def _over_sheave(anchor: Matrix, axis: Matrix, radius: float, attachment: Matrix) -> Exit:
+def _exit(anchor: Matrix, axis: Matrix, attachment: Matrix, radius: float) -> Exit:
+    if radius == 0:
+        vector = anchor - attachment
+        length = ca.norm_2(vector)
+        return Exit(anchor, vector / length, length, 0 * length)
     offset = attachment - anchor
     up = ca.dot(offset, axis)  # d . k
     across = offset - up * axis

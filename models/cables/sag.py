@@ -37,48 +37,36 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 @dataclass(frozen=True)
 class SaggingCable(Displayed):
-    """Elastic catenaries at rest, one or a batch of shape (...).
+    """Elastic catenaries at rest, one or a batch of shape (...)."""
 
-    Attributes
-    ----------
-    start, length, stiffness, weight, up
-        As given to `hang`; `up` of unit length.
-    across
-        Horizontal unit vector from start to end, (..., 3); zero for a cable in a vertical line.
-    H, V_m
-        Horizontal tension, and vertical component of the tension towards the end at mid-cable [N], (...).
-    start_force, end_force
-        Forces of the cable on the bodies that hold its ends [N], (..., 3). Their sum is its weight.
-    start_tension, end_tension
-        Their norms [N], (...).
-    iterations
-        Newton steps that were taken, for the slowest of the batch.
-    """
-
-    start: np.ndarray
+    start: np.ndarray  # as given to `hang`, like the next four; `up` of unit length
     length: np.ndarray
     stiffness: float
     weight: float
     up: np.ndarray
-    across: np.ndarray
-    H: np.ndarray
-    V_m: np.ndarray
-    iterations: int
+    across: np.ndarray  # horizontal unit vector from start to end, (..., 3); zero for a cable in a vertical line
+    H: np.ndarray  # horizontal tension [N], (...)
+    V_m: np.ndarray  # vertical component of the tension towards the end at mid-cable [N], (...)
+    iterations: int  # Newton steps that were taken, for the slowest of the batch
 
     @property
-    def start_force(self) -> np.ndarray:  # noqa: D102
+    def start_force(self) -> np.ndarray:
+        """Return the force of the cable on what holds its start [N], (..., 3); with `end_force` it is the weight."""
         return self._vector(self.H, self._V(0.0))
 
     @property
-    def end_force(self) -> np.ndarray:  # noqa: D102
+    def end_force(self) -> np.ndarray:
+        """Return the force of the cable on what holds its end [N], (..., 3)."""
         return -self._vector(self.H, self._V(1.0))
 
     @property
-    def start_tension(self) -> np.ndarray:  # noqa: D102
+    def start_tension(self) -> np.ndarray:
+        """Return the norm of `start_force` [N], (...)."""
         return np.hypot(self.H, self._V(0.0))
 
     @property
-    def end_tension(self) -> np.ndarray:  # noqa: D102
+    def end_tension(self) -> np.ndarray:
+        """Return the norm of `end_force` [N], (...)."""
         return np.hypot(self.H, self._V(1.0))
 
     def points(self, fractions: Any) -> np.ndarray:
@@ -109,25 +97,14 @@ class SaggingCable(Displayed):
 def hang(start: Any, end: Any, length: Any, stiffness: float, weight: float, up: Any = (0.0, 0.0, 1.0)) -> SaggingCable:
     """Hang cables between two points each, at rest.
 
-    Parameters
-    ----------
-    start, end
-        Positions of the ends [m], (..., 3); for a robot's cable, its anchor and its attachment.
-    length
-        Unstrained length L0 [m], (...).
-    stiffness
-        E A [N]; `inf`: it does not stretch, and then must be longer than the distance of its ends.
-    weight
-        Weight per unstrained length, w = rho g [N/m], above zero (`elastic`: a cable without weight).
-    up
-        Against gravity, (3,), of any length.
+    - `start`, `end`: positions of the ends [m], (..., 3); for a robot's cable, its anchor and its attachment.
+    - `length`: unstrained length L0 [m], (...).
+    - `stiffness`: E A [N]; `inf`: it does not stretch, and then must be longer than the distance of its ends.
+    - `weight`: weight per unstrained length, w = rho g [N/m], above zero (`elastic`: a cable without weight).
+    - `up`: against gravity, (3,), of any length.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value, or a cable that does not stretch is too short.
-    SolverError
-        If Newton's method did not meet the ends within 1e-14 of the length.
+    Raises `InputError` if an argument has a wrong shape or value, or a cable that does not stretch is too short;
+    `SolverError` if Newton's method did not meet the ends within 1e-14 of the length.
     """
     stiffness = number("stiffness", stiffness, TINY, np.inf)
     weight = number("weight", weight, TINY, HUGE)
@@ -181,7 +158,11 @@ def _forces(spans: np.ndarray, softness: np.ndarray) -> tuple[np.ndarray, int]:
     # From a force along the chord: `BEGIN` and what stretches the cable to it.
     stretched = np.divide(chord - 1, softness, out=np.zeros_like(chord), where=chord > 1)
     forces = spans * np.divide(BEGIN + stretched, chord, out=np.zeros_like(chord), where=x > 0)
-    forces[1] = np.where(x > 0, forces[1], _vertical(z, softness))
+    # In a vertical line: taut, or folded where its ends are nearer than its length.
+    folded = z / (softness + 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        taut = np.sign(z) * (np.abs(z) - 1) / softness
+    forces[1] = np.where(x > 0, forces[1], np.where(np.abs(folded) <= 0.5, folded, taut))
     left, steps = np.flatnonzero(x > 0), 0
     while left.size:
         if steps == ITERATIONS:
@@ -195,14 +176,6 @@ def _forces(spans: np.ndarray, softness: np.ndarray) -> tuple[np.ndarray, int]:
         left = left[~(np.abs(misses).max(axis=0) <= TOLERANCE * np.maximum(1, chord[left]))]
         steps += 1
     return forces, steps
-
-
-def _vertical(z: np.ndarray, softness: np.ndarray) -> np.ndarray:
-    """Return V of a cable in a vertical line, (k,): taut, or folded where its ends are nearer than its length."""
-    folded = z / (softness + 2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        taut = np.sign(z) * (np.abs(z) - 1) / softness
-    return np.where(np.abs(folded) <= 0.5, folded, taut)
 
 
 def _misses(forces: np.ndarray, spans: np.ndarray, softness: np.ndarray) -> np.ndarray:

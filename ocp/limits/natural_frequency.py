@@ -31,8 +31,8 @@ class NaturalFrequency(Limit):
     def values(self, state: State) -> ca.SX:
         """Return the entries of the stiffness and then of the inertia about the CoM, (2 k^2, 1)."""
         robot, pose, t = state.robot, state.platform.pose, state.tensions
-        axes = kinematics.axes(robot.pulley_axes, robot.carrier_of_cable, state.carrier_poses)
-        A = kinematics.wrench_matrix(robot.attachments, np.array(robot.platform.com), pose, state.run.directions)
+        axes = kinematics.axes(robot, state.carrier_poses)
+        A = kinematics.wrench_matrix(robot, pose, state.run.directions)
         K = tension_stiffness(robot, pose, state.anchors, axes, t) + cable_stiffness(robot, A, state.run.lengths, t)
         R = rotation(pose[3:6])
         M = ca.diagcat(robot.platform.mass * ca.SX.eye(3), R @ ca.DM(robot.inertia) @ R.T)

@@ -73,7 +73,7 @@ class State(Displayed):
     @cached_property
     def anchors(self) -> ca.SX:
         """Return the anchors, (3, m) [m]."""
-        return kinematics.anchors(self.robot.anchors, self.robot.carrier_of_cable, self.carrier_poses)
+        return kinematics.anchors(self.robot, self.carrier_poses)
 
     @cached_property
     def attachments(self) -> ca.SX:
@@ -83,9 +83,8 @@ class State(Displayed):
     @cached_property
     def run(self) -> Exit:
         """Return directions, leaving points and lengths of the cables."""
-        axes = kinematics.axes(self.robot.pulley_axes, self.robot.carrier_of_cable, self.carrier_poses)
-        radii = self.robot.pulley_radii
-        return kinematics.cables(self.robot.attachments, self.platform.pose, self.anchors, axes, radii)
+        axes = kinematics.axes(self.robot, self.carrier_poses)
+        return kinematics.cables(self.robot, self.platform.pose, self.anchors, axes)
 
     @cached_property
     def efforts(self) -> list[tuple[Effort, ...]]:
