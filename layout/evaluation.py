@@ -4,7 +4,9 @@ The characteristic length stays that of the robot's file, whatever the attachmen
 change the unit in which it is measured.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -27,6 +29,7 @@ from .room import Room
 from .variables import Variables, parts
 
 NO_BOUNDS = Room()
+ByVariables = Callable[[np.ndarray, np.ndarray], np.ndarray]  # (poses, columns), (k,) each -> (k, p)
 MOST_SLOW = 40  # lowest frequencies, which a linear program has
 MOST_LONG = 4  # longest lengths of each cable, which a linear program has
 _STEP = 1e-6  # of the range of a variable, for differences of frequencies
@@ -188,20 +191,13 @@ class Evaluation:
     def spaces(self, y: np.ndarray) -> np.ndarray:
         """Return by how much the bounds of the room are kept at each pose, (N, k) [m]; negative where they are not.
 
-        Frequencies are relative to their bound.
+        Frequencies are relative to their bound. Of regions a value that is not negative may be too small.
         """
-        room, found = self.room, [np.zeros((len(self._poses), 0))]
-        if room.clearance > 0.0:
-            found.append(self.distances(y) - room.clearance)
-        if room.limits_lengths:
-            lengths = self.lengths(y)
-            found += [lengths - room.shortest, room.longest - lengths]
-        found += [self._ends(y)[..., 2] - room.lowest] * (room.lowest > -np.inf)
-        found += [each.spaces(*self._ends_for(y, each)).reshape(-1, self._m) for each in room.regions]
-        if room.frequency > 0.0:
+        found = [np.zeros((len(self._poses), 0)), *(values for values, _ in self._bounds(y, exact=False))]
+        if self.room.frequency > 0.0:
             least = np.full(len(self._poses), np.inf)
             np.minimum.at(least, self.rows.pose_of, self.frequencies(y)[:, 0])
-            found.append(least[:, None] / room.frequency - 1.0)
+            found.append(least[:, None] / self.room.frequency - 1.0)
         return np.hstack(found)
 
     def missing(self, y: np.ndarray) -> float:
@@ -209,19 +205,15 @@ class Evaluation:
         return max(0.0, -float(self.spaces(y).min(initial=np.inf)))
 
     def space_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
-        """Return the smallest spaces `below` a value, up to `most` of distances and of lengths, with derivatives."""
-        room, found = self.room, [Slopes(np.zeros(0), np.zeros((0, self.variables.size)))]
-        if room.clearance > 0.0 and self.pairs.size:
-            near = self.distance_slopes(y, most, room.clearance + below)
-            found.append(Slopes(near.value - room.clearance, near.by_variables))
-        if room.limits_lengths:
-            found.append(self._length_slopes(y, most, below))
-        if room.lowest > -np.inf:
-            found.append(self._height_slopes(y, most, below))
-        found += [self._region_slopes(y, region, most, below) for region in room.regions]
-        if room.frequency > 0.0:
+        """Return up to `most` of the smallest spaces `below` a value for each bound, with their derivatives."""
+        found = [Slopes(np.zeros(0), np.zeros((0, self.variables.size)))]
+        for values, slopes in self._bounds(y, exact=True):
+            chosen = np.argsort(values, axis=None)[:most]
+            chosen = chosen[values.ravel()[chosen] < below]
+            found.append(Slopes(values.ravel()[chosen], slopes(*np.unravel_index(chosen, values.shape))))
+        if self.room.frequency > 0.0:
             slow = self.frequency_slopes(y)
-            found.append(Slopes(slow.value / room.frequency - 1.0, slow.by_variables / room.frequency))
+            found.append(Slopes(slow.value / self.room.frequency - 1.0, slow.by_variables / self.room.frequency))
         return Slopes(*(np.concatenate(part) for part in zip(*((f.value, f.by_variables) for f in found), strict=True)))
 
     def longest_slopes(self, y: np.ndarray) -> tuple[Slopes, np.ndarray]:
@@ -229,42 +221,55 @@ class Evaluation:
         lengths = self.lengths(y)
         poses = np.argsort(-lengths, axis=0)[:MOST_LONG]
         cables = np.broadcast_to(np.arange(self._m), poses.shape).ravel()
-        return Slopes(
-            lengths[poses.ravel(), cables], self._by_length(poses.ravel(), cables, np.ones(cables.size))
-        ), cables
+        return Slopes(lengths[poses.ravel(), cables], self._by_length(poses.ravel(), cables)), cables
 
-    def _length_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
-        lengths = self.lengths(y)
-        every = np.stack([lengths - self.room.shortest, self.room.longest - lengths]).ravel()
-        chosen = _smallest(every, most, below)
-        side, poses, cables = np.unravel_index(chosen, (2, *lengths.shape))
-        return Slopes(every[chosen], self._by_length(poses, cables, np.where(side == 0, 1.0, -1.0)))
+    def _bounds(self, y: np.ndarray, exact: bool) -> Iterator[tuple[np.ndarray, ByVariables]]:
+        """Yield how far each bound of distances, lengths and heights is kept, (N, k) [m], and a function.
 
-    def _by_length(self, poses: np.ndarray, cables: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return the derivatives of the lengths of cables at poses, times a sign (k,), by the variables, (k, p)."""
+        That returns the derivatives of chosen ones by the variables, from their indices.
+        """
+        room, m = self.room, self._m
+        if room.clearance > 0.0:
+            yield self.distances(y) - room.clearance, lambda poses, pairs: self._by_gap(self._ends(y), poses, pairs)
+        if room.limits_lengths:
+            lengths = self.lengths(y)
+            yield np.hstack([lengths - room.shortest, room.longest - lengths]), self._by_length
+        if room.lowest > -np.inf:
+            yield self._ends(y)[..., 2] - room.lowest, self._by_height
+        for region in room.regions:
+            ends = self._ends_for(y, region)
+            spaces = region.distances(*ends) - region.least if exact else region.spaces(*ends)
+            yield spaces.reshape(-1, m), partial(self._by_region, region, *(end.reshape(-1, m, 3) for end in ends))
+
+    def _by_gap(self, ends: np.ndarray, poses: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+        (i, j), m = self.pairs[pairs].T, self._m
+        gap, *shares = nearest_points(ends[poses, m + i], ends[poses, i], ends[poses, m + j], ends[poses, j])
+        u = gap / np.maximum(np.linalg.norm(gap, axis=1), 1e-9)[:, None]
+        # The nearest point is (1 - share) of the attachment and `share` of the anchor.
+        of_i, of_j = (share[:, None] for share in shares)
+        slopes = self._by_ends(poses, i, of_i * u, (1.0 - of_i) * u)
+        return slopes - self._by_ends(poses, j, of_j * u, (1.0 - of_j) * u)
+
+    def _by_length(self, poses: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Return derivatives of lengths at poses; of columns beyond the number of cables, times -1."""
         A = np.empty((len(self._poses), 6, self._m))
         core.lines(self._record, self._poses, self._home, None, A, None, None, None)
         # A cable pulls the attachment towards the anchor along u: its length grows if either moves away from the other.
-        u = A[poses, :3, cables] * sign[:, None]
+        cables = columns % self._m
+        u = A[poses, :3, cables] * np.where(columns < self._m, 1.0, -1.0)[:, None]
         return self._by_ends(poses, cables, u, -u)
 
-    def _height_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
-        heights = self._ends(y)[..., 2] - self.room.lowest
-        chosen = _smallest(heights.ravel(), most, below)
-        poses, ends = np.unravel_index(chosen, heights.shape)
-        up = np.array([0.0, 0.0, 1.0])
-        of_anchor = (ends < self._m)[:, None]
-        return Slopes(heights.ravel()[chosen], self._by_ends(poses, ends % self._m, of_anchor * up, ~of_anchor * up))
+    def _by_height(self, poses: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        up, of_anchor = np.array([0.0, 0.0, 1.0]), (ends < self._m)[:, None]
+        return self._by_ends(poses, ends % self._m, of_anchor * up, ~of_anchor * up)
 
-    def _region_slopes(self, y: np.ndarray, region: Region, most: int, below: float) -> Slopes:
-        ends, anchors = self._ends_for(y, region)
-        spaces = region.distances(ends, anchors) - region.least
-        chosen = _smallest(spaces, most, below)
-        poses, cables = np.divmod(chosen, self._m)
-        by_end, by_anchor = region.slopes(ends[chosen], anchors[chosen])
+    def _by_region(
+        self, region: Region, ends: np.ndarray, anchors: np.ndarray, poses: np.ndarray, cables: np.ndarray
+    ) -> np.ndarray:
+        by_end, by_anchor = region.slopes(ends[poses, cables], anchors[poses, cables])
         if region.riding:
             by_end, by_anchor = (np.einsum("kij,kj->ki", self._turn[poses], each) for each in (by_end, by_anchor))
-        return Slopes(spaces[chosen], self._by_ends(poses, cables, by_anchor, by_end))
+        return self._by_ends(poses, cables, by_anchor, by_end)
 
     def _by_ends(self, poses: np.ndarray, cables: np.ndarray, by_anchor: np.ndarray, by_end: np.ndarray) -> np.ndarray:
         """Return derivatives by the variables, (k, p), of those by anchor and attachment of a cable in {G}, (k, 3)."""
@@ -272,20 +277,6 @@ class Evaluation:
         by_points[k, 0, cables] = np.einsum("kij,ki->kj", self._carried[cables], by_anchor)
         by_points[k, 1, cables] = np.einsum("kij,ki->kj", self._turn[poses], by_end)
         return by_points.reshape(len(cables), 6 * self._m) @ self.variables.S[: 6 * self._m]
-
-    def distance_slopes(self, y: np.ndarray, most: int, below: float) -> Slopes:
-        """Return up to `most` of the smallest distances `below` a value, with their derivatives."""
-        gap, s, t = self._gaps(y)
-        distance = np.sqrt((gap**2).sum(axis=2)).ravel()
-        chosen = _smallest(distance, most, below)
-        poses, pairs = np.unravel_index(chosen, s.shape)
-        u = gap[poses, pairs] / np.maximum(distance[chosen], 1e-9)[:, None]
-        # The nearest point is (1 - share) of the attachment and `share` of the anchor.
-        i, j = self.pairs[pairs].T
-        of_i, of_j = (share[poses, pairs][:, None] for share in (s, t))
-        slopes = self._by_ends(poses, i, of_i * u, (1.0 - of_i) * u)
-        slopes -= self._by_ends(poses, j, of_j * u, (1.0 - of_j) * u)
-        return Slopes(distance[chosen], slopes)
 
     def _place(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Put a layout into the record; return the tension limits."""
@@ -322,13 +313,6 @@ class Evaluation:
         anchors, attachments = ends[:, : self._m].reshape(-1, 3), ends[:, self._m :].reshape(-1, 3)
         return np.ascontiguousarray(attachments), np.ascontiguousarray(anchors)
 
-    def _gaps(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return vectors between the nearest points of pairs of cables, and these as shares of the cables."""
-        ends = self._ends(y)
-        anchors, attachments = ends[:, : self._m], ends[:, self._m :]
-        i, j = self.pairs.T
-        return nearest_points(attachments[:, i], anchors[:, i], attachments[:, j], anchors[:, j])
-
     def _always_together(self) -> np.ndarray:
         """Return which pairs of cables have a common end in every layout, as equal points make them."""
         low, high, m = self.variables.low, self.variables.high, self._m
@@ -339,9 +323,3 @@ class Evaluation:
         carrier = self.variables.robot.carrier_of_cable  # in whose frame an anchor is
         elsewhere = carrier[i] != carrier[j]
         return ~((apart[0] | elsewhere) & apart[1]) & ~((apart[2] | elsewhere) & apart[3])
-
-
-def _smallest(values: np.ndarray, most: int, below: float) -> np.ndarray:
-    """Return the indices of up to `most` of the smallest values that are below a value."""
-    chosen = np.argsort(values)[:most]
-    return chosen[values[chosen] < below]

@@ -88,14 +88,10 @@ def find_impossibility(variables: Variables, rows: Rows) -> Impossibility | None
         if d is None:
             continue
         bound, _, at_max = _support(cables, d)
-        direction, none = d * scale, np.zeros(0, dtype=int)
-        every = np.arange(robot.m)
-        demand = float(direction @ wrench)
-        limits = np.setdiff1d(every, at_max)
-        certificate = Certificate(
-            direction, bound, demand, demand - bound, at_max, limits if limits.size else none, np.zeros(robot.m),
-            robot.length,
-        )  # fmt: skip
+        direction = d * scale
+        demand, limits = float(direction @ wrench), np.setdiff1d(np.arange(robot.m), at_max)
+        none = np.zeros(robot.m)
+        certificate = Certificate(direction, bound, demand, demand - bound, at_max, limits, none, robot.length)
         proof = Impossibility(pose, wrench, certificate)
         if proof.verify(variables):
             return proof
@@ -174,7 +170,10 @@ def _separating(cables: list[_Cables], w: np.ndarray, mask: np.ndarray) -> np.nd
             return None
         columns.append(column * mask)
         A = np.array(columns).T / size
-        shares = _shares(np.vstack([A, np.full(A.shape[1], _SUM)]), np.r_[w / size, _SUM])
+        try:
+            shares = nnls(np.vstack([A, np.full(A.shape[1], _SUM)]), np.r_[w / size, _SUM])[0]
+        except RuntimeError:  # too many iterations, of numbers close to dependent
+            shares = np.full(A.shape[1], 1.0 / A.shape[1])
         nearest = A @ shares / max(float(shares.sum()), 1e-12) * size
         rest = w - nearest
         distance = float(np.linalg.norm(rest))
@@ -182,13 +181,6 @@ def _separating(cables: list[_Cables], w: np.ndarray, mask: np.ndarray) -> np.nd
             return None
         d = rest / distance
     return None
-
-
-def _shares(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    try:
-        return nnls(A, b)[0]
-    except RuntimeError:  # too many iterations, of numbers close to dependent
-        return np.full(A.shape[1], 1.0 / A.shape[1])
 
 
 def _projected(towards: np.ndarray, g: np.ndarray) -> np.ndarray:

@@ -128,7 +128,9 @@ class Design(Drawn, Reported, Displayed):
         if self.requirements.minimise == "t_max":
             mean, before = (quantity(robot.t_max.mean(), "N") for robot in (self.robot, self.before))
             text = f"mean t_max {mean} (before {before}), {text}"
-        frequency = self._frequency()
+        values = [None if found is None else found.frequency for found in (self.judgement, self.judgement_before)]
+        now, before = ("" if value is None else quantity(value, "Hz") for value in values)
+        frequency = f"lowest natural frequency {now} (before {before})" if now else ""
         if self.size_before is not None:
             size, before = (f"{one:.2f} times" for one in (self.size, self.size_before))
             text = f"boxes {size} as long and wide as required (before {before}), {text}"
@@ -144,12 +146,6 @@ class Design(Drawn, Reported, Displayed):
             if self.requirements.cable_floor_clearance is not None:
                 text += f", not below z = {quantity(self.judgement.height, 'm')}"
         return text
-
-    def _frequency(self) -> str:
-        """Return the lowest natural frequency of both robots as a text; empty if it does not count."""
-        values = [None if found is None else found.frequency for found in (self.judgement, self.judgement_before)]
-        now, before = ("" if value is None else quantity(value, "Hz") for value in values)
-        return f"lowest natural frequency {now} (before {before})" if now else ""
 
     def _headline(self) -> str:
         return self._report().headline
@@ -173,7 +169,8 @@ class Design(Drawn, Reported, Displayed):
             ("searched", f"{searched}, audited at {quantity(self.audited)} random pair{'s' * (self.audited != 1)}")
         ]
         if self.size_before is not None:
-            facts += _boxes(self.requirements)
+            boxes = [each.box for each in self.requirements.require if each.box is not None]
+            facts += [("box", f"from {quantity_row(box.min)} to {quantity_row(box.max)} [m]") for box in boxes]
         if self.stopped:
             facts.append(("", "INTERRUPTED: this is the best layout so far"))
         facts += [("task", each.report().splitlines()[0]) for each in self.plans]
@@ -184,7 +181,13 @@ class Design(Drawn, Reported, Displayed):
             facts.append(("wanted", f"{' and a '.join(wanted)}; the search does not prove that no layout has them"))
         why = [] if self.reasons is None else self._why(self.reasons)
         files = [("The robot's file", to_yaml(self.robot))]
-        parts += [Section("", [*facts, *self._state()]), *why]
+        if (found := self.reasons) is not None:  # whether the layout can be improved
+            state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
+            bounds = f"{found.at_bounds} free numbers are at a bound of their box"
+            if pairing:
+                state, bounds = "the best of all pairings at the poses of the grid", "all points are given"
+            facts.append(("layout", f"{state}; {bounds}"))
+        parts += [Section("", facts), *why]
         return Report(about, self.status, self._summary(), parts, files=files, drawings=self._drawings)
 
     def _why_not(self, proof: Impossibility) -> list[Part]:
@@ -237,17 +240,6 @@ class Design(Drawn, Reported, Displayed):
         figures = reversed(self.figures().items())  # what was found comes first
         return [Drawing(f"The robot {name} the design, {where}", figure) for name, figure in figures]
 
-    def _state(self) -> list[Fact]:
-        """Return in a sentence whether the layout can be improved."""
-        found = self.reasons
-        if found is None:
-            return []
-        state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
-        bounds = f"{found.at_bounds} free numbers are at a bound of their box"
-        if self.requirements.free[0].pairing:
-            state, bounds = "the best of all pairings at the poses of the grid", "all points are given"
-        return [("layout", f"{state}; {bounds}")]
-
     def _why(self, found: Reasons) -> list[Part]:
         falls = {"t_max": "mean t_max -", "cost": "cost -"}
         grows = "natural frequency +" if self.requirements.maximise == "natural_frequency" else "margin +"
@@ -269,7 +261,9 @@ class Design(Drawn, Reported, Displayed):
             for name, cables in (("t_max", one.at_max), ("t_min", one.at_min))
             if cables
         ]
-        along = _direction(one, self.before)
+        none = np.zeros(0, dtype=int)
+        direction = Certificate(one.direction, 0.0, 0.0, 0.0, none, none, np.zeros(self.before.m), self.before.length)
+        along = direction.text(self._up()).along.partition(";")[0]  # as certificates describe theirs
         return [f"{one.weight:.2f}", quantity_row(one.pose), quantity_row(one.wrench), along, "; ".join(limits)]
 
     def to_dict(self) -> dict[str, Any]:
@@ -309,16 +303,3 @@ class Design(Drawn, Reported, Displayed):
                 **self.impossibility.certificate.to_dict(),
             },
         }
-
-
-def _boxes(requirements: Requirements) -> list[Fact]:
-    """Return the boxes of the required positions."""
-    boxes = [each.box for each in requirements.require if each.box is not None]
-    return [("box", f"from {quantity_row(box.min)} to {quantity_row(box.max)} [m]") for box in boxes]
-
-
-def _direction(one: Binding, robot: Robot) -> str:
-    """Return the direction of a binding wrench, as certificates describe theirs."""
-    none = np.zeros(0, dtype=int)
-    certificate = Certificate(one.direction, 0.0, 0.0, 0.0, none, none, np.zeros(robot.m), robot.length)
-    return certificate.text(-np.array(robot.gravity)).along.partition(";")[0]

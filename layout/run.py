@@ -22,7 +22,7 @@ from .reasons import reasons
 from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design
 from .room import room_of
-from .search import AUDITED, ROOM_AUDITED, Progress, few, search
+from .search import ROOM_AUDITED, Progress, audited_rows, few, search
 from .task_rows import with_tasks
 from .variables import Variables, variables_of
 
@@ -80,9 +80,13 @@ def design(
                 raise InputError(f"{name} must be left out with requirements, which contain it")
         wanted = read_requirements(requirements)
     else:
-        parts = {"free": free, "require": require}
-        lists = {name: _list(name, value) for name, value in parts.items() if value is not None}
-        wanted = read_requirements({**lists, "maximise": maximise, **options})
+        lists = {name: value for name, value in (("free", free), ("require", require)) if value is not None}
+        for name, value in lists.items():
+            if isinstance(value, str | dict) or not isinstance(value, Sequence):
+                raise InputError(f"{name} must be a list of mappings, got {shown(value)}")
+        wanted = read_requirements(
+            {**{name: list(value) for name, value in lists.items()}, "maximise": maximise, **options}
+        )
     if chosen.drive == "fixed-length":
         raise InputError(f"robot {chosen.name!r} must have winches, got cables of fixed length")
     if chosen.m < (count := int(chosen.dof_mask.sum())):
@@ -133,8 +137,7 @@ def _designed(
     """Judge the layout at the rows and at new random poses, and find the reasons."""
     robot = variables.robot_at(y)
     random = np.random.default_rng([wanted.seed, 1])
-    per_demand = max(1000, AUDITED // sum(len(each.demands) for each in wanted.require))
-    audited = rows_of(before, wanted.require, [each.sampled(per_demand, random) for each in wanted.require])
+    audited = audited_rows(before, wanted, random)
     every = rows.joined(audited)
     margin = judged_margin(robot, before.length, every)
     room, goal = room_of(before, wanted), goal_of(variables, wanted)
@@ -157,9 +160,3 @@ def _nearest(evaluation: Evaluation, y: np.ndarray | None) -> float:
     if not evaluation.pairs.size:
         return np.inf
     return float(evaluation.distances(evaluation.variables.of_robot() if y is None else y).min())
-
-
-def _list(name: str, value: Any) -> list[Any]:
-    if isinstance(value, str | dict) or not isinstance(value, Sequence):
-        raise InputError(f"{name} must be a list of mappings, got {shown(value)}")
-    return list(value)

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..models import Robot
 from .annealing import anneal
 from .evaluation import Evaluation, Rows, rows_of
 from .goal import NOTHING, Goal, Outcome, goal_of
 from .linear_programs import PROGRAMS, maximise, merit
 from .moves import Moves
 from .requirements import Requirements
-from .room import Room, room_of
+from .room import room_of
 from .symmetry import Mirrors
 from .task_rows import FEW_INSTANTS, with_tasks
 from .variables import Variables
@@ -78,7 +79,10 @@ class _Search:
         self._variables, self._requirements, self._progress = variables, requirements, progress
         self._rng = np.random.default_rng(requirements.seed)
         self._room = room_of(robot, requirements)
-        coarse = few(rows_of(robot, require, _coarse(requirements)), self._rng, FEW)
+        corners = [
+            each.places(tuple(min(count, 3) for count in each.grid)) for each in require
+        ]  # middles and centre too
+        coarse = few(rows_of(robot, require, corners), self._rng, FEW)
         rows = with_tasks(coarse, robot, tasks, FEW_INSTANTS)
         self._coarse = Evaluation(variables, rows, self._room.with_spare(_FEW_SPARE))
         rows = with_tasks(rows_of(robot, require, [each.places() for each in require]), robot, tasks)
@@ -167,57 +171,56 @@ class _Search:
         ends = min(self._until, time.perf_counter() + _IMPROVING * self._requirements.time_limit)
         evaluation = Evaluation(self._variables, found.rows, self._room.with_spare(_SPARE))
         maximise(evaluation, found.goal, self._y, ends, delta, programs)
-        _take(self._variables, self._requirements, found, self._y, self._rng)
+        self._take(self._y)
+
+    def _take(self, y: np.ndarray) -> None:
+        """Audit a layout, add the worst poses to the rows, and keep it if it is the best."""
+        found = self.found
+        promised = Evaluation(self._variables, found.rows, self._room).outcome(y, found.goal)
+        if not found.better(y, promised):
+            return  # the audit can only find less
+        audited, worst = self._audit(y)
+        agrees = audited.missing <= promised.missing and all(
+            found >= wanted - _SAME * abs(wanted)
+            for found, wanted in ((audited.margin, promised.margin), (audited.frequency, promised.frequency))
+        )
+        if not agrees:
+            found.rows = found.rows.joined(worst)
+        outcome = Outcome(
+            min(audited.margin, promised.margin),
+            max(audited.missing, promised.missing),
+            min(audited.frequency, promised.frequency),
+            max(audited.cable, promised.cable),
+        )
+        if found.better(y, outcome):
+            found.y, found.outcome, found.audit_agrees = y.copy(), outcome, agrees
+
+    def _audit(self, y: np.ndarray) -> tuple[Outcome, Rows]:
+        """Return the result at random poses, and the worst rows."""
+        variables, goal, rng = self._variables, self.found.goal, self._rng
+        rows = audited_rows(variables.robot, self._requirements, rng)
+        values = Evaluation(variables, rows).margins(y)
+        worst, margin = rows.only(_apart(rows, np.argsort(values)[:300])), float(values.min())
+        some = few(rows, rng, ROOM_AUDITED)
+        evaluation = Evaluation(variables, some, self._room)
+        spaces, short = evaluation.spaces(y), 0.0
+        outcome = evaluation.outcome_besides(y, goal._replace(per_hertz=0.0), margin)
+        if spaces.size:
+            least = spaces.min(axis=1)
+            short = max(0.0, -float(least.min()))
+            worst = worst.joined(some.only(_apart(some, np.argsort(least)[:100])))
+        if goal.per_hertz:
+            frequencies = evaluation.frequencies(y)[:, 0]
+            outcome = outcome._replace(frequency=float(frequencies.min()))
+            worst = worst.joined(some.only(_apart(some, np.argsort(frequencies)[:100])))
+        return outcome._replace(missing=short), worst
 
 
-def _take(
-    variables: Variables, requirements: Requirements, found: Found, y: np.ndarray, rng: np.random.Generator
-) -> None:
-    """Audit a layout, add the worst poses to the rows, and keep it if it is the best."""
-    room, goal = room_of(variables.robot, requirements), found.goal
-    promised = Evaluation(variables, found.rows, room).outcome(y, goal)
-    if not found.better(y, promised):
-        return  # the audit can only find less
-    audited, worst = _audit(variables, requirements, room, goal, y, rng)
-    agrees = audited.missing <= promised.missing and all(
-        found >= wanted - _SAME * abs(wanted)
-        for found, wanted in ((audited.margin, promised.margin), (audited.frequency, promised.frequency))
-    )
-    if not agrees:
-        found.rows = found.rows.joined(worst)
-    outcome = Outcome(
-        min(audited.margin, promised.margin),
-        max(audited.missing, promised.missing),
-        min(audited.frequency, promised.frequency),
-        max(audited.cable, promised.cable),
-    )
-    if found.better(y, outcome):
-        found.y, found.outcome, found.audit_agrees = y.copy(), outcome, agrees
-
-
-def _audit(
-    variables: Variables, requirements: Requirements, room: Room, goal: Goal, y: np.ndarray, rng: np.random.Generator
-) -> tuple[Outcome, Rows]:
-    """Return the result at random poses, and the worst rows."""
+def audited_rows(robot: Robot, requirements: Requirements, rng: np.random.Generator) -> Rows:
+    """Return rows at random poses of all requirements."""
     require = requirements.require
-    demands = sum(len(each.demands) for each in require)
-    count = max(1000, AUDITED // demands)
-    rows = rows_of(variables.robot, require, [each.sampled(count, rng) for each in require])
-    values = Evaluation(variables, rows).margins(y)
-    worst, margin = rows.only(_apart(rows, np.argsort(values)[:300])), float(values.min())
-    some = few(rows, rng, ROOM_AUDITED)
-    evaluation = Evaluation(variables, some, room)
-    spaces, short = evaluation.spaces(y), 0.0
-    outcome = evaluation.outcome_besides(y, goal._replace(per_hertz=0.0), margin)
-    if spaces.size:
-        least = spaces.min(axis=1)
-        short = max(0.0, -float(least.min()))
-        worst = worst.joined(some.only(_apart(some, np.argsort(least)[:100])))
-    if goal.per_hertz:
-        frequencies = evaluation.frequencies(y)[:, 0]
-        outcome = outcome._replace(frequency=float(frequencies.min()))
-        worst = worst.joined(some.only(_apart(some, np.argsort(frequencies)[:100])))
-    return outcome._replace(missing=short), worst
+    count = max(1000, AUDITED // sum(len(each.demands) for each in require))
+    return rows_of(robot, require, [each.sampled(count, rng) for each in require])
 
 
 def _apart(rows: Rows, order: np.ndarray) -> np.ndarray:
@@ -230,11 +233,6 @@ def _apart(rows: Rows, order: np.ndarray) -> np.ndarray:
         if len(picked) == _ADDED:
             break
     return np.array(picked, dtype=int)
-
-
-def _coarse(requirements: Requirements) -> list[np.ndarray]:
-    """Return few poses of each requirement: corners, middles and centre of its box."""
-    return [each.places(tuple(min(count, 3) for count in each.grid)) for each in requirements.require]
 
 
 def few(rows: Rows, rng: np.random.Generator, most: int) -> Rows:

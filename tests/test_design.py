@@ -161,7 +161,7 @@ def test_derivatives_are_those_of_differences(name, seed):
     assert smooth.any()
     error = np.abs(differences - slopes)[smooth].max(axis=1) / np.abs(slopes)[smooth].max(axis=1)
     assert error.max() < 2e-8
-    near = evaluation.distance_slopes(y, 6, np.inf)
+    near = Evaluation(variables, evaluation.rows, Room(clearance=1e-9)).space_slopes(y, 6, np.inf)
     distances = evaluation.distances(y)
     where = [int(np.abs(distances.ravel() - value).argmin()) for value in near.value]
     slopes = np.array(
