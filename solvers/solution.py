@@ -153,21 +153,3 @@ class TensionSolution(Displayed):
             "iterations": self.iterations,
             "detail": self.detail,
         }
-
-
-def of_core(problem: TensionProblem, tensions: Array, time: float) -> TensionSolution:
-    """Return the optimum that the C core found; the constructor of the class would take 0.1 us of some 1.2."""
-    solution = _new(TensionSolution)
-    solution.problem = problem
-    solution.tensions = tensions
-    solution.status = _OPTIMAL
-    solution.method = "active-set"
-    solution.backend = "c"
-    solution.time = time
-    solution.iterations = None
-    solution.detail = ""
-    solution.proof = None
-    return solution
-
-
-_new = object.__new__

@@ -5,6 +5,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy import empty
 
 from ..base.errors import InputError
 from ..base.inputs import shown
@@ -15,10 +16,13 @@ from .methods import METHODS
 from .methods.method import Method, Proposal
 from .methods.qp import ActiveSet
 from .problem import Array, TensionProblem
-from .solution import TensionSolution, of_core
+from .solution import TensionSolution
 from .standard_form import StandardForm, standard_forms
 from .status import INFEASIBLE, OPTIMAL, SINGULAR, STATUSES
 from .verify import verify
+
+_OPTIMAL = STATUSES[OPTIMAL]
+_new = object.__new__
 
 
 def methods() -> dict[str, Method]:
@@ -52,17 +56,27 @@ def solve(
         If the method, back end or option does not exist; the message lists the existing ones.
     """
     start = perf_counter()
-    if not isinstance(problem, TensionProblem):
-        raise InputError(f"problem must be a TensionProblem, got {shown(problem)}, a {type(problem).__name__}")
-    # These few lines decide the time of a step.
-    if type(method) is str and method == "active-set" and backend is None and not options:
-        tensions = np.empty(problem.m)
+    # These few lines decide the time of a step: a constructor would add a tenth.
+    plain = isinstance(problem, TensionProblem) and type(method) is str and backend is None and not options
+    if plain and method == "active-set":
+        tensions = empty(problem.m)
         code = solve_packed(problem.packed, tensions)
         if code == OPTIMAL:
-            return of_core(problem, tensions, perf_counter() - start)
+            solution = _new(TensionSolution)
+            solution.problem = problem
+            solution.tensions = tensions
+            solution.status = _OPTIMAL
+            solution.method = "active-set"
+            solution.backend = "c"
+            solution.iterations = solution.proof = None
+            solution.detail = ""
+            solution.time = perf_counter() - start
+            return solution
         if code <= SINGULAR:
             spent = perf_counter() - start
             return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _PROOFS[code])
+    if not isinstance(problem, TensionProblem):
+        raise InputError(f"problem must be a TensionProblem, got {shown(problem)}, a {type(problem).__name__}")
     chosen, backend = _look_up(method, backend, options)
     chosen = chosen.for_options(problem, options)
     used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core does not take this size, or was not sure

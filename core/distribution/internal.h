@@ -118,7 +118,7 @@ TOWLINE_LINKAGE outcome towline_enter_limits(form *f);
 
 /* reduction.c */
 TOWLINE_LINKAGE int towline_reduce(form *f, int cut);
-TOWLINE_LINKAGE void towline_null_space(form *f);
+TOWLINE_LINKAGE void towline_turn_back(form *f, real *s, int dimensions);
 
 /* slabs.c and dual_active_set.c: move s to the point of least norm inside the limits. */
 NOT_INLINE TOWLINE_LINKAGE outcome towline_slabs(form *f);

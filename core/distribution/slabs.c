@@ -58,15 +58,12 @@ outcome towline_slabs(form *f) {
     }
     for (int t = 0; t <= cables; t++) {
         int worst = -1;
-        real most = f->slack, value = 0;
+        real most = f->slack;
         for (int i = 0; i < cables; i++) {
             const real s = f->s[i] + normal[0][i] * z[0] + normal[1][i] * z[1];
-            const real violation = larger(f->low[i] - s, s - f->high[i]);
-            if (side[i] == 0 && violation > most) {
-                worst = i;
-                most = violation;
-                value = s;
-            }
+            const real violation = side[i] == 0 ? larger(f->low[i] - s, s - f->high[i]) : 0;
+            worst = violation > most ? i : worst; /* nothing branches, as in `largest` of reduction.c */
+            most = larger(violation, most);
         }
         if (worst < 0) {
             break;
@@ -74,7 +71,7 @@ outcome towline_slabs(form *f) {
         f->steps++;
         const real a[2] = {normal[0][worst], normal[1][worst]};
         const real square = a[0] * a[0] + a[1] * a[1];
-        side[worst] = value < f->low[worst] ? (real)1 : (real)-1;
+        side[worst] = f->s[worst] + a[0] * z[0] + a[1] * z[1] < f->low[worst] ? (real)1 : (real)-1;
         if (square <= f->parallel * f->parallel) { /* nothing moves this s, and it is beyond its limit */
             f->push[worst] = -side[worst];
             return EXCLUDED;

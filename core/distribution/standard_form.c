@@ -50,15 +50,22 @@ real towline_standard_form(form *f, const towline_problem *problem, real rho, in
     const real per_length = 1 / problem->length;
     for (int i = 0; i < n; i++) {
         const real scale = problem->n == 6 && i >= 3 ? per_length : 1;
+        const real *own = problem->A + i * m;
         real rest = problem->w[i];
         for (int c = 0; c < m; c++) {
-            rest -= problem->A[i * m + c] * t[c];
+            rest -= own[c] * t[c];
         }
         f->scale[i] = scale;
         f->b[i] = rest * scale;
         real *row = f->B + i * f->width;
-        for (int c = 0; c < f->cables; c++) {
-            row[c] = problem->A[i * m + f->moving[c]] * scale * f->unit[c];
+        if (f->cables == m) { /* all cables, in their order: several entries at once */
+            for (int c = 0; c < m; c++) {
+                row[c] = own[c] * scale * f->unit[c];
+            }
+        } else {
+            for (int c = 0; c < f->cables; c++) {
+                row[c] = own[f->moving[c]] * scale * f->unit[c];
+            }
         }
         for (int c = f->cables; c < f->width; c++) {
             row[c] = c == f->cables + i && c < f->columns ? f->unit[c] : 0;
@@ -73,8 +80,9 @@ real towline_standard_form(form *f, const towline_problem *problem, real rho, in
 }
 
 /*
- * Make s the least norm without limits. Return its size, and in `worst` and `missing` the row whose part of b is
- * farthest outside the range of B; -1 and 0 if there is none.
+ * Make s the least norm without limits, and a basis of the null space if it has at most two dimensions. Return the size
+ * of s, and in `worst` and `missing` the row whose part of b is farthest outside the range of B; -1 and 0 if there is
+ * none.
  */
 real towline_least_norm(form *f, int *worst, real *missing) {
     real square = 0;
@@ -97,9 +105,7 @@ real towline_least_norm(form *f, int *worst, real *missing) {
     for (int c = f->rank; c < f->width; c++) {
         f->s[c] = 0;
     }
-    for (int j = f->rank - 1; j >= 0; j--) {
-        reflect(f, j, f->s);
-    }
+    towline_turn_back(f, f->s, f->k <= 2 ? f->k : 0);
     return root(square);
 }
 
@@ -115,6 +121,9 @@ outcome towline_enter_limits(form *f) {
     if (!outside) {
         return REACHED;
     }
-    towline_null_space(f);
-    return f->k <= 2 ? towline_slabs(f) : towline_dual_active_set(f);
+    if (f->k <= 2) { /* of so few dimensions there is a basis already */
+        return towline_slabs(f);
+    }
+    towline_turn_back(f, 0, f->k);
+    return towline_dual_active_set(f);
 }
