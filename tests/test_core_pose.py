@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from towline import available, load
-from towline.core import pose_covariance, pose_from_lengths
+from towline.core import one_pose_from_lengths, pose_covariance, pose_from_lengths
 from towline.estimation.pose.estimate import moved
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
@@ -104,3 +104,23 @@ def test_arrays_that_do_not_fit_are_refused():
         wrong = [array if i != place else np.append(array, 0.0) for i, array in enumerate(given)]
         with pytest.raises(ValueError, match="rows of the sizes that fit it"):
             pose_from_lengths(*wrong, *results)
+
+
+@pytest.mark.parametrize("name", ["caroca-pulleys", "cogiro", "planar-4", "multi-quadrotor-6"])
+def test_one_pose_has_the_bits_of_a_row(name):
+    robot = load(name)
+    carriers, lengths, weights, starts = cases(robot, 4, 7)
+    record, sigma = record_of(robot), 1 / weights
+    poses, errors, steps, covariances = starts.copy(), np.empty((4, robot.m)), np.empty(4), np.empty((4, 6, 6))
+    pose_from_lengths(record, carriers, lengths, 1 / sigma, robot.dof_mask, np.array(0.0), poses, errors, steps)
+    pose_covariance(record, carriers, 1 / sigma, poses, covariances)
+    for row in range(4):
+        pose, residuals, covariance = starts[row].copy(), np.empty(robot.m), np.empty((6, 6))
+        given = [record, carriers[row], lengths[row], sigma, pose, residuals, covariance]
+        assert one_pose_from_lengths(*given) is bool(steps[row] > 0)
+        for one, of_rows in zip(given[4:], (poses[row], errors[row] * sigma, covariances[row]), strict=True):
+            np.testing.assert_array_equal(one, of_rows)
+    for place in range(1, len(given)):
+        wrong = [array if i != place else np.append(array, 0.0) for i, array in enumerate(given)]
+        with pytest.raises(ValueError, match="rows of the sizes that fit it"):
+            one_pose_from_lengths(*wrong)

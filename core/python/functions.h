@@ -36,6 +36,9 @@ FUNCTION(pose_from_lengths, "(robot, carriers, lengths, weights, free, damping, 
          "Move poses to where the errors of their lengths are least; carriers has as many rows or one.")
 FUNCTION(pose_covariance, "(robot, carriers, weights, poses, covariances)",
          "Compute how the noise of the lengths spreads each pose; carriers has as many rows or one.")
+FUNCTION(one_pose_from_lengths, "(robot, carriers, lengths, sigma, pose, residuals, covariance)",
+         "Move one pose to where the errors of its lengths are least, with its residuals and its covariance; return "
+         "whether it ended at a minimum.")
 
 /* horizon.c */
 FUNCTION(horizon_size, "(N, n, m, p)",

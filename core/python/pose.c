@@ -59,3 +59,31 @@ TOWLINE_PY(pose_covariance) {
     }
     return done(&given, fits);
 }
+
+TOWLINE_PY(one_pose_from_lengths) {
+    enum { ROBOT, CARRIERS, LENGTHS, SIGMA, POSE, RESIDUALS, COVARIANCE, ALL };
+    arrays given;
+    if (!take(&given, arguments, count, ALL, POSE)) {
+        return NULL;
+    }
+    const towline_robot *robot = robot_of(&given);
+    const int m = robot ? robot->cables : 0;
+    double weights[TOWLINE_MOST_CABLES], steps = 0, *residuals = given.of[RESIDUALS];
+    const int fits = robot && given.size[CARRIERS] == 6 * robot->carriers && given.size[LENGTHS] == m &&
+                     given.size[SIGMA] == m && given.size[POSE] == 6 && given.size[RESIDUALS] == m &&
+                     given.size[COVARIANCE] == 36;
+    if (fits) {
+        for (int i = 0; i < m; i++) {
+            weights[i] = 1 / given.of[SIGMA][i];
+        }
+        const towline_lengths measured = {given.of[CARRIERS], 0, given.of[LENGTHS], weights, robot->freedom, 0};
+        towline_pose_from_lengths(robot, 1, measured, (towline_poses){given.of[POSE], residuals, &steps});
+        towline_pose_covariance(robot, 1, measured, given.of[POSE], given.of[COVARIANCE]);
+        for (int i = 0; i < m; i++) {
+            residuals[i] *= given.of[SIGMA][i];
+        }
+    }
+    PyObject *none = done(&given, fits);
+    Py_XDECREF(none);
+    return none ? PyBool_FromLong(steps > 0) : NULL;
+}

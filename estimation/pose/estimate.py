@@ -45,7 +45,8 @@ class PoseEstimate(Displayed):
     by_gravity
         True if the lengths alone do not determine the pose, and gravity fixes it, (...).
     known_covariance
-        Covariance of an equilibrium, (..., 6, 6), which does not follow from the lengths alone.
+        Covariance that was computed with the pose, (..., 6, 6): of one pose near a start, and of an equilibrium, where
+        it does not follow from the lengths alone.
     """
 
     robot: Robot

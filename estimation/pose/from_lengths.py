@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
 from ...base.inputs import leading, repeated, shown
-from ...core import extent
+from ...core import extent, one_pose_from_lengths
 from ...models.batch import as_array
 from ...models.files import as_robot
 from ...models.part import LARGEST
@@ -64,6 +64,8 @@ def pose_from_lengths(
     if start is not None:
         start = _poses("start", start, (6,))
         shapes["start"] = start.shape[:-1]
+    if not any(shapes.values()) and start is not None and not (problem := problem_of(robot, carriers)).open:
+        return _near(problem, lengths, start, carriers, deviations)
     batch = lengths.shape[:-1] if len(set(shapes.values())) == 1 else leading(shapes)
     rows = _rows(lengths, batch, 1)
     each = carriers if carriers is None or carriers.ndim == 2 else _rows(carriers, batch, 2)
@@ -76,13 +78,20 @@ def pose_from_lengths(
     return found
 
 
+def _near(
+    problem: Problem, lengths: np.ndarray, start: np.ndarray, carriers: np.ndarray | None, sigma: np.ndarray
+) -> PoseEstimate:
+    """Return the pose, with its covariance, that fits the lengths (m,) of one pose near a start (6,) best."""
+    pose = np.where(problem.free > 0.0, start, problem.home) if problem.freedoms < 6 else start.copy()
+    residuals, covariance = np.empty(problem.robot.m), np.empty((6, 6))
+    lengths = np.ascontiguousarray(lengths)
+    found = one_pose_from_lengths(problem.record, problem.carriers, lengths, sigma, pose, residuals, covariance)
+    return PoseEstimate(problem.robot, pose, residuals, found, sigma, carriers, known_covariance=covariance)
+
+
 def checked_lengths(lengths: ArrayLike, robot: Robot) -> np.ndarray:
     """Return lengths (..., m), or raise InputError unless all are above zero and of a size that can be squared."""
-    array = as_array("lengths", lengths, (robot.m,))
-    least, _ = extent(np.ascontiguousarray(array))
-    if not least > 0.0:
-        raise InputError(f"lengths must be numbers > 0 [m], got {least:g}")
-    return _of_a_size("lengths", "m", array)
+    return _of_a_size("lengths", "m", lengths, (robot.m,), positive=True)
 
 
 def one_pose(lengths: ArrayLike, carrier_pose: ArrayLike | None, robot: Robot) -> tuple[np.ndarray, np.ndarray | None]:
@@ -118,12 +127,15 @@ def _equal(sigma: float, m: int) -> np.ndarray:
 
 def _poses(name: str, value: ArrayLike, core: tuple[int, ...]) -> np.ndarray:
     """Return poses, or raise InputError unless they are of a size that can be squared."""
-    return _of_a_size(name, "m, rad", as_array(name, value, core))
+    return _of_a_size(name, "m, rad", value, core)
 
 
-def _of_a_size(name: str, unit: str, array: np.ndarray) -> np.ndarray:
-    """Return an array, or raise InputError if the square of a number would be too large."""
-    least, most = extent(np.ascontiguousarray(array))
+def _of_a_size(name: str, unit: str, value: ArrayLike, core: tuple[int, ...], positive: bool = False) -> np.ndarray:
+    """Return an array (..., *core), or raise InputError if the square of a number would be too large."""
+    array = as_array(name, value, core)
+    least, most = extent(array if array.flags.c_contiguous else np.ascontiguousarray(array))
+    if positive and not least > 0.0:
+        raise InputError(f"{name} must be numbers > 0 [{unit}], got {least:g}")
     if (largest := max(-least, most)) > LARGEST:
         raise InputError(f"{name} must be numbers up to {LARGEST:g} [{unit}], got {largest:g}")
     return array
