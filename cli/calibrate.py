@@ -71,14 +71,15 @@ def calibrate(
     )
     check_ending("--out", target, ".yaml", ".yml")
     read = read_log(log, stated, poses, loaded, fields)
-    measurements = read.measurements
+    measurements, notes = read.measurements, read.notes
+    del read  # with the files
     if fix:
         loaded, measurements, texts, counted = correction_of(loaded, measurements)
-        read.notes.extend(f"corrected: {text}" for text in texts)
+        notes.extend(f"corrected: {text}" for text in texts)
         if counted and names is None:
             names = [*usual(loaded, measurements), "scales"]
     if not as_json:
-        for note in read.notes:
+        for note in notes:
             typer.echo(f"  {note}")
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
     text = result.report()  # before anything is written
@@ -89,7 +90,7 @@ def calibrate(
     if report is not None:
         written["report"] = result.save_report(report)
     pictures = [] if figures is None else result.plot(figures, form)
-    data = {**result.to_dict(), "notes": read.notes, "file": None, **written, "figures": pictures}
+    data = {**result.to_dict(), "notes": notes, "file": None, **written, "figures": pictures}
     print_result(as_json, data, lambda: text, [*written.values(), *pictures])
     if kept:
         typer.echo("towline: the file has corrected encoders alone, which other parameters do not improve", err=True)

@@ -10,7 +10,7 @@ from towline import Dynamics, load, read_measurements
 from towline.base.errors import InputError
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.model import Model
-from towline.estimation.calibration.normal_equations import state_equations
+from towline.estimation.calibration.normal_equations import NormalEquations
 from towline.estimation.calibration.parameters import OF_CABLE, Parameters
 from towline.estimation.calibration.sightings import SEEN
 from towline.estimation.calibration.solving import model_of
@@ -215,7 +215,7 @@ def test_normal_equations_are_those_of_all_residuals(known):
     own, poses_too = H[:size, size:], H[size:, size:]
     S = H[:size, :size] - (0 if known else own @ np.linalg.solve(poses_too, own.T))
     b = g[:size] - (0 if known else own @ np.linalg.solve(poses_too, g[size:]))
-    equations = state_equations(model, state, np.ones_like(state.x))
+    equations = NormalEquations.at(model, state, np.ones_like(state.x))
     np.testing.assert_allclose(equations.S, S, rtol=2e-5, atol=2e-5 * np.abs(S).max())
     np.testing.assert_allclose(equations.b, b, rtol=2e-5, atol=2e-5 * np.abs(b).max())
 

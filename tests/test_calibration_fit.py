@@ -1,12 +1,17 @@
 """The fit reaches the minimum that MINPACK reaches, in about as many steps, or says that it did not."""
 
+import tracemalloc
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
 from towline.estimation.calibration import Measurements, calibrate, cross_validation, starts
+from towline.estimation.calibration import model as model_module
 from towline.estimation.calibration.curvature import curvature
 from towline.estimation.calibration.fit import fit
+from towline.estimation.calibration.normal_equations import NormalEquations, metric
 from towline.estimation.calibration.parameters import OF_CABLE
 from towline.estimation.calibration.solving import length_of, model_of
 from towline.models import Dynamics, load
@@ -116,3 +121,58 @@ def test_second_derivatives_of_lengths_by_poses():
     numeric = np.stack([(after - before) / (2 * h) for after, before in ends], axis=2)
     found = first + curvature(residuals, derivatives)
     np.testing.assert_allclose(found, (numeric + np.swapaxes(numeric, 1, 2)) / 2, atol=1e-7 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_log_in_parts_gives_the_same_result(monkeypatch, known):
+    """A winch slips in the middle; with directions and known poses, or with neither."""
+    robot, draw, times = load("cogiro"), np.random.default_rng(2), 0.5 * np.arange(120)
+    poses = robot.home + [1, 0.8, 0.4, 0.1, 0.1, 0.2] * np.sin(np.outer(times, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]))
+    built = as_built(120, 2, poses=poses)
+    readings = built.readings.copy()
+    readings[60:, 3] += 0.05
+    u = -np.swapaxes(Dynamics(robot).wrench_matrix(poses)[:, :3], 1, 2) + draw.normal(0, 0.01, (120, 8, 3))
+    log = Measurements(readings)
+    if known:
+        log = Measurements(readings, poses, directions=u, sigma={"lengths": 1e-3, "directions": 0.01})
+    prior = None if known else {"anchors": 0.02, "offsets": 0.05}
+    whole = calibrate(robot, log, prior=prior)
+    assert [(one.cable, one.sample) for one in whole.slips] == [(3, 60)]
+    monkeypatch.setattr(model_module, "PART", 17)
+    parts = calibrate(robot, log, prior=prior)
+    assert [one.name for one in parts.parameters] == [one.name for one in whole.parameters]
+    for name in ("value", "sigma"):
+        one, other = ([getattr(parameter, name) for parameter in result.parameters] for result in (parts, whole))
+        np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(parts.residuals, whole.residuals, atol=1e-7)
+    assert parts.autocorrelation == pytest.approx(whole.autocorrelation, rel=1e-5)
+
+
+def test_forces_in_parts_are_those_of_the_whole_log(monkeypatch):
+    """Accelerations follow from all poses, so a part of the log has those of the whole one."""
+    robot, draw, times = load("cogiro"), np.random.default_rng(3), 0.05 * np.arange(60)
+    poses = robot.home + [1, 0.8, 0.4, 0.1, 0.1, 0.2] * np.sin(np.outer(times, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]))
+    given = {"tensions": draw.uniform(500, 900, (60, 8)), "times": times, "sigma": {"position": 1e-3, "rotation": 1e-3}}
+    u = -np.swapaxes(Dynamics(robot).wrench_matrix(poses)[:, :3], 1, 2) + draw.normal(0, 0.01, (60, 8, 3))
+    log = Measurements(Dynamics(robot).cable_lengths(poses), poses, directions=u, **given)
+    model = replace(model_of(robot, log, ("anchors", "clock", "mass", "com", "friction"), {}), ahead=0.02)
+    state = model.begin()
+    state.x[model.parameters.clock] = 0.02
+    whole = NormalEquations.at(model, state, metric(model))
+    monkeypatch.setattr(model_module, "PART", 17)
+    parts = NormalEquations.at(model, state, metric(model))
+    for name in ("cost", "S", "b", "Y", "y"):
+        one, other = getattr(parts, name), getattr(whole, name)
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+
+
+def test_memory_of_a_long_log():
+    """At most 1 kB a sample of eight cables, so that a million samples need 1 GB."""
+    built = as_built(40_000, 1)
+    log = built.measurements()
+    del built
+    tracemalloc.start()
+    calibrate("cogiro", log)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1000 * 40_000 + 60e6  # of the derivatives of a part

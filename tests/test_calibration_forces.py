@@ -192,7 +192,7 @@ def test_gradients_are_slopes_of_the_cost(name):
         exact[i * OF_CABLE : (i + 1) * OF_CABLE] += residuals.readings[i] @ derivatives.cables[i]
     for column in np.flatnonzero(model.parameters.varies):
         step = 1e-6 * np.eye(len(state.x))[column] * (1e-6 if column % OF_CABLE == 10 else 1.0)
-        more, less = (model.residuals(state._replace(x=state.x + sign * step)).cost for sign in (1, -1))
+        more, less = (model.cost(state._replace(x=state.x + sign * step)) for sign in (1, -1))
         assert (more - less) / (4 * step.max()) == pytest.approx(exact[column], rel=1e-3, abs=1e-4 * abs(exact).max())
     of_pose = np.einsum("mnc,mn->nc", derivatives.poses, residuals.readings)
     of_pose += np.einsum("nic,ni->nc", derivatives.balance.by_pose, residuals.balance)

@@ -49,7 +49,7 @@ class FeltTensions(NamedTuple):
     tensions: np.ndarray
     errors: np.ndarray
 
-    def only(self, rows: np.ndarray) -> FeltTensions:
+    def only(self, rows: np.ndarray | slice) -> FeltTensions:
         """Return the tensions of some samples (k,)."""
         return FeltTensions(*(part[rows] for part in self))
 
@@ -70,27 +70,59 @@ class _Forces(NamedTuple):
     by_arm: np.ndarray
 
 
+class _Log:
+    """Motion and tensions of a whole log, which the balance at any of its samples shares; computed at first use."""
+
+    def __init__(self, robot: Robot, measurements: Measurements):
+        self._robot, self._measurements = robot, measurements
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Return the motion of the log."""
+        return motion_of(self._robot, self._measurements)
+
+    @cached_property
+    def terms(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return what capstan, friction and gain multiply, as measured and smoothed, (3, N, m).
+
+        These are y s, s and y, with tensions y and signs s of the cable speeds.
+        """
+        y, motion = self._measurements.tensions, self.motion
+        if y is None:
+            return (np.zeros((3, len(self._measurements), self._robot.m)),) * 2
+        terms = np.stack([y * motion.signs, motion.signs, y])
+        return terms, terms if motion.smooth is None else motion.smooth.values(terms)
+
+    @cached_property
+    def variances(self) -> np.ndarray:
+        """Return the variances of the felt tensions over the mean gain, (N, m) [N^2], which no parameter changes."""
+        given, weight = self._measurements.tensions, self._robot.weight
+        if given is None:
+            return np.full((len(self._measurements), self._robot.m), (UNMEASURED * weight) ** 2)
+        size = np.maximum(np.abs(self.terms[1][2]), LEAST_TENSION * np.abs(given).mean(axis=0))
+        return (self._measurements.sigma.tensions * size) ** 2 + (1e-9 * max(weight, 1.0)) ** 2
+
+
 class Balance:
     """The balance of forces on a robot's platform at the samples of a log; measured tensions are at the winches."""
 
     def __init__(self, robot: Robot, measurements: Measurements):
         self._robot, self._measurements = robot, measurements
-        self._chosen: np.ndarray | None = None
+        self._log, self._chosen = _Log(robot, measurements), np.arange(len(measurements))
         self._rows = np.flatnonzero(robot.dof_mask)
         self._scale = robot.wrench_scale[self._rows]
 
-    def only(self, rows: np.ndarray) -> Balance:
+    def only(self, rows: np.ndarray | slice) -> Balance:
         """Return the balance at some samples (k,), whose motion is that of the whole log."""
         other = copy(self)
-        other._chosen = rows if self._chosen is None else self._chosen[rows]
-        other.__dict__["_of_log"] = self._of_log
+        other._chosen = self._chosen[rows]
         return other
 
     @property
     def _carriers(self) -> np.ndarray:
         """Return the poses of the carriers, (N, c, 6) or (c, 6) [m, rad]."""
         poses = carriers_of(self._robot, self._measurements)
-        return poses if self._chosen is None or poses.ndim == 2 else np.ascontiguousarray(poses[self._chosen])
+        return poses if poses.ndim == 2 else np.ascontiguousarray(poses[self._chosen])
 
     @property
     def freedoms(self) -> int:
@@ -98,42 +130,18 @@ class Balance:
         few = 0 if self._measurements.tensions is not None else self._robot.m
         return max(len(self._rows) - few, 0)
 
-    @cached_property
-    def _of_log(self) -> tuple[Motion, np.ndarray, np.ndarray]:
-        """Return the motion, and what capstan, friction and gain multiply, as measured and smoothed, (3, N, m).
-
-        These are y s, s and y, with tensions y and signs s of the cable speeds.
-        """
-        motion, y = motion_of(self._robot, self._measurements), self._measurements.tensions
-        terms = np.zeros((3, len(self._measurements), self._robot.m))
-        if y is not None:
-            terms = np.stack([y * motion.signs, motion.signs, y])
-        smooth = terms if y is None or motion.smooth is None else motion.smooth.values(terms)
-        return motion, terms, smooth
-
     def tensions(self, table: np.ndarray, smooth: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the tensions that the platform feels [N], and their derivatives by capstan, friction, gain, (N, m, 3).
 
         `table` is that of `Parameters`, (m, 14).
         """
-        _, terms, smoothed = self._of_log
-        terms = smoothed if smooth else terms
-        terms = terms if self._chosen is None else terms[:, self._chosen]
+        terms = self._log.terms[int(smooth)][:, self._chosen]
         gain = table[:, 13]
         capstan = np.clip(table[:, 11], -MOST_CAPSTAN, MOST_CAPSTAN)  # a step of the fit may be far too long
         even, odd = np.cosh(capstan), np.sinh(capstan)  # of exp(capstan s), whose s is -1 or 1
         by_gain = even * terms[2] + odd * terms[0]
         by = np.stack([gain * (odd * terms[2] + even * terms[0]), terms[1], by_gain], axis=2)
         return gain * by_gain + table[:, 12] * terms[1], by
-
-    @cached_property
-    def _variances(self) -> np.ndarray:
-        """Return the variances of the felt tensions over the mean gain, (N, m) [N^2], which no parameter changes."""
-        given, weight = self._measurements.tensions, self._robot.weight
-        if given is None:
-            return np.full((len(self._measurements), self._robot.m), (UNMEASURED * weight) ** 2)
-        size = np.maximum(np.abs(self._of_log[2][2]), LEAST_TENSION * np.abs(given).mean(axis=0))
-        return (self._measurements.sigma.tensions * size) ** 2 + (1e-9 * max(weight, 1.0)) ** 2
 
     def _forces(
         self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float, noise: float
@@ -148,11 +156,8 @@ class Balance:
         poses = np.concatenate([position, points.angles(rotation)], axis=1)
         A, lengths = np.empty((count, 6, m)), np.empty((count, m))
         lines(record, poses, self._carriers, lengths, A, None, None, None)
-        (tensions, by_tensions), variances = self.tensions(table), noise**2 * self._variances
-        motion = self._of_log[0]
-        motion = motion.ahead(self._measurements.times, clock)
-        if self._chosen is not None:
-            variances, motion = variances[self._chosen], motion.only(self._chosen)
+        (tensions, by_tensions), variances = self.tensions(table), noise**2 * self._log.variances[self._chosen]
+        motion = self._log.motion.ahead(self._measurements.times, clock, self._chosen)
         if self._measurements.tensions is None:
             tensions = tensions + robot.weight / m
         arm = rotation @ com
@@ -174,9 +179,8 @@ class Balance:
         Corrections by the balance of forces would have the errors of accelerations, which those of poses cause.
         """
         tensions, _ = self.tensions(table, smooth=True)
-        variances, smooth = self._variances, self._of_log[0].smooth
-        variances = variances if smooth is None else variances * smooth.share[:, None]
-        variances = variances if self._chosen is None else variances[self._chosen]
+        variances, smooth = self._log.variances[self._chosen], self._log.motion.smooth
+        variances = variances if smooth is None else variances * smooth.share[self._chosen, None]
         return FeltTensions(tensions, noise * np.sqrt(variances)[..., None] * np.eye(self._robot.m))
 
     def at(

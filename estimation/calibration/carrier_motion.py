@@ -44,7 +44,7 @@ class CarrierMotion:
             for i in range(len(robot.carriers))
         ]
 
-    def at_samples(self, rows: np.ndarray) -> CarrierMotion:
+    def at_samples(self, rows: np.ndarray | slice) -> CarrierMotion:
         """Return the same motion at the times of some samples (k,)."""
         other = copy(self)
         other._tracks = [track.at_samples(rows) for track in self._tracks]

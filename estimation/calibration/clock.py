@@ -96,16 +96,15 @@ def _cost_at(model: Model, clock: float, length: float) -> float:
     """Return the mean square of the readings' residuals after one step of the parameters; inf with too few poses."""
     state = model.begin()
     state.x[model.parameters.clock] = clock
-    residuals, derivatives = model.linearised(state)
     inside = int(model.inside(state).sum())
     if inside < FEWEST * len(model.measurements):
         return np.inf
-    equations = NormalEquations.at(model, residuals, derivatives, metric(model))
+    equations = NormalEquations.at(model, state, metric(model))
     of_poses = 0.0 if equations.y is None else float(np.vdot(equations.y, equations.y))
     gained = 0.0
     if equations.b.size:
         gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
-    return (residuals.cost - of_poses - gained) / max(inside, 1)
+    return (equations.cost - of_poses - gained) / max(inside, 1)
 
 
 def _thinned(model: Model) -> Model:

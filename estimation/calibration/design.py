@@ -92,7 +92,11 @@ def _rows(robot: Robot, groups: tuple[str, ...], poses: np.ndarray, measured: bo
         raise InputError("candidates must be poses at which every cable has a length, got one inside a pulley")
     model = replace(model, measurements=Measurements(readings, poses if measured else None), start=poses)
     found = project(model, state)
-    return np.stack([without_poses(model, found, cable) for cable in range(robot.m)], axis=1)
+    rows = np.zeros((len(poses), robot.m, int(model.parameters.varies.sum())))
+    for cable in range(robot.m):
+        own, columns = without_poses(model, found, cable)
+        rows[:, cable, columns] = own
+    return rows
 
 
 def _so_far(calibration: Calibration | None, robot: Robot, groups: tuple[str, ...]) -> np.ndarray:

@@ -61,53 +61,50 @@ def fit(model: Model, state: State, length: float, steps: int = MOST_STEPS, enou
     scale = metric(model)
     varies = model.parameters.varies
     first = model.parameters.first
-    damping, back, at_best = _Damping(), 1.0, False
-    cost, done, idle = np.inf, 0, 0
-    while done < steps:
-        residuals, derivatives = model.linearised(state)
-        cost = residuals.cost
-        while done < steps:
-            done += 1
-            equations = NormalEquations.at(model, residuals, derivatives, scale, damping.added)
-            damping.see(equations.diagonals)
-            away = (state.x - first)[varies] * scale[varies]
-            dp, expected = _step(equations, away * back, length, damping.factor > 0, at_best)
-            if expected < enough * cost:
-                return Fit(state, cost, True, done)
-            size = float(np.abs(dp).max(initial=0.0))
-            dx = np.zeros_like(state.x)
-            dx[varies] = dp / scale[varies]
-            tried = model.moved(state, dx, equations.poses_after(dp))
-            new = model.residuals(tried).cost
-            little = NEGLIGIBLE * (1 + cost)
-            negligible = expected <= little
-            settles = equations.inverse_root is not None and little - GOOD * expected < new - cost < np.inf
-            if settles:
-                # The parameters may be right, and some poses have farther to go than their derivatives show.
-                tried = settled(model, tried, little / len(state.shift))
-                new = model.residuals(tried).cost
-            if negligible and damping.factor == 0:
-                idle += 1
-                costly = new - cost > SMALL * (1 + cost)
-                if size <= STILL or idle >= MOST_IDLE or (costly and back < LEAST_BACK):
-                    # The last step costs nothing, and improves nearly quadratically.
-                    return Fit(tried, new, True, done) if new <= cost else Fit(state, cost, True, done)
-                back = back / 4 if costly else min(2 * back, 1.0)
-                if costly:
-                    continue
-            # A step along open directions may cost a little: they are straight lines only nearby.
-            if new - cost <= SMALL * (1 + cost) if negligible else new <= cost and size <= FARTHEST * length:
-                # Where nothing more is expected, a step without damping shows whether that is so.
-                damping.accept(0.0 if negligible else (cost - new) / expected)
-                damping.factor *= not negligible
-                state, cost, at_best = tried, new, settles
-                del derivatives, equations  # before the next ones need as much memory
-                break
-            damping.reject()
-            if damping.factor > LARGEST:
-                # No step is short enough.
-                return Fit(state, cost, False, done)
-    return Fit(state, cost, False, done)
+    damping, back, at_best, equations = _Damping(), 1.0, False, None
+    cost, idle = np.inf, 0
+    for done in range(1, steps + 1):
+        del equations  # before the next ones need as much memory
+        equations = NormalEquations.at(model, state, scale, damping.added)
+        cost = equations.cost
+        damping.see(equations.diagonals)
+        away = (state.x - first)[varies] * scale[varies]
+        dp, expected = _step(equations, away * back, length, damping.factor > 0, at_best)
+        if expected < enough * cost:
+            return Fit(state, cost, True, done)
+        size = float(np.abs(dp).max(initial=0.0))
+        dx = np.zeros_like(state.x)
+        dx[varies] = dp / scale[varies]
+        tried = model.moved(state, dx, equations.poses_after(dp))
+        new = model.cost(tried)
+        little = NEGLIGIBLE * (1 + cost)
+        negligible = expected <= little
+        settles = equations.inverse_root is not None and little - GOOD * expected < new - cost < np.inf
+        if settles:
+            # The parameters may be right, and some poses have farther to go than their derivatives show.
+            tried = settled(model, tried, little / len(state.shift))
+            new = model.cost(tried)
+        if negligible and damping.factor == 0:
+            idle += 1
+            costly = new - cost > SMALL * (1 + cost)
+            if size <= STILL or idle >= MOST_IDLE or (costly and back < LEAST_BACK):
+                # The last step costs nothing, and improves nearly quadratically.
+                return Fit(tried, new, True, done) if new <= cost else Fit(state, cost, True, done)
+            back = back / 4 if costly else min(2 * back, 1.0)
+            if costly:
+                continue
+        # A step along open directions may cost a little: they are straight lines only nearby.
+        if new - cost <= SMALL * (1 + cost) if negligible else new <= cost and size <= FARTHEST * length:
+            # Where nothing more is expected, a step without damping shows whether that is so.
+            damping.accept(0.0 if negligible else (cost - new) / expected)
+            damping.factor *= not negligible
+            state, cost, at_best = tried, new, settles
+            continue
+        damping.reject()
+        if damping.factor > LARGEST:
+            # No step is short enough.
+            return Fit(state, cost, False, done)
+    return Fit(state, cost, False, steps)
 
 
 class _Damping:

@@ -19,6 +19,7 @@ The pose of sample k is the pose measured at t_k + clock, or an initial one, plu
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -29,7 +30,7 @@ from scipy.spatial.transform import Rotation
 from ...base.display import Displayed
 from ...models import points
 from ...models.robot import Robot
-from ..logs.measurements import Measurements, carriers_of, measured_poses
+from ..logs.measurements import Measurements, carriers_of, measured, measured_poses
 from ..logs.pose_track import PoseTrack
 from .balance import Balance, Balanced, FeltTensions, needs_balance
 from .carrier_motion import CarrierMotion
@@ -38,6 +39,7 @@ from .parameters import IN_BALANCE, OF_CABLE, OF_ROBOT, Parameters, normal_rows,
 from .sightings import Sighted, sightings
 
 STILL = 1e-4  # [m] along directions that are kept
+PART = 4000  # samples whose derivatives are computed together
 
 
 class State(NamedTuple):
@@ -63,7 +65,7 @@ class Residuals(NamedTuple):
     """Differences over their standard deviations.
 
     Their shapes: readings (m, N), poses and errors of tensions (N, 6 + d), parameters (P,) and kept directions (d,),
-    balance of forces (N, 6), directions (m, N, 3).
+    balance of forces (N, 6), directions (m, N, 3); the last two (N, 0), (m, N, 0) if they are no part of the fit.
     """
 
     readings: np.ndarray
@@ -72,11 +74,14 @@ class Residuals(NamedTuple):
     balance: np.ndarray
     directions: np.ndarray
 
-    @property
-    def cost(self) -> float:
-        """Return the sum of squares, inf where a cable has no length."""
-        total = sum(float(np.vdot(part, part)) for part in self)
-        return total if np.isfinite(total) else np.inf
+    @classmethod
+    def together(cls, parts: Sequence[Residuals]) -> Residuals:
+        """Return the residuals of successive parts of a log as one; those of the parameters are the same in all."""
+        if len(parts) == 1:
+            return parts[0]
+        readings, poses, parameters, balance, directions = zip(*parts, strict=True)
+        one, other = (np.concatenate(of, axis=1) for of in (readings, directions))
+        return cls(one, np.concatenate(poses), parameters[0], np.concatenate(balance), other)
 
     @property
     def of_samples(self) -> np.ndarray:
@@ -128,17 +133,13 @@ class Model(Displayed):
         return self.parameters.robot
 
     @cached_property
-    def _given(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return measured_poses(self.robot, self.measurements)
-
-    @cached_property
     def pose_sigmas(self) -> np.ndarray:
         """Return the standard deviation of each coordinate of each pose, and error of tensions, (N, 6 + d) [m, rad, 1].
 
         Inf: not measured; 0: exact, or locked by `platform.dof`.
         """
         sigma = self.measurements.sigma
-        known = self._given[2]
+        known = measured(self.measurements)
         known = known | (known.any(axis=0) & (self.interpolates or self.track is not None))
         unknown = np.repeat([np.inf, self.upright], 3)
         result = np.where(known, np.repeat([sigma.position, sigma.rotation], 3), unknown)
@@ -180,10 +181,13 @@ class Model(Displayed):
         wanted = wanted or needs_balance(self.robot, self.measurements)
         return self._forces if wanted and self._forces.freedoms else None
 
-    def only(self, rows: np.ndarray) -> Model:
-        """Return the model of some samples (k,), whose motion is that of all."""
+    def only(self, rows: np.ndarray | slice) -> Model:
+        """Return the model of some samples (k,) that rise, whose motion is that of all."""
+        samples = np.arange(len(self.measurements))[rows]
+        slips = tuple((cable, int(np.searchsorted(samples, first))) for cable, first in self.parameters.slips)
         return replace(
             self,
+            parameters=replace(self.parameters, slips=slips) if slips else self.parameters,
             measurements=self.measurements.only(rows),
             weights=self.weights[:, rows],
             start=None if self.start is None else self.start[rows],
@@ -193,6 +197,15 @@ class Model(Displayed):
             felt=None if self.felt is None else self.felt.only(rows),
             carriers=None if self.carriers is None else self.carriers.at_samples(rows),
         )
+
+    def parts(self, state: State) -> Iterator[tuple[slice, Model, State]]:
+        """Yield the model and the state by samples few enough for all their derivatives."""
+        count = len(self.measurements)
+        if count <= PART:
+            yield slice(None), self, state
+            return
+        for rows in (slice(first, first + PART) for first in range(0, count, PART)):
+            yield rows, self.only(rows), State(state.x, *(one[rows] for one in state[1:]))
 
     @cached_property
     def felt_tensions(self) -> FeltTensions | None:
@@ -222,7 +235,8 @@ class Model(Displayed):
         """Return the parameters of the file, at the initial poses."""
         count = len(self.measurements)
         errors = np.zeros((count, self._open))
-        return State(self.parameters.first.copy(), np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)), errors)
+        still, straight = np.broadcast_to(0.0, (count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3))
+        return State(self.parameters.first.copy(), still, straight, errors)
 
     def poses(self, state: State) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (N, 3) [m] and rotations (N, 3, 3) of the platform."""
@@ -243,7 +257,7 @@ class Model(Displayed):
     @cached_property
     def _begun(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the measured, or else the initial, positions (N, 3) [m] and rotations (N, 3, 3)."""
-        position, rotation, known = self._given
+        position, rotation, known = measured_poses(self.robot, self.measurements)
         if self.start is not None and not known.all():
             place, turned = ~known[:, 0], ~known[:, 3]
             position, rotation = position.copy(), rotation.copy()
@@ -253,10 +267,22 @@ class Model(Displayed):
 
     def residuals(self, state: State) -> Residuals:
         """Return the residuals of readings, poses and parameters."""
-        return self._evaluate(state, False)[0]
+        return Residuals.together([part._evaluate(own, False)[0] for _, part, own in self.parts(state)])
+
+    def cost(self, state: State) -> float:
+        """Return the sum of the squares of all residuals, inf where a cable has no length."""
+        own = self.of_parameters(state.x)
+        return float(own @ own) + sum(
+            part._evaluate(of, False)[0].of_samples.sum() for _, part, of in self.parts(state)
+        )
+
+    def of_parameters(self, x: np.ndarray) -> np.ndarray:
+        """Return the residuals of the parameters (P,) and of kept directions (d,)."""
+        change = x - self.parameters.first
+        return np.concatenate([change / self.prior_sigmas, self.kept_rows @ change / STILL])
 
     def linearised(self, state: State) -> tuple[Residuals, Derivatives]:
-        """Return the residuals and their derivatives."""
+        """Return the residuals and their derivatives, of all samples at once."""
         residuals, derivatives = self._evaluate(state, True)
         assert derivatives is not None
         return residuals, derivatives
@@ -293,15 +319,12 @@ class Model(Displayed):
             placed = position, rotation
             forces = self.balanced.at(parameters, state.x, placed, self.ahead, self.noise, derive)
         weighs = inside if self.unbalanced is None else inside & ~self.unbalanced
-        in_balance = np.zeros((len(position), 6)) if forces is None else forces.residuals * weighs[:, None]
-        change = state.x - parameters.first
-        by_prior = change / self.prior_sigmas
-        by_prior = np.concatenate([by_prior, self.kept_rows @ change / STILL])
+        in_balance = np.zeros((len(position), 0)) if forces is None else forces.residuals * weighs[:, None]
         seen = sightings(parameters, state.x, (position, rotation), run, at, self.measurements, carried, derive)
         if seen is not None:
             seen.leave_out(~inside)
         seen_residuals = np.zeros((m, len(position), 0)) if seen is None else seen.residuals
-        residuals = Residuals(readings, poses, by_prior, in_balance, seen_residuals)
+        residuals = Residuals(readings, poses, self.of_parameters(state.x), in_balance, seen_residuals)
         if not derive:
             return residuals, None
         gain = weights * ratio

@@ -40,19 +40,19 @@ class Motion(NamedTuple):
     sigma: np.ndarray
     smooth: Parabolas | None = None
 
-    def ahead(self, times: np.ndarray | None, clock: float) -> Motion:
-        """Return the motion with that of the platform at the times (N,) + `clock` [s]; its ends stay as they are."""
-        if times is None or clock == 0.0:
-            return self
-        values = np.hstack([self.gravity, self.rate, self.spin, self.turning])
-        moved = np.stack([np.interp(times + clock, times, column) for column in values.T], axis=1)
-        gravity, rate, spin, turning = np.split(moved, 4, axis=1)
-        return self._replace(gravity=gravity, rate=rate, spin=spin, turning=turning)
+    def ahead(self, times: np.ndarray | None, clock: float, rows: np.ndarray | slice) -> Motion:
+        """Return the motion at some samples, with that of the platform `clock` [s] later; its ends stay as they are.
 
-    def only(self, rows: np.ndarray) -> Motion:
-        """Return the motion at some samples, (k,)."""
-        names = ("signs", "gravity", "rate", "spin", "turning", "sigma")
-        return self._replace(**{name: getattr(self, name)[rows] for name in names}, smooth=None)
+        `times` (N,) [s] are those of all samples.
+        """
+        moved: dict[str, np.ndarray] = {}
+        for name in ("gravity", "rate", "spin", "turning"):
+            values = getattr(self, name)
+            if times is None or clock == 0.0:
+                moved[name] = values[rows]
+            else:
+                moved[name] = np.stack([np.interp(times[rows] + clock, times, one) for one in values.T], axis=1)
+        return self._replace(**moved, signs=self.signs[rows], sigma=self.sigma[rows], smooth=None)
 
     @property
     def by_arm(self) -> np.ndarray:

@@ -66,6 +66,7 @@ class Diagonals(NamedTuple):
 class NormalEquations(Displayed):
     """The equations at one state."""
 
+    cost: float  # sum of the squares of all residuals
     # of the parameters that vary, in metres, (p, p) and (p,)
     S: np.ndarray
     b: np.ndarray
@@ -76,56 +77,84 @@ class NormalEquations(Displayed):
     diagonals: Diagonals  # without damping; of poses 0 if none varies
 
     @classmethod
-    def at(
-        cls,
-        model: Model,
-        residuals: Residuals,
-        derivatives: Derivatives,
-        scale: np.ndarray,
-        damping: Diagonals | None = None,
-    ) -> NormalEquations:
-        """Return the equations; `scale` is `metric`, and `damping` is added to the diagonals of J'J and C_k."""
-        varies = model.parameters.varies
-        layers, keep = _layers(model, residuals, derivatives, scale)
-        m, count, width = layers[0].J.shape
-        size = m * width + layers[0].others.shape[2]
-        full, right = np.zeros((size, size)), np.zeros(size)
-        for layer in layers:
-            layer.add(full, right)
-        S, b = full[np.ix_(keep, keep)], right[keep]
-        sigma = model.prior_sigmas[varies] * scale[varies]
-        forces, H = derivatives.balance, np.zeros((0, 6, len(b)))
-        if forces is not None and forces.by_parameters is not None:
-            H = forces.by_parameters[..., varies] / scale[varies]  # (N, 6, p)
-            flat = H.reshape(forces.residuals.size, -1) if len(b) else np.zeros((forces.residuals.size, 0))
-            S, b = S + inner(flat, flat), b + inner(flat, forces.residuals.reshape(-1, 1))[:, 0]
-        S[np.diag_indices(len(b))] += 1 / sigma**2
-        b += residuals.parameters[: len(varies)][varies] / sigma
-        kept = model.kept_rows[:, varies] / scale[varies] / STILL
-        S, b = S + kept.T @ kept, b + kept.T @ residuals.parameters[len(varies) :]
-        own = np.diag(S).copy()
+    def at(cls, model: Model, state: State, scale: np.ndarray, damping: Diagonals | None = None) -> NormalEquations:
+        """Return the equations, summed over parts of the log, so that few derivatives are in memory at once.
+
+        `scale` is `metric`, and `damping` is added to the diagonals of J'J and C_k.
+        """
+        S, b, cost = _of_priors(model, state, scale)
+        less_S, less_b = np.zeros_like(S), np.zeros_like(b)
+        of_poses = np.zeros(model.poses_vary.shape)
+        inverse_root, Y, y = None, None, None
+        if model.poses_vary.any():
+            inverse_root, Y, y = (np.empty((*of_poses.shape, *more)) for more in (of_poses.shape[1:], b.shape, ()))
+        for rows, part, own in model.parts(state):
+            one = _of_part(part, own, scale, None if damping is None else damping.poses[rows])
+            S, b, cost = S + one.S, b + one.b, cost + one.cost
+            if one.solved is None or inverse_root is None or Y is None or y is None:
+                continue
+            inverse_root[rows], Y[rows], y[rows], of_poses[rows] = one.solved
+            stacked = Y[rows].reshape(y[rows].size, len(b))
+            less_S += inner(stacked, stacked)
+            less_b += inner(stacked, y[rows].reshape(-1, 1))[:, 0]
+        diagonals = Diagonals(np.diag(S).copy(), of_poses)
         if damping is not None:
             S[np.diag_indices(len(b))] += damping.parameters
-        if not model.poses_vary.any():
-            return cls(S, b, None, None, None, Diagonals(own, np.zeros((count, 6))))
-        inverse_root, g, of_poses = _poses(model, residuals, derivatives, damping)
-        E = np.zeros((*g.shape, size))
-        for layer in layers:
-            layer.cross(E, model.poses_vary)
-        E = E if keep.all() else E[..., keep]
-        if forces is not None and forces.by_pose is not None:
-            E = E + np.swapaxes(forces.by_pose * model.poses_vary[:, None], 1, 2) @ H
-        Y = np.matmul(inverse_root, E)
-        y = np.matmul(inverse_root, g[..., None])[..., 0]
-        stacked = Y.reshape(y.size, Y.shape[2])
-        S, b = S - inner(stacked, stacked), b - inner(stacked, y.reshape(-1, 1))[:, 0]
-        return cls(S, b, inverse_root, Y, y, Diagonals(own, of_poses))
+        return cls(cost, S - less_S, b - less_b, inverse_root, Y, y, diagonals)
 
     def poses_after(self, dp: np.ndarray) -> np.ndarray | None:
         """Return the changes of the poses (N, 6) that follow from those of the parameters (p,), None if none varies."""
         if self.inverse_root is None or self.Y is None or self.y is None:
             return None
         return -np.matmul(np.swapaxes(self.inverse_root, 1, 2), (self.y + self.Y @ dp)[..., None])[..., 0]
+
+
+class _Part(NamedTuple):
+    """Contribution of n samples to J'J (p, p), J'e (p,) and the sum of squares.
+
+    `solved` are L_k^-1, Y, y and the diagonals of C_k of the samples, or None if no pose varies.
+    """
+
+    S: np.ndarray
+    b: np.ndarray
+    cost: float
+    solved: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None = None
+
+
+def _of_part(model: Model, state: State, scale: np.ndarray, damping: np.ndarray | None) -> _Part:
+    residuals, derivatives = model.linearised(state)
+    cost = float(residuals.of_samples.sum())
+    layers, keep = _layers(model, residuals, derivatives, scale)
+    size, varies = len(keep), model.parameters.varies
+    full, right = np.zeros((size, size)), np.zeros(size)
+    for layer in layers:
+        layer.add(full, right)
+    S, b = full[np.ix_(keep, keep)], right[keep]
+    forces, H = derivatives.balance, np.zeros((0, 6, len(b)))
+    if forces is not None and forces.by_parameters is not None:
+        H = forces.by_parameters[..., varies] / scale[varies]  # (n, 6, p)
+        flat = H.reshape(forces.residuals.size, len(b))
+        S, b = S + inner(flat, flat), b + inner(flat, forces.residuals.reshape(-1, 1))[:, 0]
+    if not model.poses_vary.any():
+        return _Part(S, b, cost)
+    inverse_root, g, of_poses = _poses(model, residuals, derivatives, damping)
+    E = np.zeros((*g.shape, size))
+    for layer in layers:
+        layer.cross(E, model.poses_vary)
+    E = E if keep.all() else E[..., keep]
+    if forces is not None and forces.by_pose is not None:
+        E = E + np.swapaxes(forces.by_pose * model.poses_vary[:, None], 1, 2) @ H
+    y = np.matmul(inverse_root, g[..., None])[..., 0]
+    return _Part(S, b, cost, (inverse_root, np.matmul(inverse_root, E), y, of_poses))
+
+
+def _of_priors(model: Model, state: State, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return J'J (p, p), J'e (p,) and the sum of squares of the residuals of the parameters themselves."""
+    varies, residuals = model.parameters.varies, model.of_parameters(state.x)
+    sigma = model.prior_sigmas[varies] * scale[varies]
+    kept = model.kept_rows[:, varies] / scale[varies] / STILL
+    b = residuals[: len(varies)][varies] / sigma + kept.T @ residuals[len(varies) :]
+    return np.diag(1 / sigma**2) + kept.T @ kept, b, float(residuals @ residuals)
 
 
 class _Layer(NamedTuple):
@@ -188,7 +217,7 @@ def _layers(
 
 
 def _poses(
-    model: Model, residuals: Residuals, derivatives: Derivatives, damping: Diagonals | None
+    model: Model, residuals: Residuals, derivatives: Derivatives, damping: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return L_k^-1 (N, 6, 6), G_k'e (N, 6) and C_k's diagonal (N, 6) of the coordinates that vary."""
     vary, sigmas = model.poses_vary, model.pose_sigmas
@@ -209,7 +238,7 @@ def _poses(
     C[:, diagonal, diagonal] += inverse**2
     own = C[:, diagonal, diagonal]
     if damping is not None:
-        C[:, diagonal, diagonal] += damping.poses
+        C[:, diagonal, diagonal] += damping
     C[:, diagonal, diagonal] += C[:, diagonal, diagonal] == 0
     try:
         root = np.linalg.cholesky(C)
@@ -219,8 +248,14 @@ def _poses(
     return np.linalg.inv(root), g, own
 
 
-def pose_steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tuple[np.ndarray, np.ndarray]:
+def pose_steps(model: Model, state: State) -> tuple[np.ndarray, np.ndarray]:
     """Return Newton's steps of poses with parameters as they are, (N, 6), and the decrease to expect of each, (N,)."""
+    parts = [_steps(part, *part.linearised(own)) for _, part, own in model.parts(state)]
+    steps, decreases = (np.concatenate(of) for of in zip(*parts, strict=True))
+    return steps, decreases
+
+
+def _steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tuple[np.ndarray, np.ndarray]:
     vary = model.poses_vary
     inverse_root, g, _ = _poses(model, residuals, derivatives, None)
     bent = curvature(residuals, derivatives) * (vary[:, :, None] & vary[:, None, :])
@@ -237,14 +272,10 @@ def pose_covariances(model: Model, state: State) -> np.ndarray:
 
     They are infinite where nothing determines a coordinate, and zero where it cannot move.
     """
-    inverse_root = _poses(model, *model.linearised(state), None)[0]
+    roots = [_poses(part, *part.linearised(own), None)[0] for _, part, own in model.parts(state)]
+    inverse_root = np.concatenate(roots)
     varies = model.poses_vary[:, :, None] & model.poses_vary[:, None, :]
     covariance = np.where(varies, np.swapaxes(inverse_root, 1, 2) @ inverse_root, 0.0)[:, :6, :6]
     unknown = np.trace(covariance, axis1=1, axis2=2) > LARGEST_VARIANCE
     covariance[unknown] = np.inf
     return covariance
-
-
-def state_equations(model: Model, state: State, scale: np.ndarray) -> NormalEquations:
-    """Return the equations at a state, without damping."""
-    return NormalEquations.at(model, *model.linearised(state), scale)

@@ -14,7 +14,7 @@ import numpy as np
 from ...models import points
 from ..logs.measurements import Measurements
 from .fit import fit, held
-from .model import Derivatives, Model, State
+from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import OF_CABLE, Parameters
 from .products import onto
@@ -53,12 +53,18 @@ class Slip(NamedTuple):
 
 
 class _Projected(NamedTuple):
-    """Residuals and their redundancies, (m, N), derivatives, and L^-1 G of each reading, (m, N, 6), if poses vary."""
+    """Residuals and their redundancies, (m, N), with derivatives by what varies, in metres.
+
+    - `own`: by the cable's own parameters, (m, N, k), those at `columns` (k,) of its 14.
+    - `others`: by the robot's parameters and slips that vary, (m, N, d).
+    - `root`: L^-1 G of each reading, (m, N, 6), if poses vary.
+    """
 
     residuals: np.ndarray
     redundancy: np.ndarray
-    derivatives: Derivatives
-    scale: np.ndarray
+    columns: np.ndarray
+    own: np.ndarray
+    others: np.ndarray
     equations: NormalEquations
     root: np.ndarray | None
 
@@ -69,18 +75,30 @@ def _threshold(count: int) -> float:
     return max(LEAST_THRESHOLD, float(-ndtri(LEVEL / max(count, 1))))
 
 
-def project(model: Model, state: State) -> _Projected:
-    """Return residuals and derivatives at a state, with what unknown poses absorb of them."""
-    residuals, derivatives = model.linearised(state)
-    scale = metric(model)
-    equations = NormalEquations.at(model, residuals, derivatives, scale)
-    redundancy = np.where(model.weights * model.inside(state) > 0, 1.0, 0.0)
-    if equations.inverse_root is None:
-        return _Projected(residuals.readings, redundancy, derivatives, scale, equations, None)
-    G = derivatives.poses * model.poses_vary
-    root = np.einsum("nab,mnb->mna", equations.inverse_root, G)  # L^-1 g of each reading
-    redundancy = redundancy - np.einsum("mna,mna->mn", root, root)
-    return _Projected(residuals.readings, redundancy, derivatives, scale, equations, root)
+def project(model: Model, state: State, derivatives_too: bool = True) -> _Projected:
+    """Return residuals and, unless these are not wanted, derivatives at a state, and what unknown poses absorb."""
+    parameters, scale = model.parameters, metric(model)
+    varies, factors = parameters.table(parameters.varies), parameters.table(scale)
+    columns, last = np.flatnonzero(varies.any(axis=0)), slice(parameters.clock, parameters.count)
+    free = parameters.varies[last]
+    if not derivatives_too:
+        columns, free = columns[:0], np.zeros_like(free)
+    equations = NormalEquations.at(model, state, scale)
+    shape = model.weights.shape
+    residuals, redundancy = np.empty(shape), np.where(model.weights * model.inside(state) > 0, 1.0, 0.0)
+    own, others = np.empty((*shape, len(columns))), np.empty((*shape, int(free.sum())))
+    root = None if equations.inverse_root is None else np.empty((*shape, equations.inverse_root.shape[1]))
+    for rows, part, placed in model.parts(state):
+        values, derivatives = part.linearised(placed)
+        residuals[:, rows] = values.readings
+        own[:, rows] = derivatives.cables[..., columns] / factors[:, None, columns]
+        others[:, rows] = derivatives.others[..., free] / scale[last][free]
+        if root is not None and equations.inverse_root is not None:
+            G = derivatives.poses * part.poses_vary
+            root[:, rows] = np.einsum("nab,mnb->mna", equations.inverse_root[rows], G)  # L^-1 g of each reading
+    if root is not None:
+        redundancy = redundancy - np.einsum("mna,mna->mn", root, root)
+    return _Projected(residuals, redundancy, columns, own, others, equations, root)
 
 
 def autocorrelation(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
@@ -95,37 +113,43 @@ def autocorrelation(model: Model, state: State, covariance: np.ndarray, rank: in
     if count < BLOCKS * SHORTEST_BLOCK or not rank:
         return 1.0
     edges = np.arange(BLOCKS) * count // BLOCKS
+    block = np.searchsorted(edges, np.arange(count), side="right") - 1  # of each sample
     total = np.zeros((BLOCKS, len(covariance)))
     for i, row in enumerate(found.residuals):
-        scores = without_poses(model, found, i) * row[:, None]
-        total += np.add.reduceat(scores, edges, axis=0)
-    total += np.add.reduceat(_of_samples(model, found), edges, axis=0)
+        J, columns = without_poses(model, found, i)
+        total[:, columns] += np.add.reduceat(J * row[:, None], edges, axis=0)
+    for rows, part, own in model.parts(state):
+        np.add.at(total, block[rows], _of_samples(part, own, found.equations, rows))
     # The sums add up to 0 in a minimum, which takes one of them away.
     ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
     return ratio if ratio > 1 + BY_CHANCE else 1.0
 
 
-def _of_samples(model: Model, found: _Projected) -> np.ndarray:
-    """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (N, p) [1/m]."""
-    varies, forces, seen = model.parameters.varies, found.derivatives.balance, found.derivatives.directions
-    inverse_root, Y = found.equations.inverse_root, found.equations.Y
-    total = np.zeros((found.residuals.shape[1], int(varies.sum())))
+def _of_samples(model: Model, state: State, equations: NormalEquations, rows: slice) -> np.ndarray:
+    """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (n, p) [1/m].
+
+    The samples are `rows` of the `equations`.
+    """
+    derivatives, scale = model.linearised(state)[1], metric(model)
+    varies, forces, seen = model.parameters.varies, derivatives.balance, derivatives.directions
+    inverse_root, Y = (None if of is None else of[rows] for of in (equations.inverse_root, equations.Y))
+    total = np.zeros((len(model.measurements), int(varies.sum())))
     if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
-        rows = forces.by_parameters[..., varies] / found.scale[varies]
+        H = forces.by_parameters[..., varies] / scale[varies]
         if inverse_root is not None and Y is not None:
-            rows = rows - forces.by_pose * model.poses_vary[:, None] @ np.swapaxes(inverse_root, 1, 2) @ Y
-        total += np.einsum("nip,ni->np", rows, forces.residuals)
+            H = H - forces.by_pose * model.poses_vary[:, None] @ np.swapaxes(inverse_root, 1, 2) @ Y
+        total += np.einsum("nip,ni->np", H, forces.residuals)
     if seen is None or seen.cables is None or seen.clock is None or seen.poses is None:
         return total
-    for i, k in np.ndindex(len(seen.residuals), 3):
-        own = np.zeros((len(total), OF_CABLE))
-        own[:, SEEN] = seen.cables[i, :, k]
-        others = np.zeros((len(total), found.derivatives.others.shape[2]))
-        others[:, 0] = seen.clock[i, :, k]
-        root = None
-        if inverse_root is not None:
-            root = (inverse_root[:, :, :6] @ (seen.poses[i, :, k] * model.poses_vary[:, :6])[..., None])[..., 0]
-        total += _without_poses(model, found, i, own, others, root) * seen.residuals[i, :, k, None]
+    clock = model.parameters.clock
+    for i, e in enumerate(seen.residuals):
+        J = np.zeros((*e.shape, model.parameters.count))
+        J[..., i * OF_CABLE + np.array(SEEN)], J[..., clock] = seen.cables[i], seen.clock[i]
+        J = J[..., varies] / scale[varies]  # (n, 3, p)
+        if inverse_root is not None and Y is not None:
+            root = (seen.poses[i] * model.poses_vary[:, None, :6]) @ np.swapaxes(inverse_root[:, :, :6], 1, 2)
+            J = J - root @ Y
+        total += np.einsum("nkp,nk->np", J, e)
     return total
 
 
@@ -138,22 +162,20 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
     forces = model.balanced
     if forces is None:
         return None
-    residuals, derivatives = model.linearised(state)
-    equations = NormalEquations.at(model, residuals, derivatives, metric(model))
-    spare = np.full(len(state.shift), float(forces.freedoms))
-    if (
-        equations.inverse_root is not None
-        and derivatives.balance is not None
-        and derivatives.balance.by_pose is not None
-    ):
-        K = derivatives.balance.by_pose * model.poses_vary[:, None]
-        spare -= ((K @ np.swapaxes(equations.inverse_root, 1, 2)) ** 2).sum(axis=(1, 2))
+    equations = NormalEquations.at(model, state, metric(model))
+    spare, squares = np.full(len(state.shift), float(forces.freedoms)), np.zeros(len(state.shift))
+    for rows, part, own in model.parts(state):
+        balance = part.linearised(own)[1].balance
+        assert balance is not None
+        squares[rows] = (balance.residuals**2).sum(axis=1)
+        if equations.inverse_root is not None and balance.by_pose is not None:
+            K = balance.by_pose * part.poses_vary[:, None]
+            spare[rows] -= ((K @ np.swapaxes(equations.inverse_root[rows], 1, 2)) ** 2).sum(axis=(1, 2))
     tested = model.inside(state) & (spare > SMALLEST_REDUNDANCY)
     if not tested.any():
         return None
     from scipy.special import gammaincinv
 
-    squares = (residuals.balance**2).sum(axis=1)
     usual, most = (2 * gammaincinv(np.maximum(spare, SMALLEST_REDUNDANCY) / 2, share) for share in (0.5, UNBALANCED))
     noise = float(np.median(squares[tested] / usual[tested]))
     certain = BY_CHANCE / 3 + 3 / np.sqrt(2 * float(spare[tested].sum()))
@@ -163,13 +185,12 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
 
 def find_outliers(model: Model, state: State) -> list[Outlier]:
     """Return outliers, at most one per sample."""
-    found = project(model, state)
+    found = project(model, state, False)
     seen = found.redundancy > SMALLEST_REDUNDANCY
     if not seen.any():
         return []
-    normalised = np.zeros_like(found.residuals)
-    normalised[seen] = found.residuals[seen] / np.sqrt(found.redundancy[seen])
-    size = np.abs(normalised)
+    size = np.zeros_like(found.residuals)
+    size[seen] = np.abs(found.residuals[seen]) / np.sqrt(found.redundancy[seen])
     limit = _threshold(int(seen.sum())) * max(1.0, 1.4826 * float(np.median(size[seen])))
     worst = np.argmax(size, axis=0)
     samples = np.arange(size.shape[1])
@@ -228,15 +249,14 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     seen = found.redundancy > SMALLEST_REDUNDANCY
     if not seen.any():
         return []
-    normalised = np.where(seen, found.residuals / np.sqrt(np.maximum(found.redundancy, SMALLEST_REDUNDANCY)), 0.0)
-    spread = 1.4826 * float(np.median(np.abs(normalised[seen])))
+    spread = 1.4826 * float(np.median(np.abs(found.residuals[seen] / np.sqrt(found.redundancy[seen]))))
     limit = _threshold(m * count) * max(1.0, spread)
     candidates: list[tuple[float, int, int, float, float]] = []
     inverse = np.linalg.inv(held(found.equations.S, length))
     for i in range(m):
-        rows = without_poses(model, found, i)  # (N, p)
+        rows, columns = without_poses(model, found, i)
         after = np.cumsum(rows[::-1], axis=0)[::-1]
-        absorbed = (onto(after, inverse) * after).sum(axis=1)
+        absorbed = (onto(after, inverse[np.ix_(columns, columns)]) * after).sum(axis=1)
         total = np.cumsum(found.redundancy[i, ::-1])[::-1]
         information = np.maximum(total - absorbed, 1e-9 * max(float(total[0]), 1e-9))
         sums = np.cumsum(found.residuals[i, ::-1])[::-1]
@@ -282,23 +302,18 @@ def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
     return bool(step * size > VISIBLE * size**2 and abs(step) * np.sqrt(max(kept, 0.0)) > CLEAR * min(scatter, 1e9))
 
 
-def without_poses(model: Model, found: _Projected, cable: int) -> np.ndarray:
-    """Return the derivatives of one cable's residuals by the parameters, minus the poses' part, (N, p) [1/m]."""
-    of = found.derivatives
-    root = None if found.root is None else found.root[cable]
-    return _without_poses(model, found, cable, of.cables[cable], of.others[cable], root)
+def without_poses(model: Model, found: _Projected, cable: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the derivatives of one cable's residuals by some parameters, minus the poses' part, (N, k) [1/m].
 
-
-def _without_poses(
-    model: Model, found: _Projected, cable: int, own: np.ndarray, others: np.ndarray, root: np.ndarray | None
-) -> np.ndarray:
-    """Return derivatives by all parameters, of those by a cable's (N, 14) and the robot's, and L^-1 G (N, 6 + d)."""
-    parameters, begin = model.parameters, cable * own.shape[1]
-    where = np.flatnonzero(parameters.varies)
-    mine, rest = (where >= begin) & (where < begin + own.shape[1]), where >= parameters.clock
-    rows = np.zeros((len(own), len(where)))
-    rows[:, mine] = own[:, where[mine] - begin] / found.scale[where[mine]]
-    rows[:, rest] = others[:, where[rest] - parameters.clock] / found.scale[where[rest]]
-    if root is None or found.equations.Y is None:
-        return rows
-    return rows - np.einsum("na,nap->np", root, found.equations.Y)
+    And which of the parameters that vary these are, (k,); the derivatives by all others are zero.
+    """
+    parameters = model.parameters
+    where, first = np.flatnonzero(parameters.varies), cable * OF_CABLE
+    mine, rest = np.isin(where, first + found.columns), where >= parameters.clock
+    own = found.own[cable][:, np.isin(found.columns, where[mine] - first)]
+    rows, columns = np.hstack([own, found.others[cable]]), np.flatnonzero(mine | rest)
+    if found.root is None or found.equations.Y is None:
+        return rows, columns
+    whole = -np.einsum("na,nap->np", found.root[cable], found.equations.Y)
+    whole[:, columns] += rows
+    return whole, np.arange(len(where))

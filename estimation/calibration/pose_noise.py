@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from .model import Model, State
-from .normal_equations import NormalEquations, metric, state_equations
+from .normal_equations import NormalEquations, metric
 from .observability import Observability, observability
 
 ONE_BY_ONE = 2000  # samples; more need no sigma points along single axes, because random ones average out
@@ -38,13 +38,13 @@ def seeming_information(model: Model, state: State, equations: NormalEquations, 
             continue
         for sign in (1.0, -1.0):
             moved = model.moved(state, np.zeros_like(state.x), sign * dq)
-            B += (state_equations(model, moved, scale).S - equations.S) / 2
+            B += (NormalEquations.at(model, moved, scale).S - equations.S) / 2
     return B
 
 
 def observed(model: Model, state: State, length: float) -> Observability:
     """Return the observability at a state; `length` is the length of the cables [m]."""
-    equations = state_equations(model, state, scale := metric(model))
+    equations = NormalEquations.at(model, state, scale := metric(model))
     B = seeming_information(model, state, equations, scale)
     return observability(equations.S, B, model.parameters, state, scale, length, model.kept_rows)
 
@@ -63,4 +63,4 @@ def steadied(model: Model, state: State, length: float) -> tuple[Model, State]:
     dp = -noise @ (rows @ (state.x - model.parameters.first))
     dx[varies] = dp / scale[varies]
     kept = rows if model.kept is None else np.vstack([model.kept, rows])
-    return replace(model, kept=kept), model.moved(state, dx, state_equations(model, state, scale).poses_after(dp))
+    return replace(model, kept=kept), model.moved(state, dx, NormalEquations.at(model, state, scale).poses_after(dp))

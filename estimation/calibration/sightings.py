@@ -18,7 +18,6 @@ from .motion import cross
 from .parameters import Parameters
 
 SEEN = (*range(6), 8)  # parameters of a cable on which its direction depends
-BLOCK = 20_000  # samples whose derivatives are computed together
 STEEPEST = 1e-3  # horizontal part of a unit vector, of which an azimuth tells nothing
 
 
@@ -60,22 +59,12 @@ def sightings(
     d = measurements.directions
     if d is None:
         return None
-    count, m = d.shape[:2]
-    shapes = ((3,), (3, 7), (3,), (3, 6)) if derive else ((3,),)
-    whole = [np.empty((m, count, *shape)) for shape in shapes]
-    at = np.broadcast_to(carriers, (count, *carriers.shape[-2:]))
-    for first in range(0, count, BLOCK):
-        rows = slice(first, first + BLOCK)
-        moved = None if carried is None else (carried[0][:, rows], carried[1][:, rows])
-        part = _block(
-            of, x, (placed[0][rows], placed[1][rows]), run.directions[:, rows], at[rows], d[rows], moved, derive
-        )
-        for one, values in zip(whole, part, strict=True):
-            one[:, rows] = values / measurements.sigma.directions
-    return Sighted(*whole)
+    at = np.broadcast_to(carriers, (len(d), *carriers.shape[-2:]))
+    parts = _sighted(of, x, placed, run.directions, at, d, carried, derive)
+    return Sighted(*(part / measurements.sigma.directions for part in parts))
 
 
-def _block(
+def _sighted(
     of: Parameters,
     x: np.ndarray,
     placed: tuple[np.ndarray, np.ndarray],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from copy import copy
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -138,6 +139,11 @@ class Measurements(Displayed):
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
         try:
+            if isinstance(rows, slice) and rows.step in (None, 1) and len(self.lengths[rows]):
+                part = copy(self)
+                for name, array in arrays.items():
+                    setattr(part, name, None if array is None else array[rows])
+                return part
             return changed(self, **{name: None if array is None else array[rows] for name, array in arrays.items()})
         except (IndexError, TypeError, ValueError):
             accepted = f"indices below {len(self)} that rise, flags ({len(self)},) or a slice"
@@ -248,16 +254,20 @@ def measured_poses(robot: Robot, measurements: Measurements) -> tuple[np.ndarray
 
     Coordinates that were not measured have their values at home.
     """
-    count, home = len(measurements), robot.home
-    poses = np.full((count, 6), np.nan) if measurements.poses is None else measurements.poses.copy()
-    known = np.isfinite(poses)
-    poses[~known] = np.broadcast_to(home, poses.shape)[~known]
+    known = measured(measurements)
+    poses = np.where(known, 0.0 if measurements.poses is None else measurements.poses, robot.home)
     return poses[:, :3], points.rotations(poses[:, 3:]), known
+
+
+def measured(measurements: Measurements) -> np.ndarray:
+    """Return which coordinates of the poses were measured, (N, 6) of bool."""
+    poses = measurements.poses
+    return np.zeros((len(measurements), 6), dtype=bool) if poses is None else np.isfinite(poses)
 
 
 def tracked(robot: Robot, measurements: Measurements) -> np.ndarray:
     """Return the samples with a position, and an orientation if any was measured, (N,) of bool."""
-    known, moves = measured_poses(robot, measurements)[2], robot.dof_mask > 0
+    known, moves = measured(measurements), robot.dof_mask > 0
     there = known.any(axis=0) & moves
     placed = bool(there[:3].sum() == moves[:3].sum() and there.any())
     return np.asarray(known[:, there].all(axis=1) & placed)

@@ -46,7 +46,7 @@ class PoseTrack:
         self._curve = CubicSpline(measured, smooth(measured, np.hstack([position[known], quaternions]), neighbours))
         self._last: tuple[float, tuple[np.ndarray, ...]] | None = None
 
-    def at_samples(self, rows: np.ndarray) -> PoseTrack:
+    def at_samples(self, rows: np.ndarray | slice) -> PoseTrack:
         """Return the same motion, evaluated at the times of some samples (k,)."""
         return self.at_times(self._times[rows])
 
