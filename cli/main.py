@@ -143,7 +143,9 @@ def _report(error: BaseException) -> int:
         return CLOSED
     code = 2
     if isinstance(error, UsageError):
-        message = _usage(error)
+        message = error.format_message().rstrip(".")
+        hint = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
+        message = f"{message[:1].lower()}{message[1:]}{hint}"
     elif isinstance(error, TowlineError | OSError | MemoryError):
         message = str(error) or "out of memory"
         if isinstance(error, OSError):
@@ -179,13 +181,6 @@ def _to_nobody(stream: int) -> None:
     handle = os.open(os.devnull, os.O_WRONLY)
     os.dup2(handle, stream)
     os.close(handle)
-
-
-def _usage(error: Any) -> str:
-    """Return the message of a wrong command line."""
-    message = error.format_message().rstrip(".")
-    hint = f"; see {error.ctx.command_path} --help" if error.ctx is not None else ""
-    return f"{message[:1].lower()}{message[1:]}{hint}"
 
 
 if __name__ == "__main__":

@@ -33,7 +33,8 @@ def replay_log(
     try:
         result = replay(loaded, log, fit=fit is not None, **options)
     except InputError as error:
-        raise InputError(_as_options(str(error))) from None
+        option = "--" * str(error).startswith(("drive ", "delay ", "window ", "tolerance "))
+        raise InputError(f"{option}{error}") from None
     written = {"file": result.save(target)}
     if page is not None:
         written["report"] = result.save_report(page)
@@ -46,9 +47,3 @@ def replay_log(
         typer.echo(f"towline: {fit} is not written: {result.refused}", err=True)
     if not result.passed or (fit is not None and result.refused):
         raise typer.Exit(1)
-
-
-def _as_options(text: str) -> str:
-    """Name options in place of arguments in an error."""
-    first = text.split(" ", 1)[0]
-    return f"--{text}" if first in ("drive", "delay", "window", "tolerance") else text

@@ -43,11 +43,18 @@ def tension(
 
     The exit code is 1 if the method returns no tensions inside the limits. If none exist, the proof is printed.
     """
-    from ..models import load
+    from ..models import Dynamics, load
     from ..solvers import methods
+    from ..statics.distribution import pose_problem
 
     loaded = load(robot)
-    problem, at = _problem(loaded, pose, velocity, acceleration, carrier_pose, wind)
+    place = loaded.home if pose is None else numbers("--pose", pose, 6)
+    rate = None if velocity is None else numbers("--velocity", velocity, 6)
+    rate_rate = None if acceleration is None else numbers("--acceleration", acceleration, 6)
+    carriers = None if carrier_pose is None else numbers("--carrier-pose", carrier_pose, 6, rows=len(loaded.carriers))
+    air = None if wind is None else numbers("--wind", wind, 3)
+    problem = pose_problem(Dynamics(loaded), place, rate, rate_rate, carriers, wind=air)
+    at = {"pose": place.tolist(), "wrench": problem.w.tolist()}
     # Of a wrong method or back end, report before the others compute.
     solution = _solve(problem, method, backend)
     solutions = {method: solution, **{name: _solve(problem, name) for name in methods() if name != method}}
@@ -66,30 +73,6 @@ def _solve(problem: TensionProblem, method: str, backend: str | None = None) -> 
 
     solve(problem, method=method, backend=backend)
     return solve(problem, method=method, backend=backend)
-
-
-def _problem(
-    robot: Robot,
-    pose: str | None,
-    velocity: str | None,
-    acceleration: str | None,
-    carrier_pose: str | None,
-    wind: str | None,
-) -> tuple[TensionProblem, dict[str, Any]]:
-    """Return the problem of the instant, and its pose and wrench as lists."""
-    import numpy as np
-
-    from ..models import Dynamics
-    from ..statics.distribution import pose_problem
-
-    at = robot.home if pose is None else numbers("--pose", pose, 6)
-    rate = np.zeros(6) if velocity is None else numbers("--velocity", velocity, 6)
-    rate_rate = np.zeros(6) if acceleration is None else numbers("--acceleration", acceleration, 6)
-    count = len(robot.carriers)
-    carriers = robot.carrier_home if carrier_pose is None else numbers("--carrier-pose", carrier_pose, 6, rows=count)
-    air = None if wind is None else numbers("--wind", wind, 3)
-    problem = pose_problem(Dynamics(robot), at, rate, rate_rate, carriers, wind=air)
-    return problem, {"pose": at.tolist(), "wrench": problem.w.tolist()}
 
 
 def _show(robot: Robot, at: dict[str, Any], solutions: dict[str, TensionSolution], method: str) -> None:

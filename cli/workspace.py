@@ -83,8 +83,9 @@ def workspace(
 ) -> None:
     """Sample the poses at which a condition holds; the exit code is 1 if there are none."""
     from ..base.execution import Execution
+    from ..figures import style
     from ..models import load
-    from ..workspace import sample
+    from ..workspace import draw, sample, save
     from ..workspace.condition import for_robots
 
     for file in define or []:
@@ -94,6 +95,8 @@ def workspace(
     region = _region(box, attitude, carriers, lengths)
     target = out or Path(f"{loaded.name}-workspace.nc")
     stored = checkpoint_of(checkpoint, resume)
+    if not float(samples).is_integer() or samples > 1e15:
+        raise InputError(f"--samples must be a whole number from 1, got {samples:g}")
     _check_files(target, figure, mesh, stored, define or [])
     if mesh is not None and ((attitude is not None and ";" in attitude) or carriers != "home" or lengths is not None):
         raise InputError(f"--mesh requires a region in which only positions vary, got {mesh} of another")
@@ -102,9 +105,13 @@ def workspace(
     with counting(f"sampling {loaded.name}", "accepted", quiet=as_json) as show:
         where = Execution(workers, scheduler, stored, resume is not None, resumable(show, stored, "samples"))
         kept = {"size": size, "keep": keep, "metrics": metric or ()}
-        result = sample(loaded, required, region, _count(samples), method, seed, execution=where, **kept)
+        result = sample(loaded, required, region, int(samples), method, seed, execution=where, **kept)
     add_to_message("")
-    written = _write(result, loaded, target, figure, mesh, surface)
+    written = [save(result, target)]
+    if figure is not None:
+        written.append(style.save(draw(result, loaded), figure))
+    if mesh is not None and surface is not None:
+        written.append(surface.save(mesh))
     summary = _summary(result, metric or [])
     reason = None if summary["accepted"] else required.why_nowhere(loaded)
     if as_json:
@@ -131,21 +138,6 @@ def _check_files(
     check_outputs(outputs, {f"--define {file}": file for file in read})
     if figure is not None:
         style.check_picture(figure)
-
-
-def _write(
-    result: xr.Dataset, robot: Robot, target: Path, figure: Path | None, mesh: Path | None, surface: Mesh | None
-) -> list[Path]:
-    """Write the samples, their picture and the boundary, and return the files."""
-    from ..figures import style
-    from ..workspace import draw, save
-
-    written = [save(result, target)]
-    if figure is not None:
-        written.append(style.save(draw(result, robot), figure))
-    if mesh is not None and surface is not None:
-        written.append(surface.save(mesh))
-    return written
 
 
 def _boundary(robot: Robot, condition: Condition, data: dict[str, Any]) -> Mesh:
@@ -221,12 +213,6 @@ def _ends(option: str, text: str, names: str) -> dict[str, list[float]]:
     if len(parts) != 2:
         raise InputError(f"{option} must be '{names}; {names}', got {text!r}")
     return {end: numbers(option, part, 3).tolist() for end, part in zip(("min", "max"), parts, strict=True)}
-
-
-def _count(samples: float) -> int:
-    if not float(samples).is_integer() or samples > 1e15:
-        raise InputError(f"--samples must be a whole number from 1, got {samples:g}")
-    return int(samples)
 
 
 def _summary(result: xr.Dataset, metrics: list[str]) -> dict[str, Any]:

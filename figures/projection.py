@@ -39,7 +39,9 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
     low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(3), np.ones(3))
     extent = (1 + 2 * AIR) * (high - low)
     middle, extent = (low + high) / 2, np.maximum(extent, max(FLAT * float(extent.max()), 1e-6))
-    places = _places(views)
+    # Views share a column if they share the axis across, a row if that up.
+    columns, rows = (list(dict.fromkeys(view[k] for view in views)) for k in (1, 2))
+    places = [(columns.index(view.across), rows.index(view.up)) for view in views]
     widths, heights = (
         {place[k]: float(extent[view[k + 1]]) for view, place in zip(views, places, strict=True)} for k in (0, 1)
     )
@@ -69,10 +71,3 @@ def views_of(points: np.ndarray, views: Sequence[View], below: float = 0.4) -> t
             axis.set_major_locator(style.few_ticks(int(np.clip(scale * extent[k] / APART, 2, 4))))
         panels.append(ax)
     return canvas, panels
-
-
-def _places(views: Sequence[View]) -> list[tuple[int, int]]:
-    """Return column and row of each view: views share a column if they share the axis across, a row if that up."""
-    columns = list(dict.fromkeys(view.across for view in views))
-    rows = list(dict.fromkeys(view.up for view in views))
-    return [(columns.index(view.across), rows.index(view.up)) for view in views]

@@ -53,6 +53,7 @@ def live_page(subject: Subject) -> str:
 def _data(subject: Subject, geometry: Geometry) -> dict[str, Any]:
     robot, extent = subject.robot, geometry.extent
     cloud = subject.cloud
+    platform = robot.attachments if robot.platform.body is None else surface(robot.platform.body)
     return {
         "name": robot.name,
         "core": b64encode((FOLDER / "robot_at_rest.wasm").read_bytes()).decode(),
@@ -64,7 +65,10 @@ def _data(subject: Subject, geometry: Geometry) -> dict[str, Any]:
         "pose": opening_pose(robot, geometry).tolist(),
         "carriers": robot.carrier_home.tolist(),
         "sliders": [it._asdict() | {"label": it.label} for it in sliders(robot, geometry)],
-        "bodies": [_platform(robot), *(_carrier(robot, index) for index in range(len(robot.carriers)))],
+        "bodies": [
+            _body("platform", platform, rgb(style.colour(4)), []),
+            *(_carrier(robot, index) for index in range(len(robot.carriers))),
+        ],
         "posts": [ends.tolist() for ends in posts(robot, extent.floor)],
         "boxes": [
             edge.tolist()
@@ -88,11 +92,6 @@ def _data(subject: Subject, geometry: Geometry) -> dict[str, Any]:
         "shades": [_css(shade) for shade in shades(np.linspace(0.0, 1.0, SHADES))],
         "noTension": NO_TENSION,
     }
-
-
-def _platform(robot: Robot) -> dict[str, Any]:
-    corners = robot.attachments if robot.platform.body is None else surface(robot.platform.body)
-    return _body("platform", corners, rgb(style.colour(4)), [])
 
 
 def _carrier(robot: Robot, index: int) -> dict[str, Any]:

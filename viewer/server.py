@@ -49,10 +49,7 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     port
         The port; if it is in use, one of the next. 0 selects any free port.
 
-    Raises
-    ------
-    InputError
-        If `subject` is not a `Subject`, viser is not installed, or the host or port is invalid.
+    Raises `InputError` if `subject` is not a `Subject`, viser is not installed, or the host or port is invalid.
     """
     required("subject", subject, Subject)
     _check_address(host, port)
@@ -93,11 +90,8 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     file
         The file to write.
 
-    Raises
-    ------
-    InputError
-        If `subject` is not a `Subject`, viser is not installed and the subject is a plan or a simulation, the robot
-        is too large for the core, or the file cannot be written.
+    Raises `InputError` if `subject` is not a `Subject`, viser is not installed and the subject is a plan or a
+    simulation, the robot is too large for the core, or the file cannot be written.
     """
     required("subject", subject, Subject)
     path = file_path("file", file)

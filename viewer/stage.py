@@ -67,7 +67,9 @@ class Stage:
     def show(self, instant: Snapshot, other: Snapshot | None = None) -> None:
         """Draw an instant, and one of another plan or simulation as a shadow."""
         if other is not None:
-            self._shadow(other)
+            move(self._other_platform, other.pose)
+            ways = np.where(np.isfinite(other.points.exits), other.points.exits, other.points.anchors)
+            self._other_cables.points = np.stack([ways, other.points.attachments], axis=1).astype(np.float32)
         points = instant.points
         colours = shades(place(instant.tensions, self._robot.t_min, self._robot.t_max))
         exits = np.where(np.isfinite(points.exits), points.exits, points.anchors)
@@ -124,12 +126,6 @@ class Stage:
         """Show or hide number and tension at the cables."""
         for label in self._numbers:
             label.visible = shown
-
-    def _shadow(self, other: Snapshot) -> None:
-        """Draw platform and cables of another plan or simulation."""
-        move(self._other_platform, other.pose)
-        exits = np.where(np.isfinite(other.points.exits), other.points.exits, other.points.anchors)
-        self._other_cables.points = np.stack([exits, other.points.attachments], axis=1).astype(np.float32)
 
     def _point(self, instant: Snapshot) -> None:
         """Draw the arrow of the certificate."""

@@ -60,6 +60,9 @@ class Audit(Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return "rate_hz", "worst_violation" [N], "at_s", "tolerance" [N], "excess", "soft_excess" and "drift"."""
+        drift = None
+        if self.drift is not None:  # infinity becomes None: JSON has no number for it
+            drift = {name: value if np.isfinite(value) else None for name, value in self.drift._asdict().items()}
         return {
             "rate_hz": self.rate,
             "worst_violation": float(self.violation.max()),
@@ -67,13 +70,8 @@ class Audit(Displayed):
             "tolerance": self.tolerance,
             "excess": [excess.to_dict() for excess in self.excess],
             "soft_excess": [excess.to_dict() for excess in self.soft_excess],
-            "drift": None if self.drift is None else {k: _number(v) for k, v in self.drift._asdict().items()},
+            "drift": drift,
         }
-
-
-def _number(value: float) -> float | None:
-    """Return a number that JSON has: infinity becomes None."""
-    return value if np.isfinite(value) else None
 
 
 def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False) -> Audit:
@@ -82,7 +80,10 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     One that is known to be infeasible and only `to_show` is audited at the output times, without its drift. Raises
     `InputError` if a cable has zero length somewhere.
     """
-    intervals = scenario.output_samples * (1 if to_show else _audits_per_output(scenario))
+    intervals = scenario.output_samples
+    if not to_show:  # a multiple: saved instants are audited ones
+        least = max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS)
+        intervals *= max(int(np.ceil(least / intervals - 1e-9)), 1)
     times = np.linspace(0.0, scenario.duration, intervals + 1)
     regular = instants(scenario, deviation, times)
     seen = regular if to_show else with_peaks(regular)
@@ -130,9 +131,3 @@ def other_tensions_exist(scenario: Scenario, audit: Audit) -> bool:
     A = scenario.dynamics.wrench_matrix(audit.motion.pose, audit.carriers.pose)
     values = np.linalg.svd(scaled(scenario, A), compute_uv=False)
     return scenario.robot.m > values.shape[1] or bool((values[:, -1] < INDEPENDENT * values[:, 0]).any())
-
-
-def _audits_per_output(scenario: Scenario) -> int:
-    """Return the number of audited instants per output sample: saved instants are audited ones."""
-    intervals = max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS)
-    return max(int(np.ceil(intervals / scenario.output_samples - 1e-9)), 1)

@@ -41,7 +41,8 @@ class NaturalFrequency(Limit):
 
     @override
     def rows(self, values: ca.SX, shrink: float = 0.0) -> Rows:
-        K, M = self._matrices(values)
+        k = len(self._moves)
+        K, M = (ca.reshape(part, k, k) for part in ca.vertsplit(values, k * k))
         size = ca.diag(1.0 / ca.sqrt(ca.diag(M)))
         Y = size @ (K / (2 * np.pi * self.low) ** 2 - M) @ size
         pivots = []
@@ -67,7 +68,3 @@ class NaturalFrequency(Limit):
     def slack_weight(self) -> float:
         # A pivot is about 1 - (bound / frequency)^2, whose slope at the bound is 2 / bound.
         return 0.0 if self.soft is None else self.low / 2 / self.soft
-
-    def _matrices(self, values: ca.SX) -> list[ca.SX]:
-        k = len(self._moves)
-        return [ca.reshape(part, k, k) for part in ca.vertsplit(values, k * k)]

@@ -7,7 +7,6 @@ import numpy as np
 
 from ...base.display import Fact
 from ...base.text import quantity, quantity_row
-from ..audits.excess import Excess
 from ..global_path.at_rest import AtRest
 from ..global_path.space import Space
 from ..proofs.too_heavy import OF_WEIGHT
@@ -147,16 +146,13 @@ def _carriers(plan: PlanData) -> list[Fact]:
 
 def _strength(plan: PlanData) -> list[Fact]:
     """Return how much stronger what is too weak for the weight must be."""
-    weak = [excess for excess in plan.audit.excess if excess.limit in OF_WEIGHT]
-    return [(f"a larger {excess.limit}", _times(excess)) for excess in weak[:1]]
-
-
-def _times(excess: Excess) -> str:
-    least = excess.bound / excess.value
-    return (
-        f"{quantity(TO_MOVE * least, digits=3)} times as large; {quantity(least, digits=3)} times would carry the "
-        "weight at rest, but tilt and acceleration need more"
-    )
+    for excess in plan.audit.excess:
+        if excess.limit in OF_WEIGHT:
+            least = excess.bound / excess.value
+            larger, enough = (quantity(times, digits=3) for times in (TO_MOVE * least, least))
+            why = f"{enough} times would carry the weight at rest, but tilt and acceleration need more"
+            return [(f"a larger {excess.limit}", f"{larger} times as large; {why}")]
+    return []
 
 
 def _wind(plan: PlanData) -> list[Fact]:

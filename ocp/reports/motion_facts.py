@@ -6,7 +6,7 @@ from ...base.display import Fact
 from ...base.text import quantity, quantity_row
 from ...models.part import Vector3
 from ..result import PlanData
-from ..tasks.paths import FeedPath, PathBase, TimedPath
+from ..tasks.paths import FeedPath, TimedPath
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox, WindDisc
 
@@ -25,37 +25,23 @@ def motion_facts(plan: PlanData) -> list[Fact]:
         kind, law = task.path.along.kind, ", with its own time law"
     if isinstance(path, TimedPath) and path is not task.path:
         law = ", with the fastest time law" if path.smoothing is None else ", in a tube about its fastest time law"
-    return [
+    facts = [
         ("duration", quantity(plan.scenario.duration, "s", digits=6)),
         ("path", f"{kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
-        *_feed(task.path),
-        *_accuracy(plan),
-        ("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"),
-        *([("loads", LOADS)] if plan.scenario.phases.extremes else []),
-        *_stop(plan),
-        *([("wind", _task_wind(task))] if task.wind is not None else []),
     ]
-
-
-def _stop(plan: PlanData) -> list[Fact]:
-    """Return how long the robot takes to stop, where it takes longest."""
-    its = plan.stop
-    if its is None:
-        return []
-    return [
-        (
-            "stops",
-            f"in at most {quantity(its.duration, 's')}, over {quantity(its.distance, 'm')} from t = {its.begins:.3f} s",
-        )
-    ]
-
-
-def _feed(path: PathBase) -> list[Fact]:
-    """Return how steady the speed of a path at a feed is, and which words of its file were not used."""
-    if not isinstance(path, FeedPath):
-        return []
-    ignored = [("ignored words", ", ".join(path.ignored))] if path.ignored else []
-    return [("feed", path.steadiness()), *ignored]
+    if isinstance(task.path, FeedPath):
+        facts.append(("feed", task.path.steadiness()))
+        facts += [("ignored words", ", ".join(task.path.ignored))] if task.path.ignored else []
+    facts += _accuracy(plan)
+    facts.append(("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"))
+    if plan.scenario.phases.extremes:
+        facts.append(("loads", LOADS))
+    if (stop := plan.stop) is not None:
+        over = f"over {quantity(stop.distance, 'm')} from t = {stop.begins:.3f} s"
+        facts.append(("stops", f"in at most {quantity(stop.duration, 's')}, {over}"))
+    if task.wind is not None:
+        facts.append(("wind", _task_wind(task)))
+    return facts
 
 
 def _accuracy(plan: PlanData) -> list[Fact]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...models import Robot
 from .deviation import Deviation
-from .paths import AnyPath, LinePath, RestPath, WaypointPath
+from .paths import LinePath, RestPath, WaypointPath
 from .scenario import POSITION, Scenario
 from .task import FreeBase, GivenBase, Task
 
@@ -30,7 +30,10 @@ def platform_ends(task: Task) -> Word:
     """Return how the platform starts and ends: as the task requires, or else at rest if its path goes to rest."""
     if task.tube.ends is not None:
         return task.tube.ends
-    return "rest" if _goes_to_rest(task.path, task.seconds) and not isinstance(task.base, GivenBase) else "free"
+    if isinstance(task.base, GivenBase) or isinstance(task.path, RestPath):
+        return "free"
+    _, velocity, acceleration = task.path.at(np.array([0.0, task.seconds]), task.seconds)
+    return "rest" if max(np.abs(velocity).max(), np.abs(acceleration).max()) <= AT_REST else "free"
 
 
 def carrier_ends(task: Task) -> Word:
@@ -105,14 +108,6 @@ def at_rest_without_acceleration(robot: Robot, owner: int | None, coordinate: in
     if robot.fixed_lengths is not None or robot.m < len(robot.platform.dof):
         return owner is None and coordinate in POSITION
     return owner is None or coordinate in POSITION
-
-
-def _goes_to_rest(path: AnyPath, seconds: float) -> bool:
-    """Return whether a path goes from rest to rest: without speed and acceleration at both ends."""
-    if isinstance(path, RestPath):
-        return False
-    _, velocity, acceleration = path.at(np.array([0.0, seconds]), seconds)
-    return bool(max(np.abs(velocity).max(), np.abs(acceleration).max()) <= AT_REST)
 
 
 def with_timing(robot: Robot, task: Task) -> Task:

@@ -301,15 +301,11 @@ def cost_list(robot: Robot, task: Task) -> Costs:
         CarrierAcceleration(objective.carrier_acceleration),
         Jerk(objective.jerk),
     ]
-    deviation = objective.deviation or _tenth_of_tube(robot, task)
+    turn = 0.0 if task.tube.attitude == "free" else task.tube.turn
+    deviation = objective.deviation or 0.1 * max(task.tube.radius, robot.length * turn)  # of the tube
     if 0 < deviation < np.inf:
         costs.append(PathDeviation(deviation))
     for kind, amount in ((TensionRate, objective.tension_rate), (Time, objective.time), (Margin, objective.margin)):
         if amount is not None:
             costs.append(kind(amount))
     return Costs(robot, (*costs, *objective.own))
-
-
-def _tenth_of_tube(robot: Robot, task: Task) -> float:
-    turn = 0.0 if task.tube.attitude == "free" else task.tube.turn
-    return 0.1 * max(task.tube.radius, robot.length * turn)
