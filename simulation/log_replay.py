@@ -22,10 +22,12 @@ from ..estimation.logs.reading import Paths
 from ..estimation.logs.recorded import read_recorded
 from ..figures.drawn import Drawn
 from ..figures.report import Report, Reported, Section, Table
+from ..models.files import as_robot
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
 from .explanations import Explanation, Matching, tied
 from .replayed_robot import Parameters, changed
+from .tolerance import tolerance_of
 from .windows import Windows
 
 if TYPE_CHECKING:
@@ -281,7 +283,7 @@ def replay(
     drive: str | None = None,
     delay: float = 0.0,
     window: float = 0.5,
-    tolerance: float = 0.05,
+    tolerance: float | None = None,
     fit: bool = False,
 ) -> Replay:
     """Replay a recording: simulate its commands, in windows that each start from the recorded state.
@@ -300,7 +302,8 @@ def replay(
     window
         Duration of a window [s].
     tolerance
-        Largest position residual for a pass, of 95 % of the samples [m].
+        Largest position residual for a pass, of 95 % of the samples [m]; default: 0.05 m, or 5 % of the mean cable
+        length at home if that is less.
     fit
         True to fit parameters to half of the windows, and to validate them on the other half.
 
@@ -312,8 +315,9 @@ def replay(
     if drive is not None:
         one_of("drive", drive, DRIVES)
     late, lasting = number("delay", delay, -LATEST, LATEST), number("window", window, 0.05, 10.0)
-    largest, fits = number("tolerance", tolerance, 0.0, 1e6), flag("fit", fit)
-    windows = Windows(read_recorded(robot, log, poses, fields), drive, lasting)
+    fits, the_robot = flag("fit", fit), as_robot(robot)
+    largest = tolerance_of(the_robot, tolerance)
+    windows = Windows(read_recorded(the_robot, log, poses, fields), drive, lasting)
     matching = Matching(windows, windows.usual._replace(delay=late))
     found = matching.explanations(matching.first, matching.kept)
     explained = None

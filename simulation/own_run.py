@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.inputs import number, required, shown
+from ..base.inputs import required, shown
 from ..control import Reference
 from ..control.noise import Noise
 from ..control.planned_references import references_at
@@ -17,12 +17,13 @@ from .events import Cut
 from .experiment import Experiment
 from .record import Record
 from .simulation import Simulation
+from .tolerance import tolerance_of
 
 UNCONTROLLED = -1  # the status of steps without a controller
 SAME = 1e-6  # of the time between two states
 
 
-def simulation_of(plant: Plant, history: History, reference: Any = None, tolerance: float = 0.05) -> Simulation:
+def simulation_of(plant: Plant, history: History, reference: Any = None, tolerance: float | None = None) -> Simulation:
     """Return a run of a plant as a `Simulation`.
 
     Parameters
@@ -35,7 +36,8 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
         Reference of the position errors: a plan, the NetCDF file of one, a path or a pose (6,); default:
         the motion itself.
     tolerance
-        Largest position error allowed for a pass [m].
+        Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at home if that
+        is less.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
     period = float(steps.mean())
     if np.abs(steps - period).max() > SAME * period:
         raise InputError("history must have equally spaced times, got others")
-    count, error = len(states), number("tolerance", tolerance, 0.0, 1e6)
+    count, error = len(states), tolerance_of(robot, tolerance)
     record, lengths = Record(robot, count), np.zeros((count, 2, robot.m))
     sense(plant.record, np.ascontiguousarray(states), record.motions, lengths)
     record.lengths[:], record.tensions[:], record.answered[:] = lengths[:, 0], history.tensions, UNCONTROLLED

@@ -38,6 +38,7 @@ from .mismatch import Mismatch
 from .record import Record
 from .runs import fly_many
 from .simulation import Simulation
+from .tolerance import tolerance_of
 from .winds import read_wind
 
 if TYPE_CHECKING:
@@ -180,7 +181,7 @@ def simulate(
     _check_shape(the_robot, pilot)
     meets = replace(meets, drive=meets.drive or pilot.drive or default_drive(the_robot))
     plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
-    first, error = whole_number("seed", seed, 0, 2**63 - 1), meets.tolerance
+    first, error = whole_number("seed", seed, 0, 2**63 - 1), tolerance_of(the_robot, meets.tolerance)
     if runs is None:
         where.check_alone()
         return _one(plant, pilot, experiment, first, error)

@@ -539,3 +539,18 @@ def test_a_plan_whose_dataset_was_changed_is_followed_as_changed(crane):
     dataset["pose"] = dataset["pose"] + np.array([0.1, 0, 0, 0, 0, 0])
     (before, _), (after, _) = (read_trajectory(robot, one, None).at(np.linspace(0, 1, 5)) for one in (crane, changed))
     np.testing.assert_allclose(after[0] - before[0], np.tile([0.1, 0, 0, 0, 0, 0], (5, 1)), atol=1e-9)
+
+
+@pytest.mark.parametrize(("size", "passes"), [(1.0, True), (0.04, False)])
+def test_small_robots_must_stay_nearer_to_their_reference(size, passes):
+    """The same push moves a robot with cables of 2.8 m and one with cables of 0.11 m as many millimetres."""
+    robot = load("point-mass-3")
+    cables = tuple(cable.model_copy(update={"anchor": tuple(size * x for x in cable.anchor)}) for cable in robot.cables)
+    platform = robot.platform.model_copy(update={"home": tuple(size * x for x in robot.platform.home)})
+    robot = robot.model_copy(update={"cables": cables, "platform": platform})
+    push = f"push {0.4 * robot.weight} 0 0 at 0.1 for 0.3"
+    run = simulate(robot, {"kind": "rest", "pose": robot.platform.home}, duration=0.5, events=[push])
+    lengths = np.linalg.norm(robot.anchors - np.array(robot.platform.home[:3]), axis=1)
+    assert run.tolerance == pytest.approx(min(0.05, 0.05 * lengths.mean()), rel=1e-12)
+    assert 0.05 * lengths.mean() < run.error.max() < 0.05 or passes
+    assert run.passed is passes
