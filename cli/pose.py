@@ -60,7 +60,7 @@ def pose(
 
     If the lengths do not determine the pose, the result is the equilibrium pose. The exit code is 1 if no pose fits the
     lengths. With --log, the poses of all samples are written, and samples that no pose fits are listed; the exit code
-    is 1 if these are more than 5 % of all samples.
+    is 1 if these are more than 5 % of all samples, or if the log probably has an input error.
     """
     from ..estimation import branches, pose_from_lengths
     from ..models import load
@@ -130,7 +130,7 @@ def _of_log(
         for line in (*read.notes, *found.lines()):
             typer.echo(f"  {line}")
         print_written(files)
-    if data["consistent"] < FEWEST_FIT:
+    if data["consistent"] < FEWEST_FIT or data["doubt"]:
         raise typer.Exit(1)
 
 

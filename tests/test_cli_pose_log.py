@@ -102,3 +102,28 @@ def test_wrong_options(arguments, message, tmp_path):
     done = towline("pose", "cogiro", *arguments, cwd=tmp_path, code=2)
     assert done.stderr.count("\n") == 1
     assert message in done.stderr
+
+
+@pytest.mark.parametrize("error", ["exchanged", "millimetres", "inverted"])
+def test_an_input_error_of_a_log_with_poses_is_said_as_by_calibrate(robot, tmp_path, error):
+    times = np.arange(0, 20, 0.05)
+    table, poses = readings(robot, times), motion(load(robot), times)
+    if error == "exchanged":
+        table[:, [2, 5]] = table[:, [5, 2]]
+    elif error == "inverted":
+        poses[:, 3:] = points.angles(np.swapaxes(points.rotations(poses[:, 3:]), 1, 2))
+    else:
+        poses[:, :3] *= 1e3
+    header = ["time", *(f"winch_{i + 1}_position" for i in range(8)), "x", "y", "z", "roll", "pitch", "yaw"]
+    whole = np.column_stack([times, table, poses])
+    np.savetxt(tmp_path / "log.csv", whole, "%.12g", ",", header=",".join(header), comments="")
+    done = towline("pose", robot, "--log", "log.csv", "--json", cwd=tmp_path, code=1)
+    doubt = json.loads(done.stdout)["doubt"]
+    refused = json.loads(towline("calibrate", robot, "log.csv", "--json", cwd=tmp_path, code=1).stdout)["doubt"]
+    assert refused in doubt
+    assert "towline calibrate --fix" in doubt
+    assert {"exchanged": "l2 and l5 look exchanged", "inverted": "inverted", "millimetres": "millimetres"}[
+        error
+    ] in doubt
+    text = towline("pose", robot, "--log", "log.csv", cwd=tmp_path, code=1).stdout
+    assert doubt[:60] in " ".join(text.split())

@@ -67,6 +67,12 @@ class Mistake(NamedTuple):
 
     __repr__ = record
 
+    @property
+    def doubt(self) -> str | None:
+        """Return the error and how to correct it, in one line, None if it only means another frame."""
+        hint = "; `towline calibrate --fix` corrects it" if self.corrected else ""
+        return f"the log probably has an input error: {self.text}{hint}" if self.severe else None
+
 
 class _Log(NamedTuple):
     """Samples with measured poses: the parameters' table, positions, rotations, angles as logged, and readings.

@@ -97,8 +97,7 @@ def read_recorded(
         doubt = None
         if lengths is not None and not any(carrier.moves for carrier in known.carriers):
             wrong = mistake(known, measured)
-            hint = "; `towline calibrate --fix` corrects it" if wrong and wrong.corrected else ""
-            doubt = f"the log probably has an input error: {wrong.text}{hint}" if wrong and wrong.severe else None
+            doubt = wrong and wrong.doubt
         carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
         axis = read.ned or ned_frame(known, pose, carrier_pose)
         if axis is not None:

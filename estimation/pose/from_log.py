@@ -19,6 +19,7 @@ from ...base.writing import whole_file
 from ...models import points
 from ...models.part import COORDINATES
 from ...models.robot import Robot
+from ..calibration.plausibility import Mistake, mistake
 from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, carriers_of, check_measurements
 from ..logs.recording import COUNTED
@@ -60,6 +61,8 @@ class LogPoses(Displayed):
         Factor by which these other residuals exceed their standard deviations.
     misread
         Description of an error of the measured orientations, which is corrected; or None.
+    mistake
+        Probable input error of the log, or None.
     """
 
     estimate: PoseEstimate
@@ -68,6 +71,12 @@ class LogPoses(Displayed):
     more: int = 0
     excess: float = 1.0
     misread: str | None = None
+    mistake: Mistake | None = None
+
+    @property
+    def doubt(self) -> str | None:
+        """Return the input error of the log that makes the poses doubtful, in one line, or None."""
+        return self.mistake and self.mistake.doubt
 
     @property
     def cost(self) -> np.ndarray:
@@ -117,12 +126,16 @@ class LogPoses(Displayed):
         return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
 
     def lines(self) -> Iterator[str]:
-        """Yield the wrong samples, one line for each run of them, and how far the platform may swing."""
+        """Yield input errors, wrong samples, one line for each run of them, and how far the platform may swing."""
+        if self.mistake:
+            yield self.doubt or self.mistake.text
         if self.misread:
             yield f"corrected: {self.misread}"
         if self.excess > 1.0:
             yield f"residuals are {quantity(self.excess, digits=3)} times as large as stated, and so are the sigmas"
         if len(self.wrong) == 1 and not self.fits.any():
+            if self.doubt:
+                return
             yield "no pose fits the lengths of any sample: the robot file is not that of the log, or not calibrated"
             return
         if np.any(self.estimate.by_gravity):
@@ -179,6 +192,7 @@ class LogPoses(Displayed):
             "determined": float(np.mean(self.estimate.determined)),
             "swing": self.swing,
             "wrong": [one._asdict() for one in self.wrong],
+            "doubt": self.doubt,
         }
 
 
@@ -191,7 +205,8 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
         The robot.
     measurements
         Readings; measured tensions stretch cables with a stiffness, and measured poses of carriers move their anchors.
-        Directions of cables and orientations of the platform are used, and tensions with these, but no positions.
+        Directions of cables and orientations of the platform are used, and tensions with these. Positions only serve
+        to detect input errors of the log (`mistake`).
     sigma
         Standard deviations of the lengths [m], one number or (m,).
     begin
@@ -207,6 +222,7 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     alone = few and given.poses is not None and not np.isfinite(given.poses[:, :3]).any()  # as of an AHRS
     if given.directions is not None or alone:
         return _by_more(robot, given, deviations, begin, alone)
+    found_mistake = mistake(robot, given)
     lengths = lengths_of(robot, given.lengths, given.tensions)
     rows = np.unique(np.linspace(0, len(lengths) - 1, min(len(lengths), MOST_TRACKED)).astype(int))
     some, last = list[PoseEstimate](), None
@@ -223,7 +239,8 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     good |= ~good.any()
     starts = np.column_stack([np.interp(np.arange(len(lengths)), rows[good], column[good]) for column in known.T])
     estimate = pose_from_lengths(robot, lengths, starts, given.carrier_poses, deviations)
-    return LogPoses(estimate, None if given.times is None else given.times + begin)
+    times = None if given.times is None else given.times + begin
+    return LogPoses(estimate, times, mistake=found_mistake)
 
 
 def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float, oriented: bool) -> LogPoses:
@@ -257,7 +274,9 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
         known_covariance=excess**2 * covariances,
     )
     times = None if given.times is None else given.times + begin
-    return LogPoses(estimate, times, squares / excess**2, more, excess, None if misread is None else misread.text)
+    if misread is not None:
+        return LogPoses(estimate, times, squares / excess**2, more, excess, misread.text)
+    return LogPoses(estimate, times, squares / excess**2, more, excess, mistake=mistake(robot, given))
 
 
 def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[np.ndarray, ...]:
