@@ -127,7 +127,7 @@ def test_a_fit_that_moves_anchors_by_metres_is_refused(tmp_path):
     assert "Parameters" not in done.stdout
 
 
-def flight(folder, ned):
+def flight(folder, ned, load=True):
     """Two drones with a load in a table, in north, east, down as PX4 records them, or in {G}."""
     draw = np.random.default_rng(0)
     t, x, drones = user.team(12)
@@ -137,7 +137,8 @@ def flight(folder, ned):
         columns.append(values @ TO_NED.T if ned and len(axes) == 3 else values)
         names.extend(f"{name}_{axis}" for axis in axes)
 
-    add("load", x + draw.normal(0, 5e-4, x.shape), "xyz")
+    if load:
+        add("load", x + draw.normal(0, 5e-4, x.shape), "xyz")
     for i, (p, R, thrust, q) in enumerate(drones):
         add(f"cf{i + 1}", p + draw.normal(0, 5e-4, p.shape), "xyz")
         R = TO_NED @ R @ np.diag([1, -1, -1]) if ned else R
@@ -170,6 +171,33 @@ def test_two_drones_in_north_east_down(ned, tmp_path):
     (mass,) = [one["value"] for one in told["parameters"] if one["name"] == "mass"]
     assert mass == pytest.approx(0.4, rel=0.01)
     assert "PASSED" in towline("simulate", "team-calibrated.yaml", "flight.csv", *fields, cwd=tmp_path).stdout
+
+
+def test_drones_in_north_east_down_without_the_load(tmp_path):
+    """Carriers below the origin, and directions of the cables in the same frame: the load is where it was."""
+    robot = flight(tmp_path, True, load=False)
+    done = towline("pose", robot, "--log", "flight.csv", "--sigma", "lengths=0.05", "--json", cwd=tmp_path)
+    assert any("carriers would be below the origin" in note for note in json.loads(done.stdout)["notes"])
+    found = np.loadtxt(tmp_path / "flight-poses.csv", delimiter=",", skiprows=1)[:, 1:4]
+    # The file's cables are 0.8 m long, the real ones 20 mm longer and 10 mm shorter.
+    assert np.sqrt(((found - user.team(12)[1]) ** 2).sum(axis=1).mean()) < 0.02
+    flight(tmp_path, False, load=False)
+    notes = json.loads(towline("pose", robot, "--log", "flight.csv", "--json", cwd=tmp_path).stdout)["notes"]
+    assert not any("north" in note for note in notes)
+
+
+def test_tensions_of_load_cells_that_are_negative(tmp_path):
+    """A load cell that is mounted upside down measures compression."""
+    robot = user.hanging_robot(tmp_path)
+    user.statics(tmp_path, np.zeros(4))
+    head, *lines = (tmp_path / "statics.csv").read_text().splitlines()
+    rows = np.array([line.split(",") for line in lines], dtype=float)
+    expected = read_measurements(tmp_path / "statics.csv", robot=robot).tensions
+    rows[:, 7:] *= -1
+    user.write(tmp_path / "negative.csv", head.split(","), rows)
+    np.testing.assert_allclose(read_measurements(tmp_path / "negative.csv", robot=robot).tensions, expected)
+    told = json.loads(towline("pose", robot, "--log", "negative.csv", "--json", cwd=tmp_path).stdout)
+    assert any("read with the other sign" in note for note in told["notes"])
 
 
 def test_an_ahrs_in_north_east_down(tmp_path):

@@ -30,6 +30,7 @@ _BODY = r"(?:payload|load|platform|end[_ ]?effector|ee|mp|mocap|vicon|optitrack|
 _BODY += r"|state(?:_?estimate)?)"
 _DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?)"
 _CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
+_SENSOR = r"(?:load[_ ]?cell|cable|rope|wire|winch|tension|force[_ ]?sensor|ft)"
 _NO_LENGTH = re.compile(r"tension|force|effort|speed|veloc|vel_|accel|current|torque|thrust|temp|status|error")
 _VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
 # The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
@@ -45,6 +46,7 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:tensions?|forces?)[./_ ](?:data|values?|effort)\[(\d+)\]",
         r".*(?:cable|rope|wire|winch)[_ ]?(\d+)[./_ ](?:tension|force)(?:[./_ ](?:data|value))*",
         rf"{_BEFORE}(?:tensions?|forces?)[./_ ](?:cable|rope|wire|winch)[_ ]?(\d+)",
+        rf".*{_SENSOR}[_ ]?(\d+)[./_ ](?:.*[./_ ])?force[./_ ]z",  # of a WrenchStamped
     ),
     "position": (
         rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])",

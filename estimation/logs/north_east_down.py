@@ -15,22 +15,26 @@ def ned_frame(robot: Robot, poses: np.ndarray | None, carriers: np.ndarray) -> s
     """Return the axis of x of {G} by which poses in a frame of north, east, down are those of a team, or None.
 
     Cables cannot push, so a load cannot be above all carriers that move, unless their frames are below it at home too,
-    as those of vehicles with masts. Which axis it is follows from the home poses.
+    as those of vehicles with masts. Without a position of the load, carriers below the origin that are above it at home
+    are in such a frame. Which axis it is follows from the home poses.
 
     - `poses`: of the platform, (N, 6) [m, rad], nan where not measured.
     - `carriers`: of the carriers, (N, c, 6).
     """
     moving = [i for i in sorted(set(robot.carrier_of_cable)) if robot.carriers[i].moves]
-    if poses is None or not moving or len(moving) < len(set(robot.carrier_of_cable)):
+    if not moving or len(moving) < len(set(robot.carrier_of_cable)) or np.any(robot.gravity[:2]):
         return None
-    at_home = robot.carrier_home[moving, :3] - robot.home[:3]
-    if not (at_home[:, 2] > 0).all() or np.any(robot.gravity[:2]) or not robot.gravity[2] < 0:
+    loaded = poses is not None and bool(np.isfinite(poses[:, :3]).any())
+    at_home = robot.carrier_home[moving, :3] - (robot.home[:3] if loaded else 0.0)
+    if not (at_home[:, 2] > 0).all() or not robot.gravity[2] < 0:
         return None
-    away = carriers[:, moving, :3] - poses[:, None, :3]
+    away = carriers[:, moving, :3] - (poses[:, None, :3] if loaded and poses is not None else 0.0)
     away = away[(np.abs(away[..., 2]) > HANGS * at_home[:, 2]).all(axis=1) & np.isfinite(away).all(axis=(1, 2))]
     if not len(away) or (np.median(away[..., 2], axis=0) >= 0).any():
         return None
     middle = np.median(away, axis=0)
+    if not loaded and len(moving) > 1:  # how the carriers lie to each other
+        middle, at_home = middle - middle.mean(axis=0), at_home - at_home.mean(axis=0)
     return min(FROM_NED, key=lambda axis: float(np.linalg.norm(middle @ FROM_NED[axis].T - at_home)))
 
 
@@ -54,14 +58,18 @@ def carriers_from_ned(robot: Robot, poses: np.ndarray, axis: str) -> np.ndarray:
     return result
 
 
-def platform_from_ned(robot: Robot, poses: np.ndarray, axis: str) -> np.ndarray:
+def platform_from_ned(robot: Robot, poses: np.ndarray | None, axis: str) -> np.ndarray | None:
     """Return poses of the platform (N, 6) in {G}, as `from_ned`; locked coordinates stay at home."""
+    if poses is None:
+        return None
     return np.where((robot.dof_mask > 0) | ~(poses == robot.home), from_ned(poses, axis), poses)
 
 
-def note_of(axis: str) -> str:
-    """Return the remark on converted poses."""
+def note_of(axis: str, poses: np.ndarray | None) -> str:
+    """Return the remark on converted poses, where those of the platform were `poses`, (N, 6) or None."""
+    loaded = poses is not None and bool(np.isfinite(poses[:, :3]).any())
+    why = "the load would be above its carriers" if loaded else "the carriers would be below the origin"
     return (
-        "the load would be above its carriers, so the poses are read as north, east, down, and forward, right, down of "
-        f"the bodies, with x of {{G}} to the {axis}"
+        f"{why}, so the poses are read as north, east, down, and forward, right, down of the bodies, with x of {{G}} "
+        f"to the {axis}"
     )

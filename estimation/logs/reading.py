@@ -155,10 +155,10 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
         read.notes.append(f"{quantity(int((~kept).sum()))} samples without poses of carriers are left out")
     tensions = None
     axis = ned_frame(robot, measured.poses, poses)
-    if axis is not None and measured.poses is not None:
+    if axis is not None:
         poses = carriers_from_ned(robot, poses, axis)
+        read.notes.append(note_of(axis, measured.poses))
         measured = changed(measured, poses=platform_from_ned(robot, measured.poses, axis))
-        read.notes.append(note_of(axis))
     if measured.tensions is None:
         tensions = tensions_by_thrust(robot, poses[kept], thrusts[kept], times if times is None else times[kept])
     if tensions is not None:
@@ -238,6 +238,9 @@ def measurements_of(
     if not found.lengths:
         lengths = _constant(robot, lengths)
     tensions = read.stream(found.tensions) if found.tensions else None
+    if tensions is not None and (np.nanmedian(tensions.values, axis=0) < 0).all():
+        notes.append("all tensions are negative, so they are read with the other sign")
+        tensions = Samples(tensions.times, -tensions.values)
     orientation = _whole(robot, read.stream(found.orientation), 3) if found.orientation else None
     times = lengths.times
     begin = float(times[0]) if times is not None and times[0] > COUNTED else 0.0

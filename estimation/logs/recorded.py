@@ -101,9 +101,9 @@ def read_recorded(
         carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
         axis = read.ned or ned_frame(known, pose, carrier_pose)
         if axis is not None:
-            pose = pose if read.ned else platform_from_ned(known, pose, axis)
+            notes += [] if read.ned else [note_of(axis, pose)]
+            pose = pose if read.ned else np.asarray(platform_from_ned(known, pose, axis))
             carrier_pose = carriers_from_ned(known, carrier_pose, axis)
-            notes += [] if read.ned else [note_of(axis)]
         return Recorded(
             robot=known,
             times=times,
