@@ -26,6 +26,7 @@ from .harness import machine, table
 
 STANDARD = "computed torque"
 Progress = Callable[[str, int, int], None]
+Makers = dict[str, Callable[[Robot], Controller]]  # of controllers by name
 TIMED = ("casadi", "daqp", "osqp", "numpy")
 EVERYONE = (*CONTENDERS, *ACADOS)  # acados, where it is installed
 
@@ -51,7 +52,7 @@ class Task:
         """Return the options of predictive control."""
         return {"reach": (self.reach, 0.0) if self.reach else None, "stage": self.stage}
 
-    def controllers(self) -> dict[str, Callable[[Robot], Controller]]:
+    def controllers(self) -> Makers:
         """Return what makes each controller."""
         reach = self.options["reach"]
         return {
@@ -181,16 +182,19 @@ def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progres
                 progress(name, at + part, 3 * len(tasks))
 
         robot = task.robot()
+        accepted, refused = _accepted(task, robot)
         show(0)
-        rows += _programs(task, robot, steps)
+        if "predictive" in accepted:
+            rows += measure(task.name, record(task, robot, steps), EVERYONE)
         show(1)
-        whole += _steps(task, robot, steps)
+        whole += _steps(task, robot, steps, accepted)
+        whole += [Step(task.name, name, detail=why) for name, why in refused.items()]
         show(2)
-        errors += _errors(task, robot, steps, seeds)
+        errors += _errors(task, robot, steps, seeds, accepted)
     return Report(rows, whole, errors, machine=machine(TIMED), count=steps, seeds=seeds)
 
 
-def _accepted(task: Task, robot: Robot) -> tuple[dict[str, Callable[[Robot], Controller]], dict[str, str]]:
+def _accepted(task: Task, robot: Robot) -> tuple[Makers, dict[str, str]]:
     """Return what makes the controllers that accept the robot, and why others do not."""
     accepted, refused = {}, {}
     for name, make in task.controllers().items():
@@ -203,26 +207,23 @@ def _accepted(task: Task, robot: Robot) -> tuple[dict[str, Callable[[Robot], Con
     return accepted, refused
 
 
-def _steps(task: Task, robot: Robot, steps: int) -> list[Step]:
+def _steps(task: Task, robot: Robot, steps: int, accepted: Makers) -> list[Step]:
     """Measure the steps of one run with each controller, after one that is not counted."""
-    accepted, refused = _accepted(task, robot)
     times = {}
     for _ in range(2):
         for name, make in accepted.items():
             flight = simulate(robot, robot.home, make(robot), duration=steps * 1e-3, **task.conditions())
             times[name] = 1e6 * flight.seconds
     standard = float(np.median(times[STANDARD]))
-    measured = [
+    return [
         Step(task.name, name, float(np.median(of)), float(np.percentile(of, 99)), float(np.median(of)) / standard)
         for name, of in times.items()
     ]
-    return [*measured, *(Step(task.name, name, detail=why) for name, why in refused.items())]
 
 
-def _errors(task: Task, robot: Robot, steps: int, seeds: int) -> list[Error]:
+def _errors(task: Task, robot: Robot, steps: int, seeds: int, accepted: Makers) -> list[Error]:
     """Fly all seeds with each controller."""
     given: dict[str, Any] = {**task.conditions(), "duration": steps * 1e-3, "runs": seeds}
-    accepted, _ = _accepted(task, robot)
     flown = {name: simulate(robot, robot.home, make(robot), **given) for name, make in accepted.items()}
     known, rows = flown[STANDARD]["error_max"].values, []
     for name, flights in flown.items():
@@ -239,15 +240,6 @@ def _errors(task: Task, robot: Robot, steps: int, seeds: int) -> list[Error]:
             )
         )
     return rows
-
-
-def _programs(task: Task, robot: Robot, steps: int) -> list[Row]:
-    """Solve the programs of one run with all solvers, alternating."""
-    try:
-        programs = record(task, robot, steps)
-    except InputError:
-        return []
-    return measure(task.name, programs, EVERYONE)
 
 
 def markdown(report: Report) -> str:

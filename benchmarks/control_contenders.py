@@ -5,6 +5,7 @@ that solves it, which is. What solvers keep from one program to the next they ke
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -105,46 +106,38 @@ def fill(horizon: Horizon, program: Program | Horizon) -> None:
         getattr(horizon, name)[...] = getattr(program, name)
 
 
-def _towline(warm: bool) -> Callable[[Program], Solver]:
-    def prepare(first: Program) -> Solver:
-        horizon = horizon_of(first, 1e-6, 20)
+def _towline(first: Program, warm: bool) -> Solver:
+    horizon = horizon_of(first, 1e-6, 20)
 
-        def arrange(program: Program) -> bool:
-            fill(horizon, program)
-            horizon.states[:], horizon.controls[:] = program.states, program.controls
-            return warm and program.warm
+    def arrange(program: Program) -> bool:
+        fill(horizon, program)
+        horizon.states[:], horizon.controls[:] = program.states, program.controls
+        return warm and program.warm
 
-        def solve(begun: bool) -> Array | None:
-            horizon.solve(warm=begun)
-            usable = horizon.converged or all(residual <= GOOD for residual in horizon.residuals)
-            return horizon.controls.copy() if usable else None
+    def solve(begun: bool) -> Array | None:
+        horizon.solve(warm=begun)
+        usable = horizon.converged or all(residual <= GOOD for residual in horizon.residuals)
+        return horizon.controls.copy() if usable else None
 
-        return Solver(arrange, solve)
-
-    return prepare
+    return Solver(arrange, solve)
 
 
-def _daqp(alone: bool) -> Callable[[Program], Solver]:
-    """Return how to start DAQP: `alone` without the time of condensing, from the last solution."""
+def _daqp(first: Program, alone: bool) -> Solver:
+    """Start DAQP: `alone` without the time of condensing, from the last solution."""
+    import daqp
 
-    def prepare(first: Program) -> Solver:
-        import daqp
+    none, kinds = np.zeros((0, first.r.size)), np.zeros(first.r.size, dtype=np.int32)
 
-        shape = first.r.shape
-        none, kinds = np.zeros((0, first.r.size)), np.zeros(first.r.size, dtype=np.int32)
+    def condensed(program: Program) -> tuple[Any, ...]:
+        return *condense(program), none, program.u_max.ravel(), program.u_min.ravel(), kinds
 
-        def condensed(program: Program) -> tuple[Any, ...]:
-            return *condense(program), none, program.u_max.ravel(), program.u_min.ravel(), kinds
+    def solve(given: tuple[Any, ...], guess: Array | None = None) -> Array | None:
+        u, _, flag, _ = daqp.solve(*given, primal_start=guess)
+        return u.reshape(first.r.shape) if flag > 0 else None
 
-        def solve(given: tuple[Any, ...], guess: Array | None = None) -> Array | None:
-            u, _, flag, _ = daqp.solve(*given, primal_start=guess)
-            return u.reshape(shape) if flag > 0 else None
-
-        if alone:
-            return Solver(lambda program: (condensed(program), program.controls.ravel()), lambda given: solve(*given))
-        return Solver(lambda program: program, lambda program: solve(condensed(program)))
-
-    return prepare
+    if alone:
+        return Solver(lambda program: (condensed(program), program.controls.ravel()), lambda given: solve(*given))
+    return Solver(lambda program: program, lambda program: solve(condensed(program)))
 
 
 class Sparse:
@@ -242,10 +235,10 @@ def _hpipm(first: Program) -> Solver:
 
 
 CONTENDERS = (
-    Contender(TOWLINE, "1e-6", _towline(True)),
-    Contender("towline Horizon, cold", "1e-6", _towline(False)),
-    Contender(REFERENCE, "1e-6, its own", _daqp(alone=False)),
-    Contender("daqp.solve, warm, condensing not counted", "1e-6, its own", _daqp(alone=True)),
+    Contender(TOWLINE, "1e-6", partial(_towline, warm=True)),
+    Contender("towline Horizon, cold", "1e-6", partial(_towline, warm=False)),
+    Contender(REFERENCE, "1e-6, its own", partial(_daqp, alone=False)),
+    Contender("daqp.solve, warm, condensing not counted", "1e-6, its own", partial(_daqp, alone=True)),
     Contender("osqp, sparse, warm", "1e-6", _osqp),
     Contender("hpipm through CasADi", "speed_abs, its own", _hpipm),
 )

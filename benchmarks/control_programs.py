@@ -56,7 +56,7 @@ def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contend
             controls = solver.solve(given)
             spent[name][turn].append((time.perf_counter_ns() - start) / 1e3)
             if controls is not None:
-                errors[name][k] = _error(programs[k], controls, best)
+                errors[name][k] = (np.abs(controls[0] - best[0]) / _range(programs[k])[0]).max()
                 residuals[name][k] = _residual(programs[k], controls, cost, slope)
     rows = []
     for each in contenders:
@@ -90,10 +90,6 @@ def _range(program: Program) -> Array:
     """Return the range of each control, (N, m); 1 for a control that is fixed or has no limits."""
     width = program.u_max - program.u_min
     return np.where((width > 0) & np.isfinite(width), width, 1.0)
-
-
-def _error(program: Program, controls: Array, best: Array) -> float:
-    return float((np.abs(controls[0] - best[0]) / _range(program)[0]).max())
 
 
 def _residual(program: Program, controls: Array, cost: Array, slope: Array) -> float:

@@ -17,6 +17,7 @@ Each result is judged at 100 000 random positions of the box. The contenders alt
 import argparse
 import time
 from collections.abc import Callable
+from functools import partial
 from itertools import cycle
 from typing import Any
 
@@ -50,11 +51,11 @@ class Task:
         self.requirements = Requirements.model_validate(data)
         self.variables: Variables = variables_of(robot, self.requirements)
         self.rng = np.random.default_rng(seed)
-        self._evaluation = self._at([each.places() for each in self.requirements.require])
+        self._evaluation = self._at(self.requirements.require[0].places())
         self.until = time.perf_counter() + seconds
 
-    def _at(self, poses: list[np.ndarray]) -> Evaluation:
-        return Evaluation(self.variables, rows_of(self.variables.robot, self.requirements.require, poses))
+    def _at(self, poses: np.ndarray) -> Evaluation:
+        return Evaluation(self.variables, rows_of(self.variables.robot, self.requirements.require, [poses]))
 
     def score(self, share: np.ndarray) -> float:
         """Return what peers maximise, from shares of the ranges of the variables [N]."""
@@ -74,7 +75,7 @@ class Task:
     def judged(self, y: np.ndarray) -> float:
         """Return the smallest margin at random positions and those of the grid [N]."""
         poses = self.requirements.require[0].sampled(AUDITED, np.random.default_rng(0))
-        return float(min(self._at([poses]).margins(y).min(), self._evaluation.margins(y).min()))
+        return float(min(self._at(poses).margins(y).min(), self._evaluation.margins(y).min()))
 
 
 def towline(task: Task) -> np.ndarray:
@@ -102,21 +103,12 @@ def pymoo(task: Task) -> np.ndarray:
     return task.layout(np.asarray(found.X))
 
 
-def cma(task: Task) -> np.ndarray:
-    """Search by CMA-ES from the middle of the bounds."""
-    return _by_cma(task, np.full((1, task.variables.size), 0.5), 0.3)
-
-
-def cma_drawn(task: Task) -> np.ndarray:
-    """Search by CMA-ES from the best random layouts."""
-    return _by_cma(task, task.draws(), 0.2)
-
-
-def _by_cma(task: Task, starts: np.ndarray, deviation: float) -> np.ndarray:
-    """Search from one start after the other: when it has converged, from the next."""
+def cma(task: Task, drawn: bool) -> np.ndarray:
+    """Search by CMA-ES from the middle of the bounds, or from the best random layouts: from the next when converged."""
     from cma import CMAEvolutionStrategy
 
     best, value = np.zeros(task.variables.size), -np.inf
+    starts, deviation = (task.draws(), 0.2) if drawn else (np.full((1, task.variables.size), 0.5), 0.3)
     for start in cycle(starts):
         options = {"bounds": [0, 1], "seed": int(task.rng.integers(1, 2**31)), "verbose": -9}
         strategy = CMAEvolutionStrategy(start, deviation, options)
@@ -134,8 +126,8 @@ def _by_cma(task: Task, starts: np.ndarray, deviation: float) -> np.ndarray:
 CONTENDERS: dict[str, Callable[[Task], np.ndarray]] = {
     "towline": towline,
     "pymoo GA": pymoo,
-    "cma": cma,
-    "cma, drawn": cma_drawn,
+    "cma": partial(cma, drawn=False),
+    "cma, drawn": partial(cma, drawn=True),
 }
 
 

@@ -35,6 +35,7 @@ from ..ocp.audits.audit import Audit, audit
 from ..ocp.nlp.solver import FROM_A_SOLUTION
 from ..ocp.tasks.deviation import Deviation
 from ..ocp.tasks.lay_out import lay_out
+from ..ocp.tasks.paths import Motion
 from ..studies.flying.circle import HOVER, tasks
 from .harness import alternating, machine, ratio
 from .harness import table as table_of
@@ -81,60 +82,72 @@ def mapped(steps: int) -> Run:
     and speed are integrated exactly from an acceleration that is linear in each interval.
     """
     robot = load(ROBOT)
-    start = time.perf_counter()
-    task = circle(steps)
-    nodes = np.linspace(0.0, task.seconds, steps + 1)
-    path = task.path.at(nodes, task.seconds)
-    h, weight, m = task.seconds / steps, robot.force_scale, robot.m
-    needed = robot.platform.mass * (path.acceleration[:, :3] - np.array(robot.gravity)) / weight
-    given = ca.DM(np.hstack([path.pose[:, :3], needed]).T)
+    weight, m = robot.force_scale, robot.m
 
-    X: Any = ca.MX.sym("X", 9 + m, steps + 1)
-    costs, balances = _node(robot).map(steps + 1)(X, given)
-    q, v, a = X[:3, :], X[3:6, :], X[6:9, :]
-    here, there = a[:, :-1], a[:, 1:]
-    position = q[:, 1:] - (q[:, :-1] + h * v[:, :-1] + h**2 / 6 * (2 * here + there))
-    speed = h * (v[:, 1:] - (v[:, :-1] + h / 2 * (here + there)))
-    shares = np.full((1, steps + 1), 1 / steps)
-    shares[0, [0, -1]] /= 2
-    problem = {
-        "x": ca.vec(X),
-        "f": ca.dot(costs, ca.DM(shares)) + ca.sumsqr((there - here) / h) / JERK**2 / steps,
-        "g": ca.vertcat(ca.vec(balances), ca.vec(position), ca.vec(speed), X[:9, 0] - X[:9, -1]),
-    }
+    def write(ipopt: dict[str, Any]) -> tuple[Solve, tuple[Any, ...]]:
+        task, _, path = _nodes(steps)
+        h = task.seconds / steps
+        needed = robot.platform.mass * (path.acceleration[:, :3] - np.array(robot.gravity)) / weight
+        given = ca.DM(np.hstack([path.pose[:, :3], needed]).T)
+        X: Any = ca.MX.sym("X", 9 + m, steps + 1)
+        costs, balances = _node(robot).map(steps + 1)(X, given)
+        q, v, a = X[:3, :], X[3:6, :], X[6:9, :]
+        here, there = a[:, :-1], a[:, 1:]
+        position = q[:, 1:] - (q[:, :-1] + h * v[:, :-1] + h**2 / 6 * (2 * here + there))
+        speed = h * (v[:, 1:] - (v[:, :-1] + h / 2 * (here + there)))
+        shares = np.full((1, steps + 1), 1 / steps)
+        shares[0, [0, -1]] /= 2
+        problem = {
+            "x": ca.vec(X),
+            "f": ca.dot(costs, ca.DM(shares)) + ca.sumsqr((there - here) / h) / JERK**2 / steps,
+            "g": ca.vertcat(ca.vec(balances), ca.vec(position), ca.vec(speed), X[:9, 0] - X[:9, -1]),
+        }
+        low, high = np.full((2, 9 + m, steps + 1), np.inf)
+        low[:9] *= -1
+        low[9:], high[9:] = robot.t_min[:, None] / weight, robot.t_max[:, None] / weight
+        node_low, node_high = np.zeros((2, steps + 1, 7))
+        node_low[:, 6], node_high[:, 6] = -np.inf, 1.0
+        rest = np.zeros(6 * steps + 9)
+        bounds = {"lbx": low.ravel("F"), "ubx": high.ravel("F")}
+        bounds |= {"lbg": np.r_[node_low.ravel(), rest], "ubg": np.r_[node_high.ravel(), rest]}
+        guess = np.zeros((9 + m, steps + 1))
+        guess[:3] = (path.pose[:, :3] - path.pose[:, :3].mean(axis=0)).T
+        guess[3:6], guess[6:9] = path.velocity[:, :3].T, path.acceleration[:, :3].T
+        guess[9:] = 1 / m
+        solver = ca.nlpsol("mapped", "ipopt", problem, _options(ipopt))
 
-    low, high = np.full((2, 9 + m, steps + 1), np.inf)
-    low[:9] *= -1
-    low[9:], high[9:] = robot.t_min[:, None] / weight, robot.t_max[:, None] / weight
-    node_low, node_high = np.zeros((2, steps + 1, 7))
-    node_low[:, 6], node_high[:, 6] = -np.inf, 1.0
-    rest = np.zeros(6 * steps + 9)
-    bounds = {
-        "lbx": low.ravel("F"),
-        "ubx": high.ravel("F"),
-        "lbg": np.r_[node_low.ravel(), rest],
-        "ubg": np.r_[node_high.ravel(), rest],
-    }
+        def solve(*start: Any) -> tuple[ca.DM, ...]:
+            found = solver(**dict(zip(("x0", "lam_x0", "lam_g0"), start, strict=True)), **bounds)
+            return found["x"], found["lam_x"], found["lam_g"]
 
-    guess = np.zeros((9 + m, steps + 1))
-    guess[:3] = (path.pose[:, :3] - path.pose[:, :3].mean(axis=0)).T
-    guess[3:6], guess[6:9] = path.velocity[:, :3].T, path.acceleration[:, :3].T
-    guess[9:] = 1 / m
-    solver = ca.nlpsol("mapped", "ipopt", problem, _options(FIRST))
-    solution = solver(x0=guess.ravel("F"), **bounds)
-    first = time.perf_counter() - start
+        return solve, (guess.ravel("F"), 0, 0)
 
-    warm = ca.nlpsol("mapped", "ipopt", problem, _options(AGAIN))
-    start = time.perf_counter()
-    repeated = warm(x0=solution["x"], lam_x0=solution["lam_x"], lam_g0=solution["lam_g"], **bounds)
-    again = time.perf_counter() - start
-
-    def audited(x: ca.DM) -> Audit:
+    def audited(x: ca.DM, *_: ca.DM) -> Audit:
+        task, nodes, _path = _nodes(steps)
         columns = x.full().reshape(9 + m, steps + 1, order="F").T
         parts = columns[:, :3], columns[:, 3:6], columns[:, 6:9], weight * columns[:, 9:]
         return audit(lay_out(robot, task), Deviation(nodes, *parts))
 
-    return Run(first, again, (audited(solution["x"]), audited(repeated["x"])))
+    return _twice(write, audited)
+
+
+def _nodes(steps: int) -> tuple[Task, np.ndarray, Motion]:
+    """Return the task, the instants of its nodes (N + 1,) [s], and the path there."""
+    task = circle(steps)
+    nodes = np.linspace(0.0, task.seconds, steps + 1)
+    return task, nodes, task.path.at(nodes, task.seconds)
+
+
+def _twice(write: Callable[[dict[str, Any]], tuple[Solve, tuple[Any, ...]]], audited: Callable[..., Audit]) -> Run:
+    """Write a program and solve it from its guess; then solve it from its solution, with a solver made before."""
+    start = time.perf_counter()
+    solve, guess = write(FIRST)
+    solution = solve(*guess)
+    first = time.perf_counter() - start
+    solve, _ = write(AGAIN)
+    start = time.perf_counter()
+    repeated = solve(*solution)
+    return Run(first, time.perf_counter() - start, (audited(*solution), audited(*repeated)))
 
 
 def _node(robot: Robot) -> ca.Function:
@@ -150,41 +163,6 @@ def _node(robot: Robot) -> ca.Function:
     cost = ca.sumsqr(tensions) + ca.sumsqr(a) + ca.sumsqr(q) / OFFSET**2
     values = ca.vertcat(force, moment, ca.sumsqr(a) / MOST**2)
     return ca.Function("node", [x, given], [cost, values], {"cse": True, "is_diff_in": [True, False]})
-
-
-class _Shooting:
-    """The shooting that rockit is given: a step of the dynamics, the path, costs and a guess.
-
-    x = (position, angles, velocity and body rates of the platform, position, velocity and acceleration of the base),
-    u = (tensions over the weight, jerk of the base).
-    """
-
-    def __init__(self, robot: Robot, steps: int) -> None:
-        self.robot, self.steps, self.task = robot, steps, circle(steps)
-        self.seconds = self.task.seconds
-        self.nodes = np.linspace(0.0, self.seconds, steps + 1)
-        self.path = self.task.path.at(self.nodes, self.seconds)
-        self.low, self.high = robot.t_min / robot.force_scale, robot.t_max / robot.force_scale
-        self.step = _step(robot, self.seconds / steps)
-
-    def guess(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return states (21, N + 1) and controls (9, N): on the path, the base above it, the weight shared out."""
-        base = self.path.pose[:, :3] - self.path.pose[:, :3].mean(axis=0) + HOVER[:3]
-        acceleration = self.path.acceleration[:, :3]
-        states = np.hstack([self.path.pose, self.path.velocity, base, self.path.velocity[:, :3], acceleration]).T
-        jerk = np.diff(acceleration, axis=0) * self.steps / self.seconds
-        return states, np.hstack([np.full((self.steps, 6), 1 / 6), jerk]).T
-
-    def cost(self, u: Any, x: Any) -> Any:
-        """Return the running cost."""
-        moved = ca.sumsqr(x[18:]) + ca.sumsqr(x[12:15] - ca.DM(HOVER[:3])) / OFFSET**2
-        return ca.sumsqr(u[:6]) + ca.sumsqr(u[6:]) / JERK**2 + moved
-
-    def audited(self, x: ca.DM, u: ca.DM) -> Audit:
-        """Audit the base's motion of a solution: x (21, N + 1), u (9, N)."""
-        q, v, a = np.hsplit(x.full()[12:].T, 3)
-        tensions = self.robot.force_scale * np.vstack([u.full()[:6].T, u.full()[:6, -1]])
-        return audit(lay_out(self.robot, self.task), Deviation(self.nodes, q - HOVER[:3], v, a, tensions))
 
 
 def _step(robot: Robot, h: float) -> ca.Function:
@@ -205,41 +183,50 @@ def _step(robot: Robot, h: float) -> ca.Function:
 
 
 def rockit(steps: int) -> Run:
-    """Write the shooting with rockit, and solve it."""
+    """Write a shooting with rockit, and solve it.
+
+    x = (position, angles, velocity and body rates of the platform, position, velocity and acceleration of the base),
+    u = (tensions over the weight, jerk of the base).
+    """
     robot = load(ROBOT)
-    start = time.perf_counter()
-    problem = _Shooting(robot, steps)
-    solution = _write_rockit(problem, FIRST)(*problem.guess(), 0)
-    first = time.perf_counter() - start
-    warm = _write_rockit(problem, AGAIN)
-    start = time.perf_counter()
-    repeated = warm(*solution)
-    again = time.perf_counter() - start
-    return Run(first, again, (problem.audited(*solution[:2]), problem.audited(*repeated[:2])))
 
+    def write(ipopt: dict[str, Any]) -> tuple[Solve, tuple[Any, ...]]:
+        from rockit import MultipleShooting, Ocp
 
-def _write_rockit(problem: _Shooting, ipopt: dict[str, Any]) -> Solve:
-    """Return rockit's solver of the shooting with these options of IPOPT."""
-    from rockit import MultipleShooting, Ocp
+        task, _, path = _nodes(steps)
+        make: Any = Ocp  # by its types T is a whole number and a state may be None
+        ocp = make(T=task.seconds)
+        x, u = ocp.state(21), ocp.control(9)
+        place = ocp.parameter(6, grid="control+")
+        ocp.set_value(place, path.pose.T)
+        ocp.set_next(x, _step(robot, task.seconds / steps)(x, u))
+        ocp.subject_to(robot.t_min / robot.force_scale <= (u[:6] <= robot.t_max / robot.force_scale))
+        ocp.subject_to(ca.sumsqr(x[18:]) / MOST**2 <= 1)
+        ocp.subject_to(x[:6] == place, include_first=False)
+        ocp.subject_to(ocp.at_t0(x) == ocp.at_tf(x))
+        moved = ca.sumsqr(x[18:]) + ca.sumsqr(x[12:15] - ca.DM(HOVER[:3])) / OFFSET**2
+        ocp.add_objective(ocp.sum(ca.sumsqr(u[:6]) + ca.sumsqr(u[6:]) / JERK**2 + moved) / steps)
+        ocp.solver("ipopt", _options(ipopt))
+        ocp.method(MultipleShooting(N=steps))
+        X, U = (ocp.sample(each, grid=grid)[1] for each, grid in ((x, "control"), (u, "control-")))
+        places = ocp.sample(place, grid="control")[1]
+        multipliers = ocp._method.opti.lam_g  # rockit's own code generator takes it from here too
+        solve = ocp.to_function("rockit", [X, U, multipliers, places], [X, U, multipliers])
+        # On the path, the base above it, the weight shared out.
+        base = path.pose[:, :3] - path.pose[:, :3].mean(axis=0) + HOVER[:3]
+        acceleration = path.acceleration[:, :3]
+        states = np.hstack([path.pose, path.velocity, base, path.velocity[:, :3], acceleration]).T  # (21, N + 1)
+        jerk = np.diff(acceleration, axis=0) * steps / task.seconds
+        controls = np.hstack([np.full((steps, 6), 1 / 6), jerk]).T  # (9, N)
+        return lambda X, U, multipliers: solve(X, U, multipliers, path.pose.T), (states, controls, 0)
 
-    make: Any = Ocp  # by its types T is a whole number and a state may be None
-    ocp = make(T=problem.seconds)
-    x, u = ocp.state(21), ocp.control(9)
-    place = ocp.parameter(6, grid="control+")
-    ocp.set_value(place, problem.path.pose.T)
-    ocp.set_next(x, problem.step(x, u))
-    ocp.subject_to(problem.low <= (u[:6] <= problem.high))
-    ocp.subject_to(ca.sumsqr(x[18:]) / MOST**2 <= 1)
-    ocp.subject_to(x[:6] == place, include_first=False)
-    ocp.subject_to(ocp.at_t0(x) == ocp.at_tf(x))
-    ocp.add_objective(ocp.sum(problem.cost(u, x)) / problem.steps)
-    ocp.solver("ipopt", _options(ipopt))
-    ocp.method(MultipleShooting(N=problem.steps))
-    X, U = (ocp.sample(each, grid=grid)[1] for each, grid in ((x, "control"), (u, "control-")))
-    places = ocp.sample(place, grid="control")[1]
-    multipliers = ocp._method.opti.lam_g  # rockit's own code generator takes it from here too
-    solve = ocp.to_function("rockit", [X, U, multipliers, places], [X, U, multipliers])
-    return lambda X, U, multipliers: solve(X, U, multipliers, problem.path.pose.T)
+    def audited(x: ca.DM, u: ca.DM, _: ca.DM) -> Audit:
+        task, nodes, _path = _nodes(steps)
+        q, v, a = np.hsplit(x.full()[12:].T, 3)
+        tensions = robot.force_scale * np.vstack([u.full()[:6].T, u.full()[:6, -1]])
+        return audit(lay_out(robot, task), Deviation(nodes, q - HOVER[:3], v, a, tensions))
+
+    return _twice(write, audited)
 
 
 def _options(ipopt: dict[str, Any]) -> dict[str, Any]:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from ..base.errors import InputError
 from ..base.writing import check_writable, whole_file
 from ..figures import style
-from ..solvers import TensionProblem
 from .harness import alternating, machine, ratio, table
 from .tension_contenders import REFERENCE, Contender, contenders
 from .tension_tasks import KINDS, Task, make_task
@@ -200,13 +199,10 @@ def _judge(contender: Contender, task: Task, answers: list[Array | None]) -> tup
             errors.append(float(np.abs(answer[: task.m] - task.optima[i][: task.m]).max()))
             failures += errors[-1] > FAILED
         else:
-            failures += _violation(task.problems[i], answer) > FAILED
+            p = task.problems[i]
+            violation = float(max(np.abs(p.A @ answer - p.w).max(), *(p.t_min - answer), *(answer - p.t_max)))
+            failures += violation > FAILED
     return max(errors, default=None), failures
-
-
-def _violation(problem: TensionProblem, x: Array) -> float:
-    """Return the largest error of the wrench or of a limit."""
-    return float(max(np.abs(problem.A @ x - problem.w).max(), (problem.t_min - x).max(), (x - problem.t_max).max()))
 
 
 def write(report: Report, folder: Path) -> list[Path]:

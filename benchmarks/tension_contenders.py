@@ -8,6 +8,7 @@ ever on infeasible problems.
 
 import warnings
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -65,13 +66,15 @@ def contenders() -> list[Contender]:
     required = f"{EPS:g} absolute"
     entries = [Contender(REFERENCE, required, _daqp)]
     for name in methods():
-        entries.append(Contender(f"towline {name}", "its own, 1e-9", _towline(name), same_aim=name in _LEAST_NORM))
+        entries.append(
+            Contender(f"towline {name}", "its own, 1e-9", partial(_towline, method=name), same_aim=name in _LEAST_NORM)
+        )
     entries.append(Contender("towline core alone", "its own, 1e-9", _towline_core))
-    entries.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch(None), batch=True))
-    soft = _towline_batch(STIFFNESS)
+    entries.append(Contender("towline solve_batch", "its own, 1e-9", _towline_batch, batch=True))
+    soft = partial(_towline_batch, rho=STIFFNESS)
     entries.append(Contender("towline solve_batch, rho", "its own, 3e-14", soft, batch=True, kinds=("soft",)))
     native = {
-        "daqp": ("daqp Model, reuse", _daqp_model),
+        "daqp": ("daqp Model, reuse", partial(_daqp, reuse=True)),
         "osqp": ("osqp, reuse", _osqp),
         "clarabel": ("clarabel, reuse", _clarabel),
         "piqp": ("piqp, reuse", _piqp),
@@ -87,14 +90,8 @@ def contenders() -> list[Contender]:
 
     for name in sorted(set(_QPSOLVERS) & set(qpsolvers.available_solvers)):
         tolerance = "exact" if name == "quadprog" else required
-        entries.append(Contender(f"qpsolvers {name}", tolerance, _through_qpsolvers(name)))
+        entries.append(Contender(f"qpsolvers {name}", tolerance, partial(_through_qpsolvers, name=name)))
     return entries
-
-
-def _stacked(qp: dict[str, Any]) -> tuple[Array, Array, Array]:
-    """Return rows, lower and upper limits of lower <= C x <= upper: the equations, then x itself."""
-    n = qp["q"].size
-    return np.vstack([qp["A"], np.eye(n)]), np.r_[qp["b"], qp["lb"]], np.r_[qp["b"], qp["ub"]]
 
 
 def _one_sided(qp: dict[str, Any]) -> tuple[Array, Array]:
@@ -119,38 +116,31 @@ def _columns(matrices: list[Array], equations: int) -> tuple[csc_matrix, list[Ar
     return first, entries
 
 
-def _towline(method: str) -> Callable[[Task], Single]:
-    def prepare(task: Task) -> Single:
-        # Problems remember what was computed from them: each run gets new ones, as in a control loop.
-        problems = [TensionProblem(p.A, p.w, p.t_min, p.t_max, p.t_ref, p.weights, p.length) for p in task.problems]
+def _towline(task: Task, method: str) -> Single:
+    # Problems remember what was computed from them: each run gets new ones, as in a control loop.
+    problems = [TensionProblem(p.A, p.w, p.t_min, p.t_max, p.t_ref, p.weights, p.length) for p in task.problems]
 
-        def run(i: int) -> Array | None:
-            answer = solve(problems[i], method=method)
-            return answer.tensions if answer.feasible else None
+    def run(i: int) -> Array | None:
+        answer = solve(problems[i], method=method)
+        return answer.tensions if answer.feasible else None
 
-        return run
-
-    return prepare
+    return run
 
 
-def _towline_batch(rho: float | None) -> Callable[[Task], Batch]:
-    """Return how to start `solve_batch`; with `rho` the tensions are the only variables."""
+def _towline_batch(task: Task, rho: float | None = None) -> Batch:
+    """Prepare `solve_batch`; with `rho` the tensions are the only variables."""
+    m = task.problems[0].m if rho is None else task.m
+    A, t_min, t_max, weights = (
+        _over_and_over(np.array([getattr(problem, name)[..., :m] for problem in task.problems]))
+        for name in ("A", "t_min", "t_max", "weights")
+    )
+    w = _over_and_over(np.array([problem.w for problem in task.problems]))
 
-    def prepare(task: Task) -> Batch:
-        m = task.problems[0].m if rho is None else task.m
-        A, t_min, t_max, weights = (
-            _over_and_over(np.array([getattr(problem, name)[..., :m] for problem in task.problems]))
-            for name in ("A", "t_min", "t_max", "weights")
-        )
-        w = _over_and_over(np.array([problem.w for problem in task.problems]))
+    def run(_: int) -> tuple[Array, NDArray[np.bool_]]:
+        answer = solve_batch(A, w, t_min, t_max, weights=weights, rho=rho, threads=1)
+        return answer.tensions, answer.feasible if rho is None else np.isfinite(answer.residual)
 
-        def run(_: int) -> tuple[Array, NDArray[np.bool_]]:
-            answer = solve_batch(A, w, t_min, t_max, weights=weights, rho=rho, threads=1)
-            return answer.tensions, answer.feasible if rho is None else np.isfinite(answer.residual)
-
-        return run
-
-    return prepare
+    return run
 
 
 def _towline_core(task: Task) -> Single:
@@ -169,56 +159,46 @@ def _over_and_over(rows: Array) -> Array:
     return np.tile(rows, (-(-BATCH // len(rows)),) + (1,) * (rows.ndim - 1))
 
 
-def _daqp_arguments(task: Task) -> list[tuple[Any, ...]]:
-    arguments = []
-    for qp in task.qps:
-        sense = np.zeros(qp["q"].size + qp["b"].size, dtype=np.int32)
-        sense[qp["q"].size :] = _EQUALITY
-        upper, lower = np.r_[qp["ub"], qp["b"]], np.r_[qp["lb"], qp["b"]]
-        arguments.append((qp["P"], qp["q"], np.ascontiguousarray(qp["A"]), upper, lower, sense))
-    return arguments
-
-
-def _daqp(task: Task) -> Single:
+def _daqp(task: Task, reuse: bool = False) -> Single:
+    """Prepare DAQP; `reuse` one model, whose memory is updated."""
     import daqp
 
-    arguments = _daqp_arguments(task)
+    arguments = []
+    for qp in task.qps:
+        sense = np.r_[np.zeros(qp["q"].size, dtype=np.int32), np.full(qp["b"].size, _EQUALITY, dtype=np.int32)]
+        upper, lower = np.r_[qp["ub"], qp["b"]], np.r_[qp["lb"], qp["b"]]
+        arguments.append((qp["P"], qp["q"], np.ascontiguousarray(qp["A"]), upper, lower, sense))
+    model = daqp.Model()
+    model.settings = {"primal_tol": EPS}
 
     def run(i: int) -> Array | None:
         x, _, flag, _ = daqp.solve(*arguments[i], primal_tol=EPS)
         return x if flag > 0 else None
 
-    return run
-
-
-def _daqp_model(task: Task) -> Single:
-    import daqp
-
-    arguments = _daqp_arguments(task)
-    model = daqp.Model()
-    model.settings = {"primal_tol": EPS}
-    model.setup(*arguments[0])
-
-    def run(i: int) -> Array | None:
+    def again(i: int) -> Array | None:
         _, _, A, upper, lower, sense = arguments[i]
         model.update(A=A, bupper=upper, blower=lower, sense=sense)
         x, _, flag, _ = model.solve()
         return x if flag > 0 else None
 
-    return run
+    if not reuse:
+        return run
+    model.setup(*arguments[0])
+    return again
 
 
 def _osqp(task: Task) -> Single:
     import osqp
 
-    rows = [_stacked(qp) for qp in task.qps]
-    first, values = _columns([C for C, _, _ in rows], task.qps[0]["b"].size)
+    # Rows, lower and upper limits of lower <= C x <= upper: the equations, then x itself.
+    limits = [(np.r_[qp["b"], qp["lb"]], np.r_[qp["b"], qp["ub"]]) for qp in task.qps]
+    first, values = _columns([np.vstack([qp["A"], np.eye(qp["q"].size)]) for qp in task.qps], task.qps[0]["b"].size)
     solver, P = osqp.OSQP(), csc_matrix(task.qps[0]["P"])
     settings = {"eps_abs": EPS, "eps_rel": 0.0, "max_iter": 4000, "verbose": False}
-    solver.setup(P, task.qps[0]["q"], first, rows[0][1], rows[0][2], **settings)
+    solver.setup(P, task.qps[0]["q"], first, *limits[0], **settings)
 
     def run(i: int) -> Array | None:
-        solver.update(Ax=values[i], l=rows[i][1], u=rows[i][2])
+        solver.update(Ax=values[i], l=limits[i][0], u=limits[i][1])
         answer = solver.solve(raise_error=False)
         return answer.x if answer.info.status == "solved" else None
 
@@ -342,23 +322,19 @@ def _moreau_batch(task: Task) -> Batch:
     return run
 
 
-def _through_qpsolvers(name: str) -> Callable[[Task], Single]:
-    def prepare(task: Task) -> Single:
-        import qpsolvers
+def _through_qpsolvers(task: Task, name: str) -> Single:
+    import qpsolvers
 
-        dense = name in qpsolvers.dense_solvers
-        problems = []
-        for qp in task.qps:
-            P, A = (qp["P"], qp["A"]) if dense else (csc_matrix(qp["P"]), csc_matrix(qp["A"]))
-            problems.append(qpsolvers.Problem(P, qp["q"], A=A, b=qp["b"], lb=qp["lb"], ub=qp["ub"]))
-        settings = _QPSOLVERS[name]
+    dense = name in qpsolvers.dense_solvers
+    problems = []
+    for qp in task.qps:
+        P, A = (qp["P"], qp["A"]) if dense else (csc_matrix(qp["P"]), csc_matrix(qp["A"]))
+        problems.append(qpsolvers.Problem(P, qp["q"], A=A, b=qp["b"], lb=qp["lb"], ub=qp["ub"]))
 
-        def run(i: int) -> Array | None:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                answer = qpsolvers.solve_problem(problems[i], solver=name, **settings)
-            return answer.x if answer.found else None
+    def run(i: int) -> Array | None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            answer = qpsolvers.solve_problem(problems[i], solver=name, **_QPSOLVERS[name])
+        return answer.x if answer.found else None
 
-        return run
-
-    return prepare
+    return run
