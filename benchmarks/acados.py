@@ -48,19 +48,14 @@ def folder() -> Path | None:
     return next((place for place in places if (place / "libacados.so").is_file()), None)
 
 
-def _libraries(place: Path) -> tuple[CDLL, CDLL]:
-    """Return the libraries of acados and of HPIPM."""
-    found = [CDLL(str(place / name), mode=RTLD_GLOBAL) for name in LIBRARIES if (place / name).is_file()]
-    acados = CDLL(str(place / "libacados.so"), mode=RTLD_GLOBAL)
-    for name in MAKERS:
-        getattr(acados, name).restype = c_void_p
-    return acados, next(library for library in found if "hpipm" in library._name)
-
-
 def _acados(first: Program) -> Solver:
     place = folder()
     assert place is not None
-    acados, hpipm = _libraries(place)
+    needed = [CDLL(str(place / name), mode=RTLD_GLOBAL) for name in LIBRARIES if (place / name).is_file()]
+    hpipm = next(library for library in needed if "hpipm" in library._name)
+    acados = CDLL(str(place / "libacados.so"), mode=RTLD_GLOBAL)
+    for name in MAKERS:
+        getattr(acados, name).restype = c_void_p
     N, n, m = first.B.shape
 
     def make(name: str, *given: Any) -> c_void_p:

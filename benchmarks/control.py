@@ -7,6 +7,7 @@ the steps of each controller take, whole steps from state to command; how long e
 predictive control had in such a run, alternating every few programs; and how far each controller lets the platform go.
 """
 
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -20,15 +21,16 @@ from ..models import Robot, load
 from ..simulation import simulate
 from ..solvers import Horizon
 from .acados import ACADOS
-from .control_contenders import CONTENDERS, FIELDS, REFERENCE, TOWLINE, Program, fill
-from .control_programs import BLOCK, FAILED, Row, measure
-from .harness import machine, table
+from .control_contenders import CONTENDERS, FIELDS, REFERENCE, TOWLINE, Array, Contender, Program, condense, exact, fill
+from .harness import alternating, machine, ratio, table
 
 STANDARD = "computed torque"
 Progress = Callable[[str, int, int], None]
 Makers = dict[str, Callable[[Robot], Controller]]  # of controllers by name
 TIMED = ("casadi", "daqp", "osqp", "numpy")
 EVERYONE = (*CONTENDERS, *ACADOS)  # acados, where it is installed
+FAILED = 1e-3  # controls this far off are a failure, in units of their range
+BLOCK = 25  # programs of a turn
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,26 @@ def record(task: Task, robot: Robot, steps: int) -> list[Program]:
     controller = Recording(robot, **task.options)
     simulate(robot, robot.home, controller, duration=steps * 1e-3, **task.conditions())
     return controller.keeping.kept
+
+
+@dataclass(frozen=True)
+class Row:
+    """A solver at the programs of a task; errors are in units of the range of a control.
+
+    `residual` is the largest step of a control of any stage along its gradient, over its curvature, inside its bounds.
+    """
+
+    task: str
+    contender: str
+    tolerance: str  # the accuracy required
+    median_us: float  # of a program [us]
+    p99_us: float
+    ratio: float  # to condensing and `daqp.solve`, median over the turns
+    ratio_to_horizon: float  # to `Horizon` as it was simulated, likewise
+    max_error: float | None  # of the first stage's controls
+    residual: float | None
+    failures: int  # programs, of `programs`, without a result or with an error above `FAILED`
+    programs: int  # how many it was given
 
 
 @dataclass(frozen=True)
@@ -242,6 +264,69 @@ def _errors(task: Task, robot: Robot, steps: int, seeds: int, accepted: Makers) 
     return rows
 
 
+def measure(task: str, programs: Sequence[Program], contenders: Sequence[Contender]) -> list[Row]:
+    """Measure contenders at the programs of one run, alternating every few; `TOWLINE` and `REFERENCE` among them."""
+    solvers = {each.name: each.prepare(programs[0]) for each in contenders}
+    for solver in solvers.values():  # imports belong to no program
+        solver.solve(solver.arrange(programs[0]))
+    count = len(programs)
+    spent: dict[str, dict[int, list[float]]] = {name: {} for name in solvers}  # [us] by turn
+    errors, residuals = ({name: np.full(count, np.nan) for name in solvers} for _ in range(2))
+    of_turn, known = -1, list[tuple[Array, Array, Array]]()
+    for turn, (name, solver) in alternating([*solvers.items()], -(-count // BLOCK)):
+        block = range(turn * BLOCK, min((turn + 1) * BLOCK, count))
+        if turn != of_turn:
+            of_turn, known = turn, [_known(programs[k]) for k in block]
+        spent[name][turn] = []
+        for k, (best, cost, slope) in zip(block, known, strict=True):
+            given = solver.arrange(programs[k])
+            start = time.perf_counter_ns()
+            controls = solver.solve(given)
+            spent[name][turn].append((time.perf_counter_ns() - start) / 1e3)
+            if controls is not None:
+                errors[name][k] = (np.abs(controls[0] - best[0]) / _range(programs[k])[0]).max()
+                residuals[name][k] = _residual(programs[k], controls, cost, slope)
+    rows = []
+    for each in contenders:
+        off, answered = errors[each.name], np.isfinite(errors[each.name])
+        times = np.concatenate([*spent[each.name].values()])
+        rows.append(
+            Row(
+                task=task,
+                contender=each.name,
+                tolerance=each.tolerance,
+                median_us=float(np.median(times)),
+                p99_us=float(np.percentile(times, 99)),
+                ratio=ratio(spent[each.name], spent[REFERENCE]),
+                ratio_to_horizon=ratio(spent[each.name], spent[TOWLINE]),
+                max_error=float(off[answered].max()) if answered.any() else None,
+                residual=float(residuals[each.name][answered].max()) if answered.any() else None,
+                failures=int((~(off <= FAILED)).sum()),
+                programs=count,
+            )
+        )
+    return rows
+
+
+def _known(program: Program) -> tuple[Array, Array, Array]:
+    """Return the best solution that is known, (N, m), by its residual, and the condensed cost."""
+    cost, slope = condense(program)
+    return min(exact(program), key=lambda u: _residual(program, u, cost, slope)), cost, slope
+
+
+def _range(program: Program) -> Array:
+    """Return the range of each control, (N, m); 1 for a control that is fixed or has no limits."""
+    width = program.u_max - program.u_min
+    return np.where((width > 0) & np.isfinite(width), width, 1.0)
+
+
+def _residual(program: Program, controls: Array, cost: Array, slope: Array) -> float:
+    """Return how far each control alone would move to lower the cost inside its bounds, by the condensed cost."""
+    u = controls.ravel()
+    moved = np.clip(u - (cost @ u + slope) / np.diag(cost), program.u_min.ravel(), program.u_max.ravel())
+    return float((np.abs(moved - u) / _range(program).ravel()).max())
+
+
 def markdown(report: Report) -> str:
     """Return the report as a page."""
     steps, programs, errors = [], [], []
@@ -259,35 +344,34 @@ def markdown(report: Report) -> str:
     for row in report.errors:
         cells = [f"{row.rms_mm:.3g}", f"{row.max_mm:.3g}", f"{row.ratio:.2g}"]
         errors.append((row.task, row.controller, *cells, f"{100 * row.soft:.1f} %", f"{100 * row.slack:.1f} %"))
-    lines = [
-        "# Control",
-        "",
-        f"Measured on {report.machine}.",
-        f"Flights of {report.count} steps of 1 ms in gusts, with elastic cables.",
-        "",
-        "## Whole steps, from state to command",
-        "",
-        f"Ratio: to {STANDARD}.",
-        "",
-        *table("task | controller | median us | p99 us | ratio", steps, 2),
-        "",
-        "## Quadratic programs of predictive control",
-        "",
-        f"Ratios: to `{REFERENCE}` and to `{TOWLINE}`, medians over turns of {BLOCK}. Error: of the first stage's "
-        "controls, in units of their range. Residual: of the conditions of optimality, in the same units, all stages.",
-        f"Failures: no result, or an error of more than {FAILED:g}.",
-        "",
-        *table(
-            "task | solver | required | median us | p99 us | ratio | to Horizon | error | residual | failures",
-            programs,
-            3,
-        ),
-        "",
-        "## Errors of the position",
-        "",
-        f"{report.seeds} flights, the same gusts for all controllers. Ratio: of a run's largest error to that with "
-        f"{STANDARD}, median of the runs.",
-        "",
-        *table("task | controller | rms mm | largest mm | ratio | not as planned | slack", errors, 2),
-    ]
-    return "\n".join(lines) + "\n"
+    steps_table = "\n".join(table("task | controller | median us | p99 us | ratio", steps, 2))
+    columns = "task | solver | required | median us | p99 us | ratio | to Horizon | error | residual | failures"
+    programs_table = "\n".join(table(columns, programs, 3))
+    columns = "task | controller | rms mm | largest mm | ratio | not as planned | slack"
+    errors_table = "\n".join(table(columns, errors, 2))
+    return f"""# Control
+
+Measured on {report.machine}.
+Flights of {report.count} steps of 1 ms in gusts, with elastic cables.
+
+## Whole steps, from state to command
+
+Ratio: to {STANDARD}.
+
+{steps_table}
+
+## Quadratic programs of predictive control
+
+Ratios: to `{REFERENCE}` and to `{TOWLINE}`, medians over turns of {BLOCK}. Error: of the first stage's \
+controls, in units of their range. Residual: of the conditions of optimality, in the same units, all stages.
+Failures: no result, or an error of more than {FAILED:g}.
+
+{programs_table}
+
+## Errors of the position
+
+{report.seeds} flights, the same gusts for all controllers. Ratio: of a run's largest error to that with \
+{STANDARD}, median of the runs.
+
+{errors_table}
+"""

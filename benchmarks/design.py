@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
+from ..layout.annealing import drawn
 from ..layout.evaluation import Evaluation, rows_of
-from ..layout.moves import drawn
 from ..layout.requirements import Requirements
 from ..layout.search import AUDITED, search
 from ..layout.variables import Variables, variables_of

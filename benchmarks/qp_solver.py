@@ -68,8 +68,7 @@ def solve_problem(
 ) -> qpsolvers.Solution:
     """Solve a QP with diagonal cost, equations and limits; the signature is that of qpsolvers' back ends.
 
-    - `problem`: the QP; sparse matrices are made dense.
-    - `initvals`, `verbose`: not used.
+    - `problem`: the QP; sparse matrices are made dense. `initvals`, `verbose`: not used.
     - `eps_abs`: residuals and duality gap that are good enough. It matters only where the equations are nearly
       dependent: then those that equal 0 = 0 within the tolerance are left out, if the result meets the original QP to
       `eps_abs`.
@@ -123,31 +122,26 @@ def multipliers(gradient: Array, A: Array, b: Array, x: Array, lower: Array, upp
     at_lower, at_upper = x <= lower + near, x >= upper - near
     inside = ~(at_lower | at_upper)
 
-    def signed(z: Array) -> Array:
-        return np.where(at_upper, np.maximum(z, 0.0), 0.0) + np.where(at_lower, np.minimum(z, 0.0), 0.0)
-
-    def error(y: Array, z: Array) -> float:
+    def candidate(y: Array) -> tuple[float, Array, Array]:
+        """Return the error of multipliers, and them."""
+        z = -(gradient + y @ A)
+        z = np.where(at_upper, np.maximum(z, 0.0), 0.0) + np.where(at_lower, np.minimum(z, 0.0), 0.0)
         gap = gradient @ x + b @ y + z[z < 0] @ lower[z < 0] + z[z > 0] @ upper[z > 0]
-        return max(float(np.abs(gradient + y @ A + z).max()), abs(float(gap)))
+        return max(float(np.abs(gradient + y @ A + z).max()), abs(float(gap))), y, z
 
     candidates: list[tuple[float, Array, Array]] = []
     for cut in _CUTS:
         y = np.asarray(np.linalg.lstsq(A[:, inside].T, -gradient[inside], rcond=cut)[0], dtype=np.float64)
-        z = signed(-(gradient + y @ A))
-        candidates.append((error(y, z), y, z))
+        candidates.append(candidate(y))
         if candidates[-1][0] <= _GOOD:
-            return y, z
+            return candidates[-1][1:]
     rows = A.shape[0]
     M = np.hstack([A.T, np.eye(x.size)[:, ~inside]])
     free = np.full(rows, np.inf)
     low = np.concatenate([-free, np.where(at_lower, -np.inf, 0.0)[~inside]])
     high = np.concatenate([free, np.where(at_upper, np.inf, 0.0)[~inside]])
     both, _ = box_least_squares(M, -gradient, low, high)
-    y = both[:rows]
-    z = signed(-(gradient + y @ A))
-    candidates.append((error(y, z), y, z))
-    _, y, z = min(candidates, key=lambda candidate: candidate[0])
-    return y, z
+    return min([*candidates, candidate(both[:rows])], key=lambda each: each[0])[1:]
 
 
 def as_qp(problem: TensionProblem) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 import io
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -98,11 +97,8 @@ def angles() -> Figure:
 def small(name: str, file: Path) -> None:
     """Draw a robot as `towline robots NAME --figure` does, in a small file."""
     file.parent.mkdir(exist_ok=True)
-    with tempfile.TemporaryDirectory() as folder:
-        drawn = Path(folder) / "robot.png"
-        command = [sys.executable, "-m", "towline.cli.entry", "robots", name, "--figure", str(drawn)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        file.write_bytes(drawn.read_bytes())
+    command = [sys.executable, "-m", "towline.cli.entry", "robots", name, "--figure", str(file)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     shrink(file, WIDTH)
 
 

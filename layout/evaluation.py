@@ -5,7 +5,6 @@ change the unit in which it is measured.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from typing import NamedTuple
@@ -23,9 +22,8 @@ from ..solvers.margins import Reserves, all_reserves, margins, reserves
 from ..statics.stiffness import frequencies_of
 from ..workspace.conditions.interference import nearest_points
 from .goal import Goal, Outcome
-from .regions import Region
 from .requirements import Requirement
-from .room import Room
+from .room import Region, Room
 from .variables import Variables, parts
 
 NO_BOUNDS = Room()
@@ -46,13 +44,8 @@ class Rows(NamedTuple):
 
     def joined(self, other: "Rows") -> "Rows":
         """Return these rows followed by others."""
-        pose_of = np.concatenate([self.pose_of, other.pose_of + len(self.poses)])
-        return Rows(
-            np.concatenate([self.poses, other.poses]),
-            pose_of,
-            np.concatenate([self.wrenches, other.wrenches]),
-            np.concatenate([self.accelerations, other.accelerations]),
-        )
+        other = other._replace(pose_of=other.pose_of + len(self.poses))
+        return Rows(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
     def only(self, chosen: np.ndarray) -> "Rows":
         """Return some of the rows, by index."""
@@ -75,8 +68,7 @@ def rows_of(robot: Robot, requirements: tuple[Requirement, ...], poses: list[np.
     return Rows(np.concatenate(poses), pose_of, wrenches, accelerations)
 
 
-@dataclass(frozen=True)
-class Slopes:
+class Slopes(NamedTuple):
     """Values of some rows and their derivatives by the variables."""
 
     value: np.ndarray  # (k,)
@@ -107,7 +99,6 @@ class Evaluation:
         self._carried = rotations(self._home[robot.carrier_of_cable, 3:])  # (m, 3, 3)
         self.pairs = np.array(list(combinations(range(robot.m), 2)), dtype=int).reshape(-1, 2)
         self._apart = np.flatnonzero(~self._always_together())
-        self._all_pairs = self._apart.size == len(self.pairs)
         self.pairs = self.pairs[self._apart]
 
     def margins(self, y: np.ndarray) -> np.ndarray:
@@ -147,7 +138,7 @@ class Evaluation:
         self._place(y)
         distances = np.empty((len(self._poses), self._m * (self._m - 1) // 2))
         core.cable_distances(self._record, self._poses, self._home, distances)
-        return distances if self._all_pairs else distances[:, self._apart]
+        return distances[:, self._apart]
 
     def lengths(self, y: np.ndarray) -> np.ndarray:
         """Return the length of each cable at each pose, (N, m) [m]."""
@@ -214,7 +205,7 @@ class Evaluation:
         if self.room.frequency > 0.0:
             slow = self.frequency_slopes(y)
             found.append(Slopes(slow.value / self.room.frequency - 1.0, slow.by_variables / self.room.frequency))
-        return Slopes(*(np.concatenate(part) for part in zip(*((f.value, f.by_variables) for f in found), strict=True)))
+        return Slopes(*(np.concatenate(part) for part in zip(*found, strict=True)))
 
     def longest_slopes(self, y: np.ndarray) -> tuple[Slopes, np.ndarray]:
         """Return the largest lengths of each cable with their derivatives, and the cable of each, (k,)."""

@@ -47,23 +47,20 @@ def judge(robot: Robot, rows: Rows, room: Room, frequency: bool) -> Judgement:
             p, p_end = (in_frame(rows.poses[:, None], points) for points in (ends, starts))
         distance = float(outside(region.shape, p.reshape(-1, 3), p_end.reshape(-1, 3)).min())
         distances.append((region.name, distance))
+    lowest = None
+    if frequency:  # with the tensions of least norm; 0 where no tensions exist
+        A, w = _problems(robot, robot.length, rows)
+        solved = solve_batch(A, w, robot.t_min, robot.t_max)
+        poses = rows.poses[rows.pose_of]
+        lowest = float(natural_frequencies(robot, poses, solved.tensions)[:, 0].min()) if solved.feasible.all() else 0.0
     return Judgement(
         float(least_distance(robot, starts, ends).min()),
         (float(lengths.min()), float(lengths.max())),
         tuple(distances),
         float(min(starts[..., 2].min(), ends[..., 2].min())),
         float(lengths.max(axis=0).sum()),
-        _lowest_frequency(robot, rows) if frequency else None,
+        lowest,
     )
-
-
-def _lowest_frequency(robot: Robot, rows: Rows) -> float:
-    """Return the lowest natural frequency with the tensions of least norm [Hz]; 0 where no tensions exist."""
-    A, w = _problems(robot, robot.length, rows)
-    solved = solve_batch(A, w, robot.t_min, robot.t_max)
-    if not solved.feasible.all():
-        return 0.0
-    return float(natural_frequencies(robot, rows.poses[rows.pose_of], solved.tensions)[:, 0].min())
 
 
 def judged_margin(robot: Robot, length: float, rows: Rows) -> float:

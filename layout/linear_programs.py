@@ -8,7 +8,6 @@ from scipy.optimize import linprog
 
 from .evaluation import Evaluation, Slopes
 from .goal import Goal
-from .variables import Variables
 
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
 _PER_METRE = 40.0  # force scales that a metre costs by which a bound is missed
@@ -79,9 +78,6 @@ class _Program:
         self.solution = linprog(cost, A_ub=A, b_ub=b, bounds=bounds, method="highs", options=options)
         self.value = -self.solution.fun - float(goal.price @ y) if self.solution.success else -np.inf
 
-    def moved(self, y: np.ndarray, variables: Variables) -> np.ndarray:
-        return np.clip(y + self.solution.x[: y.size] * self.scale, variables.low, variables.high)
-
 
 def maximise(
     evaluation: Evaluation, goal: Goal, y: np.ndarray, until: float, delta: float = 0.1, programs: int = PROGRAMS
@@ -103,11 +99,12 @@ def maximise(
         predicted = program.value - value
         if not predicted > _FOUND * max(1.0, abs(value)):
             break
-        candidate = program.moved(y, evaluation.variables)
+        step, variables = program.solution.x[: y.size], evaluation.variables
+        candidate = np.clip(y + step * program.scale, variables.low, variables.high)
         candidate_value, candidate_every = merit(evaluation, goal, candidate)
         actual = candidate_value - value
         if actual > 1e-4 * predicted:
-            largest = float(np.abs(program.solution.x[: y.size]).max())
+            largest = float(np.abs(step).max())
             y[:], value, every = candidate, candidate_value, candidate_every
             if actual > 0.7 * predicted and largest > 0.9 * delta:
                 delta = min(2.0 * delta, 0.5)
@@ -131,14 +128,10 @@ def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float 
     program = _Program(evaluation, goal, y, delta, every)
     solution, p = program.solution, y.size
     if not solution.success:
-        none = np.zeros(0)
-        rows = np.zeros(0, dtype=int)
-        return Multipliers(rows, none, np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(p), np.zeros(p), np.inf)
+        none, nowhere = np.zeros((0, 0)), np.zeros(p)
+        return Multipliers(np.zeros(0, dtype=int), np.zeros(0), none, none, nowhere, nowhere, np.inf)
     weights = np.abs(solution.ineqlin.marginals[: program.rows.size])
-    upper, lower = (
-        np.abs(solution.upper.marginals[:p]) / program.scale,
-        np.abs(solution.lower.marginals[:p]) / program.scale,
-    )
+    upper, lower = (np.abs(side.marginals[:p]) / program.scale for side in (solution.upper, solution.lower))
     keep = weights > 1e-9
     return Multipliers(
         program.rows[keep],

@@ -10,8 +10,20 @@ from pydantic import Field, model_validator
 from ..base.inputs import file_path
 from ..models import Robot
 from ..models.parsing import read_yaml, validate
-from ..models.part import Box, NonNegative, Part, Pose, Positive, Rows, Title, Vector3, Whole, optional
-from ..models.ranges import PositiveRange, Range
+from ..models.part import (
+    Box,
+    NonNegative,
+    Part,
+    Pose,
+    Positive,
+    PositiveRange,
+    Range,
+    Rows,
+    Title,
+    Vector3,
+    Whole,
+    optional,
+)
 from ..ocp.tasks.task import Task
 from ..ocp.tasks.task_limits import AnyKeepOut
 

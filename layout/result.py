@@ -37,38 +37,24 @@ MOST_LISTED = 8
 class Design(Drawn, Reported, Displayed):
     """The result of `design`.
 
-    Attributes
-    ----------
-    robot
-        The best robot found; the robot of the file if the requirements are impossible.
-    before
-        The initial robot.
-    requirements
-        The requirements of the design.
-    status
-        feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, the distances and
-        lengths of its cables, its lowest natural frequency and the plans of its tasks are as required; infeasible if no
-        layout inside the boxes meets the requirements, by `impossibility`; otherwise not-found, which proves nothing.
-    margin, margin_before
-        Smallest capacity margin of both robots at the same poses, with moments divided by `before.length` [N].
-    clearance
-        Smallest distance between two cables [m]; infinite for one cable.
-    judgement, judgement_before
-        Lengths and heights of cables, distances from regions, and lowest natural frequency of both robots at the
-        required and at audited poses; None if the requirements are impossible.
-    reasons
-        Active constraints and the gain from relaxing them; None if the requirements are impossible.
-    poses, audited
-        Number of pairs of pose and wrench in the requirements, and of random ones in the last audit.
-    starts
-        Number of initial layouts, or of compared pairings.
-    stopped
-        Whether the search was interrupted.
-    plans
-        A plan of each task of the requirements; empty if the margin or the clearance is not as required.
-    size, size_before
-        With maximise: volume, the factor by which all edges of the given boxes can be multiplied so that `robot`, or
-        `before`, still meets the requirements: 2 is 8 times the volume. `requirements` then has the larger boxes.
+    - `robot`: the best robot found; that of the file if the requirements are impossible. `before`: the initial robot.
+    - `requirements`: those of the design.
+    - `status`: feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, the
+      distances and lengths of its cables, its lowest natural frequency and the plans of its tasks are as required;
+      infeasible if no layout inside the boxes meets the requirements, by `impossibility`; otherwise not-found, which
+      proves nothing.
+    - `margin`, `margin_before`: smallest capacity margin of both robots at the same poses, with moments divided by
+      `before.length` [N].
+    - `clearance`: smallest distance between two cables [m]; infinite for one cable.
+    - `judgement`, `judgement_before`: lengths and heights of cables, distances from regions, and lowest natural
+      frequency of both robots at the required and at audited poses; None if the requirements are impossible.
+    - `reasons`: active constraints and the gain from relaxing them; None if the requirements are impossible.
+    - `poses`, `audited`: number of pairs of pose and wrench in the requirements, and of random ones in the last audit.
+    - `starts`: number of initial layouts, or of compared pairings. `stopped`: whether the search was interrupted.
+    - `plans`: a plan of each task of the requirements; empty if the margin or the clearance is not as required.
+    - `size`, `size_before`: with maximise: volume, the factor by which all edges of the given boxes can be multiplied
+      so that `robot`, or `before`, still meets the requirements: 2 is 8 times the volume. `requirements` then has the
+      larger boxes.
     """
 
     robot: Robot
@@ -268,38 +254,26 @@ class Design(Drawn, Reported, Displayed):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain lists and numbers, ready for JSON."""
-        found = self.reasons
+        found, judged, proof = self.reasons, self.judgement, self.impossibility
+        values = ("status", "feasible", "margin", "margin_before", "size", "size_before", "cost", "cost_before")
+        binding = [] if found is None else [one._asdict() for one in found.binding]
+        certificate = None
+        if proof is not None:
+            where = {"pose": proof.pose.tolist(), "wrench": proof.wrench.tolist()}
+            certificate = where | proof.certificate.to_dict()
         return {
-            "status": self.status,
-            "feasible": self.feasible,
-            "margin": self.margin,
-            "margin_before": self.margin_before,
-            "size": self.size,
-            "size_before": self.size_before,
-            "cost": self.cost,
-            "cost_before": self.cost_before,
+            **{name: getattr(self, name) for name in values},
             "t_max": self.robot.t_max.tolist(),
             "clearance": self.clearance,
             "cable_lengths": None if self.lengths is None else list(self.lengths),
-            "cable_distances": [] if self.judgement is None else [list(one) for one in self.judgement.distances],
-            "cable_height": None if self.judgement is None else self.judgement.height,
-            "natural_frequency": None if self.judgement is None else self.judgement.frequency,
+            "cable_distances": [] if judged is None else [list(one) for one in judged.distances],
+            "cable_height": None if judged is None else judged.height,
+            "natural_frequency": None if judged is None else judged.frequency,
             "length": self.before.length,
-            "poses": self.poses,
-            "audited": self.audited,
-            "starts": self.starts,
-            "stopped": self.stopped,
+            **{name: getattr(self, name) for name in ("poses", "audited", "starts", "stopped")},
             "tasks": [{"task": each.scenario.task.name, "status": each.status} for each in self.plans],
             "local_optimum": None if found is None else found.local_optimum,
-            "binding": []
-            if found is None
-            else [{name: np.asarray(value).tolist() for name, value in one._asdict().items()} for one in found.binding],
+            "binding": [{name: np.asarray(value).tolist() for name, value in one.items()} for one in binding],
             "advice": [] if found is None else [one._asdict() for one in found.advice],
-            "certificate": None
-            if self.impossibility is None
-            else {
-                "pose": self.impossibility.pose.tolist(),
-                "wrench": self.impossibility.wrench.tolist(),
-                **self.impossibility.certificate.to_dict(),
-            },
+            "certificate": certificate,
         }

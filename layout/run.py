@@ -43,29 +43,17 @@ def design(
     at 100 000 random poses add the worst. The result is judged by `capacity_margin`. It is a local optimum. Carriers
     are at home.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    free
-        Numbers to choose: `Free`, or mappings with its keys.
-    require
-        Poses and wrenches: `Requirement`, or mappings with its keys.
-    maximise
-        Objective: "margin", "natural_frequency" or "volume" (of the boxes). With the option minimise="t_max" or
-        "cost", the mean t_max or the cost is minimised instead, and the option `margin` is the smallest accepted one.
-    requirements
-        Instead of all of these: `Requirements`, a mapping, or the path of a file.
-    progress
-        Called with a description of the step, the elapsed share of the time, and the best margin so far [N].
-    **options
-        Other keys of `Requirements`: name, minimise, prices, margin, clearance, cable_length, tasks, start,
-        time_limit, seed.
+    - `robot`: a `Robot`, the name of one in the library, or the path of a robot file.
+    - `free`: numbers to choose: `Free`, or mappings with its keys.
+    - `require`: poses and wrenches: `Requirement`, or mappings with its keys.
+    - `maximise`: objective: "margin", "natural_frequency" or "volume" (of the boxes). With the option minimise="t_max"
+      or "cost", the mean t_max or the cost is minimised instead, and the option `margin` is the smallest accepted one.
+    - `requirements`: instead of all of these: `Requirements`, a mapping, or the path of a file.
+    - `progress`: called with a description of the step, the elapsed share of the time, and the best margin so far [N].
+    - `options`: other keys of `Requirements`: name, minimise, prices, margin, clearance, cable_length, tasks, start,
+      time_limit, seed.
 
-    Returns
-    -------
-    :
-        The result: after an interrupt the best so far, and with a certificate if the requirements are impossible.
+    After an interrupt the result is the best so far; it has a certificate if the requirements are impossible.
 
     Raises
     ------
@@ -114,10 +102,10 @@ def design(
         wanted, found = largest.requirements, largest.found
     else:
         found = search(variables, wanted, on_progress)
-    result = _designed(chosen, variables, wanted, found.y, found.rows, len(grid.pose_of), found.starts, found.stopped)
+    how = found.rows, len(grid.pose_of), found.starts, found.stopped
+    result = _designed(chosen, variables, wanted, found.y, *how)
     if not result.feasible:  # the robot itself may meet the requirements, as nearly as its numbers may be chosen
-        own = variables.of_robot()
-        kept = _designed(chosen, variables, wanted, own, found.rows, len(grid.pose_of), found.starts, found.stopped)
+        kept = _designed(chosen, variables, wanted, variables.of_robot(), *how)
         result = kept if kept.feasible else result
     if largest is not None:
         result = replace(result, size=largest.size, size_before=largest.size_before)

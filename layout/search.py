@@ -11,11 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..models import Robot
-from .annealing import anneal
+from .annealing import Moves, anneal
 from .evaluation import Evaluation, Rows, rows_of
 from .goal import NOTHING, Goal, Outcome, goal_of
 from .linear_programs import PROGRAMS, maximise, merit
-from .moves import Moves
 from .requirements import Requirements
 from .room import room_of
 from .symmetry import Mirrors

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .variables import Variables, parts
+from .variables import Variables, by_cable
 
 _ALIKE = 0.02  # of the extent of anchors, attachments or forces: how far bounds may be from mirror images of others
 
@@ -40,10 +40,10 @@ class Mirrors:
         ends = S * variables.low, S * variables.high
         low = variables.fixed + np.minimum(*ends).sum(axis=1)
         high = variables.fixed + np.maximum(*ends).sum(axis=1)
-        self._low, self._high = _by_cable(low, m), _by_cable(high, m)  # (m, 8)
+        self._low, self._high = by_cable(low, m), by_cable(high, m)  # (m, 8)
         used = (S != 0.0).sum(axis=0)
         columns = np.where((S != 0.0).any(axis=1), (S != 0.0).argmax(axis=1), -1)
-        self._columns = _by_cable(columns, m)  # the variable of each number, or -1
+        self._columns = by_cable(columns, m)  # the variable of each number, or -1
         self._shared = np.append(used > 1, False)[self._columns]  # with other numbers, (m, 8)
         middle = (self._low.min(axis=0) + self._high.max(axis=0)) / 2
         self._middle = np.r_[middle[:6], 0.0, 0.0]
@@ -90,9 +90,3 @@ class Mirrors:
         first, second = self._columns[one], self._columns[other]
         alone = (first >= 0) & (second >= 0) & ~self._shared[one] & ~self._shared[other]
         return bool((alone | ((first == second) & ((first < 0) | (sign > 0)))).all())
-
-
-def _by_cable(layout: np.ndarray, m: int) -> np.ndarray:
-    """Return the numbers of each cable: anchor, attachment, t_min and t_max, (m, 8)."""
-    anchors, attachments, t_min, t_max = parts(layout, m)
-    return np.column_stack([anchors, attachments, t_min, t_max])

@@ -9,7 +9,7 @@ from ..base.inputs import shown
 from ..models import Robot
 from .requirements import MOST_PAIRED, POINTS, Free, Requirements
 
-_AXES = "xyz"
+_AXES, PARTS = "xyz", ("anchor", "attachment", "t_min", "t_max")
 
 
 @dataclass(frozen=True)
@@ -43,20 +43,23 @@ class Variables:
 
         Raises `InputError` if no such robot exists.
         """
-        anchors, attachments, t_min, t_max = parts(self.layout(y), self.robot.m)
+        numbers = dict(zip(PARTS, parts(self.layout(y), self.robot.m), strict=True))
         data = self.robot.model_dump()
-        cables = []
-        for i, cable in enumerate(data["cables"]):
-            cables.append(
-                {**cable, "anchor": anchors[i].tolist(), "attachment": attachments[i].tolist()}
-                | {"t_min": float(t_min[i]), "t_max": float(t_max[i])}
-            )
+        cables = [
+            cable | {name: values[i].tolist() for name, values in numbers.items()}
+            for i, cable in enumerate(data["cables"])
+        ]
         return Robot.model_validate({**data, "cables": cables})
 
 
 def parts(layout: np.ndarray, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return anchors (m, 3), attachments (m, 3), t_min (m,) and t_max (m,) of a layout."""
     return layout[: 3 * m].reshape(m, 3), layout[3 * m : 6 * m].reshape(m, 3), layout[6 * m : 7 * m], layout[7 * m :]
+
+
+def by_cable(layout: np.ndarray, m: int) -> np.ndarray:
+    """Return the numbers of each cable: anchor, attachment, t_min and t_max, (m, 8)."""
+    return np.column_stack(parts(layout, m))
 
 
 def variables_of(robot: Robot, requirements: Requirements) -> Variables:
@@ -73,13 +76,15 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
     for free in requirements.free:
         if free.copy_of is not None or free.pairing:
             continue
-        bounds = _bounds(free)
+        box = free.box or free.range  # of a point, or of a tension limit
+        assert box is not None
+        low_high = np.atleast_1d(box.min).tolist(), np.atleast_1d(box.max).tolist()
         for number, cable in enumerate(free.cables or range(1, robot.m + 1)):
             rows = _rows(free.part, cable, robot.m)
             if number == 0 or not free.equal:
                 start = len(low)
-                low += [bound[0] for bound in bounds]
-                high += [bound[1] for bound in bounds]
+                low += low_high[0]
+                high += low_high[1]
                 names += [f"cables[{cable - 1}].{free.part}{suffix}" for suffix in _suffixes(free)]
                 points.append(np.arange(start, len(low)))
             column_of |= {row: (column, 1.0) for row, column in zip(rows, points[-1], strict=True)}
@@ -148,13 +153,6 @@ def _check_elastic(robot: Robot, lowest: np.ndarray) -> None:
 
 def _layout_of(robot: Robot) -> np.ndarray:
     return np.concatenate([robot.anchors.ravel(), robot.attachments.ravel(), robot.t_min, robot.t_max])
-
-
-def _bounds(free: Free) -> list[tuple[float, float]]:
-    if free.box is not None:
-        return list(zip(free.box.min, free.box.max, strict=True))
-    assert free.range is not None
-    return [(free.range.min, free.range.max)]
 
 
 def _suffixes(free: Free) -> list[str]:

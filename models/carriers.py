@@ -358,20 +358,20 @@ def _adapter(classes: tuple[type[Carrier], ...]) -> TypeAdapter[Carrier]:
     return TypeAdapter(Annotated[one, Field(discriminator="kind")])
 
 
+def _known() -> TypeAdapter[Carrier]:
+    return _adapter(tuple(_KINDS.values()))
+
+
 class _ByKind:
     """The check of a carrier of any kind that is known when the check is made."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Return a check that chooses the class by the kind."""
-        return core_schema.no_info_plain_validator_function(_check)
+        return core_schema.no_info_plain_validator_function(lambda value: _known().validator.validate_python(value))
 
     def __get_pydantic_json_schema__(self, _: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the alternatives, one a kind."""
-        return handler(_adapter(tuple(_KINDS.values())).core_schema)
-
-
-def _check(value: Any) -> Carrier:
-    return _adapter(tuple(_KINDS.values())).validator.validate_python(value)
+        return handler(_known().core_schema)
 
 
 AnyCarrier = Annotated[Carrier, _ByKind()]

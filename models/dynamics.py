@@ -69,9 +69,7 @@ class Dynamics(Displayed):
         - `pose`: (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6).
         - `carrier_pose`: the same of each carrier, (..., c, 6); default: at home.
         """
-        if numeric := self._numeric(pose, carrier_pose):
-            return numeric.wrench_matrix(pose, carrier_pose)
-        return self._call("wrench_matrix", pose=pose, carrier_pose=carrier_pose)["A"]
+        return self._line("wrench_matrix", pose, carrier_pose)
 
     @one_array
     def cable_lengths(self, pose: Array, carrier_pose: Array | None = None) -> Array:
@@ -79,9 +77,7 @@ class Dynamics(Displayed):
 
         Over a pulley it is the length of the cable from the anchor around the sheave to the attachment.
         """
-        if numeric := self._numeric(pose, carrier_pose):
-            return numeric.cable_lengths(pose, carrier_pose)
-        return self._call("cable_lengths", pose=pose, carrier_pose=carrier_pose)["lengths"]
+        return self._line("cable_lengths", pose, carrier_pose)
 
     @one_array
     def length_jacobian(self, pose: Array, carrier_pose: Array | None = None) -> Array:
@@ -89,9 +85,7 @@ class Dynamics(Displayed):
 
         Arguments as in `wrench_matrix`.
         """
-        if numeric := self._numeric(pose, carrier_pose):
-            return numeric.length_jacobian(pose, carrier_pose)
-        return self._call("length_jacobian", pose=pose, carrier_pose=carrier_pose)["J"]
+        return self._line("length_jacobian", pose, carrier_pose)
 
     @one_array
     def wrench_jacobian(self, pose: Array, tensions: Array, carrier_pose: Array | None = None) -> Array:
@@ -312,6 +306,12 @@ class Dynamics(Displayed):
             if isinstance(argument, SYMBOLIC):
                 return None
         return self._core
+
+    def _line(self, name: str, pose: Array, carrier_pose: Array | None) -> Array:
+        """Return what has one output and needs the poses alone."""
+        if numeric := self._numeric(pose, carrier_pose):
+            return numeric.line(name, pose, carrier_pose)
+        return next(iter(self._call(name, pose=pose, carrier_pose=carrier_pose).values()))
 
     def _call(self, name: str, **arguments: Array) -> dict[str, Array]:
         """Evaluate one of the functions, with its carriers at home if `carrier_pose` is None."""

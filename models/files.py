@@ -13,12 +13,7 @@ from .robot import Robot
 
 
 def load(name: str | os.PathLike[str]) -> Robot:
-    """Load a robot of the library by its name, or any robot file by its path.
-
-    Parameters
-    ----------
-    name
-        A name of `available()`, or the path of a YAML file.
+    """Load a robot of the library by its `name`, one of `available()`, or any YAML file by its path.
 
     Raises
     ------

@@ -17,8 +17,7 @@ from .robot import Robot
 
 ROWS_WORTH_A_THREAD = 50_000  # some milliseconds
 
-_LENGTHS, _A, _J = range(3)  # among the results of `core.lines`
-_RESULTS = 5
+_RESULTS = 5  # of `core.lines`
 
 
 class Mechanics:
@@ -30,20 +29,19 @@ class Mechanics:
 
     def __init__(self, robot: Robot, record: np.ndarray | None = None):
         self._record = record_of(robot) if record is None else record
-        self._home, self._m = robot.carrier_home, robot.m
+        self._home, m = robot.carrier_home, robot.m
+        self._m = m
+        self._lines = {"cable_lengths": (0, (m,)), "wrench_matrix": (1, (6, m)), "length_jacobian": (2, (m, 6))}
         self._stiffness = np.array([cable.stiffness or 0.0 for cable in robot.cables])
 
-    def wrench_matrix(self, pose: Array, carrier_pose: Array | None) -> np.ndarray:
-        """Return A, (..., 6, m)."""
-        return self._line(_A, (6, self._m), pose, carrier_pose)
-
-    def cable_lengths(self, pose: Array, carrier_pose: Array | None) -> np.ndarray:
-        """Return the lengths of the cables, (..., m) [m]."""
-        return self._line(_LENGTHS, (self._m,), pose, carrier_pose)
-
-    def length_jacobian(self, pose: Array, carrier_pose: Array | None) -> np.ndarray:
-        """Return the derivative of the lengths with respect to the pose, (..., m, 6) [-, m]."""
-        return self._line(_J, (self._m, 6), pose, carrier_pose)
+    def line(self, name: str, pose: Array, carrier_pose: Array | None) -> np.ndarray:
+        """Return "wrench_matrix", (..., 6, m), "cable_lengths", (..., m) [m], or "length_jacobian", (..., m, 6)."""
+        which, shape = self._lines[name]
+        batch, poses, carriers = self._placed(pose, carrier_pose)
+        results: list[np.ndarray | None] = [None] * _RESULTS
+        results[which] = result = np.empty(batch + shape)
+        self._run(core.lines, [poses, carriers, *results], batch)
+        return result
 
     def points(self, pose: Array, carrier_pose: Array | None) -> tuple[np.ndarray, np.ndarray]:
         """Return anchors and attachments in {G}, (..., m, 3) each [m]."""
@@ -70,7 +68,7 @@ class Mechanics:
         """Return K about the CoM in {G}, (..., 6, 6) [N/m, N, N m]; see `elasticity`."""
         K = -self._of_tensions(core.wrench_by_axes, pose, tensions, carrier_pose)
         if elastic:
-            A, lengths = self.wrench_matrix(pose, carrier_pose), self.cable_lengths(pose, carrier_pose)
+            A, lengths = (self.line(name, pose, carrier_pose) for name in ("wrench_matrix", "cable_lengths"))
             pulls = np.maximum(np.asarray(tensions, dtype=float), 0.0)
             k = axial_stiffness(self._stiffness, unstrained_length(lengths, pulls, self._stiffness))
             K += (A * np.where(pulls > 0, k, 0.0)[..., None, :]) @ A.swapaxes(-1, -2)  # a slack cable has none
@@ -93,14 +91,6 @@ class Mechanics:
         w = np.empty((*batch, 6))
         self._run(core.required_wrench, [*(_rows(array, batch, (6,)) for array in arrays), air, w], batch)
         return w
-
-    def _line(self, which: int, shape: tuple[int, ...], pose: Array, carrier_pose: Array | None) -> np.ndarray:
-        """Return one of the results of `core.lines`, of this shape a row."""
-        batch, poses, carriers = self._placed(pose, carrier_pose)
-        results: list[np.ndarray | None] = [None] * _RESULTS
-        results[which] = result = np.empty(batch + shape)
-        self._run(core.lines, [poses, carriers, *results], batch)
-        return result
 
     def _of_tensions(self, function: Callable, pose: Array, tensions: Array, carrier_pose: Array | None) -> np.ndarray:
         """Return a derivative of the wrench of tensions, (..., 6, 6)."""

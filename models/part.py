@@ -69,13 +69,7 @@ class Part(Displayed, BaseModel):
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """Check a mapping as pydantic does, with the errors of towline.
-
-        Raises
-        ------
-        InputError
-            In one line that names the field, the value and what is accepted.
-        """
+        """Check a mapping as pydantic does, or raise InputError in one line: field, value and what is accepted."""
         from .parsing import one_line
 
         try:
@@ -112,6 +106,26 @@ class Box(Part):
             if low > high:
                 raise ValueError(f"min must not exceed max, {high:g} m along {axis}, got {low:g} m")
         return self
+
+
+class Range(Part):
+    """The numbers from min to max, both included."""
+
+    min: Finite = Field(description="smallest value")
+    max: Finite = Field(description="largest value")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.min > self.max:
+            raise ValueError(f"min must be at most max, {self.max:g}, got {self.min:g}")
+        return self
+
+
+class PositiveRange(Range):
+    """The positive numbers from min to max, both included."""
+
+    min: Positive = Field(description="smallest value, positive")
+    max: Positive = Field(description="largest value, positive")
 
 
 def inertia_matrix(inertia: Inertia) -> np.ndarray:

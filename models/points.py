@@ -1,23 +1,12 @@
 """Where the points of a robot are, for many poses at once, in NumPy alone.
 
 `kinematics` has the same for CasADi expressions, and the numeric core for a robot's record. A robot is checked at home,
-and its record filled, with what is here, so that it can use neither.
+and its record filled, with what is here, so that it can use neither; and robots are of any type here, not `Robot`.
 """
 
-from typing import Protocol
+from typing import Any
 
 import numpy as np
-
-
-class _WithPoints(Protocol):
-    """Robots as far as points need them: anchors in the carriers' frames, attachments in that of the platform."""
-
-    @property
-    def carrier_of_cable(self) -> np.ndarray: ...  # (m,)
-    @property
-    def anchors(self) -> np.ndarray: ...  # (m, 3) [m]
-    @property
-    def attachments(self) -> np.ndarray: ...  # (m, 3) [m]
 
 
 def rotations(angles: np.ndarray) -> np.ndarray:
@@ -51,7 +40,7 @@ def in_frame(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.einsum("...ij,...i->...j", rotations(pose[..., 3:]), points - pose[..., :3])
 
 
-def anchors(robot: _WithPoints, carrier_pose: np.ndarray) -> np.ndarray:
+def anchors(robot: Any, carrier_pose: np.ndarray) -> np.ndarray:
     """Place the anchors of a robot into {G}, with its carriers at `carrier_pose` (..., c, 6), (..., m, 3) [m]."""
     owner, points = robot.carrier_of_cable, robot.anchors
     if not points.any():
@@ -63,7 +52,7 @@ def anchors(robot: _WithPoints, carrier_pose: np.ndarray) -> np.ndarray:
     return result
 
 
-def attachments(robot: _WithPoints, pose: np.ndarray) -> np.ndarray:
+def attachments(robot: Any, pose: np.ndarray) -> np.ndarray:
     """Place the attachments of a robot into {G}, with its platform at `pose` (..., 6), (..., m, 3) [m]."""
     return placed(pose, robot.attachments)
 

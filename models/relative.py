@@ -14,14 +14,8 @@ Source: paper F, Eqs. 26 to 38 as corrected.
 import casadi as ca
 
 from .motion import Motion
-from .rigid_body import body_of, body_wrench
 from .robot import Robot
 from .rotation import Matrix, angles_of, body_rate, inverse_rate_matrix, rate_matrix_derivative, rotation, turning
-
-
-def relative_inertial_wrench(robot: Robot, motion: Motion) -> Matrix:
-    """Return M_B ddX_b + F_B, (6, 1), in {A} [N, N m]: for the relative motion, without gravity and carrier."""
-    return body_wrench(*body_of(robot), ca.DM.zeros(3), motion.pose, motion.velocity, motion.acceleration)
 
 
 def base_disturbance(robot: Robot, motion: Motion) -> Matrix:

@@ -114,7 +114,8 @@ def _relative_functions(robot: Robot) -> dict[str, ca.Function]:
     run = kinematics.cables(robot, motion.pose, anchors, axes)
     A = kinematics.wrench_matrix(robot, motion.pose, run.directions)
     D_B = relative.base_disturbance(robot, motion)
-    w = relative.relative_inertial_wrench(robot, motion) + D_B
+    still = ca.DM.zeros(3)  # without gravity, which D_B has, M_B ddX_b + F_B is that of the relative motion
+    w = rigid_body.body_wrench(*rigid_body.body_of(robot), still, *motion[:3]) + D_B
     in_world = list(relative.motion_in_world(motion))
     disturbing = motion._asdict()
     del disturbing["acceleration"]  # of the platform, which is no part of the disturbance

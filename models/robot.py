@@ -138,14 +138,9 @@ class Robot(Part):
         return Robot.model_validate({**data, "cables": cables})
 
     def drawn(self, count: int, seed: int = 0) -> tuple[Robot, ...]:
-        """Sample robots from the `uncertainty` of the file; the samples themselves are exact.
+        """Sample `count` robots from the `uncertainty` of the file; the samples themselves are exact.
 
-        Parameters
-        ----------
-        count
-            Number of robots.
-        seed
-            Seed of the random numbers; the first robots do not depend on the count.
+        The first robots of a `seed` do not depend on the count.
 
         Raises
         ------

@@ -11,12 +11,7 @@ from .part import Finite, Part
 ROUNDING = 1e-9  # of the largest number of the covariance, in its symmetry and in its eigenvalues
 
 
-def _is_one(name: str) -> str:
-    locate(name)
-    return name
-
-
-ParameterName = Annotated[str, AfterValidator(_is_one)]
+ParameterName = Annotated[str, AfterValidator(lambda name: locate(name) and name)]
 
 
 class Uncertainty(Part):

@@ -102,24 +102,23 @@ class WorldFunctions:
         attachments = kinematics.transform(self._symbols["pose"], self._robot.attachments)
         return {"anchors": self._anchors.T, "attachments": attachments.T}
 
-    def _length_jacobian(self) -> dict[str, Matrix]:
-        return {"J": ca.densify(ca.jacobian(self._exit.lengths, self._symbols["pose"]))}
-
-    def _wrench_jacobian(self) -> dict[str, Matrix]:
-        return {"D": ca.densify(ca.jacobian(self._pull, self._symbols["pose"]))}
-
     def _stiffness(self) -> dict[str, Matrix]:
         K = elasticity.cable_stiffness(self._robot, self._A, self._exit.lengths, self._symbols["tensions"])
         return {"K": self._K_t + K}
 
 
-_PLACE, _MOTION, _STATE = "pose carrier_pose", " ".join(Motion._fields), "pose velocity tensions carrier_pose"
+def _slopes(values: Matrix, of: WorldFunctions) -> Matrix:
+    return ca.densify(ca.jacobian(values, of._symbols["pose"]))
+
+
+_PLACE, _PULLED, _STATE = "pose carrier_pose", "pose tensions carrier_pose", "pose velocity tensions carrier_pose"
+_MOTION = " ".join(Motion._fields)
 # Of each function its inputs, and its outputs by name.
 _DEFINITIONS: dict[str, tuple[str, Callable[[WorldFunctions], dict[str, Matrix]]]] = {
     "wrench_matrix": (_PLACE, lambda of: {"A": of._A}),  # (6, m)
     "cable_lengths": (_PLACE, lambda of: {"lengths": of._exit.lengths}),  # (m, 1)
-    "length_jacobian": (_PLACE, WorldFunctions._length_jacobian),  # (m, 6)
-    "wrench_jacobian": ("pose tensions carrier_pose", WorldFunctions._wrench_jacobian),  # (6, 6)
+    "length_jacobian": (_PLACE, lambda of: {"J": _slopes(of._exit.lengths, of)}),  # (m, 6)
+    "wrench_jacobian": (_PULLED, lambda of: {"D": _slopes(of._pull, of)}),  # (6, 6)
     "points": (_PLACE, WorldFunctions._points),  # (m, 3) each
     "exits": (_PLACE, lambda of: {"exits": of._exit.points.T}),  # (m, 3)
     "required_wrench": (_MOTION, lambda of: {"w": of._w}),  # (6, 1)
@@ -136,6 +135,6 @@ _DEFINITIONS: dict[str, tuple[str, Callable[[WorldFunctions], dict[str, Matrix]]
         WorldFunctions._coupled_acceleration,  # (6, 1) and (c, 6)
     ),
     "linearisation": (_STATE, WorldFunctions._linearisation),  # (12, 12) and (12, m)
-    "tension_stiffness": ("pose tensions carrier_pose", lambda of: {"K": of._K_t}),  # (6, 6)
-    "stiffness": ("pose tensions carrier_pose", WorldFunctions._stiffness),  # (6, 6)
+    "tension_stiffness": (_PULLED, lambda of: {"K": of._K_t}),  # (6, 6)
+    "stiffness": (_PULLED, WorldFunctions._stiffness),  # (6, 6)
 }

@@ -7,9 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from towline.base.errors import InputError
-from towline.benchmarks.control import EVERYONE, TASKS, Task, record, run
+from towline.benchmarks.control import EVERYONE, TASKS, Task, measure, record, run
 from towline.benchmarks.control_contenders import REFERENCE, TOWLINE, Contender, condense, horizon_of
-from towline.benchmarks.control_programs import measure
 from towline.cli.bench import app
 from towline.control import Predictive
 from towline.models import load

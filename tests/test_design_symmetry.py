@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from towline import Robot, load, read_requirements
+from towline.layout.annealing import Moves
 from towline.layout.evaluation import Evaluation, rows_of
-from towline.layout.moves import Moves
 from towline.layout.symmetry import Mirrors
 from towline.layout.variables import variables_of
 

@@ -6,8 +6,7 @@ import numpy as np
 from pydantic import model_validator
 
 from ..models import Robot
-from ..models.part import Box, Name, Part, Vector3, optional
-from ..models.ranges import PositiveRange
+from ..models.part import Box, Name, Part, PositiveRange, Vector3, optional
 
 
 class AngleBox(Part):

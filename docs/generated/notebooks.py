@@ -4,7 +4,6 @@ import base64
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 MAGIC = re.compile(r"^%.*\n+", re.MULTILINE)  # commands to the notebook itself
 FOLDER = Path(__file__).parent.parent.parent / "notebooks"
@@ -25,7 +24,8 @@ def notebooks() -> dict[str, str | bytes]:
             for number, output in enumerate(cell["outputs"]):
                 picture = output.get("data", {}).get("image/png")
                 if picture is None:
-                    parts.append(_fenced("text", _text(output)))
+                    printed = output.get("text") or output.get("data", {}).get("text/plain", "")  # or the value's text
+                    parts.append(_fenced("text", "".join(printed)))
                     continue
                 name = f"{notebook.stem}-{index}-{number}.png"
                 files[f"notebooks/{name}"] = base64.b64decode(picture)
@@ -33,11 +33,6 @@ def notebooks() -> dict[str, str | bytes]:
         name = f"The notebook is `notebooks/{notebook.name}`. To run it, open it in JupyterLab or in an editor."
         files[f"notebooks/{notebook.stem}.md"] = "\n\n".join([*parts, name]) + "\n"
     return files
-
-
-def _text(output: dict[str, Any]) -> str:
-    """Return what a cell has printed, or the text of its value."""
-    return "".join(output.get("text") or output.get("data", {}).get("text/plain", ""))
 
 
 def _fenced(language: str, text: str) -> str:

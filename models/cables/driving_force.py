@@ -121,7 +121,14 @@ def driving_force(
     carrier_pose, carrier_velocity, carrier_acceleration = given
     carrier_pose = _series("carrier_pose", carrier_pose, instants)
     one_of("winding", winding, ("paid out", "printed"))
-    pretension = _pretension(pretension, (instants, robot.m))
+    shape = (instants, robot.m)
+    try:
+        pretension = np.broadcast_to(np.asarray(pretension, dtype=float), shape)
+    except (TypeError, ValueError):
+        accepted = f"one number [N] or an array that broadcasts to {shape}"
+        raise InputError(f"pretension must be {accepted}, got {pretension!r}") from None
+    if not (pretension >= 0).all():
+        raise InputError(f"pretension must have numbers >= 0, got {pretension.min():g}")
 
     dynamics = Dynamics(robot).relative
     w = dynamics.required_wrench(
@@ -168,18 +175,6 @@ def _series(name: str, value: Any, instants: int) -> np.ndarray:
     if array.shape not in ((6,), (1, 6), (instants, 6)):
         raise InputError(f"{name} must have the shape ({instants}, 6) like pose, or (6,), got {array.shape}")
     return np.broadcast_to(array, (instants, 6))
-
-
-def _pretension(value: Any, shape: tuple[int, int]) -> np.ndarray:
-    try:
-        array = np.broadcast_to(np.asarray(value, dtype=float), shape)
-    except (TypeError, ValueError):
-        raise InputError(
-            f"pretension must be one number [N] or an array that broadcasts to {shape}, got {value!r}"
-        ) from None
-    if not (array >= 0).all():
-        raise InputError(f"pretension must have numbers >= 0, got {array.min():g}")
-    return array
 
 
 def _traction(robot: Robot, A: np.ndarray, w: np.ndarray, dT: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

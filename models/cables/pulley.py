@@ -55,8 +55,8 @@ def exit_points(anchor: Matrix, axis: Matrix, radius: Any, attachment: Matrix) -
     radii = as_array("radius", radius, ()).ravel()
     if not (radii >= 0).all():
         raise InputError(f"radius must have numbers >= 0, got {radii.min():g}")
-    ends = zip(*(ca.horzsplit(each) for each in (anchor, axis, attachment)), strict=True)
-    columns = [_exit(*end, float(r)) for end, r in zip(ends, np.broadcast_to(radii, attachment.shape[1]), strict=True)]
+    each = enumerate(np.broadcast_to(radii, attachment.shape[1]))
+    columns = [_exit(anchor[:, i], axis[:, i], attachment[:, i], float(r)) for i, r in each]
     points, directions, lengths, wraps = zip(*columns, strict=True)
     return Exit(ca.horzcat(*points), ca.horzcat(*directions), ca.vertcat(*lengths), ca.vertcat(*wraps))
 

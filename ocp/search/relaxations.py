@@ -7,7 +7,7 @@ import numpy as np
 
 from ...base.text import quantity
 from ...models.parsing import validate
-from ...models.ranges import PositiveRange
+from ...models.part import PositiveRange
 from ..audits.audit import Audit, other_tensions_may_pass
 from ..audits.excess import Excess
 from ..limits.bodies import LOAD, PLATFORM

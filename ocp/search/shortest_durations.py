@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ...base.errors import InputError
 from ...base.text import quantity
-from ...models.ranges import PositiveRange
+from ...models.part import PositiveRange
 from ..audits.audit import audit
 from ..plan import Plan
 from ..result import PlannerStep

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.text import quantity
-from ...models.ranges import PositiveRange
+from ...models.part import PositiveRange
 from ...models.trajectory import Motion, Trajectory
 from ...statics.stops import longest_stop_along
 from ..audits.excess import Excess

@@ -7,8 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from ...models.body import AnyBody
-from ...models.part import Name, NonNegative, Part, Pose, Positive, Vector3, optional
-from ...models.ranges import PositiveRange
+from ...models.part import Name, NonNegative, Part, Pose, Positive, PositiveRange, Vector3, optional
 from ...models.rigid_load import RigidLoad
 from .paths import RestPath, SequencePath, SinglePath
 from .paths.sequence import Piece, check_continuity, lasting

@@ -14,8 +14,7 @@ import numpy as np
 from ...base.display import Displayed
 from ...models import Dynamics, Robot, points
 from ...models.body import skeleton
-from ...models.part import Vector3
-from ...models.ranges import PositiveRange
+from ...models.part import PositiveRange, Vector3
 from ..costs.cost import Cost
 from ..costs.costs import Costs
 from ..costs.terms import CarrierAcceleration, CarrierOffset, Jerk, Margin, PathDeviation, Tension, TensionRate, Time

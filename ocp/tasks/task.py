@@ -15,8 +15,19 @@ from typing_extensions import override
 from ...base.errors import InputError
 from ...base.inputs import file_path, number
 from ...models.parsing import read_yaml, save_yaml, validate
-from ...models.part import Name, NonNegative, Part, Pose, Positive, Share, Title, Vector3, Whole, optional
-from ...models.ranges import PositiveRange
+from ...models.part import (
+    Name,
+    NonNegative,
+    Part,
+    Pose,
+    Positive,
+    PositiveRange,
+    Share,
+    Title,
+    Vector3,
+    Whole,
+    optional,
+)
 from ..costs.cost import Cost
 from .initial import Final, Initial
 from .paths import AnyPath

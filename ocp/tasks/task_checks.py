@@ -7,8 +7,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...models import Robot
-from ...models.part import COORDINATES
-from ...models.ranges import PositiveRange
+from ...models.part import COORDINATES, PositiveRange
 from ...models.shapes import Shape
 from ..limits.clearance import point_outside
 from ..limits.limits import Limits

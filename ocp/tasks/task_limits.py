@@ -11,8 +11,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from ...models import shapes
 from ...models.body import THINNEST
-from ...models.part import Box, NonNegative, Part, Positive, Vector3, optional
-from ...models.ranges import Range
+from ...models.part import Box, NonNegative, Part, Positive, Range, Vector3, optional
 from ..limits.limit import Limit
 
 Distance = Annotated[NonNegative | None, Field(description="least distance [m]; null: no limit")]

@@ -19,6 +19,11 @@ from .helix import flight
 from .motion import FEASIBLE, TIMES, circle, steady_tensions
 from .plans import NOT_READ, PITCH, SECONDS, pitching_flight
 
+CAPTIONS = {
+    "disturbance-flight": "Figure 12: the quadrotor's flight in {G}, assumed",
+    "disturbance": "Figures 13 to 15: pitch, tension of cable 1 with and without D_B, and its relative error",
+    "mobility": "Conclusion 3: the range of all tensions against the quadrotor's largest pitch",
+}
 PITCHES = np.linspace(0.0, 0.3, 7)  # largest pitch [rad]
 
 
@@ -39,28 +44,18 @@ def chapter() -> Chapter:
             (np.diff(spans) > 0).all(),
         ),
     ]
-    drawings = {
-        "disturbance-flight": Drawing(
-            "Figure 12: the quadrotor's flight in {G}, assumed", curve_in_space({"quadrotor": base.pose[:, :3]})
-        ),
-        "disturbance": Drawing(
-            "Figures 13 to 15: pitch, tension of cable 1 with and without D_B, and its relative error",
-            curves(
-                TIMES,
-                "time [s]",
-                [
-                    Panel("pitch [degrees]", {"assumed": np.degrees(base.pose[:, 4])}),
-                    Panel("tension [N]", {"with D_B": moving[:, 0], "without D_B": without[:, 0]}),
-                    Panel("relative error [%]", {"of cable 1": error[:, 0]}),
-                ],
-            ),
-        ),
-        "mobility": Drawing(
-            "Conclusion 3: the range of all tensions against the quadrotor's largest pitch",
-            curves(np.degrees(PITCHES), "largest pitch [degrees]", [Panel("largest - smallest T [N]", {"": spans})]),
-        ),
+    panels = [
+        Panel("pitch [degrees]", {"assumed": np.degrees(base.pose[:, 4])}),
+        Panel("tension [N]", {"with D_B": moving[:, 0], "without D_B": without[:, 0]}),
+        Panel("relative error [%]", {"of cable 1": error[:, 0]}),
+    ]
+    span = Panel("largest - smallest T [N]", {"": spans})
+    figures = {
+        "disturbance-flight": curve_in_space({"quadrotor": base.pose[:, :3]}),
+        "disturbance": curves(TIMES, "time [s]", panels),
+        "mobility": curves(np.degrees(PITCHES), "largest pitch [degrees]", [span]),
     }
-    return Chapter(claims, drawings)
+    return Chapter(claims, {name: Drawing(CAPTIONS[name], figure) for name, figure in figures.items()})
 
 
 def flown(pitch: float) -> Motion:

@@ -57,12 +57,25 @@ def chapter() -> Chapter:
     robot = load("wang-flying")
     flown: dict[Name, Flown] = {name: fly(robot, name) for name in MOTIONS}
     hovering = small_circle(robot, 0.0), small_circle(robot, AWAY)
+    pitching, least = flown["pitching"], [part.gives.record.tensions.min() for part in flown.values()]
+    windy = np.stack([part.windy.tensions for part in flown.values()])
+    slack = (windy <= 0).any(axis=-1).mean(axis=-1).max()
     claims = [
         _lengths(flown),
         _followed("VI.B-flown", "circle", flown),
         _followed("VI.A-flown", "helix", flown),
-        _pitching(flown["pitching"]),
-        _positive(flown),
+        claim("VI.C-flown").undetermined(
+            pitching.gives.error.max(),
+            place=PLACES["pitching"],
+            what=WHAT["pitching"],
+            not_read=NOT_READ,
+            time=pitching.gives.times[pitching.gives.error.argmax()],
+            short=np.nanmax(pitching.gives.record.shortfall, initial=0.0),
+            stays=100 * pitching.stays.error.max(),
+        ),
+        claim("flown-positive").repaired(
+            f"{', '.join(f'{value:.2f}' for value in least)} N", min(least) > 0, slack=slack, most=windy.max()
+        ),
         _wind(robot, flown["circle"]),
         _own_drag(robot, flown["helix"]),
         _stability(*hovering),
@@ -138,27 +151,6 @@ def _followed(id: str, name: Name, flown: dict[Name, Flown]) -> Claim:
         stays=100 * stays.error.max(),
         near=1000.0 * ON_CIRCLE,
     )
-
-
-def _pitching(part: Flown) -> Claim:
-    gives = part.gives
-    return claim("VI.C-flown").undetermined(
-        gives.error.max(),
-        place=PLACES["pitching"],
-        what=WHAT["pitching"],
-        not_read=NOT_READ,
-        time=gives.times[gives.error.argmax()],
-        short=np.nanmax(gives.record.shortfall, initial=0.0),
-        stays=100 * part.stays.error.max(),
-    )
-
-
-def _positive(flown: dict[Name, Flown]) -> Claim:
-    least = [part.gives.record.tensions.min() for part in flown.values()]
-    windy = np.stack([part.windy.tensions for part in flown.values()])
-    slack = (windy <= 0).any(axis=-1).mean(axis=-1).max()
-    text = ", ".join(f"{value:.2f}" for value in least)
-    return claim("flown-positive").repaired(f"{text} N", min(least) > 0, slack=slack, most=windy.max())
 
 
 def _wind(robot: Robot, part: Flown) -> Claim:

@@ -42,16 +42,15 @@ def chapter() -> Chapter:
         values=values,
         length=robot.length,
     )
-    pairs = {
-        f"as printed: rank {printed.rank}": _points("wang-flying-printed"),
-        f"crossed: rank {crossed.rank}": _points("wang-flying"),
-    }
+    robots = {f"as printed: rank {printed.rank}": load("wang-flying-printed"), f"crossed: rank {crossed.rank}": robot}
+    pairs = {title: (each.anchors, each.attachments) for title, each in robots.items()}
     return Chapter([rank], {"pairing": Drawing("The numbered cables from above", from_above(pairs))})
 
 
 def off_affine() -> float:
     """Return how far the lines' coordinates are from affine ones at random level poses, over the largest."""
-    rng, (anchors, attachments) = np.random.default_rng(0), _points("wang-flying-printed")
+    rng, robot = np.random.default_rng(0), load("wang-flying-printed")
+    anchors, attachments = robot.anchors, robot.attachments
     angles = np.radians(60) * np.arange(6)
     basis = np.column_stack([np.ones(6), np.cos(angles), np.sin(angles)])
     rest = np.eye(6) - basis @ np.linalg.pinv(basis)
@@ -61,12 +60,6 @@ def off_affine() -> float:
     ends = places + np.stack([along, across, np.tile(attachments[:, 2], (LEVEL, 1))], axis=-1)
     lines = np.concatenate([anchors - ends, np.cross(ends, anchors - ends)], axis=-1)
     return float(np.abs(rest @ lines).max() / np.abs(lines).max())
-
-
-def _points(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return anchors and attachments, (6, 3) each; cable i has the number of its anchor."""
-    robot = load(name)
-    return robot.anchors, robot.attachments
 
 
 def from_above(pairings: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:

@@ -23,7 +23,12 @@ AXES = 0.25 * np.array([[1, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 0], [0, 0, 1]]) 
 
 def chapter() -> Chapter:
     """Check how the robot is put together."""
-    return Chapter([_suspended(), *_points(instants())], {"structure": _structure(), "frames": _frames()})
+    robot = load("wang-flying-printed")
+    tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home), rcond=RANK)[:, 2] * robot.weight
+    scene = scene_at(robot, robot.home, tensions, "the printed pairing at home")
+    about = "Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1"
+    drawings = {"structure": Drawing(about, draw(scene)), "frames": _frames()}
+    return Chapter([_suspended(), *_points(instants())], drawings)
 
 
 def _suspended() -> Claim:
@@ -63,13 +68,6 @@ def _points(samples: Instants) -> list[Claim]:
         claim("fig-2").compared(np.linalg.norm(ends + L - anchors, axis=-1).max(), within=ROUNDING),
         claim("eq-8").stated(share, share < SMALL, apart=np.linalg.norm(moved - linear, axis=-1).max(), small=SMALL),
     ]
-
-
-def _structure() -> Drawing:
-    robot = load("wang-flying-printed")
-    tensions = np.linalg.pinv(Dynamics(robot).wrench_matrix(robot.home), rcond=RANK)[:, 2] * robot.weight
-    scene = scene_at(robot, robot.home, tensions, "the printed pairing at home")
-    return Drawing("Figure 1: quadrotor, ring of anchors, six cables and platform, from Table 1", draw(scene))
 
 
 def _frames() -> Drawing:

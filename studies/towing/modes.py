@@ -5,7 +5,7 @@ import numpy as np
 from ...figures.curves import Panel, curves
 from ...figures.drawing import Drawing
 from ...ocp import Plan
-from ..accounts.claim import Chapter, Claim, Verdict
+from ..accounts.claim import Chapter, Verdict
 from .claims import claim
 from .equations import SIZES
 from .plans import DRIVES, FIXED, Drive, planned
@@ -23,29 +23,28 @@ def chapter() -> Chapter:
     plans: dict[Drive, dict[int, Plan]] = {
         drive: {m: planned(name, drive) for m, name in SIZES.items()} for drive in DRIVES
     }
-    claims = [_carried(drive, by_m) for drive, by_m in plans.items()]
+    claims = []
+    for drive, by_m in plans.items():
+        feasible = [one.feasible for one in by_m.values()]
+        tensions = np.concatenate([one.trajectory["tensions"].values for one in by_m.values()], axis=None)
+        carried = claim("drive-{drive}").stated(
+            sum(feasible),
+            all(feasible),
+            printed=len(by_m),
+            otherwise=Verdict.NOT_DETERMINED,
+            drive=drive,
+            section=SECTIONS[drive],
+            changes=CHANGES[drive],
+            least=np.nanmin(tensions),
+            most=np.nanmax(tensions),
+        )
+        claims.append(carried)
     lengths = np.concatenate(
         [one.trajectory["cable_lengths"].values for one in plans["fixed-length"].values()], axis=None
     )
     off = np.abs(lengths - FIXED).max()  # on the dense grid of the audit
     claims.append(claim("drive-fixed-kept").stated(off, off < 1e-4))
     return Chapter(claims, {f"drive-{drive}": _drawing(drive, by_m[3]) for drive, by_m in plans.items()})
-
-
-def _carried(drive: Drive, plans: dict[int, Plan]) -> Claim:
-    feasible = [one.feasible for one in plans.values()]
-    tensions = np.concatenate([one.trajectory["tensions"].values for one in plans.values()], axis=None)
-    return claim("drive-{drive}").stated(
-        sum(feasible),
-        all(feasible),
-        printed=len(plans),
-        otherwise=Verdict.NOT_DETERMINED,
-        drive=drive,
-        section=SECTIONS[drive],
-        changes=CHANGES[drive],
-        least=np.nanmin(tensions),
-        most=np.nanmax(tensions),
-    )
 
 
 def _drawing(drive: Drive, planned: Plan) -> Drawing:

@@ -69,8 +69,18 @@ def loops(drive: Drive, count: int = LOOPS, seed: int = 0, widths: bool = True) 
     Without `widths` the robot-ends have the printed x and y and any of the printed heights, which all boxes contain,
     however wide.
     """
-    system = robot("wang-ctmrts", drive)
-    places = _draw(system, count, np.random.default_rng([seed, DRIVES.index(drive)]), widths)
+    system, rng = robot("wang-ctmrts", drive), np.random.default_rng([seed, DRIVES.index(drive)])
+    carriers = np.tile(system.carrier_home, (count, 1, 1))
+    if drive != "variable-length":
+        ends = rng.uniform(*reach(system), carriers[:, :, :3].shape)
+        moved = slice(0, 3) if widths else slice(2, 3)
+        carriers[:, :, moved] = ends[:, :, moved]
+    angles = rng.uniform(-POSTURE, POSTURE, (count, 3))
+    if system.fixed_lengths is not None:
+        positions = three_cable_pose(system, angles, carriers, system.fixed_lengths)
+    else:
+        positions = rng.uniform(*_box(system), (count, 3))
+    places = Places(np.concatenate([positions, angles], axis=1), carriers)
     return Loops(system, places, ForceBalance().holds(system, places))
 
 
@@ -107,21 +117,6 @@ def in_prism(system: Robot, points: np.ndarray) -> np.ndarray:
     corners = np.vstack([ends[:, :2].T, np.ones(3)])
     shares = np.linalg.solve(corners, np.vstack([points[:, :2].T, np.ones(len(points))]))  # (3, n)
     return (shares >= 0).all(axis=0) & (points[:, 2] < shares.T @ ends[:, 2])
-
-
-def _draw(system: Robot, count: int, rng: np.random.Generator, widths: bool) -> Places:
-    """Return poses of one system type, uniform in what its drive moves."""
-    carriers = np.tile(system.carrier_home, (count, 1, 1))
-    if system.drive != "variable-length":
-        ends = rng.uniform(*reach(system), carriers[:, :, :3].shape)
-        moved = slice(0, 3) if widths else slice(2, 3)
-        carriers[:, :, moved] = ends[:, :, moved]
-    angles = rng.uniform(-POSTURE, POSTURE, (count, 3))
-    if system.fixed_lengths is not None:
-        places = three_cable_pose(system, angles, carriers, system.fixed_lengths)
-        return Places(np.concatenate([places, angles], axis=1), carriers)
-    low, high = _box(system)
-    return Places(np.concatenate([rng.uniform(low, high, (count, 3)), angles], axis=1), carriers)
 
 
 def reach(system: Robot) -> tuple[np.ndarray, np.ndarray]:
