@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from .options import PLAIN, Command, JsonOption, parameters, print_json
+from .options import PLAIN, Command, JsonOption, parameters, print_json, print_result
 from .watching import progress_bar
 
 app = typer.Typer(**PLAIN)
@@ -84,7 +84,4 @@ def control(steps: int = 500, seeds: int = 3, as_json: JsonOption = False) -> No
 
     with results_alone(), progress_bar("control", quiet=as_json) as progress:
         report = benchmark.run(steps, seeds, progress=progress)
-    if as_json:
-        print_json(report.to_dict())
-    else:
-        typer.echo(benchmark.markdown(report), nl=False)
+    print_result(as_json, report.to_dict(), lambda: benchmark.markdown(report).removesuffix("\n"))

@@ -6,7 +6,7 @@ from typing import Any
 import typer
 
 from ..base.errors import InputError
-from ..base.inputs import check_ending, one_of
+from ..base.inputs import check_ending
 from .log import FieldsOption
 from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters, print_result
 from .outputs import check_outputs
@@ -56,10 +56,8 @@ def calibrate(
     from ..estimation.calibration.correction import correction_of
     from ..estimation.calibration.solving import usual
     from ..estimation.logs import read_log
-    from ..figures.style import FORMATS
     from ..models import load
 
-    one_of("--format", form, FORMATS)
     names = None if free is None else [name.strip() for name in free.split(",")]
     stated = None if sigma is None else _sigma(sigma)
     known = None if prior is None else by_name("--prior", prior)

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import typer
 
-from ..base.inputs import one_of
 from .options import FormatOption, JsonOption, parameters, print_json, print_written
 from .watching import watching
 
@@ -18,10 +17,8 @@ def demo(folder: Path = Path("towline-demo"), form: FormatOption = "png", as_jso
     The circle is infeasible while the quadrotor hovers, and feasible if it moves. The exit code is 0 if the plans show
     this and the simulation passes.
     """
-    from ..figures.style import FORMATS
     from ..studies.flying import circle as flying_circle
 
-    one_of("--format", form, FORMATS)
     with watching("planning the circle with a quadrotor that may move", quiet=as_json) as progress:
         result = flying_circle.run(folder, progress, form)
     # Reports and files of the plans come before the flight: Ctrl-C loses none of them.

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..base.errors import InputError
-from ..base.inputs import check_ending, one_of
+from ..base.inputs import check_ending
 from .options import (
     FormatOption,
     JsonOption,
@@ -50,13 +50,11 @@ def design(
     The exit code is 1 if no layout that meets the requirements was found, or if none exists, which is then proven.
     Ctrl-C ends the search with the best layout so far.
     """
-    from ..figures.style import FORMATS
     from ..layout import Requirements, read_requirements
     from ..layout import design as find
     from ..models import load
     from ..models.parsing import validate
 
-    one_of("--format", form, FORMATS)
     loaded, read = load(robot), read_requirements(requirements)
     given = {"time_limit": seconds, "seed": seed}
     changed = {key: value for key, value in given.items() if value is not None}

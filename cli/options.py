@@ -84,11 +84,20 @@ CarrierPoseOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on standard output and nothing else.")]
 
+
+def _known_format(form: str) -> str:
+    from ..base.inputs import one_of
+    from ..figures.style import FORMATS
+
+    return one_of("--format", form, FORMATS)
+
+
 FormatOption = Annotated[
     str,
     typer.Option(
         "--format",
         metavar="FORMAT",
+        callback=_known_format,
         help="Format of figures, which are as wide as a journal's column (88 mm): png, pdf or svg.",
     ),
 ]

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..base.errors import InputError
-from ..base.inputs import check_ending, one_of, shown
+from ..base.inputs import check_ending, shown
 from .options import (
     FPS,
     SPEED,
@@ -72,9 +72,6 @@ def plan(
 
     With --vary it plans once per combination of the given values, and writes a table.
     """
-    from ..figures.style import FORMATS
-
-    one_of("--format", form, FORMATS)
     check_animation(animate, speed, fps)
     if vary:
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):

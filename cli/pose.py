@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..base.errors import InputError
-from ..base.inputs import check_ending, one_of
+from ..base.inputs import check_ending
 from .calibrate import by_name
 from .log import FieldsOption
 from .options import (
@@ -103,7 +103,6 @@ def _of_log(
     from ..estimation.pose.from_log import poses_from_log
     from ..figures import calibration, style
 
-    one_of("--format", form, style.FORMATS)
     check_ending("--out", out, ".csv")
     picture = figures and figures / f"consistency.{form}"
     check_outputs({"--out": out, "--figures": picture}, {"the log": log})

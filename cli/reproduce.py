@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import typer
 
 from ..base.errors import InputError
-from ..base.inputs import one_of
 from .options import FormatOption, JsonOption, parameters, print_json, print_written
 from .watching import progress_bar
 
@@ -23,13 +22,11 @@ if TYPE_CHECKING:
 def reproduce(paper: str, out: Path | None = None, form: FormatOption = "png", as_json: JsonOption = False) -> None:
     """Recompute the equations, tables and figures of a paper, and report for each claim whether it is reproduced."""
     from ..base.writing import check_writable
-    from ..figures.style import FORMATS
     from ..studies.accounts.files import write
     from ..studies.papers import PAPERS
 
     if paper not in PAPERS:
         raise InputError(f"PAPER must be one of {', '.join(PAPERS)}, got {paper!r}")
-    one_of("--format", form, FORMATS)
     folder = out if out is not None else Path(f"towline-{paper}")
     check_writable(folder / f"{paper}.md")
     with progress_bar("", quiet=as_json) as progress:

@@ -120,10 +120,7 @@ def simulate(
     otherwise 1. A recording is replayed with its commands, in windows that each start from the recorded state; it
     passes if 95 % of the position residuals are within --tolerance.
     """
-    from ..figures.style import FORMATS
-
     one_of("--controller", controller, CONTROLLERS)
-    one_of("--format", form, FORMATS)
     check_animation(animate, speed, fps)
     if runs is None:
         many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint, "--resume": resume}

@@ -10,6 +10,7 @@ import numpy as np
 from . import style
 
 WITHIN_95 = 2.795  # standard deviations: the root of the 95 % quantile of chi-square with three degrees of freedom
+DOTS: dict[str, Any] = {"linestyle": "none", "markersize": 2.0, "markeredgewidth": 0.0, "rasterized": True}
 MOST_SAMPLES = 2000  # of a cable in a panel: more are not visible, and files grow
 
 
@@ -36,8 +37,7 @@ def residuals(
             look = {"color": style.colour(1), "markersize": 4.0, "clip_on": False, "label": "left out"}
             ax.plot(at, np.clip(1e3 * values[rows, cables], low, high), "x", **look)
             ax.set_ylim(low, high)
-    style.legend_below(canvas, top, scale=2.0)
-    return canvas
+    return style.legend_below(canvas, top, scale=2.0)
 
 
 def consistency(
@@ -62,8 +62,7 @@ def consistency(
     bottom.set_yscale("symlog", linthresh=1.0)
     if np.isfinite(largest):
         style.limit_line(bottom, largest, "1 % of sound logs exceed this")
-    style.legend_below(canvas, top, scale=2.0)
-    return canvas
+    return style.legend_below(canvas, top, scale=2.0)
 
 
 def _of_cables(ax: style.Axes, values: np.ndarray, times: np.ndarray | None) -> None:
@@ -71,17 +70,8 @@ def _of_cables(ax: style.Axes, values: np.ndarray, times: np.ndarray | None) -> 
     at = np.arange(len(values)) if times is None else times
     step = -(-len(values) // MOST_SAMPLES)
     for cable in range(values.shape[1]):
-        ax.plot(
-            at[::step],
-            1e3 * values[::step, cable],
-            linestyle="none",
-            marker=style.marker(cable),
-            markersize=2.0,
-            markeredgewidth=0.0,
-            color=style.colour(cable),
-            label=f"cables[{cable}]",
-            rasterized=True,
-        )
+        look = DOTS | {"marker": style.marker(cable), "color": style.colour(cable), "label": f"cables[{cable}]"}
+        ax.plot(at[::step], 1e3 * values[::step, cable], **look)
     rms = 1e3 * float(np.sqrt(np.nanmean(values**2)))
     style.heading(ax, f"root mean square {rms:.3g} mm")
 
@@ -122,8 +112,7 @@ def anchors(file: np.ndarray, found: np.ndarray, covariances: np.ndarray) -> sty
         ax.set_title(f"cables[{cable}]", fontsize=style.NOTE)
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_locator(style.few_ticks())
-    style.legend_below(canvas, canvas.axes[0])
-    return canvas
+    return style.legend_below(canvas, canvas.axes[0])
 
 
 def observability(sigmas: Mapping[str, np.ndarray]) -> style.Figure:
@@ -158,5 +147,4 @@ def observability(sigmas: Mapping[str, np.ndarray]) -> style.Figure:
         style.limit_line(ax, beyond / 1.6, "above this line: not determined", above=True)
     cables = max(len(values) for values in sigmas.values())
     ax.set_xticks(range(cables))
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)

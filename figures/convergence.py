@@ -43,9 +43,7 @@ def convergence(iterates: Sequence[Iterate]) -> style.Figure:
         ax.set_xlim(-0.5, max(float(starts[-1]), 1.0) - 0.5)
     above.set_yscale("log")
     _scale_objective(below, np.concatenate([part[:, 1] for part in parts]) if parts else np.ones(1))
-    if len(parts) > 1:
-        style.legend_below(canvas, above)
-    return canvas
+    return style.legend_below(canvas, above) if len(parts) > 1 else canvas
 
 
 def _scale_objective(ax: style.Axes, values: np.ndarray) -> None:

@@ -17,5 +17,4 @@ def curve_in_space(ways: Mapping[str, np.ndarray]) -> style.Figure:
         ax.plot(*points.T, **style.look(index), label=name)
         ax.plot(*points[0], "o", color=style.colour(index), markersize=4)
     style.equal_scales(ax, np.concatenate(list(ways.values())))
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)

@@ -66,5 +66,4 @@ def curves(
             missing = FLATTEST * max(abs(low), abs(high)) - (high - low)
             if missing > 0:
                 ax.set_ylim(low - missing / 2, high + missing / 2)
-    style.legend_below(canvas, *canvas.axes)
-    return canvas
+    return style.legend_below(canvas, *canvas.axes)

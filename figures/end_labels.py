@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from . import style
@@ -9,6 +11,8 @@ from . import style
 GAP = 0.065  # of a panel's height, between the names of curves at its edge
 HIGHEST = 0.97  # of a panel's height, for the same: above is their heading
 MOST_NAMES = 5  # of a curve: more would leave it no room
+LINE = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0}
+BESIDE: dict[str, Any] = {"xycoords": "axes fraction", "va": "center", "arrowprops": LINE, "annotation_clip": False}
 SAME = 1e-3  # of the panel's height: curves that are nowhere farther apart share a name
 
 
@@ -41,16 +45,8 @@ def name_at_the_end(ax: style.Axes, values: np.ndarray, names: list[str], about:
     order = np.argsort(places)
     gap = min(GAP, HIGHEST / max(len(order) - 1, 1))
     for cable, place in zip(order, _spread(places[order], gap), strict=True):
-        ax.annotate(
-            f"{about}{names[cable]}" if cable == order[-1] else names[cable],
-            (1.0, places[cable]),
-            xytext=(1.05, place),
-            xycoords="axes fraction",
-            va="center",
-            fontsize=style.NOTE * gap / GAP,
-            arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0},
-            annotation_clip=False,
-        )
+        text, size = f"{about if cable == order[-1] else ''}{names[cable]}", style.NOTE * gap / GAP
+        ax.annotate(text, (1.0, places[cable]), (1.05, place), fontsize=size, **BESIDE)
 
 
 def _spread(places: np.ndarray, gap: float = GAP) -> np.ndarray:

@@ -37,8 +37,7 @@ def envelopes(flights: xr.Dataset) -> style.Figure:
     errors.fill_between([], [], color=GREY, alpha=0.25, linewidth=0, label="5 to 95 %")
     errors.plot([], [], color=GREY, linewidth=0.6, label="extreme of all")
     draw_tolerance(errors, float(flights.attrs["tolerance_m"]), largest, scale)
-    style.legend_below(canvas, errors)
-    return canvas
+    return style.legend_below(canvas, errors)
 
 
 def _draw_band(ax: style.Axes, flights: xr.Dataset, values: np.ndarray, index: int, extreme: int) -> None:

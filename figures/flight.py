@@ -90,8 +90,7 @@ def tensions(trajectory: xr.Dataset) -> style.Figure:
     shown, names = together(real[:, left], names, float(np.diff(ax.get_ylim())[0]))
     name_at_the_end(ax, shown[-1], names)
     _mark_events([ax], trajectory)
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)
 
 
 def errors(flights: xr.Dataset) -> style.Figure:
@@ -111,8 +110,7 @@ def errors(flights: xr.Dataset) -> style.Figure:
         ax.set_ylim(bottom=0.0)
     draw_tolerance(ax, tolerance, largest[-1], scale)
     ax.set_xlim(0, 100)
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)
 
 
 def _mark_events(panels: list[style.Axes], trajectory: xr.Dataset) -> None:

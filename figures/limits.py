@@ -77,5 +77,4 @@ def limits(times: np.ndarray, quantities: list[Limited]) -> style.Figure:
     ax.set_ylim(0.0, 1.08 * min(highest, 200.0))
     for label in small:
         ax.plot([], [], " ", label=label)
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)

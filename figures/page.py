@@ -62,15 +62,17 @@ def contents(links: Iterable[Link]) -> str:
     return "<nav><ul>\n" + "\n".join(f"<li>{one.html}</li>" for one in links) + "\n</ul></nav>"
 
 
-def facts(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    """Return a table of named facts with a heading; a fact without a name continues the one before it."""
-    return f"{heading(title)}\n{_facts(rows)}" if title else _facts(rows)
+def facts(title: str, rows: Iterable[tuple[str, str]], anchor: str = "") -> str:
+    """Return a table of named facts with a heading; a fact without a name continues the one before it.
 
-
-def folded(title: str, rows: Iterable[tuple[str, str]], anchor: str) -> str:
-    """Return a table of named facts, folded under a title; a link to `anchor` unfolds it."""
-    # The anchor is inside: browsers open what hides the target of a link.
-    return f"<details><summary>{_safe(title)}</summary>\n{_facts(rows, anchor)}</details>"
+    Where it is folded, a link to `anchor` unfolds it: browsers open what hides the target of a link.
+    """
+    lines = [
+        f'<tr{"" if name else " class=more"}><th scope="row">{_broken(name)}</th><td>{_safe(fact)}</td></tr>'
+        for name, fact in rows
+    ]
+    table = f"<table{_id(anchor)}>\n" + "\n".join(lines) + "\n</table>"
+    return f"{heading(title)}\n{table}" if title else table
 
 
 def fold(title: str, inside: str) -> str:
@@ -107,9 +109,9 @@ def picture(drawing: Drawing) -> str:
     return f'<figure><img alt="{caption}" src="{source}"><figcaption>{caption}</figcaption></figure>'
 
 
-def file(title: str, text: str) -> str:
-    """Return the text of a file, folded under its title."""
-    return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"
+def verbatim(text: str) -> str:
+    """Return the text of a file."""
+    return f"<pre>{escape(text)}</pre>"
 
 
 def _safe(text: str) -> str:
@@ -119,14 +121,6 @@ def _safe(text: str) -> str:
 
 def _id(anchor: str) -> str:
     return f' id="{escape(anchor)}"' if anchor else ""
-
-
-def _facts(rows: Iterable[tuple[str, str]], anchor: str = "") -> str:
-    lines = [
-        f'<tr{"" if name else " class=more"}><th scope="row">{_broken(name)}</th><td>{_safe(fact)}</td></tr>'
-        for name, fact in rows
-    ]
-    return f"<table{_id(anchor)}>\n" + "\n".join(lines) + "\n</table>"
 
 
 def _broken(name: str) -> str:

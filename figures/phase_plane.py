@@ -29,5 +29,4 @@ def phase_plane(s: np.ndarray, sd: np.ndarray, active: Sequence[tuple[float, flo
         ax.plot(there, np.sqrt(np.maximum(np.interp(there, fine, speed**2), 0.0)), **look, label=label)
     ax.set_ylim(bottom=0.0)
     ax.margins(x=0.01)
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)

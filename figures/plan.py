@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+MISSING: dict[str, Any] = {"step": "mid", "color": "#e4e4e4", "linewidth": 0}
+SLANTED: dict[str, Any] = {"textcoords": "offset points", "rotation": 45, "fontsize": style.NOTE}
 FLAT = 0.3  # of the largest range of tensions: panels with a smaller range have their own scale
 
 
@@ -37,8 +39,7 @@ def path(trajectory: xr.Dataset) -> style.Figure:
     ax.plot(*position[0], "o", color=style.colour(0), markersize=4, label="start")
     moving = trajectory["carrier_moves"].values
     style.equal_scales(ax, np.concatenate([position, carriers[:, moving].reshape(-1, 3)]))
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)
 
 
 def tensions(trajectory: xr.Dataset) -> style.Figure:
@@ -64,8 +65,7 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> style.Figure:
     _same_scale(panels)
     for ax, trajectory in zip(panels, trajectories.values(), strict=True):
         _name_cables(ax, trajectory)
-    style.legend_below(canvas, *panels)
-    return canvas
+    return style.legend_below(canvas, *panels)
 
 
 def base_offset(trajectory: xr.Dataset) -> style.Figure:
@@ -81,8 +81,7 @@ def base_offset(trajectory: xr.Dataset) -> style.Figure:
         ax.plot(time, sideways[:, index], **style.look(2 * index), label=f"{name}: horizontal")
         ax.plot(time, apart[:, index, 2], **style.look(2 * index + 1), label=f"{name}: height")
     ax.set_ylim(bottom=min(0.0, float(apart[:, :, 2].min())), top=1.08 * max(highest, 1e-3))
-    style.legend_below(canvas, ax)
-    return canvas
+    return style.legend_below(canvas, ax)
 
 
 def _same_scale(panels: list[style.Axes]) -> None:
@@ -109,17 +108,7 @@ def _draw_tensions(ax: style.Axes, trajectory: xr.Dataset) -> None:
     if missing.any():
         shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N", digits=3)
         label = f"no tensions inside the limits:\nshortfall up to {shortfall}; thin\nlines: needed without limits"
-        ax.fill_between(
-            time,
-            0,
-            1,
-            where=missing,
-            step="mid",
-            transform=ax.get_xaxis_transform(),
-            color="#e4e4e4",
-            linewidth=0,
-            label=label,
-        )
+        ax.fill_between(time, 0, 1, missing, transform=ax.get_xaxis_transform(), label=label, **MISSING)
     _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
 
 
@@ -143,24 +132,11 @@ def _draw_phases(ax: style.Axes, trajectory: xr.Dataset) -> None:
     for name, start, end in zip(trajectory["phase"].values, starts, ends, strict=True):
         if start > 0:
             ax.axvline(start, color="#999999", linewidth=0.8, linestyle=":")
-        ax.annotate(
-            str(name),
-            ((start + end) / 2, 1.0),
-            xycoords=ax.get_xaxis_transform(),
-            xytext=(0, 2),
-            textcoords="offset points",
-            rotation=45,
-            fontsize=style.NOTE,
-        )
+        ax.annotate(str(name), ((start + end) / 2, 1.0), (0, 2), ax.get_xaxis_transform(), **SLANTED)
     reaction = trajectory["ground_reaction"].values
     if reaction.any():
-        ax.plot(
-            trajectory["time"].values,
-            np.where(reaction > 0, reaction, np.nan),
-            color="#aaaaaa",
-            linewidth=1.8,
-            label="ground",
-        )
+        pushing = np.where(reaction > 0, reaction, np.nan)
+        ax.plot(trajectory["time"].values, pushing, color="#aaaaaa", linewidth=1.8, label="ground")
 
 
 def _draw_limits(ax: style.Axes, trajectory: xr.Dataset, shown: np.ndarray) -> None:

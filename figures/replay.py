@@ -47,8 +47,7 @@ def replay(
         ax.axhline(scale * usual * noise[name], color="#444444", linewidth=0.8, linestyle=":", label="noise, rms")
         ax.set_ylim(bottom=0.0)
     style.heading(panels[0], title)
-    style.legend_below(canvas, panels[0])
-    return canvas
+    return style.legend_below(canvas, panels[0])
 
 
 def _size(name: str, values: np.ndarray) -> np.ndarray:

@@ -88,7 +88,7 @@ class Report(Displayed):
             else:
                 inside = "\n".join([page.heading(title), *(page.paragraph(fact) for _, fact in part.facts)])
             (folded if hidden else shown).append(page.fold(name, inside) if hidden else inside)
-        folded += [page.file(*file) for file in self.files]
+        folded += [page.fold(title, page.verbatim(text)) for title, text in self.files]
         parts = page.beside([*shown, *folded], [page.picture(drawing) for drawing in self.drawings()])
         word, colour = self.status or "result", style.colour(COLOURS.get(self.status, OTHER))
         return page.page(self.about, word, self.summary, colour, parts)

@@ -29,6 +29,10 @@ MARKERS = "os^vDP*X"
 LIMIT = {"color": "#666666", "linestyle": "--", "linewidth": 0.8}
 COLUMN = 88 / 25.4  # width of a journal's column [inches]
 TEXT, NOTE = 8.0, 7.0  # sizes of letters [points]: labels of axes; numbers, legends, titles and notes
+BELOW: dict[str, Any] = {"loc": "outside lower center", "fontsize": NOTE, "frameon": False}  # of legends
+BELOW |= {"handlelength": 2.6, "columnspacing": 1.2, "borderpad": 0.2}
+AT_LINE: dict[str, Any] = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "fontsize": NOTE}
+AT_LINE |= {"bbox": {"facecolor": "#ffffff", "alpha": 0.7, "linewidth": 0, "pad": 0.2}}
 BESIDE, LETTER = 36.0, 3.8  # points: labels and numbers beside axes; a letter of a title on average
 FORMATS = ("png", "pdf", "svg")
 DPI = 300
@@ -149,17 +153,7 @@ def limit_line(ax: Axes, value: float, text: str, place: float = 1.0, above: boo
     """Draw a limit as a dashed line with its name above or below it: 0 is at the left end, 1 at the right."""
     ax.axhline(value, **LIMIT)
     side, edge = "left" if place < 0.5 else "right", "bottom" if above else "top"
-    ax.annotate(
-        text,
-        (place, value),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 1 if above else -1),
-        textcoords="offset points",
-        ha=side,
-        va=edge,
-        fontsize=NOTE,
-        bbox={"facecolor": "#ffffff", "alpha": 0.7, "linewidth": 0, "pad": 0.2},
-    )
+    ax.annotate(text, (place, value), (0, 1 if above else -1), ha=side, va=edge, **AT_LINE)
 
 
 def far_limit(ax: Axes, text: str) -> None:
@@ -167,8 +161,8 @@ def far_limit(ax: Axes, text: str) -> None:
     ax.plot([], [], **LIMIT, label=text)
 
 
-def legend_below(canvas: Figure, *panels: Axes, scale: float = 1.0) -> None:
-    """Draw one legend for all panels at the bottom, in rows of equal length that fit the width of the figure.
+def legend_below(canvas: Figure, *panels: Axes, scale: float = 1.0) -> Figure:
+    """Return the figure with one legend for all panels at the bottom, in rows of equal length that fit its width.
 
     Its markers are `scale` times those of the curves.
     """
@@ -178,26 +172,13 @@ def legend_below(canvas: Figure, *panels: Axes, scale: float = 1.0) -> None:
     for ax in panels:
         handles, labels = ax.get_legend_handles_labels()
         shown = {**shown, **{label: it for label, it in zip(labels, handles, strict=True) if label not in shown}}
-    count = len(shown)
-    if not count:
-        return
-    renderer = FigureCanvasAgg(canvas).get_renderer()
+    renderer, count = FigureCanvasAgg(canvas).get_renderer(), len(shown)
     for rows in range(1, count + 1):
-        legend = canvas.legend(
-            list(shown.values()),
-            list(shown),
-            fontsize=NOTE,
-            ncols=-(-count // rows),
-            loc="outside lower center",
-            frameon=False,
-            handlelength=2.6,
-            markerscale=scale,
-            columnspacing=1.2,
-            borderpad=0.2,
-        )
+        legend = canvas.legend(list(shown.values()), list(shown), ncols=-(-count // rows), markerscale=scale, **BELOW)
         if rows == count or legend.get_window_extent(renderer).width <= 0.98 * canvas.bbox.width:
-            return
+            break
         legend.remove()
+    return canvas
 
 
 def one_value(low: float, high: float) -> bool:

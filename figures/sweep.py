@@ -43,8 +43,7 @@ def sweep(
     known = {label: values for label, values in quantities.items() if np.isfinite(values).any()}
     quantities = known or {"no plan is feasible": np.full(status.shape, np.nan)}
     canvas = _curves(axes[0], status, quantities) if len(axes) == 1 else _maps(axes, status, quantities, lower)
-    style.legend_below(canvas, *canvas.axes)
-    return canvas
+    return style.legend_below(canvas, *canvas.axes)
 
 
 def _curves(axis: Axis, status: np.ndarray, quantities: Mapping[str, np.ndarray]) -> style.Figure:

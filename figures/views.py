@@ -24,8 +24,7 @@ def views(scene: Scene) -> style.Figure:
     canvas, panels = views_of(np.vstack([robot, *outlines]), (ABOVE, FRONT), below=0.7)
     for ax, view in zip(panels, (ABOVE, FRONT), strict=True):
         _view(ax, scene, [view.across, view.up])
-    style.legend_below(canvas, panels[0])
-    return canvas
+    return style.legend_below(canvas, panels[0])
 
 
 def _view(ax: style.Axes, scene: Scene, axes: list[int]) -> None:

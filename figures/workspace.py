@@ -29,8 +29,7 @@ def projections(points: dict[str, np.ndarray], marks: np.ndarray | None = None) 
     for ax, view in zip(panels, VIEWS, strict=True):
         axes = [view.across, view.up]
         _panel(ax, {label: some[:, axes] for label, some in points.items()}, None if marks is None else marks[:, axes])
-    style.legend_below(canvas, panels[0], scale=2.0)
-    return canvas
+    return style.legend_below(canvas, panels[0], scale=2.0)
 
 
 def cross_sections(points: np.ndarray, heights: list[float], thickness: float) -> style.Figure:
@@ -91,8 +90,7 @@ def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> style.Figu
         _contours(ax, result, behind, across, up)
         if anchors is not None:
             ax.plot(*anchors[:, [view.across, view.up]].T, "^", color="#000000", markersize=3, label="anchors")
-    style.legend_below(canvas, panels[0])
-    return canvas
+    return style.legend_below(canvas, panels[0])
 
 
 def _contours(ax: style.Axes, result: xr.Dataset, behind: str, across: str, up: str) -> None:

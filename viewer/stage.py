@@ -37,6 +37,10 @@ BARBS = 12
 VIEWS = {"all": ALONG, "top": (0.0, -1e-3, 1.0), "front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0)}  # to the camera
 AIMS = 50  # of a camera that are remembered
 
+DOTS: dict[str, Any] = {"point_shape": "circle", "precision": "float32"}
+# The shaders of other materials keep a machine without a GPU busy for ten seconds.
+MATERIAL: dict[str, Any] = {"material": "toon3", "side": "double", "cast_shadow": False, "receive_shadow": False}
+
 Colour = tuple[int, int, int]
 
 
@@ -233,14 +237,8 @@ class Stage:
         self._cloud, self._points = None, subject.cloud
         self._bands: list[Any] = []
         if subject.cloud is not None and len(subject.cloud.positions):
-            self._cloud = scene.add_point_cloud(
-                "/workspace",
-                subject.cloud.positions.astype(np.float32),
-                subject.cloud.colours,
-                point_size=0.004 * self._size,
-                point_shape="circle",
-                precision="float32",
-            )
+            places, colours = subject.cloud.positions.astype(np.float32), subject.cloud.colours
+            self._cloud = scene.add_point_cloud("/workspace", places, colours, point_size=0.004 * self._size, **DOTS)
 
     def _lines(self, name: str, lines: list[np.ndarray], colour: Colour, width: float = THIN) -> None:
         """Draw lines, (k, 3) each [m]."""
@@ -263,7 +261,7 @@ class Stage:
         # Dots would hide a platform that is much smaller than the robot.
         small = min(DOT * size, 0.25 * float(np.ptp(robot.attachments, axis=0).max()) or DOT * size)
         self._ends = [
-            scene.add_point_cloud(name, ends, BLACK, point_size=dot, point_shape="circle", precision="float32")
+            scene.add_point_cloud(name, ends, BLACK, point_size=dot, **DOTS)
             for name, dot in (("/ends/anchors", DOT * size), ("/ends/attachments", small))
         ]
         self._sheaves = self._segments("/pulleys", nowhere, BLACK, 2 * THIN)
@@ -311,18 +309,8 @@ class Stage:
         self, name: str, places: np.ndarray, triangles: np.ndarray, colour: Colour, opacity: float, flat: bool
     ) -> viser.MeshHandle:
         """Draw triangles (n, 3), by the indices of their corners among `places` (k, 3) [m]."""
-        return self._scene.add_mesh_simple(
-            name,
-            places.astype(np.float32),
-            triangles.astype(np.uint32),
-            color=colour,
-            opacity=opacity,
-            material="toon3",  # the shaders of the others keep a machine without a GPU busy for ten seconds
-            flat_shading=flat,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
+        corners, look = places.astype(np.float32), {"color": colour, "opacity": opacity, "flat_shading": flat}
+        return self._scene.add_mesh_simple(name, corners, triangles.astype(np.uint32), **MATERIAL, **look)
 
 
 def _strokes(start: np.ndarray, tip: np.ndarray) -> np.ndarray:

@@ -102,7 +102,7 @@ def _margin(scenario: Scenario, plan: Plan, share: float) -> RobustMargin:
     reach = factor * sigmas
     low, high = _limits(scenario, audit.times)
     outside = np.maximum(low + reach - audit.tensions, audit.tensions + reach - high)
-    return RobustMargin(share, factor, reach, scenario.tightened_by, np.maximum(outside, 0.0))
+    return RobustMargin(share, factor, reach, np.zeros(robot.m) + scenario.tightened, np.maximum(outside, 0.0))
 
 
 def _limits(scenario: Scenario, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -51,8 +51,7 @@ class Scenario(Displayed):
     duration: float  # [s]; of a task that leaves it free: where the planner starts, then what it chose
     phases: Phases = field(default_factory=Phases, repr=False)  # those of the task, if it has some
     passing: bool = False  # whether each leg of the path has its own duration (`search.passing_times`)
-    # By how much the tension limits are tightened for the uncertain robots, (m,) [N]; default: not.
-    tightened: np.ndarray | None = None
+    tightened: np.ndarray | float = 0.0  # by how much the tension limits are, for the uncertain robots, (m,) [N]
 
     @cached_property
     def costs(self) -> Costs:
@@ -145,13 +144,8 @@ class Scenario(Displayed):
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the tension limits less the task's margin if that is hard, and tightened, (m,) each [N]."""
-        inside = self.hard_margin + self.tightened_by
+        inside = self.hard_margin + self.tightened
         return self.robot.t_min + inside, self.robot.t_max - inside
-
-    @property
-    def tightened_by(self) -> np.ndarray:
-        """Return by how much the tension limits are tightened, (m,) [N]."""
-        return np.zeros(self.robot.m) if self.tightened is None else self.tightened
 
     def bounds_in(self, phase: LaidPhase | None) -> tuple[np.ndarray, np.ndarray]:
         """Return the tension limits in a phase, less the margin: of cables that may be slack the lower one is 0."""

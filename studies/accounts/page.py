@@ -55,7 +55,8 @@ def _claim(claim: Claim) -> str:
         (claim.verdict.value.capitalize(), claim.why),
         ("Name", claim.id),
     ]
-    return html.folded(f"{claim.place}: {claim.statement} – {claim.verdict.value}", rows, _anchor(claim))
+    title = f"{claim.place}: {claim.statement} – {claim.verdict.value}"
+    return html.fold(title, html.facts("", rows, _anchor(claim)))
 
 
 def _anchor(claim: Claim) -> str:

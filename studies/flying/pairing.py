@@ -81,5 +81,4 @@ def from_above(pairings: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
         ax.set_aspect("equal")
         ax.margins(0.12)
         style.heading(ax, title, 1 / len(pairings))
-    style.legend_below(canvas, *canvas.axes)
-    return canvas
+    return style.legend_below(canvas, *canvas.axes)
