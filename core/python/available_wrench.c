@@ -13,15 +13,6 @@ static int matrices_of(const arrays *given, int i, Py_ssize_t n, Py_ssize_t m, t
     return 1;
 }
 
-static PyObject *none_or_refusal(arrays *given, int fits) {
-    release(given);
-    if (!fits) {
-        PyErr_SetString(PyExc_ValueError, "the arrays must be those of wrench matrices of a size that the core has");
-        return NULL;
-    }
-    Py_RETURN_NONE;
-}
-
 TOWLINE_PY(facets) {
     enum { A, LOW, HIGH, NORMALS, LEAST, MOST_, ALL };
     arrays given;
@@ -37,12 +28,9 @@ TOWLINE_PY(facets) {
         fits =
             given.size[HIGH] == m && given.size[NORMALS] == facets * n && rows == facets && given.size[MOST_] == facets;
     }
-    if (fits) {
-        Py_BEGIN_ALLOW_THREADS;
-        towline_facets(&matrices, given.of[LOW], given.of[HIGH], given.of[NORMALS], given.of[LEAST], given.of[MOST_]);
-        Py_END_ALLOW_THREADS;
-    }
-    return none_or_refusal(&given, fits);
+    FINISH(
+        &given, fits,
+        towline_facets(&matrices, given.of[LOW], given.of[HIGH], given.of[NORMALS], given.of[LEAST], given.of[MOST_]));
 }
 
 TOWLINE_PY(margins) {
@@ -60,13 +48,9 @@ TOWLINE_PY(margins) {
     if (fits && given.of[RESERVES]) {
         fits = given.size[RESERVES] == rows * towline_facets_of((int)n, (int)m);
     }
-    if (fits) {
-        Py_BEGIN_ALLOW_THREADS;
-        towline_margins(&matrices, given.of[W], given.size[W] == n ? 0 : n, given.of[LOW], given.of[HIGH],
-                        given.of[MARGINS], given.of[RESERVES]);
-        Py_END_ALLOW_THREADS;
-    }
-    return none_or_refusal(&given, fits);
+    FINISH(&given, fits,
+           towline_margins(&matrices, given.of[W], given.size[W] == n ? 0 : n, given.of[LOW], given.of[HIGH],
+                           given.of[MARGINS], given.of[RESERVES]));
 }
 
 TOWLINE_PY(full_rank) {
@@ -85,10 +69,5 @@ TOWLINE_PY(full_rank) {
     }
     const Py_ssize_t per = given.size[FULL] > 0 ? given.size[A] / given.size[FULL] : 0;
     const int fits = n > 0 && matrices_of(&given, A, n, per / n, &matrices) && matrices.count == given.size[FULL];
-    if (fits) {
-        Py_BEGIN_ALLOW_THREADS;
-        towline_full_rank(&matrices, tolerance, given.of[FULL]);
-        Py_END_ALLOW_THREADS;
-    }
-    return none_or_refusal(&given, fits);
+    FINISH(&given, fits, towline_full_rank(&matrices, tolerance, given.of[FULL]));
 }

@@ -26,7 +26,7 @@ static int has_shape(const Py_buffer *view, Py_ssize_t rows, const place *at) {
 /* Copy an array of each row, or of all rows, to its place; return 0 with an exception if it is no such array. */
 static int put(PyObject *array, Py_ssize_t rows, place at) {
     Py_buffer view;
-    if (PyObject_GetBuffer(array, &view, PyBUF_STRIDED_RO | PyBUF_FORMAT) < 0) {
+    if (view_of(array, &view, PyBUF_STRIDED_RO | PyBUF_FORMAT) < 0) {
         return 0;
     }
     const int fits = has_shape(&view, rows, &at);

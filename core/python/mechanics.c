@@ -4,115 +4,91 @@
 #include "python/arrays.h"
 #include "python/extension.h"
 
-/* The robot and the poses with which a call begins; return whether they fit each other. */
-static int places_of(const arrays *given, const towline_robot **robot, towline_places *at) {
-    enum { ROBOT, POSES, CARRIERS };
-    *robot = robot_of(given);
-    if (!*robot || !given->of[POSES] || !given->of[CARRIERS] || given->size[POSES] % 6 != 0) {
+/* The arrays with which a call begins. */
+enum { ROBOT, POSES, CARRIERS, PLACES };
+
+/* A call at many poses; without a robot that fits them there are no cables. */
+typedef struct {
+    arrays given;
+    const towline_robot *robot;
+    towline_places at;
+    Py_ssize_t cables; /* of all poses */
+    int fits;
+} call;
+
+/* Take the arrays of a call, of which those from `results` on are written to; return 0 with an exception if one is none. */
+static int take_call(call *to, PyObject *const *arguments, Py_ssize_t count, int wanted, int results) {
+    const arrays *given = &to->given;
+    if (!take(&to->given, arguments, count, wanted, results)) {
         return 0;
     }
-    const Py_ssize_t carriers = 6 * (*robot)->carriers, rows = given->size[POSES] / 6;
+    const towline_robot *robot = robot_of(given);
+    const Py_ssize_t carriers = robot ? 6 * robot->carriers : 0, rows = given->size[POSES] / 6;
     const int shared = given->size[CARRIERS] == carriers;
-    const towline_places places = {rows, given->of[POSES], given->of[CARRIERS], shared ? 0 : carriers};
-    *at = places;
-    return shared || given->size[CARRIERS] == rows * carriers;
+    to->robot = robot;
+    to->at = (towline_places){rows, given->of[POSES], given->of[CARRIERS], shared ? 0 : carriers};
+    to->cables = robot ? rows * robot->cables : 0;
+    to->fits =
+        robot && has_size(given, POSES, 6 * rows) && has_size(given, CARRIERS, shared ? carriers : rows * carriers);
+    return 1;
 }
 
 TOWLINE_PY(lines) {
-    enum { ROBOT, POSES, CARRIERS, LENGTHS, A, J, ANCHORS, SENSITIVITY, ALL };
-    arrays given;
-    const towline_robot *robot;
-    towline_places at;
-    if (!take(&given, arguments, count, ALL, LENGTHS)) {
+    enum { LENGTHS = PLACES, A, J, ANCHORS, SENSITIVITY, ALL };
+    call of;
+    if (!take_call(&of, arguments, count, ALL, LENGTHS)) {
         return NULL;
     }
-    int fits = places_of(&given, &robot, &at);
-    for (int i = LENGTHS; i < ALL && fits; i++) {
+    double *const *to = of.given.of;
+    for (int i = LENGTHS; i < ALL; i++) {
         const Py_ssize_t per_cable[] = {1, 6, 6, 3, 7};
-        fits = !given.of[i] || given.size[i] == at.rows * robot->cables * per_cable[i - LENGTHS];
+        of.fits &= !to[i] || of.given.size[i] == of.cables * per_cable[i - LENGTHS];
     }
-    if (fits) {
-        const towline_lines want = {given.of[LENGTHS], given.of[A], given.of[J], given.of[ANCHORS],
-                                    given.of[SENSITIVITY]};
-        Py_BEGIN_ALLOW_THREADS;
-        towline_lines_of_rows(robot, at, want);
-        Py_END_ALLOW_THREADS;
-    }
-    return done(&given, fits);
+    const towline_lines want = {to[LENGTHS], to[A], to[J], to[ANCHORS], to[SENSITIVITY]};
+    FINISH(&of.given, of.fits, towline_lines_of_rows(of.robot, of.at, want));
 }
 
 TOWLINE_PY(ends) {
-    enum { ROBOT, POSES, CARRIERS, ANCHORS, ATTACHMENTS, ALL };
-    arrays given;
-    const towline_robot *robot;
-    towline_places at;
-    if (!take(&given, arguments, count, ALL, ANCHORS)) {
+    enum { ANCHORS = PLACES, ATTACHMENTS, ALL };
+    call of;
+    if (!take_call(&of, arguments, count, ALL, ANCHORS)) {
         return NULL;
     }
-    int fits = places_of(&given, &robot, &at);
-    for (int i = ANCHORS; i < ALL && fits; i++) {
-        fits = given.of[i] && given.size[i] == 3 * robot->cables * at.rows;
-    }
-    if (fits) {
-        Py_BEGIN_ALLOW_THREADS;
-        towline_ends(robot, at, given.of[ANCHORS], given.of[ATTACHMENTS]);
-        Py_END_ALLOW_THREADS;
-    }
-    return done(&given, fits);
+    double *const *to = of.given.of;
+    of.fits &= has_size(&of.given, ANCHORS, 3 * of.cables) && has_size(&of.given, ATTACHMENTS, 3 * of.cables);
+    FINISH(&of.given, of.fits, towline_ends(of.robot, of.at, to[ANCHORS], to[ATTACHMENTS]));
 }
 
 TOWLINE_PY(cable_distances) {
-    enum { ROBOT, POSES, CARRIERS, DISTANCES, ALL };
-    arrays given;
-    const towline_robot *robot;
-    towline_places at;
-    if (!take(&given, arguments, count, ALL, DISTANCES)) {
+    enum { DISTANCES = PLACES, ALL };
+    call of;
+    if (!take_call(&of, arguments, count, ALL, DISTANCES)) {
         return NULL;
     }
-    const int fits = places_of(&given, &robot, &at) && given.of[DISTANCES] &&
-                     given.size[DISTANCES] == at.rows * (robot->cables * (robot->cables - 1) / 2);
-    if (fits) {
-        Py_BEGIN_ALLOW_THREADS;
-        towline_cable_distances(robot, at, given.of[DISTANCES]);
-        Py_END_ALLOW_THREADS;
-    }
-    return done(&given, fits);
+    of.fits = of.fits && has_size(&of.given, DISTANCES, of.cables * (of.robot->cables - 1) / 2);
+    FINISH(&of.given, of.fits, towline_cable_distances(of.robot, of.at, of.given.of[DISTANCES]));
 }
 
 TOWLINE_PY(columns_by_geometry) {
-    enum { ROBOT, POSES, CARRIERS, S, ALL };
-    arrays given;
-    const towline_robot *robot;
-    towline_places at;
-    if (!take(&given, arguments, count, ALL, S)) {
+    enum { S = PLACES, ALL };
+    call of;
+    if (!take_call(&of, arguments, count, ALL, S)) {
         return NULL;
     }
-    const int fits = places_of(&given, &robot, &at) && given.of[S] && given.size[S] == 42 * robot->cables * at.rows;
-    if (fits) {
-        Py_BEGIN_ALLOW_THREADS;
-        towline_columns_by_geometry(robot, at, given.of[S]);
-        Py_END_ALLOW_THREADS;
-    }
-    return done(&given, fits);
+    of.fits &= has_size(&of.given, S, 42 * of.cables);
+    FINISH(&of.given, of.fits, towline_columns_by_geometry(of.robot, of.at, of.given.of[S]));
 }
 
 /* The derivative of the wrench of tensions along the coordinates of the pose, or `by_axes`. */
 static PyObject *wrench_derivative(PyObject *const *arguments, Py_ssize_t count, int by_axes) {
-    enum { ROBOT, POSES, CARRIERS, TENSIONS, D, ALL };
-    arrays given;
-    const towline_robot *robot;
-    towline_places at;
-    if (!take(&given, arguments, count, ALL, D)) {
+    enum { TENSIONS = PLACES, D, ALL };
+    call of;
+    if (!take_call(&of, arguments, count, ALL, D)) {
         return NULL;
     }
-    const int fits = places_of(&given, &robot, &at) && given.of[TENSIONS] && given.of[D] &&
-                     given.size[TENSIONS] == robot->cables * at.rows && given.size[D] == 36 * at.rows;
-    if (fits) {
-        Py_BEGIN_ALLOW_THREADS;
-        towline_wrench_by_pose(robot, at, given.of[TENSIONS], by_axes, given.of[D]);
-        Py_END_ALLOW_THREADS;
-    }
-    return done(&given, fits);
+    double *const *to = of.given.of;
+    of.fits &= has_size(&of.given, TENSIONS, of.cables) && has_size(&of.given, D, 36 * of.at.rows);
+    FINISH(&of.given, of.fits, towline_wrench_by_pose(of.robot, of.at, to[TENSIONS], by_axes, to[D]));
 }
 
 TOWLINE_PY(wrench_by_pose) { return wrench_derivative(arguments, count, 0); }
@@ -120,27 +96,18 @@ TOWLINE_PY(wrench_by_pose) { return wrench_derivative(arguments, count, 0); }
 TOWLINE_PY(wrench_by_axes) { return wrench_derivative(arguments, count, 1); }
 
 TOWLINE_PY(required_wrench) {
-    enum { ROBOT, POSES, VELOCITIES, ACCELERATIONS, WIND, W, ALL };
+    enum { VELOCITIES = POSES + 1, ACCELERATIONS, WIND, W, ALL };
     arrays given;
     if (!take(&given, arguments, count, ALL, W)) {
         return NULL;
     }
     const towline_robot *robot = robot_of(&given);
-    int fits = robot && given.of[POSES] && given.size[POSES] % 6 == 0 && given.of[W];
-    if (fits) {
-        const Py_ssize_t rows = given.size[POSES] / 6;
-        const int shared = given.size[WIND] == 3;
-        for (int i = VELOCITIES; i < ALL; i++) {
-            fits = fits && (i == WIND || given.size[i] == 6 * rows);
-        }
-        fits = fits && (!given.of[WIND] || shared || given.size[WIND] == 3 * rows);
-        if (fits) {
-            const towline_motion_of_platform motion = {given.of[POSES], given.of[VELOCITIES], given.of[ACCELERATIONS],
-                                                       given.of[WIND]};
-            Py_BEGIN_ALLOW_THREADS;
-            towline_required_wrench(robot, rows, motion, shared ? 0 : 3, given.of[W]);
-            Py_END_ALLOW_THREADS;
-        }
-    }
-    return done(&given, fits);
+    const Py_ssize_t rows = given.size[POSES] / 6, numbers = 6 * rows;
+    const int shared = given.size[WIND] == 3;
+    const int fits = robot && has_size(&given, POSES, numbers) && given.size[VELOCITIES] == numbers &&
+                     given.size[ACCELERATIONS] == numbers && has_size(&given, W, numbers) &&
+                     (!given.of[WIND] || shared || given.size[WIND] == 3 * rows);
+    const towline_motion_of_platform motion = {given.of[POSES], given.of[VELOCITIES], given.of[ACCELERATIONS],
+                                               given.of[WIND]};
+    FINISH(&given, fits, towline_required_wrench(robot, rows, motion, shared ? 0 : 3, given.of[W]));
 }

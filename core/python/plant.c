@@ -37,22 +37,20 @@ TOWLINE_PY(run_plant) {
     for (int i = STATES; i < ARRAYS; i++) {
         fits = fits && given.of[i];
     }
+    Py_ssize_t rows = 0, commands = steps;
     if (fits) {
         const Py_ssize_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
-        const Py_ssize_t rows = given.size[STATES] / size, kept = 1 + steps / keep;
-        const Py_ssize_t commands = rows ? given.size[COMMANDS] / width / rows : steps;
+        const Py_ssize_t kept = 1 + steps / keep;
+        rows = given.size[STATES] / size;
+        commands = rows ? given.size[COMMANDS] / width / rows : steps;
         fits = given.size[STATES] == rows * size && given.size[COMMANDS] == rows * commands * width &&
                commands >= steps && (!rows || kept <= PTRDIFF_MAX / rows / (size * DOUBLE)) &&
                given.size[HISTORY] == rows * kept * size && given.size[TENSIONS] == rows * kept * robot->cables;
-        if (fits) {
-            const towline_run run = {rows, commands, steps, keep, (int32_t)substeps, period};
-            Py_BEGIN_ALLOW_THREADS;
-            towline_plant_run(robot, (const void *)given.of[SETTINGS], &run, given.of[STATES], given.of[COMMANDS],
-                              given.of[HISTORY], given.of[TENSIONS]);
-            Py_END_ALLOW_THREADS;
-        }
     }
-    return done(&given, fits);
+    const towline_run run = {rows, commands, steps, keep, (int32_t)substeps, period};
+    FINISH(&given, fits,
+           towline_plant_run(robot, (const void *)given.of[SETTINGS], &run, given.of[STATES], given.of[COMMANDS],
+                             given.of[HISTORY], given.of[TENSIONS]));
 }
 
 TOWLINE_PY(sense) {
@@ -62,18 +60,11 @@ TOWLINE_PY(sense) {
         return NULL;
     }
     const towline_robot *robot = robot_of(&given);
-    int fits = robot && given.of[STATES] && given.of[MOTIONS] && given.of[LENGTHS];
-    if (fits) {
-        const Py_ssize_t size = towline_plant_state_size(robot), rows = given.size[STATES] / size;
-        fits = given.size[STATES] == rows * size && given.size[MOTIONS] == rows * 12 * (1 + robot->carriers) &&
-               given.size[LENGTHS] == rows * 2 * robot->cables;
-        if (fits) {
-            Py_BEGIN_ALLOW_THREADS;
-            towline_plant_sense(robot, rows, given.of[STATES], given.of[MOTIONS], given.of[LENGTHS]);
-            Py_END_ALLOW_THREADS;
-        }
-    }
-    return done(&given, fits);
+    const Py_ssize_t size = robot ? towline_plant_state_size(robot) : 1, rows = given.size[STATES] / size;
+    const int fits = robot && has_size(&given, STATES, rows * size) &&
+                     has_size(&given, MOTIONS, rows * 12 * (1 + robot->carriers)) &&
+                     has_size(&given, LENGTHS, rows * 2 * robot->cables);
+    FINISH(&given, fits, towline_plant_sense(robot, rows, given.of[STATES], given.of[MOTIONS], given.of[LENGTHS]));
 }
 
 TOWLINE_PY(winch_lengths) {

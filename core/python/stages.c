@@ -18,7 +18,7 @@ typedef struct {
 
 /* Take matrices (N, rows, columns), or rows (N, columns), whose columns are side by side; return 0 with an exception. */
 static int take_matrices(PyObject *array, matrices *to) {
-    to->taken = PyObject_GetBuffer(array, &to->view, PyBUF_STRIDES | PyBUF_WRITABLE) == 0;
+    to->taken = view_of(array, &to->view, PyBUF_STRIDES | PyBUF_WRITABLE) == 0;
     if (!to->taken) {
         return 0;
     }
