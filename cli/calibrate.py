@@ -14,7 +14,8 @@ from .outputs import check_outputs
 
 @parameters("""
     LOG: Log of lengths and, if known, poses, tensions and times: NetCDF, MCAP, a ROS bag, or CSV with a header such as
-        't [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'.
+        't [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'. Or several logs of one
+        motion, such as one for each computer; that of a carrier has its name, as in quad1.csv.
     --poses LOG: Log of the poses, if they are in another file; its clock is aligned by cable speeds.
     --free NAMES: Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, build-up,
         clock, com; with tensions also mass, stiffness, capstan, friction, gains; or auto. Default: anchors, offsets,
@@ -31,7 +32,7 @@ from .outputs import check_outputs
 """)
 def calibrate(
     robot: RobotArgument,
-    log: Path,
+    logs: list[Path],
     poses: Path | None = None,
     fields: FieldsOption = None,
     free: str | None = None,
@@ -65,10 +66,10 @@ def calibrate(
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
     check_outputs(
         {"--out": target, "--report": report, "--figures": figures and figures / f"residuals.{form}"},
-        {"the log": log, "--poses": poses},
+        {**{f"the log {log}": log for log in logs}, "--poses": poses},
     )
     check_ending("--out", target, ".yaml", ".yml")
-    read = read_log(log, stated, poses, loaded, fields)
+    read = read_log(logs, stated, poses, loaded, fields)
     measurements, notes = read.measurements, read.notes
     del read  # with the files
     if fix:

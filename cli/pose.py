@@ -36,7 +36,7 @@ FEWEST_FIT = 0.95  # of the samples of a log
 @parameters(f"""
     --lengths 'one number for each cable': Measured lengths of the cables [m].
     --log LOG: Log of readings of the winches, instead of --lengths: CSV, NetCDF, MCAP or a ROS bag. The encoders of the
-        robot file convert them to lengths.
+        robot file convert them to lengths. May be repeated, for several logs of one motion.
     --out FILE.csv: With --log: file of poses and covariances; default: LOG-poses.csv in this folder.
     --figures FOLDER: With --log: folder for a figure of the residuals over time.
     --start '{SIX}': Pose to start from [m, rad]; default: search without a start.
@@ -46,7 +46,7 @@ FEWEST_FIT = 0.95  # of the samples of a log
 def pose(
     robot: RobotArgument,
     lengths: str | None = None,
-    log: Path | None = None,
+    log: list[Path] | None = None,
     fields: FieldsOption = None,
     out: Path | None = None,
     figures: Path | None = None,
@@ -72,7 +72,7 @@ def pose(
         left_out({"--out": out, "--figures": figures, "--fields": fields}, "with --lengths")
     else:
         left_out({"--start": start, "--carrier-pose": carrier_pose}, "with --log")
-        _of_log(loaded, log, fields, sigma, out or Path(f"{log.stem}-poses.csv"), figures, form, as_json)
+        _of_log(loaded, log, fields, sigma, out or Path(f"{log[0].stem}-poses.csv"), figures, form, as_json)
         return
     assert lengths is not None
     measured = numbers("--lengths", lengths, loaded.m)
@@ -92,7 +92,14 @@ def pose(
 
 
 def _of_log(
-    robot: Robot, log: Path, fields: Path | None, sigma: str, out: Path, figures: Path | None, form: str, as_json: bool
+    robot: Robot,
+    logs: list[Path],
+    fields: Path | None,
+    sigma: str,
+    out: Path,
+    figures: Path | None,
+    form: str,
+    as_json: bool,
 ) -> None:
     """Write the poses of a log."""
     import numpy as np
@@ -105,11 +112,11 @@ def _of_log(
 
     check_ending("--out", out, ".csv")
     picture = figures and figures / f"consistency.{form}"
-    check_outputs({"--out": out, "--figures": picture}, {"the log": log})
+    check_outputs({"--out": out, "--figures": picture}, {f"the log {log}": log for log in logs})
     stated = by_name("--sigma", sigma) if "=" in sigma else {}
     sigma = str(stated.get("lengths", SIGMA)) if stated else sigma
     deviations = numbers("--sigma", sigma, robot.m if len(sigma.replace(",", " ").split()) > 1 else 1)
-    read = read_log(log, stated or None, None, robot, fields)
+    read = read_log(logs, stated or None, None, robot, fields)
     found = poses_from_log(robot, read.measurements, deviations if len(deviations) > 1 else deviations[0], read.begin)
     files = [found.save(out)]
     if picture is not None:

@@ -103,6 +103,7 @@ NAMES = {
         "winch3/position",
         "/winch_7/length/data",
         "rope5",
+        "drum_2",
     ],
     "tensions": [
         "tension0",

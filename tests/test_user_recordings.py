@@ -1,6 +1,7 @@
 """Recordings as users have them, from other simulations, through the command line: what is found, and what is said."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -196,3 +197,30 @@ def test_a_motion_capture_that_repeats_the_last_pose(tmp_path):
         for k, axis in enumerate("xyz"):
             value, sigma = values[f"cables[{i}].anchor.{axis}"]
             assert abs(value - anchors[i, k]) < 4 * sigma + 1e-4
+
+
+@pytest.mark.parametrize("offsets", [(0.0, 0.0), (0.4, -0.28), (7200.013, -0.02)])
+def test_a_file_for_each_computer(offsets, tmp_path):
+    """Load and drones in three files with the same columns and clocks of their own: distances show the offsets."""
+    robot, draw = user.team_robot(tmp_path), np.random.default_rng(0)
+    t, x, drones = user.team()
+    load = np.column_stack([user.EPOCH + t, x + draw.normal(0, 5e-4, x.shape)])
+    user.write(tmp_path / "load.csv", ["stamp", *"xyz"], load, form="%.14g")
+    header = ["stamp", *"xyz", *(f"q{axis}" for axis in "xyzw"), "thrust", *(f"dir_{axis}" for axis in "xyz")]
+    for i, (p, R, thrust, q) in enumerate(drones):
+        seen, turned = p + draw.normal(0, 5e-4, p.shape), Rotation.from_matrix(R).as_quat()
+        table = np.column_stack([user.EPOCH + t + offsets[i], seen, turned, thrust, -q])[100 + 50 * i : -200]
+        user.write(tmp_path / f"cf{i + 1}.csv", header, table, form="%.14g")
+    files = ("load.csv", "cf1.csv", "cf2.csv")
+    told = json.loads(towline("calibrate", robot, *files, "--free", "offsets,mass", "--json", cwd=tmp_path).stdout)
+    found = {one["name"]: one["value"] for one in told["parameters"]}
+    assert found["mass"] == pytest.approx(0.4, rel=5e-3)
+    for i, length in enumerate((0.82, 0.79)):
+        assert found[f"cables[{i}].offset"] == pytest.approx(length - 0.8, abs=2e-4)
+        (said,) = [note for note in told["notes"] if f"clock of cf{i + 1}" in note] or [None]
+        assert (said is not None) == (abs(offsets[i]) > 0)
+        if said:
+            size, way = re.search(r"is ([\d.]+) s (ahead|behind)", said).groups()
+            assert float(size) * (1 if way == "ahead" else -1) == pytest.approx(offsets[i], abs=2e-3)
+    logs = [part for file in files for part in ("--log", file)]
+    assert "no pose fits" not in towline("pose", robot, *logs, cwd=tmp_path).stdout

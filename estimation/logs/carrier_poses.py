@@ -98,7 +98,7 @@ def carriers_at(
         if found.position:
             poses[:, index, :3] = at_times(times, reader.stream(found.position), found.position[0]).values
         if found.orientation:
-            poses[:, index, 3:] = _angles(times, reader, found)
+            poses[:, index, 3:] = angles_at(times, reader, found)
         elif not carrier.keeps_attitude:
             poses[:, index, 3:] = np.nan
         if found.thrusts:
@@ -116,7 +116,8 @@ def carriers_at(
     return poses, _plausible(robot, thrusts, notes)
 
 
-def _angles(times: np.ndarray | None, reader: Reader, found: Fields) -> np.ndarray:
+def angles_at(times: np.ndarray | None, reader: Reader, found: Fields) -> np.ndarray:
+    """Return the orientation of a carrier at some times as angles, (N, 3) [rad]; nan: not recorded."""
     samples = reader.stream(found.orientation)
     if samples.values.shape[1] == 3:
         samples = Samples(samples.times, np.unwrap(samples.values, axis=0))

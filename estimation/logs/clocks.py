@@ -1,6 +1,7 @@
-"""`clock_of_poses`: the clock of poses in another file than the lengths, by cable speeds."""
+"""Clocks of poses in another file than the lengths, by cable speeds, and of carriers in files of their own."""
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,12 +11,19 @@ from ...models import points
 from ...models.dynamics import Dynamics
 from ...models.robot import Robot
 from .alignment import Clock, align
-from .carrier_poses import carriers_at
-from .mapping import Field, LogMap
+from .carrier_poses import angles_at, carriers_at
+from .mapping import Field, LogMap, carrier_fields
 from .recording import Recording, Samples, check_rising
+from .streams import Reader
 
 MOST_ALIGNED = 200_000  # poses
 FAR_APART = 0.1  # [s] between clocks in one file; calibration and replay find smaller offsets themselves
+STEP, FEWEST, MOST_COMPARED = (
+    0.05,
+    0.5,
+    300,
+)  # [s] of a search, share of the samples that must overlap, and their number
+CLEARLY = 0.8  # of the spread of a cable's length, below which another clock is better
 SURELY, LIKE = 10.0, 0.8  # standard deviations of such an offset, and the correlation of speeds
 
 
@@ -99,3 +107,71 @@ def _aligned(
     effects = effects[:, np.ptp(effects, axis=0) > 1e-6]
     along = np.asarray(Dynamics(robot).cable_lengths(poses, carriers))
     return align(lengths.times, lengths.values, position.times[rows], along, effects)
+
+
+class Seen(NamedTuple):
+    """Times (N,) [s] and poses (N, 6) of the platform, with the cable lengths up to offsets, (N, m) [m]."""
+
+    times: np.ndarray
+    poses: np.ndarray
+    lengths: np.ndarray
+
+
+def set_clocks_of_carriers(
+    robot: Robot, of_poses: Sequence[Recording], all_: Sequence[Recording], given: LogMap | None, seen: Seen
+) -> list[str]:
+    """Set the clocks of carriers that were recorded in files of their own, and return a note on each.
+
+    The right offset is the one at which the distance from anchor to attachment changes as the length does: hardly, if
+    the lengths are constant. Clocks of one rate are assumed.
+    """
+    notes: list[str] = []
+    for index, carrier in enumerate(robot.carriers):
+        found = carrier_fields(all_, given, carrier.name)
+        source = found.position[0].recording if found.position else None
+        if source is None or source in of_poses or not carrier.moves:
+            continue
+        reader = Reader(found)
+        own, position = reader.stream(found.position)
+        if own is None:
+            continue
+        angles = angles_at(own, reader, found) if found.orientation else np.full_like(position, np.nan)
+        poses = np.hstack([position, np.where(np.isfinite(angles), angles, carrier.home[3:])])
+        kept = np.isfinite(position).all(axis=1)
+        if kept.sum() < 4:
+            continue
+        offset = _offset(robot, index, own[kept], poses[kept], seen)
+        if offset:
+            source.ahead = offset
+            where = "ahead of" if offset > 0 else "behind"
+            notes.append(f"the clock of {carrier.name} is {abs(offset):.4f} s {where} that of the poses")
+    return notes
+
+
+def _offset(robot: Robot, index: int, times: np.ndarray, poses: np.ndarray, seen: Seen) -> float:
+    """Return by how much the clock of a carrier's poses (K, 6) is ahead [s], 0 if that is not clear."""
+    from scipy.optimize import minimize_scalar
+
+    cables = np.flatnonzero(np.asarray(robot.carrier_of_cable) == index)
+    rows = np.flatnonzero(np.isfinite(seen.poses[:, :3]).all(axis=1))
+    if not len(rows) or not len(cables):
+        return 0.0
+    rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_COMPARED).astype(int))]
+    angles = np.where(np.isfinite(seen.poses[rows, 3:]), seen.poses[rows, 3:], robot.home[3:])
+    ends = seen.poses[rows, None, :3] + robot.attachments[cables] @ np.swapaxes(points.rotations(angles), 1, 2)
+    starts = poses[:, None, :3] + robot.anchors[cables] @ np.swapaxes(points.rotations(poses[:, 3:]), 1, 2)  # (K, c, 3)
+    flat = starts.reshape(len(starts), -1).T
+
+    def spread(offset: float) -> float:
+        at = seen.times[rows] + offset
+        inside = (at >= times[0]) & (at <= times[-1])
+        if inside.mean() < FEWEST:
+            return np.inf
+        moved = np.stack([np.interp(at[inside], times, column) for column in flat], axis=1)
+        apart = np.linalg.norm(moved.reshape(-1, len(cables), 3) - ends[inside], axis=2)
+        return float((apart - seen.lengths[rows][inside][:, cables]).std(axis=0).mean())
+
+    tried = np.arange(times[0] - seen.times[rows[-1]], times[-1] - seen.times[rows[0]] + STEP, STEP)
+    best = tried[int(np.argmin([spread(offset) for offset in tried]))]
+    found: Any = minimize_scalar(spread, bounds=(best - STEP, best + STEP), method="bounded", options={"xatol": 1e-5})
+    return float(found.x) if found.fun < CLEARLY * spread(0.0) else 0.0

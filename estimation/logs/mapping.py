@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from pathlib import PurePath
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -156,15 +157,24 @@ def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrie
     """Return the fields of a carrier: its pose and its thrust. Raises `InputError` as `fields_of`."""
     prefix, everything = _prefix(given, carrier), _everything(recordings)
     parts = [one for one in everything if _within(one[1].full(one[2]), prefix)]
+    if own := [one for one in recordings if len(recordings) > 1 and _is_of(one, prefix)]:
+        parts, prefix = _everything(own), ""
     roles = ("position", "orientation", "thrusts", "directions")
     found = {name: _usual(parts, name, None, (), prefix) for name in roles}
     return Fields(**found, time=_usual(everything, "time", None, ()))
 
 
 def _everything(recordings: Sequence[Recording], but: Sequence[str] = ()) -> list[tuple[Recording, Topic, str]]:
-    """Return all fields, except those below some prefixes."""
-    every = [(one, topic, name) for one in recordings for topic in one.topics.values() for name in topic.fields]
+    """Return all fields, except those below some prefixes, or in files of such names if there are several."""
+    kept = [one for one in recordings if len(recordings) == 1 or not any(_is_of(one, prefix) for prefix in but)]
+    every = [(one, topic, name) for one in kept for topic in one.topics.values() for name in topic.fields]
     return [one for one in every if not any(_within(one[1].full(one[2]), prefix) for prefix in but)]
+
+
+def _is_of(recording: Recording, carrier: str) -> bool:
+    """Return whether a file has the name of a carrier, up to the number of a part of a bag."""
+    stem = PurePath(recording.where).stem
+    return re.fullmatch(rf"{re.escape(carrier)}(_\d+)?", stem, re.IGNORECASE) is not None
 
 
 def _prefix(given: LogMap | None, carrier: str) -> str:

@@ -36,7 +36,7 @@ _VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
 # The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
 PATTERNS = {
     "lengths": (
-        rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|encoders?|enc){_NUMBER}{_AFTER}",
+        rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|drums?|encoders?|enc){_NUMBER}{_AFTER}",
         rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)\[(\d+)\]",
         r".*/position\[[^\]]*?(\d+)(?:[_ ][^\]0-9]+)?\]",  # also of winch_1_joint
         r".*/joints\[[^\]]*?(\d+)\]\.position",

@@ -15,7 +15,8 @@ from ...models.robot import Robot
 from .alignment import Clock
 from .cable_directions import in_world, vectors
 from .carrier_poses import carriers_at, tensions_by_thrust
-from .clocks import clock_of_poses
+from .clocks import Seen, clock_of_poses, set_clocks_of_carriers
+from .encoders import lengths_of
 from .frozen import frozen
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, read_map
 from .measurements import Measurements, changed
@@ -118,11 +119,31 @@ def read_log(
         found = _fields([*first, *others] if given else first, others, given, known)
         everything = [*first, *others]
         read = measurements_of(found, everything, sigma, known, given)._replace(recordings=everything)
+        if known is not None and len(everything) > 1:
+            _set_clocks(read, known, given)
         if not carriers:
             return read
         return _with_directions(read if known is None else _with_carriers(read, known, given), known, given)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+
+
+def _times(read: Log) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Return the times of the samples by the clocks of the lengths and of the poses, (N,) [s]."""
+    times = None if read.measurements.times is None else read.measurements.times + read.begin
+    if times is None or read.clock is None:
+        return times, times
+    return times, read.clock.offset + read.clock.rate * times
+
+
+def _set_clocks(read: Log, robot: Robot, given: LogMap | None) -> None:
+    """Set the clocks of carriers in files of their own, where poses of the platform show them."""
+    measured, seen = read.measurements, _times(read)[1]
+    if seen is None or measured.poses is None or measured.m != robot.m:
+        return
+    of_platform = {id(one.recording): one.recording for one in (*read.fields.position, *read.fields.lengths)}
+    along = Seen(seen, measured.poses, lengths_of(robot, measured.lengths))
+    read.notes.extend(set_clocks_of_carriers(robot, list(of_platform.values()), read.recordings, given, along))
 
 
 def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
@@ -131,10 +152,7 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     measured = read.measurements
     if not moving:
         return read
-    times = None if measured.times is None else measured.times + read.begin
-    seen = times  # by the clock of the poses
-    if times is not None and read.clock is not None:
-        seen = read.clock.offset + read.clock.rate * times
+    times, seen = _times(read)
     poses, thrusts = carriers_at(robot, read.recordings, given, seen, len(measured), read.notes)
     there = np.asarray(np.isfinite(poses[..., :3]).any(axis=(0, 2)))
     lost = ", ".join(robot.carriers[i].name for i in moving if not there[i])

@@ -97,7 +97,7 @@ def read_recorded(
         doubt = None
         if lengths is not None and not any(carrier.moves for carrier in known.carriers):
             wrong = mistake(known, measured)
-            doubt = wrong and wrong.doubt
+            doubt = wrong.doubt if wrong else None
         carrier_pose, thrusts = carriers_at(known, read.recordings, given, times, len(times), notes)
         axis = read.ned or ned_frame(known, pose, carrier_pose)
         if axis is not None:

@@ -50,7 +50,7 @@ class Topic:
         return f"{self.name}/{name}" if self.name else name
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Recording:
     """A log and its topics.
 
@@ -64,6 +64,8 @@ class Recording:
         Standard deviations that the file states, by the names of `Sigma`.
     notes
         Remarks about the file, such as that its end is missing.
+    ahead
+        Time by which its clock is ahead of that of the poses [s], which is found when several files are read together.
     """
 
     where: str
@@ -71,6 +73,7 @@ class Recording:
     topics: Mapping[str, Topic]
     sigma: Mapping[str, float] = field(default_factory=dict)
     notes: Sequence[str] = ()
+    ahead: float = 0.0
 
 
 def plain(name: object) -> str:

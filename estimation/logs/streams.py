@@ -60,7 +60,7 @@ class Reader:
                 times, rows = np.unique(times, return_index=True)
                 kept = np.isfinite(values[rows]).any(axis=1)
                 times, values = times[kept], values[rows[kept]]
-            self._done[key] = Samples(times, values)
+            self._done[key] = Samples(times if times is None else times - one.recording.ahead, values)
         return self._done[key]
 
     def _unit_of(self, clock: Field, column: np.ndarray) -> str:

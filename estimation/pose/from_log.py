@@ -76,7 +76,7 @@ class LogPoses(Displayed):
     @property
     def doubt(self) -> str | None:
         """Return the input error of the log that makes the poses doubtful, in one line, or None."""
-        return self.mistake and self.mistake.doubt
+        return self.mistake.doubt if self.mistake else None
 
     @property
     def cost(self) -> np.ndarray:
