@@ -252,3 +252,17 @@ def test_a_team_that_carries_its_load_on_an_exact_line_rests_at_its_ends_at_the_
     tilt = np.arccos(np.cos(plans[1].trajectory["carrier_pose"].values[..., 3:5]).prod(axis=-1))
     assert tilt.max() < np.radians(20), "34 degrees, the limit, by the law of degree 7"
     assert plans[1].scenario.task.path.timing == "smoother"
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_a_team_carries_its_load_along_exact_legs_round_a_corner(count):
+    """By the usual law the snap jumps at the corner, hence the accelerations of the quadrotors: none was found."""
+    home = load(f"multi-quadrotor-{count}").home
+    points = [(home[:3] + offset).tolist() for offset in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.15])]
+    path = {"kind": "waypoints", "points": points}
+    found = plan(f"multi-quadrotor-{count}", {"path": path, "base": {"kind": "free"}, "duration": 6, "time_limit": 60})
+    assert found.feasible
+    assert found.tracking_error_max < 1e-9
+    assert found.scenario.task.path.timing == "smoother"
+    speed = found.scenario.task.path.at(np.linspace(2, 4, 401), 6.0).velocity
+    assert np.linalg.norm(speed, axis=1).min() > 0.02  # it does not stop at the corner

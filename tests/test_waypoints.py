@@ -115,10 +115,35 @@ def test_no_list_of_points_leaves_its_box_or_its_legs():
 
 
 @pytest.mark.parametrize("seed", range(12))
+def test_smoother_legs_stay_as_near_and_their_snap_does_not_jump(seed):
+    points = random_points(seed)[:8]
+    path, duration = path_of(points, timing="smoother"), 10.0
+    motion, box = path.at(np.linspace(0, duration, 4001), duration), np.ptp(points[:, :3], axis=0)
+    place, tolerance = motion.pose[:, :3], 1e-12 * np.linalg.norm(box)
+    assert (place >= points[:, :3].min(axis=0) - tolerance).all()
+    assert (place <= points[:, :3].max(axis=0) + tolerance).all()
+    first = Rotation.from_euler("ZYX", points[0, :2:-1]).inv()
+    turned = (first * Rotation.from_euler("ZYX", points[:, :2:-1])).magnitude().max()
+    assert from_legs(place, points[:, :3]).max() <= 0.01 * np.hypot(np.linalg.norm(box), turned) + tolerance
+
+    def largest_jump(timing, step):
+        """The largest change of the snap from one step to the next."""
+        times = np.arange(0, duration + step / 2, step)
+        acceleration = path_of(points, timing=timing).at(times, duration).acceleration[:, :3]
+        return np.linalg.norm(np.diff(acceleration, 3, axis=0), axis=1).max() / step**2
+
+    if seed % 4 == 2:
+        return  # with legs that are over within a step
+    assert largest_jump("smoother", 5e-4) < 0.6 * largest_jump("smoother", 1e-3)  # in proportion to the step
+    assert largest_jump(None, 5e-4) > 0.6 * largest_jump(None, 1e-3)
+
+
+@pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("blend", [None, 0.0, 0.3])
-def test_derivatives_of_legs_by_differences(seed, blend):
+@pytest.mark.parametrize("timing", [None, "smoother"])
+def test_derivatives_of_legs_by_differences(seed, blend, timing):
     points = random_points(seed)[:6]
-    path, step, duration = path_of(points, blend=blend), 1e-4, 20.0
+    path, step, duration = path_of(points, blend=blend, timing=timing), 1e-4, 20.0
     times = np.linspace(0.01, duration - 0.01, 301)
     before, at, after = (path.at(times + shift, duration) for shift in (-step, 0, step))
     scale = 1 + np.abs(at.acceleration).max()

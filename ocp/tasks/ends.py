@@ -111,12 +111,16 @@ def at_rest_without_acceleration(robot: Robot, owner: int | None, coordinate: in
 
 
 def with_timing(robot: Robot, task: Task) -> Task:
-    """Return a task with a timing of its line: smoother where balance determines a team's motion, and none is given."""
+    """Return a task whose line or legs are smoother where balance determines a team's motion, unless a timing is given.
+
+    A team rests at the ends of a line only then. Along legs of waypoints the usual law's snap jumps, and with it the
+    accelerations of the quadrotors, which their thrusts cannot follow.
+    """
     path = task.path
-    if not isinstance(path, LinePath) or path.timing is not None:
-        return task
     exact = task.tube.radius == task.tube.turn == 0 and isinstance(task.base, FreeBase)
     team = robot.m < len(robot.platform.dof) and any(carrier.efforts for carrier in robot.carriers)
-    if not (exact and team and carrier_ends(task) == "rest"):
+    if not (exact and team and isinstance(path, LinePath | WaypointPath) and path.timing is None):
+        return task
+    if path.shape == "spline" if isinstance(path, WaypointPath) else carrier_ends(task) != "rest":
         return task
     return task.model_copy(update={"path": path.model_copy(update={"timing": "smoother"})})

@@ -23,7 +23,7 @@ import numpy as np
 
 from .attitudes import Attitudes, Progress, nearest_turn
 from .motion import Motion
-from .overlap import MOST, even_out, largest_left, leg_law, meeting, shares_of_time, size
+from .overlap import MOST, SMOOTHER, USUAL, Overlap, size
 
 BLEND = 0.01  # of the span of the points; accelerations hardly fall with more
 LOOKS = 48  # at the angles of each leg
@@ -41,6 +41,7 @@ class Legs:
       acceleration.
     - `dwell`: (n,), dwell time at each [s]; default: none.
     - `shares`: whether `times` are shares of the duration, from 0 to 1: the way is then the same one as without.
+    - `smoother`: whether the legs have five derivatives that are zero at both ends.
     """
 
     def __init__(
@@ -50,7 +51,9 @@ class Legs:
         times: Sequence[float] | None,
         dwell: Sequence[float] | None,
         shares: bool = False,
+        smoother: bool = False,
     ):
+        self._law = law = SMOOTHER if smoother else USUAL
         self._points, self._times = np.array(points), None if times is None else np.array(times)
         self._dwell = np.zeros(len(points)) if dwell is None else np.array(dwell)
         self.attitudes = Attitudes(self._points[:, 3:])
@@ -64,11 +67,11 @@ class Legs:
             share = np.diff(self._times) - self._dwell[:-1]
             last = last if shares else 2 * share  # at most: a quarter of it longer at each end
         most = MOST * np.minimum(last[1:], last[:-1]) / (1 if self._times is None or shares else 2)
-        left = np.where(self._dwell[1:-1] > 0, 0.0, largest_left(steps, last, most, blend))
-        early, late = shares_of_time(left, lengths)
+        left = np.where(self._dwell[1:-1] > 0, 0.0, law.largest_left(steps, last, most, blend))
+        early, late = law.shares_of_time(left, lengths)
         alone = 1 - early - late
         # How long each leg moves, and the time from each point to the next: [s] if there are times, else in proportion.
-        self._last = even_out(steps, last, early, late) if self._times is None else share / alone
+        self._last = law.even_out(steps, last, early, late) if self._times is None else share / alone
         self._between = self._last * alone
         self._early = early  # how long before its first point each leg starts, in shares of its time
         self._overlaps = late[:-1] * self._last[:-1] + early[1:] * self._last[1:]  # (n - 2,)
@@ -76,8 +79,8 @@ class Legs:
         self._weights = share / share.sum()  # how much of s belongs to each leg
         # s of each inner point, and where two legs begin and cease to move there, (n - 2,) each.
         self._corners = np.cumsum(self._weights)[:-1]
-        self._begins = self._corners - self._weights[:-1] * leg_law(self._overlaps / self._last[:-1])[0]
-        self._ends = self._corners + self._weights[1:] * leg_law(self._overlaps / self._last[1:])[0]
+        self._begins = self._corners - self._weights[:-1] * law.law(self._overlaps / self._last[:-1])[0]
+        self._ends = self._corners + self._weights[1:] * law.law(self._overlaps / self._last[1:])[0]
 
     def scale(self, duration: float) -> float:
         """Return the unit of `_between` [s] for a motion of `duration` [s]."""
@@ -96,7 +99,7 @@ class Legs:
         leg = np.minimum(np.searchsorted(start + last, times, side="right"), len(last) - 1)
         # After the last leg comes one that never starts.
         start, last = np.append(start, np.inf), np.append(last, 1.0)
-        first, second = (_over(times, start[k], last[k]) for k in (leg, leg + 1))
+        first, second = (_over(self._law, times, start[k], last[k]) for k in (leg, leg + 1))
         return self._motion(leg, first, second)
 
     @property
@@ -134,7 +137,7 @@ class Legs:
         if curved.size:
             k = leg[curved]
             before, after = (weights[k], last[k]), (weights[k + 1], last[k + 1])
-            both = _through(s[curved] - self._corners[k], self._overlaps[k], before, after)
+            both = _through(self._law, s[curved] - self._corners[k], self._overlaps[k], before, after)
             for part, values in zip((*first, *second), both, strict=True):
                 part[curved] = values
         return leg, first, second
@@ -168,23 +171,27 @@ class Legs:
         return np.stack([np.interp(s, places, column) for column in angles.T], axis=1)
 
 
-def _over(times: np.ndarray, start: np.ndarray, last: np.ndarray) -> Progress:
+def _over(law: Overlap, times: np.ndarray, start: np.ndarray, last: np.ndarray) -> Progress:
     """Return what a leg has done at `times`, with two derivatives by time."""
-    done, rate, rate_rate = leg_law((times - start) / last)
+    done, rate, rate_rate = law.law((times - start) / last)
     return done, rate / last, rate_rate / last**2
 
 
 def _through(
-    offset: np.ndarray, overlap: np.ndarray, before: tuple[np.ndarray, np.ndarray], after: tuple[np.ndarray, np.ndarray]
+    law: Overlap,
+    offset: np.ndarray,
+    overlap: np.ndarray,
+    before: tuple[np.ndarray, np.ndarray],
+    after: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, ...]:
     """Return what two legs have done where both move, with two derivatives by s; `offset` is s less that of the point.
 
     `before` and `after` are the weight of a leg in s and how long it lasts.
     """
     (weight_before, last_before), (weight_after, last_after) = before, after
-    since = meeting(overlap, before, after, offset)
-    left, left_rate, left_rate_rate = _over(overlap - since, np.zeros(1), last_before)
-    done, rate, rate_rate = _over(since, np.zeros(1), last_after)
+    since = law.meeting(overlap, before, after, offset)
+    left, left_rate, left_rate_rate = _over(law, overlap - since, np.zeros(1), last_before)
+    done, rate, rate_rate = _over(law, since, np.zeros(1), last_after)
     s_rate = weight_before * left_rate + weight_after * rate
     s_rate_rate = weight_after * rate_rate - weight_before * left_rate_rate
     by_s, by_s_twice = 1 / s_rate, -s_rate_rate / s_rate**3

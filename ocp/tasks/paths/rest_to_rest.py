@@ -8,6 +8,8 @@ the cables, hence the positions of the quadrotors; and these rest only if their 
 
 import numpy as np
 
+SMOOTHER_PEAK = 13860 * (2 / 9) ** 4 / 3  # of the second derivative of the smoother law, at s = 1/3
+
 
 def rest_to_rest(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the share of the way and its first two derivatives, at the shares s of the time; before and after: rest.

@@ -69,12 +69,17 @@ class WaypointPath(PathBase):
         json_schema_extra=or_number,
     )
 
+    timing: Literal["smoother"] | None = optional(
+        "for legs: smoother: the first five derivatives of each leg are zero at its ends; default: smoother if "
+        "quadrotors could otherwise not follow (an exact path of a platform under fewer than six cables)"
+    )
+
     @model_validator(mode="before")
     @classmethod
     def _read(cls, data: Any, info: ValidationInfo) -> Any:
         if not isinstance(data, dict):
             return data
-        if "timing" in data:
+        if data.get("timing") not in (None, "smoother"):
             known = GONE.get(str(data["timing"]), GONE["smooth"])
             raise ValueError(f"'timing' must be left out of waypoints: {known}")
         return with_points_of_file(data, info, ("points", "times", "dwell"))
@@ -93,7 +98,7 @@ class WaypointPath(PathBase):
             if abs(self.shares[-1] - 1) > SHORTER:
                 raise ValueError(f"shares must end at 1, got {self.shares[-1]:.10g}")
         if self.shape == "spline":
-            for name in ("blend", "dwell"):
+            for name in ("blend", "dwell", "timing"):
                 if getattr(self, name) is not None:
                     raise ValueError(f"{name} must be left out with the shape spline, which rests only at its ends")
             self._spline.check()
@@ -150,7 +155,8 @@ class WaypointPath(PathBase):
 
     @property
     def _legs(self) -> Legs:
-        return _legs(self.points, self.blend, self.times or self.shares, self.dwell, self.shares is not None)
+        times, smoother = self.times or self.shares, self.timing == "smoother"
+        return _legs(self.points, self.blend, times, self.dwell, self.shares is not None, smoother)
 
     @property
     def _spline(self) -> WaypointSpline:
