@@ -44,6 +44,7 @@ ROBOT = "wang-flying"
 MOST = 3.0  # acceleration of the base [m/s^2]
 OFFSET, JERK = 10.0, 10.0  # base away from the hovering point [m], and its jerk [m/s^3], that cost as much as 1 m/s^2
 ACCURACY = {"print_level": 0, "sb": "yes", "tol": 1e-8, "constr_viol_tol": 1e-9}
+OPTIONS = {"print_time": False, "error_on_fail": True}  # of `nlpsol`: a solve that fails raises RuntimeError
 FIRST = ACCURACY | {"mu_init": 1e-3}  # the guess is near: IPOPT's own 0.1 takes more iterations
 AGAIN = ACCURACY | FROM_A_SOLUTION
 Solve = Callable[..., Any]  # (states, controls, multipliers) -> the same of the solution
@@ -114,7 +115,7 @@ def mapped(steps: int) -> Run:
         guess[:3] = (path.pose[:, :3] - path.pose[:, :3].mean(axis=0)).T
         guess[3:6], guess[6:9] = path.velocity[:, :3].T, path.acceleration[:, :3].T
         guess[9:] = 1 / m
-        solver = ca.nlpsol("mapped", "ipopt", problem, _options(ipopt))
+        solver = ca.nlpsol("mapped", "ipopt", problem, OPTIONS | {"ipopt": ipopt})
 
         def solve(*start: Any) -> tuple[ca.DM, ...]:
             found = solver(**dict(zip(("x0", "lam_x0", "lam_g0"), start, strict=True)), **bounds)
@@ -206,7 +207,7 @@ def rockit(steps: int) -> Run:
         ocp.subject_to(ocp.at_t0(x) == ocp.at_tf(x))
         moved = ca.sumsqr(x[18:]) + ca.sumsqr(x[12:15] - ca.DM(HOVER[:3])) / OFFSET**2
         ocp.add_objective(ocp.sum(ca.sumsqr(u[:6]) + ca.sumsqr(u[6:]) / JERK**2 + moved) / steps)
-        ocp.solver("ipopt", _options(ipopt))
+        ocp.solver("ipopt", OPTIONS | {"ipopt": ipopt})
         ocp.method(MultipleShooting(N=steps))
         X, U = (ocp.sample(each, grid=grid)[1] for each, grid in ((x, "control"), (u, "control-")))
         places = ocp.sample(place, grid="control")[1]
@@ -227,11 +228,6 @@ def rockit(steps: int) -> Run:
         return audit(lay_out(robot, task), Deviation(nodes, q - HOVER[:3], v, a, tensions))
 
     return _twice(write, audited)
-
-
-def _options(ipopt: dict[str, Any]) -> dict[str, Any]:
-    """Return options of `nlpsol` with these of IPOPT; a solve that fails raises RuntimeError."""
-    return {"print_time": False, "error_on_fail": True, "ipopt": ipopt}
 
 
 CONTENDERS: dict[str, Callable[[int], Run]] = {"towline": towline, "CasADi, mapped": mapped, "rockit": rockit}

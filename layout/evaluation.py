@@ -17,6 +17,8 @@ from ..models.dynamics import dynamics_of
 from ..models.mechanics import Mechanics
 from ..models.points import rotations
 from ..models.record import record_of
+from ..ocp.tasks.lay_out import lay_out
+from ..ocp.tasks.task import Task
 from ..solvers import solve_batch
 from ..solvers.margins import Reserves, all_reserves, margins, reserves
 from ..statics.stiffness import frequencies_of
@@ -28,6 +30,7 @@ from .variables import Variables, parts
 
 NO_BOUNDS = Room()
 ByVariables = Callable[[np.ndarray, np.ndarray], np.ndarray]  # (poses, columns), (k,) each -> (k, p)
+INSTANTS, FEW_INSTANTS = 41, 9  # of each task, and for annealing
 MOST_SLOW = 40  # lowest frequencies, which a linear program has
 MOST_LONG = 4  # longest lengths of each cable, which a linear program has
 _STEP = 1e-6  # of the range of a variable, for differences of frequencies
@@ -66,6 +69,22 @@ def rows_of(robot: Robot, requirements: tuple[Requirement, ...], poses: list[np.
         start += len(places)
     pose_of, wrenches, accelerations = (np.concatenate(part) for part in zip(*blocks, strict=True))
     return Rows(np.concatenate(poses), pose_of, wrenches, accelerations)
+
+
+def with_tasks(rows: Rows, robot: Robot, tasks: tuple[Task, ...], count: int = INSTANTS) -> Rows:
+    """Return the rows, followed by those of each task that fixes its motion and leaves the carriers at home.
+
+    The wrenches of other tasks depend on the planner's choices, so these tasks are only planned at the end.
+    """
+    for task in tasks:
+        scenario = lay_out(robot, task)
+        if not scenario.is_fixed or scenario.carrier_paths:
+            continue
+        times = np.linspace(0.0, scenario.duration, count)
+        motion, carriers = scenario.motion(times, None)
+        wrenches = scenario.required_wrench(times, motion, carriers, scenario.wind)
+        rows = rows.joined(Rows(motion.pose, np.arange(count), wrenches, motion.acceleration))
+    return rows
 
 
 class Slopes(NamedTuple):

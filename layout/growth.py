@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .evaluation import Evaluation, rows_of
+from .evaluation import Evaluation, rows_of, with_tasks
 from .requirements import Requirements
 from .room import room_of
 from .search import Found, Progress, search
-from .task_rows import with_tasks
 from .variables import Variables
 
 _ROUNDS = 6  # of layouts and sizes, at most

@@ -12,7 +12,7 @@ from ..base.inputs import shown
 from ..models import Robot
 from ..models.files import as_robot
 from ..ocp.planner import plan
-from .evaluation import Evaluation, Rows, rows_of
+from .evaluation import Evaluation, Rows, rows_of, with_tasks
 from .goal import goal_of
 from .growth import grow
 from .impossibility import find_impossibility
@@ -23,7 +23,6 @@ from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design
 from .room import room_of
 from .search import ROOM_AUDITED, Progress, audited_rows, few, search
-from .task_rows import with_tasks
 from .variables import Variables, variables_of
 
 

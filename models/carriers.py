@@ -80,6 +80,7 @@ class Carrier(Part):
 
     tows: ClassVar[bool] = False  # by cables without winches, unless the robot's file has winches or states its drive
     efforts: ClassVar[tuple[str, ...]] = ()  # names of what must hold it, against gravity and the pull of its cables
+    coordinates: ClassVar[tuple[int, ...]] = ()  # in which it can move with every drive
 
     name: Name = Field(description="name by which cables and tasks refer to the carrier")
     home: Pose = optional("pose of the carrier frame in {G} at rest [m, rad]", AT_ORIGIN)
@@ -98,7 +99,7 @@ class Carrier(Part):
 
     def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
         """Return the coordinates in which it can move with a drive of the robot; the others stay at home."""
-        return ()
+        return self.coordinates
 
     def planned_coordinates(self, drive: Drive, tilts: bool = True) -> tuple[int, ...]:
         """Return the free coordinates that a planner chooses: no yaw, and no roll and pitch without `tilts`."""
@@ -195,11 +196,9 @@ class GroundCarrier(Carrier):
 class PrescribedCarrier(Carrier):
     """A carrier with imposed motion that disturbs the platform (paper F's quadrotor)."""
 
-    kind: Literal["prescribed"]
+    coordinates: ClassVar[tuple[int, ...]] = (*POSITION, *TILT, *YAW)
 
-    def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
-        """Return all six."""
-        return (*POSITION, *TILT, *YAW)
+    kind: Literal["prescribed"]
 
 
 class MobileCarrier(Carrier):
@@ -240,6 +239,7 @@ class QuadrotorCarrier(Carrier):
 
     tows: ClassVar[bool] = True
     efforts: ClassVar[tuple[str, ...]] = ("thrust", "torque", "force across the thrust")
+    coordinates: ClassVar[tuple[int, ...]] = (*POSITION, *TILT, *YAW)
 
     kind: Literal["quadrotor"]
     mass: Positive = Field(description="mass [kg]")
@@ -261,10 +261,6 @@ class QuadrotorCarrier(Carrier):
         if self.thrust_min >= self.thrust_max:
             raise ValueError(f"thrust_min must be below thrust_max, {self.thrust_max:g} N, got {self.thrust_min:g} N")
         return self
-
-    def free_coordinates(self, drive: Drive) -> tuple[int, ...]:
-        """Return all six."""
-        return (*POSITION, *TILT, *YAW)
 
     def planned_coordinates(self, drive: Drive, tilts: bool = True) -> tuple[int, ...]:
         """Return position and tilt: it tilts in every task, since its thrust must point along the force it gives."""

@@ -12,12 +12,14 @@ from .arrays import Array
 from .batch import as_array
 from .cables.elastic import axial_stiffness, unstrained_length
 from .motion import Motion
+from .parameters import locate
 from .record import record_of
 from .robot import Robot
 
 ROWS_WORTH_A_THREAD = 50_000  # some milliseconds
 
 _RESULTS = 5  # of `core.lines`
+_COLUMNS = {"anchor": 0, "attachment": 3, "radius": 6}  # of `Mechanics.columns_by_geometry`
 
 
 class Mechanics:
@@ -129,6 +131,24 @@ class Mechanics:
             function(self._record, *rows)
 
         processors.in_threads(run, count, min(processors.available(), count // ROWS_WORTH_A_THREAD))
+
+
+def derivatives(
+    robot: Robot, pose: np.ndarray, carrier_pose: np.ndarray, names: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how wrenches depend on p numbers of the cables, by the `names` of `Robot.parameter_values`.
+
+    That is the derivative by each number of the column of its cable, (n, 6, p) [1/m, -], and the index of that cable,
+    (p,), at poses of the platform, (n, 6), and of the carriers, (n, c, 6), in {G} [m, rad].
+
+    Raises `ValueError` if the robot has no such number; `InputError` if the robot has more cables or carriers than
+    the numeric core has room for.
+    """
+    places = [locate(name, robot.cables) for name in names]
+    cables = np.array([place.cable for place in places], dtype=int)
+    columns = np.array([_COLUMNS[place.part] + place.axis for place in places], dtype=int)
+    by_geometry = Mechanics(robot).columns_by_geometry(pose, carrier_pose)  # (n, m, 6, 7)
+    return np.moveaxis(by_geometry[:, cables, :, columns], 0, 2), cables
 
 
 def _common(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""Newton and Euler for the platform in {G}: the wrench that its motion needs, and the aerodynamic wrench on it.
+"""Newton and Euler for the platform in {G}: the wrench that its motion needs, that of the air, and accelerations.
 
     force  : m (a_c - g)                       a_c = ddx + alpha x R c + omega x (omega x R c)
     moment : I alpha + omega x I omega         I = R I_b R^T, omega = R Omega, alpha = R (dP dTheta + P ddTheta)
@@ -14,11 +14,21 @@ The air's wrench is that of paper F,
 
 where V is the air's velocity relative to the platform's CoM, along the axes of {G}. Eq. 25 has V_x^2 for
 V_x |V_x| and so never pushes backwards; that form is kept under `form: printed`.
+
+The wrench that a motion needs is affine in the accelerations, w = M(q) ddq + h(q, dq), so
+
+    platform   M ddq = A t + W_e - h
+    carrier    F = - sum_i t_i u_i,   M = - sum_i (c_i x R_Q^T u_i) t_i       (M in its own axes)
+
+for the pull (F, M) of the cables i that a carrier holds, which leave it at c_i: what pulls the platform pulls the
+carrier back (`carriers` has how a quadrotor moves with it).
 """
 
 import casadi as ca
+import numpy as np
 
 from ..base.errors import InputError
+from .cables.pulley import Exit
 from .robot import Robot
 from .rotation import Matrix, body_rate, rotation, turning
 
@@ -88,3 +98,32 @@ def aerodynamic_wrench(robot: Robot, pose: Matrix, velocity: Matrix, wind: Matri
     along = V[0:2] ** 2 if aero.form == "printed" else V[0:2] * ca.fabs(V[0:2])
     lift = pressure_area * aero.lift * (V[0] ** 2 + V[1] ** 2)
     return ca.vertcat(pressure_area * aero.drag * along, lift, ca.DM.zeros(3))
+
+
+def platform_acceleration(robot: Robot, pose: Matrix, velocity: Matrix, wrench: Matrix) -> Matrix:
+    """Return ddq, (6, 1), of the platform under gravity and `wrench` (6, 1): force and moment about the CoM in {G}.
+
+    Coordinates that are not in `platform.dof` do not accelerate.
+    """
+    acceleration = ca.SX.sym("acceleration", 6)
+    needed = inertial_wrench(robot, pose, velocity, acceleration)  # M ddq + h
+    M, h = ca.jacobian(needed, acceleration), ca.substitute(needed, acceleration, ca.DM.zeros(6))
+    rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]
+    moving = ca.solve(M[rows, rows], (wrench - h)[rows])
+    return ca.DM.eye(6)[:, rows] @ moving
+
+
+def pull_on_carrier(robot: Robot, index: int, run: Exit, carrier_pose: Matrix, tensions: Matrix) -> Matrix:
+    """Return the pull of its cables on carrier `index`, (6, 1): force in {G} [N], moment in its own axes [N m].
+
+    The cables run in {G} as `run` has it: over a pulley one pulls along the line that leaves the sheave. The carrier
+    is at `carrier_pose` in {G}, (6, 1).
+    """
+    R = rotation(carrier_pose[3:6])
+    force, moment = ca.DM.zeros(3), ca.DM.zeros(3)
+    for cable in np.flatnonzero(robot.carrier_of_cable == index):
+        i = int(cable)
+        along = -tensions[i] * run.directions[:, i]
+        force = force + along
+        moment = moment + R.T @ ca.cross(run.points[:, i] - carrier_pose[0:3], along)
+    return ca.vertcat(force, moment)

@@ -6,7 +6,7 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from . import elasticity, forward, kinematics, rigid_body
+from . import elasticity, kinematics, rigid_body
 from .cables.pulley import Exit
 from .motion import Motion
 from .robot import Robot
@@ -80,14 +80,14 @@ class WorldFunctions:
         return self._A @ self._symbols["tensions"]
 
     def _acceleration(self, wrench: Matrix) -> Matrix:
-        return forward.platform_acceleration(self._robot, self._symbols["pose"], self._symbols["velocity"], wrench)
+        return rigid_body.platform_acceleration(self._robot, self._symbols["pose"], self._symbols["velocity"], wrench)
 
     def _coupled_acceleration(self) -> dict[str, Matrix]:
         robot, symbols = self._robot, self._symbols
         gravity, carriers = np.array(robot.gravity), []
         for index, carrier in enumerate(robot.carriers):
             at, rate = symbols["carrier_pose"][index, :].T, symbols["carrier_velocity"][index, :].T
-            pull = forward.pull_on_carrier(robot, index, self._exit, at, symbols["tensions"])
+            pull = rigid_body.pull_on_carrier(robot, index, self._exit, at, symbols["tensions"])
             own = carrier.acceleration(at, rate, symbols["thrust"][index], symbols["torque"][index, :].T, pull, gravity)
             carriers.append(ca.SX.zeros(1, 6) if own is None else own.T)
         return {"acceleration": self._acceleration(self._pull), "carrier_acceleration": ca.vertcat(*carriers)}

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.display import record
 from ..models import kinematics
-from ..models.forward import pull_on_carrier
+from ..models.rigid_body import pull_on_carrier
 from ..models.robot import Robot
 
 MARGIN = 0.025  # of a range, that tensions and efforts keep to their limits

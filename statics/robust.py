@@ -78,7 +78,7 @@ class Spread:
 
     def __init__(self, robot: Robot, pose: ArrayLike, carrier_pose: ArrayLike, rows: ArrayLike | None = None):
         from ..models.dynamics import dynamics_of
-        from ..models.sensitivity import derivatives
+        from ..models.mechanics import derivatives
 
         uncertainty = uncertainty_of(robot)
         pose, carrier_pose = _places(robot, pose, carrier_pose)

@@ -10,7 +10,7 @@ import pytest
 from towline import Dynamics, Planner, Robot, load, plan, time_along
 from towline.base.errors import InputError
 from towline.models import Uncertainty
-from towline.models.sensitivity import derivatives
+from towline.models.mechanics import derivatives
 from towline.statics.robust import _inverse, ellipsoid_factor, motion_factor, share_of_robots, spread
 
 from .warm import towline

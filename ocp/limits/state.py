@@ -11,7 +11,7 @@ from ...base.display import Displayed
 from ...models import Robot, kinematics
 from ...models.cables.pulley import Exit
 from ...models.carriers import Effort
-from ...models.forward import pull_on_carrier
+from ...models.rigid_body import pull_on_carrier
 from ...models.rotation import rotation
 
 

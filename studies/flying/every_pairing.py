@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from ...models import Robot, load
+from ...models import load
 from ...models.diagnosis import RANK_TOLERANCE
 from ...ocp.tasks.paths import Motion
 from .motion import circle, solved
 from .plans import BELOW, SECONDS
 
+PRINTED = "wang-flying-printed"  # the robot as printed
 PAIRINGS = np.array(list(permutations(range(6))))
 """Attachment of each anchor's cable, (720, 6)."""
 BALANCED = 1e-9  # of the weight: the largest residual of a balance
@@ -39,15 +40,9 @@ class AtCentre(NamedTuple):
     taut: np.ndarray
 
 
-@cache
-def printed() -> Robot:
-    """Return the robot as printed, read from its file once."""
-    return load("wang-flying-printed")
-
-
 def wrench_matrices(positions: np.ndarray, pairs: np.ndarray = PAIRINGS) -> np.ndarray:
     """Return J of a level platform at `positions` (n, 3) in {A}, of the pairings (k, 6): (n, k, 6, 6)."""
-    robot = printed()
+    robot = load(PRINTED)
     arms = robot.attachments[pairs]
     lines = robot.anchors - arms - positions[:, None, None]
     units = lines / np.linalg.norm(lines, axis=-1, keepdims=True)
@@ -56,7 +51,7 @@ def wrench_matrices(positions: np.ndarray, pairs: np.ndarray = PAIRINGS) -> np.n
 
 def required(motion: Motion) -> np.ndarray:
     """Return the wrench that a level motion (n, 6) under a hovering quadrotor requires, (n, 6)."""
-    robot = printed()
+    robot = load(PRINTED)
     force = robot.platform.mass * (motion.acceleration[:, :3] - np.array(robot.gravity))
     return np.hstack([force, np.zeros_like(force)])
 
@@ -99,7 +94,7 @@ def pull_inward(radius: float) -> Inward:
     Of each of the 36 lines from an anchor to an attachment, the horizontal part towards the axis over the vertical part
     is at least q, at all instants. Cables that pull and carry the weight m g then pull inward with q m g at least.
     """
-    robot, motion = printed(), circle(radius, TURN)
+    robot, motion = load(PRINTED), circle(radius, TURN)
     places = motion.pose[:, :3]
     inward = np.array([0.0, 0.0, -BELOW]) - places
     lines = robot.anchors[:, None] - robot.attachments - places[:, None, None]

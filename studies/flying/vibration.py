@@ -21,7 +21,7 @@ from ...ocp.tasks.paths import Motion
 from ..accounts.claim import Chapter, Claim
 from .cable import constants
 from .claims import claim
-from .every_pairing import PAIRINGS, at_centre, hold, printed
+from .every_pairing import PAIRINGS, PRINTED, at_centre, hold
 from .every_pairing import tensions as tensions_of
 from .motion import FEASIBLE, RADIUS, TIMES, circle, steady_tensions
 
@@ -105,7 +105,7 @@ def amplitude_of(robot: Robot, ratio: float, step: float = STEP) -> float:
 
 def together(pairs: np.ndarray, radius: float) -> np.ndarray:
     """Return the correlations of length and tension of cable 1 over a turn, of pairings (k, 6), (k,)."""
-    robot, motion = printed(), circle(radius, COARSE)
+    robot, motion = load(PRINTED), circle(radius, COARSE)
     ends = robot.attachments[pairs[:, 0]] + motion.pose[:, None, :3]
     lengths = np.linalg.norm(robot.anchors[0] - ends, axis=-1)
     return np.asarray(pearsonr(lengths, tensions_of(motion, pairs)[..., 0], axis=0)[0])

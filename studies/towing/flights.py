@@ -23,7 +23,19 @@ SHOWN = slice(None, None, 5)  # of the rows, in figures
 def chapter() -> Chapter:
     """Fly every drive and every m."""
     flights: dict[Drive, dict[int, Simulation]] = {drive: {m: fly(drive, m) for m in SIZES} for drive in DRIVES}
-    claims = [_towed(drive, by_m) for drive, by_m in flights.items()]
+    claims = [
+        claim("towed-{drive}").stated(
+            max(flight.error.max() for flight in by_m.values()),
+            all(flight.passed and in_boxes(flight) for flight in by_m.values()),
+            drive=drive,
+            section=SECTIONS[drive],
+            changes=CHANGES[drive],
+            flights=len(by_m),
+            left=1000.0 * max(flight.error[-1] for flight in by_m.values()),
+            arrived=1000.0 * ARRIVED,
+        )
+        for drive, by_m in flights.items()
+    ]
     drawings = {f"towed-{drive}": _drawing(drive, by_m[PAPERS]) for drive, by_m in flights.items()}
     return Chapter([*claims, _positive(flights)], drawings)
 
@@ -38,19 +50,6 @@ def in_boxes(flight: Simulation) -> bool:
     low, high = reach(flight.robot)
     places = flight.record.motions[:, 1:, :3]
     return bool(((places >= low - EDGE) & (places <= high + EDGE)).all())
-
-
-def _towed(drive: Drive, flights: dict[int, Simulation]) -> Claim:
-    return claim("towed-{drive}").stated(
-        max(flight.error.max() for flight in flights.values()),
-        all(flight.passed and in_boxes(flight) for flight in flights.values()),
-        drive=drive,
-        section=SECTIONS[drive],
-        changes=CHANGES[drive],
-        flights=len(flights),
-        left=1000.0 * max(flight.error[-1] for flight in flights.values()),
-        arrived=1000.0 * ARRIVED,
-    )
 
 
 def _positive(flights: dict[Drive, dict[int, Simulation]]) -> Claim:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...figures.drawing import Drawing
 from ...figures.robot import draw
-from ...models import Dynamics, load
+from ...models import Dynamics
 from ...statics.equilibria import Equilibrium, equilibria
 from ...statics.scene import scene_at
 from ...workspace import ForceBalance, Places
@@ -32,10 +32,14 @@ def chapter() -> Chapter:
     found, mover = rest(3), robot("wang-ctmrts", "both")
     poses, forces = around_the_ends()
     low, high = reach(mover)
+    # x and y of the positions, in and around the box, where pulling cables balance the weight.
+    ends, held = mover.carrier_home[:, :2], poses[(forces > 0).all(axis=1), :2]
+    outside = np.maximum(ends.min(axis=0) - held, held - ends.max(axis=0)).max(axis=1)
+    share, arm = (outside < 0).mean(), np.linalg.norm(mover.attachments, axis=1).max()
     claims = [
         _suspended({m: rest(m) for m in SIZES}),
         _dimension(found),
-        _beside(poses, forces),
+        claim("eq-15-xy").stated(share, share == 1.0, arm=arm, outside=outside.max()),
         _heights(),
         claim("step-a").undetermined((high - low).max(axis=0) / 2),
         *_steps(found.pose),
@@ -95,15 +99,6 @@ def _dimension(found: Equilibrium) -> Claim:
     slopes = np.hstack([(ahead - behind).T / (2 * STEP), dynamics.wrench_matrix(found.pose)])
     size = slopes.shape[1] - int(np.linalg.matrix_rank(slopes, rtol=1e-6))
     return claim("eq-14").stated(size, 0 < size <= 6)
-
-
-def _beside(poses: np.ndarray, forces: np.ndarray) -> Claim:
-    """Check x and y of the positions, in and around the box, where pulling cables balance the weight."""
-    ends = robot("wang-ctmrts", "both").carrier_home[:, :2]
-    held = poses[(forces > 0).all(axis=1), :2]
-    outside = np.maximum(ends.min(axis=0) - held, held - ends.max(axis=0)).max(axis=1)
-    share, arm = (outside < 0).mean(), np.linalg.norm(load("wang-ctmrts").attachments, axis=1).max()
-    return claim("eq-15-xy").stated(share, share == 1.0, arm=arm, outside=outside.max())
 
 
 def _heights() -> Claim:

@@ -94,12 +94,6 @@ def infeasible(rng: np.random.Generator) -> Iterator[TensionProblem]:
             yield _beyond(rng, name, part)
 
 
-def _nearby(rng: np.random.Generator, dynamics: Dynamics) -> np.ndarray:
-    robot = dynamics.robot
-    spread = np.r_[np.ptp(robot.home_anchors, axis=0) / 8, np.full(3, 0.1)]
-    return robot.home + robot.dof_mask * spread * rng.uniform(-1, 1, 6)
-
-
 def _given(rng: np.random.Generator, name: str, offset: np.ndarray) -> TensionProblem:
     """Return the wrench of random tensions between the limits, at an offset from home."""
     dynamics = Dynamics(load(name))
@@ -114,7 +108,8 @@ def _beyond(rng: np.random.Generator, name: str, part: float) -> TensionProblem:
     dynamics = Dynamics(load(name))
     robot = dynamics.robot
     scale = robot.wrench_scale * robot.dof_mask
-    A = dynamics.wrench_matrix(_nearby(rng, dynamics))
+    spread = np.r_[np.ptp(robot.home_anchors, axis=0) / 8, np.full(3, 0.1)]
+    A = dynamics.wrench_matrix(robot.home + robot.dof_mask * spread * rng.uniform(-1, 1, 6))
     normal = rng.normal(size=6) * robot.dof_mask
     normal /= np.linalg.norm(normal)
     corner = np.where((scale * normal) @ A > 0, robot.t_max, robot.t_min)
