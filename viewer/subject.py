@@ -86,7 +86,10 @@ def read(
     other
         A plan or a simulation to compare a plan or a simulation with.
 
-    Raises `InputError` if it is none of these, or belongs to another robot.
+    Raises
+    ------
+    InputError
+        If it is none of these, or belongs to another robot.
     """
     path = file_path("target", target, ACCEPTED)
     if other is not None:
