@@ -16,4 +16,4 @@ def tolerance_of(robot: Robot, given: float | None) -> float:
     """
     if given is not None:
         return number("tolerance", given, 0.0, 1e6)
-    return min(MOST, SHARE * float(np.mean(dynamics_of(robot).cable_lengths(robot.platform.home))))
+    return min(MOST, SHARE * float(np.mean(dynamics_of(robot).cable_lengths(robot.home))))
