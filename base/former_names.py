@@ -17,6 +17,7 @@ NOW = {
     "models.forward_kinematics": "estimation.pose",
     "models.mjcf": "export.mjcf",
     "models.plant": "plant",
+    "models.ranges": "models.part",
     "models.statics": "statics.equilibria",
     "robust": "statics.robust",
     "solvers.core": "core",
