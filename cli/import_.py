@@ -37,16 +37,9 @@ def caspr(folder: Path, cable_set: str | None = None, out: Path | None = None, a
         with whole_file(out) as temporary:
             temporary.write_text(text, encoding="utf-8")
     if as_json:
-        print_json(
-            {
-                "name": result.robot.name,
-                "cable_set": result.cable_set,
-                "cable_sets": result.cable_sets,
-                "notes": result.notes,
-                "file": out,
-                "robot": result.robot.model_dump(mode="json", exclude_none=True),
-            }
-        )
+        fields = {name: getattr(result, name) for name in ("cable_set", "cable_sets", "notes")}
+        converted = result.robot.model_dump(mode="json", exclude_none=True)
+        print_json({"name": result.robot.name, **fields, "file": out, "robot": converted})
         return
     typer.echo(text if out is None else f"  {out}", nl=out is not None)
     # Standard output may be the robot file itself: notes go to standard error.

@@ -62,7 +62,12 @@ def robots(
         box = resting_box(robot)
         result = _to_dict(robot, diagnose(robot), at_home, box)
         if figure is not None:
-            _draw(robot, at_home, box, figure)
+            from ..figures import style
+            from ..figures.robot import draw
+            from ..statics.scene import scene_at
+
+            scene = scene_at(robot, robot.home, at_home.tensions, robot.name)
+            style.save(draw(scene, None if box is None else box.resting), figure)
             result["figure"] = figure
         if as_json:
             print_json(result)
@@ -90,6 +95,10 @@ def _count(kinds: dict[str, int]) -> str:
 
 def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution, box: RestingBox | None) -> dict[str, Any]:
     kinds = [carrier.kind for carrier in robot.carriers]
+    resting = None
+    if box is not None:
+        resting = {"min": box.low.tolist(), "max": box.high.tolist(), "about": box.centre.tolist()}
+        resting |= {"samples": box.samples, "spacing": box.spacing.tolist()}
     return {
         "name": robot.name,
         "source": robot.source.strip(),
@@ -104,15 +113,7 @@ def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution, box: 
         "singular_values": diagnosis.singular_values.tolist(),
         **{name: getattr(diagnosis, name) for name in ("rank", "rank_level", "rank_tilted", "reason", "warnings")},
         "at_home": at_home.to_dict(),
-        "resting_box": None
-        if box is None
-        else {
-            "min": box.low.tolist(),
-            "max": box.high.tolist(),
-            "about": box.centre.tolist(),
-            "samples": box.samples,
-            "spacing": box.spacing.tolist(),
-        },
+        "resting_box": resting,
     }
 
 
@@ -188,12 +189,3 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
         lines[0] += f" about ({quantity_row(box.centre)}) m, the sampled position nearest to home at which it can rest"
     steps = quantity_row(box.spacing[box.spacing > 0], digits=2)
     return [*lines, f"    ({quantity(box.samples)} positions sampled, spaced by {steps} m along the axes)"]
-
-
-def _draw(robot: Robot, at_home: TensionSolution, box: RestingBox | None, file: Path) -> None:
-    from ..figures import style
-    from ..figures.robot import draw
-    from ..statics.scene import scene_at
-
-    scene = scene_at(robot, robot.home, at_home.tensions, robot.name)
-    style.save(draw(scene, None if box is None else box.resting), file)

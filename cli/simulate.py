@@ -130,14 +130,9 @@ def simulate(
     from ..estimation.logs.opening import is_recording
 
     if replay or is_recording(plan):
-        of_plan = {
-            "--controller": controller if controller != CONTROLLERS[0] else None,
-            "--wind": wind,
-            "--gusts": gusts,
-            "--noise": noise,
-            "--mismatch": mismatch,
-        }
-        of_plan |= {"--event": event, "--duration": duration, "--seed": seed, "--runs": runs, "--animate": animate}
+        of_plan = {"--controller": controller != CONTROLLERS[0] and controller, "--wind": wind, "--gusts": gusts}
+        of_plan |= {"--noise": noise, "--mismatch": mismatch, "--event": event, "--duration": duration}
+        of_plan |= {"--seed": seed, "--runs": runs, "--animate": animate}
         left_out(of_plan, "with a recording")
         options = {"poses": poses, "fields": fields, "drive": drive, "delay": delay, "window": window}
         outputs = {"--out": out, "--fit": fit, "--report": report}

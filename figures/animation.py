@@ -130,15 +130,11 @@ class _Stage:
             if anchor[2] > seen.floor:
                 ax.plot(*seen(np.array([anchor, [*anchor[:2], seen.floor]])).T, color=POST, linewidth=1.0)
         edges = [edge for low, high in scene.boxes for edge in box_edges(low, high)]
-        if edges:
-            lines = [seen(edge) for edge in edges]
-            reach = LineCollection(lines, colors=style.colour(3), linewidths=0.6, label="reach of a carrier")
-            named.append(ax.add_collection(reach, autolim=False))
         outlines = _inside(scene.obstacles, np.array([seen.low, seen.high]))
-        if outlines:
-            lines = [seen(line) for line in outlines]
-            keep_out = LineCollection(lines, colors=style.colour(1), linewidths=0.8, label="keep out")
-            named.append(ax.add_collection(keep_out, autolim=False))
+        for lines, hue, width, label in ((edges, 3, 0.6, "reach of a carrier"), (outlines, 1, 0.8, "keep out")):
+            if lines:
+                drawn = LineCollection(list(map(seen, lines)), colors=style.colour(hue), linewidths=width, label=label)
+                named.append(ax.add_collection(drawn, autolim=False))
         self._figure.legend(handles=named, fontsize="x-small", loc="outside lower left", ncols=4, frameon=False)
         speed = "real time" if self._when.speed == 1 else f"{self._when.speed:g} x real time"
         ax.set_title(f"{scene.title} ({speed})", fontsize=10)
@@ -152,13 +148,11 @@ class _Stage:
         (self._trail,) = ax.plot([], [], color=style.colour(0), linewidth=1.8, animated=True)
         (self._dots,) = ax.plot([], [], "o", color="#000000", markersize=2.5, animated=True)
         self._faces = [faces(scene.platform[0]), *(faces(scene.anchors[0, cables]) for cables in scene.bodies)]
-        self._bodies: Any = ax.add_collection(
-            PolyCollection([], edgecolor="#444444", linewidths=0.6, alpha=0.85, animated=True), autolim=False
-        )
-        self._rotors: Any = ax.add_collection(
-            LineCollection([], colors="#000000", linewidths=0.9, animated=True), autolim=False
-        )
-        self._cables: Any = ax.add_collection(LineCollection([], linewidths=2.2, animated=True), autolim=False)
+        self._bodies: Any = PolyCollection([], edgecolor="#444444", linewidths=0.6, alpha=0.85, animated=True)
+        self._rotors: Any = LineCollection([], colors="#000000", linewidths=0.9, animated=True)
+        self._cables: Any = LineCollection([], linewidths=2.2, animated=True)
+        for moving in (self._bodies, self._rotors, self._cables):
+            ax.add_collection(moving, autolim=False)
         self._labels = [ax.text(0.0, 0.0, f" {name}", fontsize=8, animated=True) for name in scene.names]
         self._clock = self._figure.text(0.98, 0.03, "", fontsize=10, ha="right", animated=True)
 

@@ -6,6 +6,7 @@ Farther parts are drawn first, so that nearer ones cover them. A robot in a vert
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -39,18 +40,12 @@ def draw(scene: Scene, resting: np.ndarray | None = None) -> style.Figure:
     pieces: list[tuple[float, Callable[[], Any]]] = []
 
     def line(ends: np.ndarray, **look: Any) -> None:
-        shown = seen(ends)
-        pieces.append((seen.depth(ends), lambda: ax.plot(*shown.T, solid_capstyle="round", **look)))
+        pieces.append((seen.depth(ends), partial(ax.plot, *seen(ends).T, solid_capstyle="round", **look)))
 
     def body(corners: np.ndarray, colour: str) -> None:
         for face in faces(corners):
-            shown = seen(corners[face])
-            pieces.append(
-                (
-                    seen.depth(corners[face]),
-                    lambda shown=shown: ax.fill(*shown.T, facecolor=colour, edgecolor="#444444", lw=0.4),
-                )
-            )
+            paint = partial(ax.fill, *seen(corners[face]).T, facecolor=colour, edgecolor="#444444", lw=0.4)
+            pieces.append((seen.depth(corners[face]), paint))
         if not faces(corners) and len(corners) > 1:
             line(corners, color=colour, linewidth=3.0)
 
@@ -91,9 +86,8 @@ def draw(scene: Scene, resting: np.ndarray | None = None) -> style.Figure:
     style.heading(ax, scene.title if flat else f"{scene.title}; cells of the floor: {quantity(seen.cell, 'm')}")
     style.legend_below(canvas, ax)
     if np.isfinite(tensions).all():
-        bar = style.colour_bar(
-            canvas, scale(), ax, "tension [N] from t_min to t_max", location="bottom", aspect=40, pad=0.02
-        )
+        place_of_bar = {"location": "bottom", "aspect": 40, "pad": 0.02}
+        bar = style.colour_bar(canvas, scale(), ax, "tension [N] from t_min to t_max", **place_of_bar)
         mark(bar, scene.t_min, scene.t_max, LETTERS)
     return canvas
 

@@ -54,7 +54,8 @@ def readout(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> s
     if instant.time is not None:
         facts.append(f'<span class="towline-time">t = {instant.time:.2f} s</span>')
     facts += [f'<span class="towline-event">{escape(event)}</span>' for event in instant.events]
-    facts += _margins(instant)
+    facts += _tension_margin(instant)
+    facts += [f"capacity margin {quantity(instant.reserve, 'N')}"] if np.isfinite(instant.reserve) else []
     if other is not None:
         apart = float(np.linalg.norm(instant.pose[:3] - other.pose[:3]))
         facts.append(f"platforms {quantity(apart, 'm')} apart, the other: {escape(other.status)}")
@@ -69,14 +70,10 @@ def readout(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> s
     return f'<div class="towline-readout" style="{BODY}">{"".join(lines)}{table(instant, robot, other)}</div>'
 
 
-def _margins(instant: Snapshot) -> list[str]:
-    """Return the tension margin and the capacity margin."""
-    lines = []
-    if np.isfinite(instant.margin):
-        lines.append(f"tension margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
-    if np.isfinite(instant.reserve):
-        lines.append(f"capacity margin {quantity(instant.reserve, 'N')}")
-    return lines
+def _tension_margin(instant: Snapshot) -> list[str]:
+    """Return the tension margin in words; nothing if there is none."""
+    known = np.isfinite(instant.margin)
+    return [f"tension margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}"] if known else []
 
 
 def decimals(robot: Robot) -> int:
@@ -120,8 +117,7 @@ def table(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str
 def caption(instant: Snapshot) -> str:
     """Return time, status, margin or shortfall in two or three lines of plain text, for the scene."""
     lines = [instant.status if instant.time is None else f"t = {instant.time:.2f} s, {instant.status}"]
-    if np.isfinite(instant.margin):
-        lines.append(f"tension margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}")
+    lines += _tension_margin(instant)
     if instant.certificate is not None:
         lines.append(shortfall(instant))
     return "\n".join(lines)

@@ -37,6 +37,7 @@ BARBS = 12
 VIEWS = {"all": ALONG, "top": (0.0, -1e-3, 1.0), "front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0)}  # to the camera
 AIMS = 50  # of a camera that are remembered
 
+GRID: dict[str, Any] = {"cell_color": (225, 225, 225), "section_color": (200, 200, 200), "shadow_opacity": 0.0}
 DOTS: dict[str, Any] = {"point_shape": "circle", "precision": "float32"}
 # The shaders of other materials keep a machine without a GPU busy for ten seconds.
 MATERIAL: dict[str, Any] = {"material": "toon3", "side": "double", "cast_shadow": False, "receive_shadow": False}
@@ -208,18 +209,8 @@ class Stage:
         scene.configure_default_lights(cast_shadow=False)
         width = 2 * cell * np.ceil(self._size / cell)
         floor = np.array([*(np.round(self.extent.centre[:2] / cell) * cell), self.extent.floor])
-        scene.add_grid(
-            "/grid",
-            width=width,
-            height=width,
-            cell_size=cell,
-            section_size=5 * cell,
-            cell_color=(225, 225, 225),
-            section_color=(200, 200, 200),
-            fade_distance=100 * self._size,
-            shadow_opacity=0.0,
-            position=floor,
-        )
+        sizes = {"width": width, "height": width, "cell_size": cell, "section_size": 5 * cell}
+        scene.add_grid("/grid", position=floor, fade_distance=100 * self._size, **sizes, **GRID)
         scene.add_frame("/G", axes_length=0.08 * self._size, axes_radius=0.004 * self._size, origin_radius=0.0)
         scene.add_label("/G/name", "{G}", anchor="top-right", font_screen_scale=0.8)
         self._lines("/posts", posts(self._robot, floor[2]), GREY)

@@ -128,20 +128,16 @@ class Limits(Displayed):
         Its inputs are the motions of platform and carriers (18 each) at the first, then at the second.
         """
         if limit not in self._ways:
-            self._ways[limit] = self._way(limit)
+            count, other = 1 + len(self.robot.carriers), self._state
+            whole = [ca.SX.sym(f"body{i}", 18) for i in range(2 * count)]
+            bodies = [Body(*ca.vertsplit(body, 6)) for body in whole]
+            first, second = (
+                State(self.robot, part[0], tuple(part[1:]), other.tensions, other.off_path)
+                for part in (bodies[:count], bodies[count:])
+            )
+            values = limit.on_the_way(first, second)
+            self._ways[limit] = None if values is None else ca.Function("on_the_way", whole, [values])
         return self._ways[limit]
-
-    def _way(self, limit: Limit) -> ca.Function | None:
-        count = 1 + len(self.robot.carriers)
-        whole = [ca.SX.sym(f"body{i}", 18) for i in range(2 * count)]
-        bodies = [Body(*ca.vertsplit(body, 6)) for body in whole]
-        other = self._state
-        first, second = (
-            State(self.robot, part[0], tuple(part[1:]), other.tensions, other.off_path)
-            for part in (bodies[:count], bodies[count:])
-        )
-        values = limit.on_the_way(first, second)
-        return None if values is None else ca.Function("on_the_way", whole, [values])
 
     def separating(self, limit: Distance) -> Separating:
         """Return the functions that bound the distances of a limit over time."""

@@ -102,24 +102,14 @@ def cables_table(plan: PlanData) -> Table | None:
 
 def phases_table(plan: PlanData) -> Table | None:
     """Return the table of the phases; None for a task without."""
-    rows = [
-        (
-            phase.name,
-            f"{phase.start:.3f}",
-            f"{phase.end:.3f}",
-            quantity(phase.load),
-            _or_none(phase.tension_min),
-            _or_none(phase.tension_max),
-            "in the air" if phase.reaction_max is None else quantity(phase.reaction_max),
-        )
-        for phase in plan.phases
-    ]
+    rows = []
+    for phase in plan.phases:
+        extremes = ("none" if value is None else quantity(value) for value in (phase.tension_min, phase.tension_max))
+        reaction = "in the air" if phase.reaction_max is None else quantity(phase.reaction_max)
+        times = f"{phase.start:.3f}", f"{phase.end:.3f}"
+        rows.append((phase.name, *times, quantity(phase.load), *extremes, reaction))
     columns = ("phase", "from [s]", "to [s]", "load [kg]", "smallest tension [N]", "largest tension [N]")
     return Table("Phases", (*columns, "largest ground reaction [N]"), rows) if rows else None
-
-
-def _or_none(value: float | None) -> str:
-    return "none" if value is None else quantity(value)
 
 
 def stages_table(plan: PlanData) -> Table | None:

@@ -76,13 +76,10 @@ def initial_of(
         for i in range(6):
             if (index, i) not in chosen:
                 _agree(carriers[index, :, i], np.array([part[0, i] for part in bases[index][:2]]), carrier.name, i)
-    return Initial(
-        pose=_numbers(platform[0]),
-        velocity=_numbers(platform[1]),
-        carrier_pose=tuple(_numbers(row) for row in carriers[:, 0]),
-        carrier_velocity=tuple(_numbers(row) for row in carriers[:, 1]),
-        tensions=None if tensions is None else _numbers(tensions),
-    )
+    values = {"pose": platform[0], "velocity": platform[1]}
+    values |= {"carrier_pose": carriers[:, 0], "carrier_velocity": carriers[:, 1]}
+    values |= {} if tensions is None else {"tensions": tensions}
+    return Initial.model_validate({name: value.tolist() for name, value in values.items()})
 
 
 def _agree(measured: np.ndarray, given: np.ndarray, name: str, coordinate: int) -> None:
@@ -99,7 +96,3 @@ def _agree(measured: np.ndarray, given: np.ndarray, name: str, coordinate: int) 
                 f"within {limit:g}, got {value:g}"
             )
     measured[:] = given
-
-
-def _numbers(values: np.ndarray) -> Any:
-    return tuple(values.tolist())

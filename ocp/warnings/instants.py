@@ -32,8 +32,3 @@ class Instants(Displayed):
     def platform(self) -> np.ndarray:
         """Return the CoM of the platform and its attachments, (n, 1 + m, 3) [m]."""
         return points.placed(self.pose, np.vstack([self.robot.platform.com, self.robot.attachments]))
-
-    @cached_property
-    def lengths(self) -> np.ndarray:
-        """Return the lengths of the cables, (n, m) [m]."""
-        return self.dynamics.cable_lengths(self.pose, self.carriers)

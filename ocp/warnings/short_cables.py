@@ -14,7 +14,8 @@ def short_cables(seen: Instants) -> list[str]:
     if robot.fixed_lengths is not None:
         return []
     at_home = seen.dynamics.cable_lengths(robot.home)
-    shares = seen.lengths / at_home
+    lengths = seen.dynamics.cable_lengths(seen.pose, seen.carriers)
+    shares = lengths / at_home
     short = np.flatnonzero(shares.min(axis=0) < SHORT)
     if not short.size:
         return []
@@ -23,7 +24,7 @@ def short_cables(seen: Instants) -> list[str]:
     tows = robot.carriers[robot.carrier_of_cable[cable]].tows
     fixed = ", and with drive: fixed-length in the robot's file no winch reels it in" * tows
     return [
-        f"cable {cable + 1} gets as short as {quantity(1e3 * seen.lengths[row, cable], 'mm', 3)} at t = "
+        f"cable {cable + 1} gets as short as {quantity(1e3 * lengths[row, cable], 'mm', 3)} at t = "
         f"{seen.times[row]:.3f} s, {quantity(100 * shares[row, cable], '%', 2)} of its "
         f"{quantity(at_home[cable], 'm', 3)} at home{others * (short.size > 1)}; limits.cable_length would keep it "
         f"longer{fixed}"

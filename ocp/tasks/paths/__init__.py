@@ -4,37 +4,21 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
-from .base import PathBase, PoseOrPosition
-from .circle import CirclePath
-from .feed import FeedPath
-from .line import LinePath
-from .motion import Motion
-from .rest import RestPath
-from .returning import ReturnPath
-from .samples import SamplePath
-from .sequence import SequencePath, SinglePath
-from .stations import Stations
-from .timed import Curve, TimedPath
-from .waypoints import WaypointPath
-
-__all__ = [
-    "AnyPath",
-    "CirclePath",
-    "Curve",
-    "FeedPath",
-    "LinePath",
-    "Motion",
-    "PathBase",
-    "PoseOrPosition",
-    "RestPath",
-    "ReturnPath",
-    "SamplePath",
-    "SequencePath",
-    "SinglePath",
-    "Stations",
-    "TimedPath",
-    "WaypointPath",
-]
+from .base import PathBase as PathBase
+from .base import PoseOrPosition as PoseOrPosition
+from .circle import CirclePath as CirclePath
+from .feed import FeedPath as FeedPath
+from .line import LinePath as LinePath
+from .motion import Motion as Motion
+from .rest import RestPath as RestPath
+from .returning import ReturnPath as ReturnPath
+from .samples import SamplePath as SamplePath
+from .sequence import SequencePath as SequencePath
+from .sequence import SinglePath as SinglePath
+from .stations import Stations as Stations
+from .timed import Curve as Curve
+from .timed import TimedPath as TimedPath
+from .waypoints import WaypointPath as WaypointPath
 
 AnyPath: TypeAlias = Annotated[
     RestPath | LinePath | CirclePath | WaypointPath | SamplePath | FeedPath | TimedPath | SequencePath | ReturnPath,

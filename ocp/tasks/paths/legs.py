@@ -195,11 +195,5 @@ def _through(
     s_rate = weight_before * left_rate + weight_after * rate
     s_rate_rate = weight_after * rate_rate - weight_before * left_rate_rate
     by_s, by_s_twice = 1 / s_rate, -s_rate_rate / s_rate**3
-    return (
-        1 - left,
-        left_rate * by_s,
-        -left_rate_rate * by_s**2 + left_rate * by_s_twice,
-        done,
-        rate * by_s,
-        rate_rate * by_s**2 + rate * by_s_twice,
-    )
+    ending = (1 - left, left_rate * by_s, -left_rate_rate * by_s**2 + left_rate * by_s_twice)
+    return (*ending, done, rate * by_s, rate_rate * by_s**2 + rate * by_s_twice)

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from typing_extensions import override
 
 from ....models.part import Finite, NonNegative, Positive, optional
-from .base import PathBase
+from .base import PathBase, check_times
 from .circle import CirclePath
 from .line import LinePath
 from .motion import Motion
@@ -51,9 +51,7 @@ class TimedPath(PathBase):
             raise ValueError(f"speeds must have one number for each of the {len(self.s)} s, got {len(self.speeds)}")
         if self.s[0] != 0 or self.s[-1] != 1:
             raise ValueError(f"s must go from 0 to 1, got {self.s[0]:g} to {self.s[-1]:g}")
-        for index, (before, after) in enumerate(pairwise(self.s)):
-            if after <= before:
-                raise ValueError(f"s must increase, got s[{index + 1}] = {after:g} after {before:g}")
+        check_times(self.s, len(self.s), "s", "")
         for index, (before, after) in enumerate(pairwise(self.speeds)):
             if before == after == 0:
                 raise ValueError(f"speeds must not be 0 twice in a row, got 0 at {index} and {index + 1}")
