@@ -210,7 +210,6 @@ class ComputedTorque(Controller):
         for part in (self._loop, self._ahead, self._lead):
             if part is not None:
                 part.reset()
-        self._poses = self._measured[0, 0, :6], self._wanted[0, :6]
         self._nowhere = np.full((rows, 6), np.nan), np.full(rows, np.nan)
         self._paused = False  # whether the integral of a row does
         self._as_planned = np.full(rows, PLANNED, dtype=np.int8)
@@ -234,7 +233,7 @@ class ComputedTorque(Controller):
                 self._platform["integrates"] = 1
             self._paused = False
             simple = self._is_plain and self._is_one and not self._is_missing
-            if simple and not self._deviation.is_far(*self._poses):  # the rest, at a fifth of the time
+            if simple and not self._are_far:  # the rest, at a fifth of the time
                 tensions = problems.tensions[0].copy()
                 self._last = tensions.tobytes()
                 ordered: Any = reference.carrier_acceleration  # any array that the core can read
@@ -277,13 +276,13 @@ class ComputedTorque(Controller):
         self._senses = state.tensions is not None
         seen = time if state.time is None else measured_at(state.time, time)
         since = 0.0 if self._time is None else seen - self._seen
-        own = self._robot, self._settings
+        own, scales = (self._robot, self._settings), (self._problems.length, *self._deviation.most)
         if self._ahead is not None:
             self._ahead.pass_time(dt, self._cables["last"])
             self._last = self._cables["last"].tobytes()
         observes = self._carried.is_later(seen)
         if time - seen <= ROUNDING and since == dt and observes:
-            fixed = dt, since, self._problems.length, solves
+            fixed = dt, since, *scales, solves
             try:
                 done = control_step(*fixed, state, reference, *own, None, *self._arrays)
             except (ValueError, TypeError, BufferError):  # they need not be arrays of float64, which the core reads
@@ -301,11 +300,12 @@ class ComputedTorque(Controller):
             memory = self._measured, otherwise, self._platform["disturbance"], self._accelerations
             late = self._sent_lately.move_on(age, models, *memory)
             seen_so = self._measured.copy() if late is None else late
-            fixed = dt, since if observes else 0.0, self._problems.length, solves
+            fixed = dt, since if observes else 0.0, *scales, solves
             done = control_step(*fixed, None, None, *own, late if observes else seen_so, *self._arrays)
             if not observes:
                 self._carried.continue_observer(self._platform, float(self._settings["observer"]), seen_so[:, 0])
-        self._is_missing, self._optimal = done[0] > 0, done[1]  # whether cables or their sensors are missing
+        missing, self._optimal, self._are_far = done
+        self._is_missing = missing > 0  # cables or their sensors
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
 
@@ -347,10 +347,9 @@ class ComputedTorque(Controller):
             actuation = self._actuation.copy() if self._lead is None else self._lead.sent(self._actuation)
             if lacking > self._negligible:
                 answered, proof = self._with_thrust_lacking(answered, proof)
-        tensions, answered = (
-            self._sent(tensions),
-            self._deviation.status(answered, self._measured[:, 0, :6], self._wanted[:, :6]),
-        )
+        tensions = self._sent(tensions)
+        if self._are_far:
+            answered = self._deviation.status(answered, self._measured[:, 0, :6], self._wanted[:, :6])
         if alone:
             own = None if actuation is None else actuation[0]
             return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)

@@ -50,8 +50,16 @@ def horizon_solve(
 ) -> tuple[int, bool]: ...
 def control_take(state: Any, reference: Any, robot: Any, *arrays: Any) -> None: ...
 def control_step(
-    dt: float, since: float, length: float, solves: int, state: Any, reference: Any, *arrays: Any
-) -> tuple[int, int]: ...
+    dt: float,
+    since: float,
+    length: float,
+    distance: float,
+    angle: float,
+    solves: int,
+    state: Any,
+    reference: Any,
+    *arrays: Any,
+) -> tuple[int, int, int]: ...
 def control_thrusts(dt: float, robot: Any, controller: Any, *arrays: Any) -> float: ...
 def control_move_on(
     dt: float, robot: Any, disturbance: Any, tensions: Any, accelerations: Any, measured: Any

@@ -29,6 +29,12 @@ def angles(R: np.ndarray) -> np.ndarray:
     return np.stack([roll, pitch, np.arctan2(across, along)], axis=-1)
 
 
+def axial(matrices: np.ndarray) -> np.ndarray:
+    """Return the vectors (..., 3) of the skew-symmetric parts of matrices (..., 3, 3)."""
+    skew = (matrices - matrices.swapaxes(-1, -2)) / 2
+    return np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
+
+
 def placed(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Place points (k, 3) of the frame at `pose` (..., 6) into {G}: x + R p, (..., k, 3) [m]."""
     turned = np.einsum("...ij,kj->...ki", rotations(pose[..., 3:]), points)

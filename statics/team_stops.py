@@ -21,6 +21,7 @@ from ..base.text import quantity
 from ..models import points
 from ..models.carriers import Carrier
 from ..models.dynamics import dynamics_of
+from ..models.part import inertia_matrix
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 
@@ -249,11 +250,9 @@ def _forces(
 def _wrenches_of_forces(robot: Robot, pose: np.ndarray) -> np.ndarray:
     """Return the wrenches of unit forces of each cable on the platform, at poses (n, 6), (n, 6, 3 m)."""
     arms = points.rotations(pose[:, 3:])[:, None] @ (robot.attachments - np.array(robot.platform.com))[..., None]
-    turn = np.zeros((*arms.shape[:2], 6, 3))
+    turn = np.empty((*arms.shape[:2], 6, 3))
     turn[..., :3, :] = np.eye(3)
-    x, y, z = np.moveaxis(arms[..., 0], -1, 0)
-    turn[..., 3, 1], turn[..., 3, 2], turn[..., 4, 0] = -z, y, z
-    turn[..., 4, 2], turn[..., 5, 0], turn[..., 5, 1] = -x, -y, x
+    turn[..., 3:, :] = np.cross(arms.swapaxes(-1, -2), np.eye(3)).swapaxes(-1, -2)
     return np.concatenate(list(np.moveaxis(turn, 1, 0)), axis=-1)
 
 
@@ -285,12 +284,6 @@ def _limits_of_tensions(robot: Robot, tensions: np.ndarray) -> list[Row]:
     return [(f"tension {i + 1}", tensions[..., i], low, high) for i, (low, high) in enumerate(limits)]
 
 
-def _skew(matrices: np.ndarray) -> np.ndarray:
-    """Return the vectors of the skew-symmetric parts of matrices (..., 3, 3)."""
-    skew = (matrices - matrices.swapaxes(-1, -2)) / 2
-    return np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], axis=-1)
-
-
 def _limits(
     carrier: Carrier,
     motion: Motion,
@@ -308,10 +301,9 @@ def _limits(
     body, (_, velocity, acceleration), R = carrier.body, motion, turning[0]
     assert body is not None
     down = R.swapaxes(-1, -2)
-    spin, spun = (_skew(down @ part) for part in turning[1:])
-    xx, yy, zz, xy, xz, yz = body.inertia
-    J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    spin, spun = (points.axial(down @ part) for part in turning[1:])
     force = (down @ (body.mass * (acceleration[..., :3] - gravity) - pull)[..., None])[..., 0]
+    J = inertia_matrix(body.inertia)
     moment = spun @ J + np.cross(spin, spin @ J) - np.cross(anchor, (down @ pull[..., None])[..., 0])
     wrench, of_commands = np.concatenate([force, moment], axis=-1), np.array([a.wrench for a in carrier.actuators])
     commands, name, own = wrench @ np.linalg.pinv(of_commands), carrier.name, carrier.motion_limits

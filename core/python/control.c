@@ -206,6 +206,21 @@ static Py_ssize_t solve_all(problems at, Py_ssize_t rows, int m, double length, 
     return towline_solve_batch(&batch, rows, in_lanes);
 }
 
+/* Count the rows whose pose may be farther from its reference than a distance [m], or an angle [rad] but for whole turns. */
+static Py_ssize_t count_far(const double *measured, Py_ssize_t motions, const double *wanted, Py_ssize_t rows,
+                            const double most[2]) {
+    Py_ssize_t near = 0;
+    for (Py_ssize_t row = 0; row < rows; row++, measured += motions, wanted += ORDER) {
+        double off[6];
+        for (int i = 0; i < 6; i++) {
+            off[i] = measured[i] - wanted[i];
+        }
+        near += off[0] * off[0] + off[1] * off[1] + off[2] * off[2] <= most[0] * most[0] && fabs(off[3]) <= most[1] &&
+                fabs(off[4]) <= most[1] && fabs(off[5]) <= most[1];
+    }
+    return rows - near;
+}
+
 /* Take it that the command of the last step has acted since then, and was delivered if nothing is `sensed`. */
 static void hear_command(towline_cable_memory *cables, Py_ssize_t count, int sensed) {
     for (Py_ssize_t i = 0; i < count; i++) {
@@ -257,12 +272,12 @@ static int are_of_step(const arrays *given, const towline_robot *robot, const to
 }
 
 TOWLINE_PY(control_step) {
-    enum { DT, SINCE, LENGTH, NUMBERS, SOLVES = NUMBERS, STATE, TAKEN, BEFORE };
+    enum { DT, SINCE, LENGTH, DISTANCE, ANGLE, NUMBERS, SOLVES = NUMBERS, STATE, TAKEN, BEFORE };
     arrays given;
-    double numbers[NUMBERS] = {0, 0, 0};
-    Py_ssize_t missing = 0, optimal = 0;
+    double numbers[NUMBERS] = {0, 0, 0, 0, 0};
+    Py_ssize_t missing = 0, optimal = 0, far = 0;
     if (count != BEFORE + STEP_ARRAYS) {
-        PyErr_SetString(PyExc_TypeError, "the function takes three numbers, a flag, state, reference, and arrays");
+        PyErr_SetString(PyExc_TypeError, "the function takes five numbers, a flag, state, reference, and arrays");
         return NULL;
     }
     const long solves = PyLong_AsLong(arguments[SOLVES]);
@@ -305,9 +320,10 @@ TOWLINE_PY(control_step) {
     for (Py_ssize_t row = 0; row < rows; row++) {
         missing += ((const towline_platform_memory *)(const void *)of[PLATFORM])[row].silent > 1;
     }
+    far = count_far(of[MEASURED], MOTION * (1 + robot->carriers), of[REFERENCE], rows, numbers + DISTANCE);
     Py_END_ALLOW_THREADS;
     release(&given);
-    return Py_BuildValue("(nn)", missing, optimal);
+    return Py_BuildValue("(nnn)", missing, optimal, far);
 }
 
 TOWLINE_PY(control_thrusts) {

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from ...models import points
 from ...models.rotation import rotation
 from ...ocp.tasks.paths import Motion
 
@@ -34,12 +35,12 @@ class Turning(NamedTuple):
     @property
     def rate(self) -> np.ndarray:
         """Return the angular velocity in the rotated frame, (n, 3) [rad/s]."""
-        return _axial(self.R.transpose(0, 2, 1) @ self.dR)
+        return points.axial(self.R.transpose(0, 2, 1) @ self.dR)
 
     @property
     def acceleration(self) -> np.ndarray:
         """Return the time derivative of `rate`, (n, 3) [rad/s^2]."""
-        return _axial(self.R.transpose(0, 2, 1) @ self.ddR)
+        return points.axial(self.R.transpose(0, 2, 1) @ self.ddR)
 
 
 class Instants(NamedTuple):
@@ -85,9 +86,3 @@ def turn_back(R: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 def relative_error(vectors: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Return how far vectors (..., 3) are from the true ones, over the length of these, (...)."""
     return np.linalg.norm(vectors - true, axis=-1) / np.linalg.norm(true, axis=-1)
-
-
-def _axial(matrices: np.ndarray) -> np.ndarray:
-    """Return the vectors of the skew parts of (n, 3, 3); the symmetric part, [omega]x^2, drops out."""
-    skew = (matrices - matrices.transpose(0, 2, 1)) / 2
-    return np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
