@@ -120,6 +120,7 @@ NAMES = {
     "position": ["x", "pos_y", "position.z", "/mocap/pose.position.x", "field.pose.position.y", "px", "translation.z"],
     "quaternion": ["qx", "q_w", "quat_z", "/mocap/pose.orientation.w", "rotation.x", "orientation_y"],
     "angles": ["roll", "Yaw", "/imu/pitch"],
+    "thrusts": ["thrust_1", "/uav2/thrust_estimate/data", "quad1.thrust_measured"],
     "time": ["t", "time", "timestamp", "%time", "header.stamp", "Time_Stamp"],
     None: ["vx", "velocity.x", "yaw_rate", "linear.x", "lux", "status", "l", "temperature_1", "angular_velocity.z"],
 }

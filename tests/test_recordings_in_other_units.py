@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from towline import Dynamics, load, read_measurements
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.correction import correction_of
+from towline.estimation.logs import read_log
 from towline.estimation.logs.names import role, time_unit
 
 from . import user_recordings as user
@@ -221,6 +222,7 @@ def test_names_of_joints_and_of_px4():
     assert [role(f"vehicle_attitude/q[{i}]").which for i in range(4)] == ["w", "x", "y", "z"]
     assert (role("TimeUS").role, role("TimeUS").unit) == ("time", "us")
     assert role("dir_x").role == "directions"
+    assert [role(name).unit for name in ("millis", "micros", "sensor/nanoseconds", "t_ms")] == ["ms", "us", "ns", "ms"]
 
 
 @pytest.mark.parametrize(("step", "unit"), [(10_000, "us"), (1e7, "ns"), (200, "ms"), (0.01, "s"), (3, "s")])
@@ -257,3 +259,28 @@ def test_attachments_of_a_platform_that_hardly_turns(turn):
     assert np.abs(found.robot.anchors - true.anchors)[:, [0, 2]].max() < 0.01
     free = ("anchors", "attachments", "offsets")
     assert ("leave them out" in calibrate(robot, log, free).report()) == (turn < 0.1)
+
+
+def test_decimal_commas_and_a_map_for_one_of_two_files(tmp_path):
+    """Semicolons, decimal commas, names and a time that only the map knows; the other file has usual ones."""
+    robot, (anchors, _) = user.hanging_robot(tmp_path), user.four_cables(tmp_path)
+    head, *lines = (tmp_path / "winches.csv").read_text().splitlines()
+    names = ["Uhr", *(f"Seil {i + 1} [mm]" for i in range(head.count(";")))]
+    rows = [line.split(";") for line in lines]
+    rows = [[f"{(int(row[0]) - user.EPOCH * 10**9) / 1e6:.3f}", *row[1:]] for row in rows]
+    text = [";".join(names), *(";".join(row).replace(".", ",") for row in rows)]
+    (tmp_path / "winden.csv").write_text("\n".join(text), encoding="utf-8-sig")
+    (tmp_path / "map.yaml").write_text("lengths: Seil *\n")
+    files = ("winden.csv", "mocap.csv", "--fields", "map.yaml")
+    failed = towline("calibrate", robot, *files, cwd=tmp_path, code=2).stderr
+    assert "must have times, got none for Seil 1; a map (--fields) may name them" in failed
+    (tmp_path / "map.yaml").write_text("lengths: Seil *\ntime: Uhr [ms]\n")
+    told = json.loads(towline("calibrate", robot, *files, "--json", cwd=tmp_path).stdout)
+    assert told["residual_after"] < 7e-4  # of 0.5 mm in lengths and 0.3 mm in positions
+    found = {one["name"]: one for one in told["parameters"]}
+    for i, axis in np.ndindex(4, 3):
+        one = found[f"cables[{i}].anchor.{'xyz'[axis]}"]
+        assert abs(one["value"] - anchors[i, axis]) < 4.5 * one["sigma"]
+    (tmp_path / "map.yaml").write_text("lengths: Seil *\n")
+    (note,) = read_log(tmp_path / "winden.csv", fields=tmp_path / "map.yaml").notes
+    assert note.startswith("Uhr rises as a time does")

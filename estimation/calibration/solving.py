@@ -213,7 +213,9 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
             )
     of_forces = [name for name in groups if name in (*IN_BALANCE, "stiffness")]
     if measurements.tensions is None and of_forces not in ([], ["com"]):
-        raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}, got none")
+        flies = any(carrier.actuators for carrier in robot.carriers)
+        hint = " (or thrusts, attitudes and times of the carriers in a log)" if flies else ""
+        raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}{hint}, got none")
     model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements))))
     model = replace(model, interpolates="clock" in groups)
     if not set(IN_BALANCE).isdisjoint(groups) and (robot.weight == 0.0 or model.balanced is None):

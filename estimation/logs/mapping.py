@@ -119,7 +119,7 @@ def fields_of(
         If a name of the map is not there, part of a position or an orientation is missing, or there are several
         candidates.
     """
-    roles = ("lengths", "tensions", "position", "orientation", "time", "directions")
+    roles = ("lengths", "tensions", "position", "orientation", "directions")
     found = {name: _named(recordings, name, given, free) for name in roles} if given else {}
     if given and given.pose:
         parts = _below(recordings, given.pose)
@@ -131,7 +131,7 @@ def fields_of(
         if not found.get(name) and not (given and given.pose and name in ("position", "orientation")):
             fields = of_platform if name in ("position", "orientation", "directions") else everything
             found[name] = _usual(fields, name, m, found.get("position", ()), free=free)
-    return Fields(**found)
+    return Fields(**found, time=_times(recordings, given))
 
 
 def command_fields(
@@ -147,21 +147,28 @@ def command_fields(
     found = {name: _named(recordings, name, given) for name in roles} if given else {}
     everything = _everything(recordings)
     alone = _everything(recordings, [_prefix(given, name) for name in carriers])
-    for name in (*roles, "efforts", "time"):
+    for name in (*roles, "efforts"):
         if not found.get(name):
             found[name] = _usual(alone if name == "thrusts" else everything, name, m, ())
-    return Fields(**found)
+    return Fields(**found, time=_times(recordings, given))
 
 
 def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrier: str) -> Fields:
     """Return the fields of a carrier: its pose and its thrust. Raises `InputError` as `fields_of`."""
-    prefix, everything = _prefix(given, carrier), _everything(recordings)
-    parts = [one for one in everything if _within(one[1].full(one[2]), prefix)]
+    prefix = _prefix(given, carrier)
+    parts = [one for one in _everything(recordings) if _within(one[1].full(one[2]), prefix)]
     if own := [one for one in recordings if len(recordings) > 1 and _is_of(one, prefix)]:
         parts, prefix = _everything(own), ""
     roles = ("position", "orientation", "thrusts", "directions")
     found = {name: _usual(parts, name, None, (), prefix) for name in roles}
-    return Fields(**found, time=_usual(everything, "time", None, ()))
+    return Fields(**found, time=_times(recordings, given))
+
+
+def _times(recordings: Sequence[Recording], given: LogMap | None) -> tuple[Field, ...]:
+    """Return the times of all tables: that of the map, and the usual ones of tables that have none from there."""
+    named = _named(recordings, "time", given) if given else ()
+    usual = _usual(_everything(recordings), "time", None, ())
+    return (*named, *(one for one in usual if all(one.topic is not other.topic for other in named)))
 
 
 def _everything(recordings: Sequence[Recording], but: Sequence[str] = ()) -> list[tuple[Recording, Topic, str]]:

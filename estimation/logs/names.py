@@ -32,6 +32,7 @@ _DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?)"
 _CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
 _SENSOR = r"(?:load[_ ]?cell|cable|rope|wire|winch|tension|force[_ ]?sensor|ft)"
 _NO_LENGTH = re.compile(r"tension|force|effort|speed|veloc|vel_|accel|current|torque|thrust|temp|status|error")
+_SENSED = r"(?:[./_ ](?:data|value|estimated?|est|measured?|total))*"
 _VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
 # The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
 PATTERNS = {
@@ -59,7 +60,7 @@ PATTERNS = {
         rf"{_BEFORE}q\[([0-3])\]",  # w, x, y, z, in logs of PX4
     ),
     "angles": (rf"{_BEFORE}(roll|pitch|yaw)",),
-    "thrusts": (rf"{_BEFORE}thrusts?(?:[./_ ](?:data|value))*[_ ]?\[?(\d*)\]?(?:[./_ ](?:data|value))*",),
+    "thrusts": (rf"{_BEFORE}thrusts?{_SENSED}[_ ]?\[?(\d*)\]?{_SENSED}",),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
     "directions": (
         rf"{_BEFORE}{_OF}(?:{_DIRECTION}|q)[_ ./]?\[?(\d+)\]?{_VECTOR}",
@@ -74,6 +75,7 @@ PATTERNS = {
     "time": (
         rf"%?(t|(?:ros[_ ]?)?times?|time_?us|time \(seconds\)|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds)",
         r"(elapsed(?:[_ ]time)?)",
+        rf"{_BEFORE}((?:milli|micro|nano)s(?:ec(?:ond)?s?)?)",  # since an Arduino was switched on
     ),
 }
 DATES = 1e9, 4e9  # [s] from 1970, of recordings: 2001 to 2096
@@ -116,7 +118,8 @@ def role(name: str) -> Role | None:
                     parts = sorted(match.groups(), key=lambda part: not (part.isdigit() or not part))
                     if which == "quaternion" and parts[0].isdigit():
                         parts = ["wxyz"[int(parts[0])]]
-                    unit = "us" if which == "time" and text.endswith("us") else unit
+                    if which == "time" and (short := re.search("us$|(milli|micro|nano)s", text)):
+                        unit = {"milli": "ms", "nano": "ns"}.get(short[1] or "", "us")
                     return Role(which, " ".join(parts), group, unit)
     return None
 

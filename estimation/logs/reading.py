@@ -24,7 +24,7 @@ from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, n
 from .opening import recordings
 from .pose_track import PoseTrack
 from .recording import COUNTED, Recording, Samples
-from .streams import Reader, at_times, interpolated
+from .streams import Reader, at_times, interpolated, like_time
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
@@ -253,14 +253,18 @@ def measurements_of(
     read = Reader(found)
     position = _whole(robot, read.stream(found.position), 0) if found.position else None
     lengths = read.stream(main_fields)
-    if not found.lengths:
-        lengths = _constant(robot, lengths)
+    if not found.lengths and robot is not None:  # constant ones
+        lengths = Samples(lengths.times, np.tile(np.asarray(robot.fixed_lengths), (len(lengths.values), 1)))
     tensions = read.stream(found.tensions) if found.tensions else None
     if tensions is not None and (np.nanmedian(tensions.values, axis=0) < 0).all():
         notes.append("all tensions are negative, so they are read with the other sign")
         tensions = Samples(tensions.times, -tensions.values)
     orientation = _whole(robot, read.stream(found.orientation), 3) if found.orientation else None
     times = lengths.times
+    if times is None and (like := like_time(main.topic, {one.name for of in found for one in of})):
+        notes.append(
+            f"{like} rises as a time does, but is not read as one; if it is, name it in a map: 'time: {like} [s]'"
+        )
     begin = float(times[0]) if times is not None and times[0] > COUNTED else 0.0
     if position is not None and orientation is not None:
         orientation = at_times(position.times, orientation, found.orientation[0])
@@ -278,7 +282,11 @@ def measurements_of(
             together, lengths = False, Samples(times[complete], lengths.values[complete])
     if pose is not None and not together:
         if times is None or pose.times is None:
-            raise InputError("lengths and poses of several files or topics must have times, got none")
+            lost = main.full if times is None else source.full
+            raise InputError(
+                f"lengths and poses of several files or topics must have times, got none for {lost}; a map "
+                "(--fields) may name them, as in 'time: clock [ms]'"
+            )
         quaternions = None if orientation is None else _quaternions(orientation.values)
         places = np.full((len(pose.values), 3), np.nan) if position is None else position.values
         clock = clock_of_poses(lengths, Samples(pose.times, places), quaternions, source, main, robot, given, from_)
@@ -319,12 +327,6 @@ def _whole(robot: Robot | None, samples: Samples, first: int) -> Samples:
     values = np.tile(robot.home[first : first + 3], (len(samples.values), 1))
     values[:, free] = samples.values
     return Samples(samples.times, np.where(np.isfinite(values).all(axis=1, keepdims=True), values, np.nan))
-
-
-def _constant(robot: Robot | None, others: Samples) -> Samples:
-    """Return the constant lengths of a robot without winches at the times of other samples."""
-    assert robot is not None
-    return Samples(others.times, np.tile(np.asarray(robot.fixed_lengths), (len(others.values), 1)))
 
 
 def _merged(

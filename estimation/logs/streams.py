@@ -8,9 +8,10 @@ from ...base.errors import InputError
 from ...base.text import quantity
 from .mapping import Field, Fields
 from .names import UNITS, dated_unit, time_unit
-from .recording import GAP, Samples, check_rising
+from .recording import GAP, Samples, Topic, check_rising, plain
 
 MOST_REPEATED = 0.2  # of the samples of a table, that may repeat a time
+FEWEST, STEADY = 20, 5.0  # samples, and how many times the usual step the longest one of a time may be
 MUCH_FASTER = 8  # times the rate, from which lines between samples suffice
 
 
@@ -73,6 +74,18 @@ class Reader:
                 f"in its name, as {clock.full}_s"
             )
         return unit
+
+
+def like_time(topic: Topic, used: set[str]) -> str | None:
+    """Return the name of a column that rises as a time does, but not as a counter of the samples, or None."""
+    for name in topic.fields:
+        if name in used or topic.count < FEWEST:
+            continue
+        steps = np.diff(topic.read([name]).values[:, 0])
+        rises = (steps >= 0).all() and (steps == 0).mean() <= MOST_REPEATED
+        if rises and steps.max() < STEADY * np.median(steps) and (steps != 1).any():
+            return plain(name)
+    return None
 
 
 def at_times(times: np.ndarray | None, samples: Samples, one: Field) -> Samples:

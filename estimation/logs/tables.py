@@ -1,6 +1,7 @@
 """Tables: CSV with a header of names and units, and NetCDF with variables of one dimension."""
 
 import io
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import Any
@@ -18,6 +19,7 @@ from .recording import Recording, Samples, Topic
 
 MOST_ABOVE, LONGEST_HEADER = 20, 100_000  # lines above the numbers, and their characters
 KNOWN_UNITS = {"", *(unit for units in UNITS.values() for unit in units)}
+DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
 MOST_FIELDS = 40_000_000  # of a CSV file
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -42,10 +44,19 @@ def from_csv(content: bytes, where: str) -> Recording:
         units[name] = unit
         return 1.0
 
-    columns, lines = read_columns(one_header(text), note, gaps=True, most=MOST_FIELDS)
+    columns, lines = read_columns(one_header(_with_points(text)), note, gaps=True, most=MOST_FIELDS)
     if not lines:
         raise InputError("must have a line for each sample below its header, got none")
     return Recording(where, "CSV", {"": _table(columns, units)})
+
+
+def _with_points(text: str) -> str:
+    """Return a table with decimal points, of one with decimal commas between semicolons or tabs."""
+    for line in text[:LONGEST_HEADER].splitlines()[: MOST_ABOVE + 1]:
+        cells = re.split("[;\t]", line)
+        if len(cells) > 1 and 2 * sum(map(bool, map(DECIMAL_COMMA.fullmatch, cells))) >= len(cells):
+            return text.replace(",", ".")
+    return text
 
 
 def one_header(text: str) -> str:
