@@ -46,27 +46,28 @@ TOWLINE_PY(horizon_size) {
     return size < 0 ? NULL : PyLong_FromSsize_t(size);
 }
 
-/* Return the memory of a horizon, or NULL with an exception; the caller releases the view. */
-static double *memory_of(PyObject *array, Py_ssize_t size, Py_buffer *view) {
-    Py_ssize_t given;
-    double *memory = numbers_of(array, view, 1, &given);
-    if (memory && given != size) {
-        PyBuffer_Release(view);
-        PyErr_Format(PyExc_ValueError, "the memory must have %zd numbers, got %zd", size, given);
-        return NULL;
+/* Take arrays of which the first is the memory of a horizon; return 0 with an exception if it has other numbers. */
+static int take_memory(arrays *given, PyObject *const *arguments, int wanted, Py_ssize_t size) {
+    if (!take(given, arguments, wanted, wanted, 0)) {
+        return 0;
     }
-    return memory;
+    if (!has_size(given, 0, size)) {
+        PyErr_Format(PyExc_ValueError, "the memory must have %zd numbers, got %zd", size, given->size[0]);
+        release(given);
+        return 0;
+    }
+    return 1;
 }
 
 TOWLINE_PY(horizon_places) {
     int sizes[SIZES];
-    Py_buffer view;
+    arrays given;
     const Py_ssize_t size = sizes_of(arguments, count, SIZES + 1, sizes);
-    double *memory = size < 0 ? NULL : memory_of(arguments[SIZES], size, &view);
-    if (!memory) {
+    if (size < 0 || !take_memory(&given, arguments + SIZES, 1, size)) {
         return NULL;
     }
-    const towline_horizon h = horizon_in(sizes, 0, memory);
+    const double *memory = given.of[0];
+    const towline_horizon h = horizon_in(sizes, 0, given.of[0]);
     const struct {
         const char *name;
         const double *at;
@@ -96,7 +97,7 @@ TOWLINE_PY(horizon_places) {
         }
         Py_XDECREF(place);
     }
-    PyBuffer_Release(&view);
+    release(&given);
     return places;
 }
 
@@ -129,29 +130,21 @@ TOWLINE_PY(horizon_solve) {
     enum { PROCESSOR = SIZES, BEGINNING, ITERATIONS, WHOLE };
     enum { TOLERANCE = WHOLE, MEMORY, RESIDUALS, ALL };
     int whole[WHOLE];
-    Py_buffer memory_view, residuals_view;
-    Py_ssize_t four;
+    arrays given;
     const Py_ssize_t size = sizes_of(arguments, count, ALL, whole);
     if (size < 0 || !whole_numbers(arguments, WHOLE, whole)) {
         return NULL;
     }
     const double tolerance = PyFloat_AsDouble(arguments[TOLERANCE]);
-    if (tolerance == -1.0 && PyErr_Occurred()) {
+    if (PyErr_Occurred() || !take_memory(&given, arguments + MEMORY, ALL - MEMORY, size)) {
         return NULL;
     }
-    double *memory = memory_of(arguments[MEMORY], size, &memory_view);
-    if (!memory) {
-        return NULL;
-    }
-    double *residuals = numbers_of(arguments[RESIDUALS], &residuals_view, 1, &four);
-    if (!residuals) {
-        PyBuffer_Release(&memory_view);
-        return NULL;
-    }
+    double *residuals = given.of[1];
     towline_horizon_result result = {{0, 0, 0, 0}, 0, 0};
-    if (four == 4) {
+    const int fits = has_size(&given, 1, 4);
+    if (fits) {
         Py_BEGIN_ALLOW_THREADS;
-        const towline_horizon h = horizon_in(whole, whole[PROCESSOR], memory);
+        const towline_horizon h = horizon_in(whole, whole[PROCESSOR], given.of[0]);
         result = towline_solve_horizon(&h, (towline_beginning)whole[BEGINNING], tolerance, whole[ITERATIONS]);
         residuals[0] = result.residuals.stationarity;
         residuals[1] = result.residuals.dynamics;
@@ -159,9 +152,8 @@ TOWLINE_PY(horizon_solve) {
         residuals[3] = result.residuals.soft;
         Py_END_ALLOW_THREADS;
     }
-    PyBuffer_Release(&residuals_view);
-    PyBuffer_Release(&memory_view);
-    if (four != 4) {
+    release(&given);
+    if (!fits) {
         PyErr_SetString(PyExc_ValueError, "the residuals must be four numbers");
         return NULL;
     }
