@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from . import style
 
 
 class Drawing(NamedTuple):
     """A figure with its caption."""
 
     caption: str
-    figure: Figure
+    figure: style.Figure

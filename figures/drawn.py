@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.inputs import file_path
+from . import style
 from .drawing import Drawing
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from .scene import Scene
+from .scene import Scene
 
 
 class Drawn:
@@ -22,7 +18,7 @@ class Drawn:
 
     __slots__ = ()
 
-    def figures(self) -> dict[str, Figure]:
+    def figures(self) -> dict[str, style.Figure]:
         """Draw what `plot` saves, by the names of the files without suffix."""
         raise NotImplementedError
 
@@ -38,9 +34,7 @@ class Drawn:
 
         Raises `InputError` if the format is another, or a file cannot be written.
         """
-        from .style import save_all
-
-        return save_all(self.figures, folder, format)
+        return style.save_all(self.figures, folder, format)
 
     def _drawings(self) -> list[Drawing]:
         """Draw the figures of a report's page, with their names as captions."""

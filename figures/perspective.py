@@ -5,12 +5,9 @@ A robot in a vertical plane is seen flat, along y.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from . import style
 
 ALONG = np.array([0.45, -1.0, 0.45]) / np.linalg.norm([0.45, -1.0, 0.45])  # from the robot to the camera
 AWAY = 2.2  # of the robot's size: distance of the camera
@@ -54,7 +51,7 @@ class Perspective:
         """Return the mean distance of points (k, 3) from the camera, along its axis [m]."""
         return float(AWAY * self.size - ((points - self._centre) @ ALONG).mean())
 
-    def fit(self, ax: Axes, air: float) -> None:
+    def fit(self, ax: style.Axes, air: float) -> None:
         """Draw the floor, and show what is shown with some `air` around it, a share of its size; no axes in space."""
         corners = np.array(np.meshgrid(*np.stack([self.low, self.high], axis=1))).reshape(3, -1).T
         ground = np.column_stack([corners[:, :2], np.full(len(corners), self.floor)])

@@ -9,15 +9,10 @@ place too:
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ..base.text import quantity
-
-if TYPE_CHECKING:
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colorbar import Colorbar
+from . import style
 
 FINEST = 0.01  # of t_max
 PALEST = 0.12  # of the colour map: paler lines cannot be seen on white
@@ -46,7 +41,7 @@ def shades(places: np.ndarray) -> np.ndarray:
     return np.round(255 * rgba[..., :3]).astype(np.uint8)
 
 
-def scale() -> ScalarMappable:
+def scale() -> style.ScalarMappable:
     """Return the colours of places from 0 to 1, for a colour bar."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
@@ -54,7 +49,7 @@ def scale() -> ScalarMappable:
     return ScalarMappable(Normalize(0.0, 1.0), ListedColormap(shades(np.linspace(0.0, 1.0, 256)) / 255.0))
 
 
-def mark(bar: Colorbar, t_min: np.ndarray, t_max: np.ndarray, size: float) -> None:
+def mark(bar: style.Colorbar, t_min: np.ndarray, t_max: np.ndarray, size: float) -> None:
     """Label a colour bar of `scale` with the limits (m,) [N], and tensions between them if all cables have the same.
 
     `size` is that of the letters [points].

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....base.display import Displayed
 from .rest_to_rest import SMOOTHER_PEAK, smoother_rest_to_rest
 
 RAMP = 0.1  # of the leg, in which the acceleration rises from zero to its peak; it changes sign in twice that
@@ -53,7 +54,7 @@ def size(vectors: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Overlap:
+class Overlap(Displayed):
     """The overlap of legs that have one time law, from rest to rest; `peak` is its largest second derivative."""
 
     law: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
