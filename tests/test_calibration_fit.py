@@ -11,9 +11,10 @@ from towline.estimation.calibration import Measurements, calibrate, cross_valida
 from towline.estimation.calibration import model as model_module
 from towline.estimation.calibration.curvature import curvature
 from towline.estimation.calibration.fit import fit
+from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.normal_equations import NormalEquations, metric
 from towline.estimation.calibration.parameters import OF_CABLE
-from towline.estimation.calibration.solving import length_of, model_of
+from towline.estimation.calibration.solving import model_of
 from towline.models import Dynamics, load
 
 from .robots_as_built import as_built, moved_anchors

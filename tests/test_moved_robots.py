@@ -6,7 +6,7 @@ import pytest
 from towline import Dynamics, Robot, load, tensions
 from towline.control import Predictive
 from towline.estimation.calibration import next_poses
-from towline.estimation.calibration.solving import length_of
+from towline.estimation.calibration.geometry import length_of
 from towline.models import points
 from towline.models.diagnosis import diagnose
 from towline.solvers import capacity_margin

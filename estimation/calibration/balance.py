@@ -20,9 +20,9 @@ import numpy as np
 
 from ...core import columns_by_geometry, lines, wrench_by_axes
 from ...models import points
-from ...models.record import record_of
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, carriers_of, measured_poses
+from .geometry import record_with
 from .motion import Motion, cross, motion_of
 from .parameters import Parameters
 
@@ -149,9 +149,7 @@ class Balance:
         (position, rotation), robot, rows = placed, self._robot, self._rows
         table, m, count = of.table(x), robot.m, len(position)
         mass, com = x[of.clock + 1], x[of.clock + 2 : of.clock + 5]
-        record = record_of(robot).copy()
-        cables = record["cable"][:m]
-        cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
+        record = record_with(robot, table)
         record["com"] = 0.0  # moments about the platform frame
         poses = np.concatenate([position, points.angles(rotation)], axis=1)
         A, lengths = np.empty((count, 6, m)), np.empty((count, m))

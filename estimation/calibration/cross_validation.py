@@ -16,6 +16,7 @@ from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .balance import needs_balance
 from .fit import fit
+from .geometry import length_of
 from .model import Model, State
 from .parameters import IN_BALANCE, Parameters
 from .solving import (
@@ -25,7 +26,6 @@ from .solving import (
     covariance_of,
     inflation_of,
     is_enough,
-    length_of,
     lengths_of,
     model_of,
     noise_of,

@@ -13,10 +13,10 @@ from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .calibration import Calibration
+from .geometry import length_of
 from .model import Model
 from .outliers import project, without_poses
 from .parameters import Parameters, check_free
-from .solving import length_of
 
 DRAWN = 8192  # random poses, of which those at which the robot can rest are candidates
 KEPT = 600

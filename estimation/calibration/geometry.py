@@ -20,6 +20,14 @@ class Runs(NamedTuple):
     by_geometry: np.ndarray
 
 
+def record_with(robot: Robot, table: np.ndarray) -> np.ndarray:
+    """Return a record of the robot with the anchors, attachments and radii of a table of parameters, (m, 9 or more)."""
+    record = record_of(robot).copy()
+    cables = record["cable"][: robot.m]
+    cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
+    return record
+
+
 def runs(
     robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray, carriers: np.ndarray | None = None
 ) -> Runs:
@@ -29,14 +37,17 @@ def runs(
       robot, (m, 9). No cable is tangent to a negative radius.
     - `carriers`: their poses, (N, c, 6) or (c, 6) [m, rad]; default: at home.
     """
-    record, m, count = record_of(robot).copy(), robot.m, len(position)
-    cables = record["cable"][:m]
-    cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
+    m, count = robot.m, len(position)
     poses = np.concatenate([position, points.angles(rotation)], axis=1)
     lengths, A, by_geometry = np.empty((count, m)), np.empty((count, 6, m)), np.empty((count, m, 7))
     carriers = robot.carrier_home if carriers is None else np.ascontiguousarray(carriers)
-    lines(record, poses, carriers, lengths, A, None, None, by_geometry)
+    lines(record_with(robot, table), poses, carriers, lengths, A, None, None, by_geometry)
     lengths[:, table[:, 8] < 0] = np.nan
     # Cables first, in this order also in memory, as the fit goes through them.
     directions = np.negative(A[:, :3].transpose(2, 0, 1), order="C")
     return Runs(lengths.T.copy(), directions, by_geometry.swapaxes(0, 1).copy())
+
+
+def length_of(robot: Robot) -> float:
+    """Return a length of the robot's cables, as a scale [m]: their mean at home."""
+    return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())

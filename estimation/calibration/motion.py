@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
-from ..logs.smoothing import FEWEST, SPAN, Parabolas, within
+from ..logs.smoothing import FEWEST, SPAN, Parabolas, continuous, within
 from .parameters import Parameters
 
 
@@ -77,9 +77,7 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     if not known[:, robot.dof_mask > 0].all():
         return rest._replace(sigma=np.abs(lengths.bends).max(axis=1))
     placed = local.fitted(position)
-    quaternions = Rotation.from_matrix(rotation).as_quat()
-    flips = np.where(np.einsum("ni,ni->n", quaternions[1:], quaternions[:-1]) < 0, -1.0, 1.0)
-    quaternions[1:] *= np.cumprod(flips)[:, None]
+    quaternions = continuous(Rotation.from_matrix(rotation).as_quat())
     turned, inverse = local.fitted(quaternions), quaternions * [-1, -1, -1, 1]
     rate, spin = (2 * _vector_of_product(part, inverse) for part in (turned.slopes, turned.bends))
     sigma = np.full(count, placed.noise[2].max())

@@ -21,6 +21,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from .curvature import curvature
+from .geometry import length_of
 from .model import STILL, Derivatives, Model, Residuals, State
 from .parameters import OF_CABLE
 from .products import inner
@@ -49,7 +50,7 @@ def metric(model: Model) -> np.ndarray:
         speed = max(SLOWEST, float(np.sqrt((model.track.at(0.0)[2] ** 2).sum(axis=1).mean())))
     strong = measurements.tensions
     force = max(float(np.sqrt((strong**2).mean())) if strong is not None else model.robot.force_scale, 1e-9)
-    length = float(np.linalg.norm(model.robot.home_anchors - model.robot.home_attachments, axis=1).mean())
+    length = length_of(model.robot)
     table[:, 9], table[:, 10], table[:, 11:] = spread**2, force * length, (length, length / force, length)
     of_robot = (speed, length / model.robot.platform.mass, 1.0, 1.0, 1.0)
     return np.concatenate([table.ravel(), of_robot, np.ones(len(parameters.slips))])

@@ -26,7 +26,7 @@ from ...models.robot import Robot
 from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
 from .attitudes import misread_attitudes
 from .frames import displaced_frames, fitted_frames
-from .geometry import runs
+from .geometry import length_of, runs
 from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
 
@@ -302,7 +302,7 @@ def _likeliest(e: np.ndarray, turns: list[tuple[np.ndarray, _Way]]) -> tuple[np.
 
 def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mistake | None:
     """Return the error if readings (N, m) change more than any cable of the robot can, or None."""
-    length = float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+    length = length_of(robot)
     change = float(np.median(np.ptp(readings, axis=0)))
     if change <= LARGEST * length:
         return None

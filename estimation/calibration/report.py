@@ -9,6 +9,7 @@ from ...base.text import quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
+from .geometry import length_of
 from .result import CalibrationData, Parameter
 from .turning import turning
 
@@ -120,8 +121,6 @@ def _of_noise(result: CalibrationData) -> list[str]:
 
 
 def _of_parameters(result: CalibrationData) -> list[Part]:
-    from .solving import length_of
-
     lines: list[Part] = []
     length = length_of(result.file)  # on which a scale acts
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))

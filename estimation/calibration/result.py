@@ -17,10 +17,11 @@ from ...models.part import LARGEST
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .cross_validation import HeldOut, compare, poses_fitted
+from .geometry import length_of
 from .outliers import Outlier, Slip
 from .parameters import OF_ROBOT
 from .plausibility import Mistake
-from .solving import Solved, covariance_of, inflation_of, is_still, length_of, lengths_of, noise_of
+from .solving import Solved, covariance_of, inflation_of, is_still, lengths_of, noise_of
 
 EXACT = 1e-3  # times the stated sigma: smaller errors are as good as none
 FAR = 5.0  # standard deviations of the prior

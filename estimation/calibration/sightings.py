@@ -11,9 +11,8 @@ import numpy as np
 
 from ...core import columns_by_geometry
 from ...models import points
-from ...models.record import record_of
 from ..logs.measurements import Measurements
-from .geometry import Runs
+from .geometry import Runs, record_with
 from .motion import cross
 from .parameters import Parameters
 
@@ -56,26 +55,9 @@ def sightings(
     `run` is the geometry of the cables there, `carriers` are poses, and `carried` is `Carriers.of_cables` if these move
     with the clock offset. What was not measured has zeros.
     """
-    d = measurements.directions
-    if d is None:
+    if measurements.directions is None:
         return None
-    at = np.broadcast_to(carriers, (len(d), *carriers.shape[-2:]))
-    parts = _sighted(of, x, placed, run.directions, at, d, carried, derive)
-    return Sighted(*(part / measurements.sigma.directions for part in parts))
-
-
-def _sighted(
-    of: Parameters,
-    x: np.ndarray,
-    placed: tuple[np.ndarray, np.ndarray],
-    u: np.ndarray,
-    carriers: np.ndarray,
-    d: np.ndarray,
-    carried: tuple[np.ndarray, np.ndarray] | None,
-    derive: bool,
-) -> list[np.ndarray]:
-    """Return the parts of `Sighted` of some samples for a standard deviation of 1, with unit vectors u (m, N, 3)."""
-    d = np.swapaxes(d, 0, 1)
+    u, d = run.directions, np.swapaxes(measurements.directions, 0, 1)
     m, count = d.shape[:2]
     known, flat = np.isfinite(d[..., 0]), np.isnan(d[..., 2])
     W = np.where((known & ~flat)[..., None, None], np.eye(3), 0.0)  # (m, N, 3, 3)
@@ -83,16 +65,15 @@ def _sighted(
     level = known & flat & (steep > STEEPEST)
     W[level, 0, 0], W[level, 0, 1] = -d[level, 1] / steep[level], d[level, 0] / steep[level]
     target = np.where(flat[..., None], 0.0, np.where(known[..., None], d, 0.0))
+    W /= measurements.sigma.directions
     residuals = (W @ (u - target)[..., None])[..., 0]
     if not derive:
-        return [residuals]
-    position, rotation = placed
-    record, table = record_of(of.robot).copy(), of.table(x)
-    cables = record["cable"][:m]
-    cables["anchor"], cables["attachment"], cables["radius"] = table[:, :3], table[:, 3:6], table[:, 8]
+        return Sighted(residuals)
+    (position, rotation), table = placed, of.table(x)
+    at = np.ascontiguousarray(np.broadcast_to(carriers, (count, *carriers.shape[-2:])))
     poses = np.concatenate([position, points.angles(rotation)], axis=1)
     S = np.empty((count, m, 6, 7))
-    columns_by_geometry(record, poses, np.ascontiguousarray(carriers), S)
+    columns_by_geometry(record_with(of.robot, table), poses, at, S)
     by_geometry = -W @ np.swapaxes(S[:, :, :3], 0, 1)  # (m, N, 3, 7)
     by_shift = by_geometry[..., 3:6] @ np.swapaxes(rotation, 1, 2)
     arms = np.einsum("nij,mj->mni", rotation, table[:, 3:6])
@@ -101,7 +82,7 @@ def _sighted(
     if carried is not None:
         velocity, rate = carried
         by_clock = (W @ np.cross(rate, u)[..., None] - by_shift @ velocity[..., None])[..., 0]
-    return [residuals, by_geometry, by_clock, np.concatenate([by_shift, by_turn], axis=3)]
+    return Sighted(residuals, by_geometry, by_clock, np.concatenate([by_shift, by_turn], axis=3))
 
 
 def sighted(measurements: Measurements) -> np.ndarray:

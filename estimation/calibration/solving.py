@@ -14,6 +14,7 @@ from .balance import Balance
 from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
+from .geometry import length_of
 from .model import Model, State
 from .normal_equations import metric
 from .observability import Observability
@@ -188,11 +189,6 @@ def model_of(robot: Robot, measurements: Measurements, groups: tuple[str, ...], 
         start = level_poses(robot, lengths, "offsets" in groups, measurements.carrier_poses)
         model = replace(model, start=placed(robot, measurements, start))
     return model
-
-
-def length_of(robot: Robot) -> float:
-    """Return a length of the robot's cables, as a scale [m]: their mean at home."""
-    return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
 
 
 def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]) -> None:

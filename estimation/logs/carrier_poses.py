@@ -10,7 +10,7 @@ from ...models import points
 from ...models.robot import Robot
 from .mapping import Field, Fields, LogMap, carrier_fields, command_fields
 from .recording import Recording, Samples
-from .smoothing import FEWEST, Parabolas, within
+from .smoothing import FEWEST, Parabolas, continuous, within
 from .streams import Reader, at_times
 
 LEAST_THRUST, MOST_THRUST = 0.6, 3.0  # times the weight, of thrusts in newtons
@@ -124,10 +124,7 @@ def angles_at(times: np.ndarray | None, reader: Reader, found: Fields) -> np.nda
         return at_times(times, samples, found.orientation[0]).values
     from scipy.spatial.transform import Rotation
 
-    values = samples.values.copy()
-    jumps = np.einsum("ni,ni->n", values[1:], values[:-1]) < 0  # q and -q are the same rotation
-    values[1:] *= np.cumprod(np.where(jumps, -1.0, 1.0))[:, None]
-    values = at_times(times, Samples(samples.times, values), found.orientation[0]).values
+    values = at_times(times, Samples(samples.times, continuous(samples.values)), found.orientation[0]).values
     known = np.isfinite(values).all(axis=1) & (np.linalg.norm(values, axis=1) > 0.5)
     angles = np.full((len(values), 3), np.nan)
     angles[known] = points.angles(Rotation.from_quat(values[known]).as_matrix())

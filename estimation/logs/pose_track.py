@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...models import points
-from .smoothing import NEIGHBOURS, smooth, widest_parabola
+from .smoothing import NEIGHBOURS, continuous, smooth, widest_parabola
 
 WIDEST = 5.0  # median times between measured poses; the motion inside a longer gap is not known
 
@@ -39,10 +39,7 @@ class PoseTrack:
         measured = self._measured
         self._widest = WIDEST * float(np.median(np.diff(measured)))
         self._span = measured[0], measured[-1]
-        quaternions = Rotation.from_matrix(rotation[known]).as_quat()
-        # q and -q are the same rotation: neighbours get the same sign.
-        signs = np.where(np.einsum("ni,ni->n", quaternions[1:], quaternions[:-1]) < 0, -1.0, 1.0)
-        quaternions[1:] *= np.cumprod(signs)[:, None]
+        quaternions = continuous(Rotation.from_matrix(rotation[known]).as_quat())
         self._curve = CubicSpline(measured, smooth(measured, np.hstack([position[known], quaternions]), neighbours))
         self._last: tuple[float, tuple[np.ndarray, ...]] | None = None
 

@@ -22,6 +22,12 @@ class Fitted(NamedTuple):
     noise: np.ndarray
 
 
+def continuous(quaternions: np.ndarray) -> np.ndarray:
+    """Return quaternions (N, 4) whose signs follow from those before: q and -q are the same rotation."""
+    flips = np.where(np.einsum("ni,ni->n", quaternions[1:], quaternions[:-1]) < 0, -1.0, 1.0)
+    return quaternions * np.cumprod(np.append(1.0, flips))[:, None]
+
+
 class Parabolas:
     """Parabolas by least squares through `width` neighbours of each sample, at times (N,) [s]."""
 

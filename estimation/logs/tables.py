@@ -186,14 +186,7 @@ def _add(columns: dict, units: dict, names: Sequence[str], values: np.ndarray, s
 
 
 def _is_read(name: str) -> bool:
-    return bool(role(name)) or name in (
-        *WRITTEN,
-        *OF_CARRIERS,
-        "carrier",
-        "pose",
-        "tensions_commanded",
-        "cable_directions",
-    )
+    return bool(role(name)) or name in (*WRITTEN, *OF_CARRIERS, *OTHERS)
 
 
 def _attributes(of: Any) -> dict[str, Any]:

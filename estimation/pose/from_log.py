@@ -19,6 +19,7 @@ from ...base.writing import whole_file
 from ...models import points
 from ...models.part import COORDINATES
 from ...models.robot import Robot
+from ..calibration.geometry import length_of
 from ..calibration.plausibility import Mistake, mistake
 from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, carriers_of, check_measurements
@@ -118,12 +119,7 @@ class LogPoses(Displayed):
             return 0.0
         bends = Parabolas(self.times, within(self.times)).fitted(estimate.pose[:, :3]).bends
         gravity = max(float(np.linalg.norm(estimate.robot.gravity)), 1e-9)
-        return float(np.sqrt((bends[rows] ** 2).sum(axis=1).mean()) / gravity * self._length)
-
-    @property
-    def _length(self) -> float:
-        robot = self.estimate.robot
-        return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())
+        return float(np.sqrt((bends[rows] ** 2).sum(axis=1).mean()) / gravity * length_of(estimate.robot))
 
     def lines(self) -> Iterator[str]:
         """Yield input errors, wrong samples, one line for each run of them, and how far the platform may swing."""
@@ -140,7 +136,7 @@ class LogPoses(Displayed):
             return
         if np.any(self.estimate.by_gravity):
             moves = ""
-            if self.swing > VISIBLE * self._length:
+            if self.swing > VISIBLE * length_of(self.estimate.robot):
                 moves = (
                     ", but the platform accelerates, so they may be off by "
                     f"{quantity(1e3 * self.swing, 'mm', 2)} (rms), which the covariance does not include"
@@ -282,8 +278,8 @@ def _by_more(robot: Robot, given: Measurements, sigma: np.ndarray, begin: float,
 def _block(robot: Robot, measured: Measurements, weights: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return poses (k, 6), residuals of lengths (k, m) [m], sums of squares, covariances and success of samples."""
     from ..calibration.normal_equations import pose_covariances
-    from ..calibration.solving import length_of, model_of
     from ..calibration.solving import lengths_of as lengths_left
+    from ..calibration.solving import model_of
     from ..calibration.starts import fit_from
 
     model = model_of(robot, measured, (), {})
