@@ -14,6 +14,7 @@ from ..models.robot import Robot
 from .command_delay import Pending
 from .records import MOST_TETHERS, TETHER
 
+LEAST_REACH = 0.02  # of the mean length of cables of fixed length: with less, errors of the load are not corrected
 SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are taken to be there
 
 
@@ -217,6 +218,28 @@ class Tethered(Late):
         moving[:, :2] = self._measured[1:].reshape(-1, 2, 6)
         control_carriers(self._robot, self.tethers, motion, moving)
         carriers[:, :, :3] = moving[:, :, :3]
+
+
+def moved_coordinates(
+    robot: Robot,
+    far: np.ndarray,
+    flies: np.ndarray,
+    strongest: float,
+    boxes: tuple[np.ndarray, np.ndarray] | None,
+    delay: tuple[float, float],
+) -> tuple[Moved, np.ndarray]:
+    """Return the coordinates that may deviate by `far`, (c, 6) [m, rad], and their largest deviations, (f,).
+
+    - `flies`: which carriers fly, (c,).
+    - `strongest`: largest acceleration in addition to the reference's [m/s^2, rad/s^2].
+    - `boxes`: as in `Freed`.
+    - `delay`: time in which flying carriers turn, and duration of a stage [s].
+    """
+    if robot.fixed_lengths is None:
+        late = Flown(far, strongest, *delay) if (far.any(axis=1) & flies).any() else None
+        return late or Freed(far, strongest, boxes), far[far > 0]
+    moved = Tethered(robot, *delay)
+    return moved, np.full(moved.count, max(far.max(), LEAST_REACH * float(robot.fixed_lengths.mean())))
 
 
 def _tethers(robot: Robot) -> np.ndarray:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from typing import Any
+from warnings import warn
 
 import numpy as np
 from typing_extensions import override
@@ -14,15 +15,15 @@ from ..models.files import as_robot
 from ..models.record import record_of
 from ..models.robot import Robot
 from ..solvers.in_place import InPlace
-from ..solvers.status import OPTIMAL
 from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
 from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
 from .boxes import boxes, stay_inside
 from .carried_load import CarriedLoad
-from .command import HOLD, NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
+from .command import NOTHING, NOWHERE, PLANNED, SHIFTED, SOFT, Command
 from .controllability import uncontrolled
 from .controller import Controller
 from .deviation import Deviation
+from .fallback import NEGLIGIBLE, answer_others
 from .lag import WINCHES_KEEP, Lead, rotor_lead
 from .late_states import LateStates
 from .noise import Noise
@@ -33,9 +34,9 @@ from .settings import limits_of, reach_of, set_reach, settings_of
 from .state import State
 from .tension_loop import TensionLoop
 
+GAINS = "kd", "kp", "ki"  # of the settings, in the order of the powers of the bandwidth
+HELD_FOR = 0.75  # over the bandwidth: the longest time between steps; from 1 on the loop is unstable (Jury)
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
-NEGLIGIBLE = 1e-3  # of the robot's scale of forces: a wrench that is missed by less is given as planned
-CARRIED = 0.1  # the same of what fewer cables than degrees of freedom cannot give, and leave to their carriers
 QUICK = 6.0  # [rad/s]: the bandwidth of a carrier's deviation, unless a slower loop has to follow it
 
 
@@ -60,6 +61,8 @@ class ComputedTorque(Controller):
     bandwidth
         Bandwidth w of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = w^2. Default:
         10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers; see `sensors`.
+        If the first two steps, or three in a row, are more than 0.75 / w apart, it is lowered until two are not: the
+        loop would be unstable from 1 / w on. Of given bandwidths a warning says so.
     damping
         Damping ratio z: Kd = 2 z w.
     integral
@@ -125,8 +128,7 @@ class ComputedTorque(Controller):
         sensors: Noise | Mapping[str, Any] | None = None,
     ):
         self.robot, self._alone = as_robot(robot), OneAtATime()
-        few = self._few = self.robot.m < len(self.robot.platform.dof)
-        self._scale, self._limits = self.robot.wrench_scale, limits_of(self.robot, rate)
+        few, self._limits = self.robot.m < len(self.robot.platform.dof), limits_of(self.robot, rate)
         rotors, usual = number("rotor_lag", rotor_lag, 0.0, 0.1), SWINGING if few else HELD
         loops = bandwidths_for(self.robot, usual, sensors, rotors, bandwidth, observer, attitude)
         held = place_for(loops.attitude, place)
@@ -139,6 +141,8 @@ class ComputedTorque(Controller):
         far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
         self._settings["attitude"] = self._attitude = loops.attitude
+        self._gains, self._adapts = {name: self._settings[name].copy() for name in GAINS}, bandwidth is None
+        self._usual_longest = (HELD_FOR if self._adapts else 1.0) / max(self._settings["kd"].max() / 2, ROUNDING)
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
         has_lead = lag > WINCHES_KEEP and self.robot.fixed_lengths is None
         self._ahead = Lead(lag, WINCHES_KEEP, *self._limits) if has_lead else None
@@ -190,6 +194,8 @@ class ComputedTorque(Controller):
         """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
+        ComputedTorque._speed_up(self)
+        self._elapsed = 0.0
         self._carried.reset()
         self._robot = record_of(self.robot)
         self._seen, self._sent_lately = 0.0, LateStates(rows * m)
@@ -217,11 +223,6 @@ class ComputedTorque(Controller):
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the command for the time from `time` [s] until the next step.
-
-        Raises `InputError` if the time is not later than that of the previous step, an array has a wrong shape, or
-        another thread uses the controller.
-        """
         with self._alone:
             return self._step(time, state, reference)
 
@@ -242,7 +243,7 @@ class ComputedTorque(Controller):
             tensions, answered = problems.tensions.copy(), self._as_planned
         else:
             problems.solve_others()
-            answered = self._answer_others()
+            answered = answer_others(self.robot, problems, self._cables["last"])
             tensions, proof = problems.tensions.copy(), (problems.direction.copy(), problems.shortfall.copy())
             self._platform["integrates"] = answered == PLANNED
         self._paused = answered is not self._as_planned
@@ -271,6 +272,10 @@ class ComputedTorque(Controller):
             raise InputError(
                 f"time must increase from step to step until reset(), got {time:g} s after {self._time:g} s"
             )
+        if dt > self._longest and not 0 < self._elapsed <= self._longest:
+            self._slow_down(min(dt, self._elapsed or dt))
+        elif self._usual_longest < self._longest < np.inf and 0 < max(dt, self._elapsed) <= self._usual_longest:
+            self._speed_up()
         if reference.load is not self._carried.load:
             self._carry(reference.load, -np.inf if self._time is None else time)
         self._senses = state.tensions is not None
@@ -308,6 +313,22 @@ class ComputedTorque(Controller):
         self._is_missing = missing > 0  # cables or their sensors
         self._time, self._seen, self._elapsed = time, seen, dt
         return dt, state, reference
+
+    def _slow_down(self, period: float) -> None:
+        """Lower default gains for commands that are held for a period [s], or warn of given ones: see `HELD_FOR`."""
+        fastest = float(self._settings["kd"].max()) / 2
+        self._longest = period * (1 + ROUNDING) if self._adapts else np.inf
+        if self._adapts:
+            for order, name in enumerate(GAINS, 1):
+                self._settings[name] *= (HELD_FOR / (period * fastest)) ** order
+        else:
+            warn(f"bandwidth must be at most {1 / period:.3g} rad/s for steps {period:.3g} s apart", stacklevel=2)
+
+    def _speed_up(self) -> None:
+        """Use the usual gains."""
+        for name, gain in self._gains.items():
+            self._settings[name] = gain
+        self._longest = self._usual_longest
 
     def _carry(self, load: Any, time: float) -> None:
         """Use the model of the robot with a load from a time on [s]."""
@@ -376,22 +397,3 @@ class ComputedTorque(Controller):
     def _as_floats(self, state: State, reference: Reference) -> tuple[State, Reference]:
         rows = len(self._wanted)
         return as_floats(state, self.robot, rows), as_floats(reference, self.robot, rows)
-
-    def _answer_others(self) -> np.ndarray:
-        """Give rows without tensions a command, and return the status of each row."""
-        problems, force = self._problems, self.robot.force_scale
-        if self._few:
-            # What is missing along a cable, tensions would give if limits let them; the rest is for the carriers.
-            missing = self._scale * (problems.w - (problems.A @ problems.tensions[..., None])[..., 0])
-            along = np.abs((self._scale * missing)[:, None] @ problems.A)[:, 0].max(axis=1)
-            square = np.einsum("ij,ij->i", missing, missing)
-            nearly = (along <= NEGLIGIBLE * force) & (square <= (CARRIED * force) ** 2)
-        else:
-            nearly = problems.shortfall <= NEGLIGIBLE * force  # false for nan
-        answered = np.where((problems.code == OPTIMAL) | nearly, PLANNED, SOFT).astype(np.int8)
-        for row in np.flatnonzero(~np.isfinite(problems.tensions).all(axis=1)):
-            answered[row] = HOLD
-            last, reference = self._cables["last"][row], problems.t_ref[row]
-            target = np.where(np.isfinite(reference), reference, last)
-            problems.tensions[row] = np.clip(target, *problems.bounds[:, row])
-        return answered

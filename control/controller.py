@@ -28,7 +28,20 @@ class Controller(ABC):
 
     @abstractmethod
     def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the command from the time [s] until the next step."""
+        """Return the command from now until the next step.
+
+        Parameters
+        ----------
+        time
+            Time of the step [s], later than that of the last one.
+        state, reference
+            Measured state, and desired motion at this time.
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong type, shape or value, or another thread uses the controller.
+        """
 
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
         """Receive the future references; the default ignores them.
@@ -39,6 +52,11 @@ class Controller(ABC):
             Reference of each period, from `start` [s] on; the last one holds afterwards.
         period
             Period [s].
+
+        Raises
+        ------
+        InputError
+            If an argument has a wrong type or value.
         """
         return
 

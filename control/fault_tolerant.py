@@ -116,16 +116,11 @@ class FaultTolerant(Controller):
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
-        """Receive the future references for the prediction. Arguments and errors as those of `Predictive.follow`."""
         self._team.follow(references, period, start)
         self._announced = references, period, start
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the command for the time from `time` [s] until the next step. Arguments as in `Predictive.step`.
-
-        Raises `InputError` if an argument is wrong.
-        """
         if self._rest is None:
             command = self._team.step(time, state, reference)
             state, reference = self._as_floats(state, reference)

@@ -71,10 +71,6 @@ class Filtered(Controller):
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the command of the controller for the estimated state at the time of the measurement.
-
-        Raises `InputError` if the filter or the controller refuses an argument.
-        """
         required("state", state, State)
         seen = time if state.time is None else state.time
         self._references.append((time, reference))

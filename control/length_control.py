@@ -102,21 +102,12 @@ class LengthControl(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
-        Parameters
-        ----------
-        time
-            Time of the step [s], later than that of the last one.
-        state
-            Measured state, of which the pose is used, and with a lag the velocity. With a time of its measurement it is
-            compared with the plan then.
-        reference
-            The plan at this time.
+        Of the state the pose is used, with a lag also the velocity; if it has a time it is compared with the plan then.
 
         Raises
         ------
         InputError
-            If the time is not later than that of the last step, an array has a wrong shape, or no tensions are planned
-            for cables that stretch.
+            If an argument has a wrong shape or value, or no tensions are planned for cables that stretch.
         """
         rows = rows_of(required("state", state, State))
         state = as_floats(state, self.robot, rows)

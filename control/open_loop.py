@@ -17,7 +17,7 @@ from .state import State
 
 
 class OpenLoop(Controller):
-    """Command the planned tensions and the planned motion of the carriers: a baseline for controllers.
+    """Command the planned tensions, or the lowest ones, and the planned motion of the carriers: a baseline.
 
     Parameters
     ----------
@@ -43,20 +43,6 @@ class OpenLoop(Controller):
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
-        """Return the planned tensions, or the lowest where none are planned, and the planned motion of the carriers.
-
-        Parameters
-        ----------
-        time, state
-            Ignored, except for the leading dimension of the state.
-        reference
-            The plan at this time.
-
-        Raises
-        ------
-        InputError
-            If state or reference are invalid, or one of their arrays has a wrong shape.
-        """
         rows = rows_of(required("state", state, State))
         reference = as_floats(required("reference", reference, Reference), self.robot, rows)
         return planned_command(self.robot, reference, rows)

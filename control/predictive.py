@@ -18,9 +18,9 @@ from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
 from ..statics.distribution import tensions as tensions_at
-from .as_floats import as_floats
+from .as_floats import ROUNDING, as_floats
 from .bandwidths import PATIENT, STILL, TEAM, TOWING, bandwidths_for, noise_of_velocity
-from .carrier_references import Flown, Freed, Moved, Tethered
+from .carrier_references import moved_coordinates
 from .command import HOLD, OTHERWISE, SHIFTED, SOFT, Command
 from .computed_torque import ComputedTorque
 from .hand_over import agree
@@ -31,14 +31,14 @@ from .reference import Reference
 from .settings import reach_of, set_reach
 from .stability import grows
 from .state import State
-from .watch import BLIND, LATE, QUICK, UNSTABLE, HandOver, Watch
-from .weights import ripple, terminal, weights
+from .watch import BLIND, LATE, PAUSE, QUICK, UNSTABLE, HandOver, Watch
+from .weights import ripple, stage_at_home, terminal, weights
 
 TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
 NEARLY, GOOD = 0.1, 1e-3  # residuals, not converged, of an iterate for the next step to begin with, and of one to use
 USUAL_REACH = 0.06  # of the cables' mean length
-LEAST_REACH = 0.02  # the same for cables of fixed length: with less, errors of the load are not corrected
+FASTEST = 1.2  # over a stage, or a longer time between steps: bandwidth that commands held so long permit
 FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
 NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
 
@@ -71,9 +71,12 @@ class Predictive(ComputedTorque):
     bandwidth
         Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose. Default: 40,
         but less if carriers correct errors: 8 for teams with cables of fixed length, 6 for towing robots with winches.
+        At most 1.2 / `stage` has an effect.
     stages, stage
         Number of stages, and duration of each [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may leave their
-        reference, which is slower, and of 0.025 s if carriers correct errors.
+        reference, which is slower, of 0.025 s if carriers correct errors. If the first two steps, or three in a row,
+        and the references of `follow` are more than twice as far apart, up to 0.21 s, a stage lasts as long as a step.
+        A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
     reach
         Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft scale, not
         a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's weight. With cables
@@ -144,55 +147,76 @@ class Predictive(ComputedTorque):
         own = bandwidths_for(the_robot, usual, sensors, rotors, bandwidth, observer, attitude)
         self._bandwidth = own.bandwidth
         carrier_bandwidth = usual.carrier_bandwidth if carrier_bandwidth is None else carrier_bandwidth
-        returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)
+        self._returning = number("carrier_bandwidth", carrier_bandwidth, 1e-3, 1e3)
         self._strongest = number("carrier_acceleration", carrier_acceleration, 0.0, 1e4)
-        count = whole_number("stages", stages, 1, 200)
-        self._steps = np.full(count, number("stage", usual.stage if stage is None else stage, 1e-4, 10.0))
-        self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
+        self._stages = whole_number("stages", stages, 1, 200)
+        self._stage = number("stage", usual.stage if stage is None else stage, 1e-4, 10.0)
         loops: dict[str, Any] = {"rate": rate, "place": place, "attitude": own.attitude, "patience": patience}
         loops["rotor_lag"] = rotor_lag
         self._beside = ComputedTorque(the_robot, reach=given, sensors=sensors, **loops)
         loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag}
         super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
         set_reach(self._settings, reacts)
-        self._followed = np.flatnonzero(flies & ~far.any(axis=1))
+        self._followed, self._far = np.flatnonzero(flies & ~far.any(axis=1)), (far, flies)
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
         self._has_winches = the_robot.fixed_lengths is None
-        self._moved, reaches = self._mobility(far, flies)
-        self._sizes = count, 12 + 2 * self._moved.count, self.robot.m + self._moved.count
         self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
-        self._room = self._limits.rate * self._times[1:, None]  # for tensions, until the end of each stage
-        self._preview = Preview(self.robot, self._steps, self._moved, self._statics * (not self._has_winches))
+        self._preview = Preview(self.robot, self._statics * (not self._has_winches))
         self._surroundings = Surroundings(self.robot, tube, keep_out)
-        self._horizon = self._program(reaches, returning)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
-        usual = self.robot.force_scale / self.robot.platform.mass
         loud = None if correct else ripple(self.robot, self._limits, 2 * self._bandwidth + self._settings["observer"])
         blind, noise = BLIND if self._has_winches else QUICK, noise_of_velocity(self.robot, sensors)
-        self._watch = Watch(scale, usual, noise, loud, blind)
+        self._watch = Watch(scale, self.robot.force_scale / self.robot.platform.mass, noise, loud, blind)
         self._from_the_start: HandOver | None = None
+        self._steps, self._adapts = np.array([np.nan]), stage is None
+        fastest = FASTEST / max(self._bandwidth.max(), ROUNDING)
+        self._usual_longest = max(self._stage, min(fastest, 2 * self._stage) if self._adapts else fastest) + ROUNDING
         self.reset()
         if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
             self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
             warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
 
-    def _mobility(self, far: np.ndarray, flies: np.ndarray) -> tuple[Moved, np.ndarray]:
-        """Return the carrier coordinates that may deviate by `far`, (c, 3) [m], and their largest deviations, (f,)."""
-        # What is under way for longer than half of the stages would leave nothing to decide.
-        delay = min(2.0 / self._attitude, self._times[-1] / 2), self._steps[0]
-        if self.robot.fixed_lengths is None:
-            late = Flown(far, self._strongest, *delay) if (far.any(axis=1) & flies).any() else None
-            return late or Freed(far, self._strongest, self._boxes), far[far > 0]
-        moved = Tethered(self.robot, *delay)
-        least = LEAST_REACH * float(self.robot.fixed_lengths.mean())
-        return moved, np.full(moved.count, max(far.max(), least))
+    def _lay_out(self, stage: float) -> None:
+        """Prepare the program with stages of a duration [s], without a solution."""
+        if self._steps[0] != stage:
+            self._steps = np.full(self._stages, stage)
+            self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
+            # What is under way for longer than half of the stages would leave nothing to decide.
+            delay = min(2.0 / self._attitude, self._times[-1] / 2), stage
+            self._moved, reaches = moved_coordinates(self.robot, *self._far, self._strongest, self._boxes, delay)
+            self._sizes = self._stages, 12 + 2 * self._moved.count, self.robot.m + self._moved.count
+            self._room = self._limits.rate * self._times[1:, None]  # for tensions, until the end of each stage
+            self._preview.lay_out(self._steps, self._moved)
+            self._horizon = self._program(reaches)
+        count, n, u = self._sizes
+        self._guess, self._solved = (np.zeros((count + 1, n)), np.zeros((count, u))), np.nan  # and when it was [s]
+        self._is_near = False  # whether the next solution may start from the last
+        self._moved.reset()
 
-    def _program(self, reaches: np.ndarray, returning: float) -> Horizon:
+    @override
+    def _slow_down(self, period: float) -> None:
+        """Let a stage last as long as a command if references are as far apart, or warn of given stages."""
+        if not self._adapts:
+            self._longest = np.inf
+            warn(
+                f"stage must be at least {period:.3g} s, since steps are so far apart, or bandwidth lower", stacklevel=2
+            )
+        elif period <= min(PAUSE, self._preview.period + ROUNDING):
+            self._longest = period + ROUNDING
+            self._lay_out(period)
+
+    @override
+    def _speed_up(self) -> None:
+        super()._speed_up()
+        self._lay_out(self._stage)
+
+    def _program(self, reaches: np.ndarray) -> Horizon:
         """Return the program of all steps, with their common costs."""
         count, m, f = self._sizes[0], self.robot.m, self._moved.count
-        A, B = self._at_home()
+        A, B = stage_at_home(self.robot, self._moved, self._steps[0], self._statics)
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
-        self._weights = weights(self.robot, self._bandwidth, reaches, returning, self._steps[0], moves)
+        bandwidth = np.minimum(self._bandwidth, FASTEST / self._steps[0])
+        self._weights = weights(self.robot, bandwidth, reaches, self._returning, self._steps[0], moves)
         self._efforts = np.concatenate([np.ones(m), (self._weights.states[12 : 12 + f]) / self._steps[0]])
         self._end = terminal(A, B, self._weights)
         self._penalty = FIRM * self.robot.length * float(np.diag(self._end)[:3].max())
@@ -201,50 +225,18 @@ class Predictive(ComputedTorque):
         h.Q[:count], h.Q[count], h.R[:] = np.diag(self._weights.states), self._end, np.diag(self._weights.controls)
         return h
 
-    def _at_home(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return A and B of a stage at rest at home, (n, n) and (n, u)."""
-        robot, (_, n, u) = self.robot, self._sizes
-        carriers = np.concatenate([robot.carrier_home, np.zeros_like(robot.carrier_home)], axis=1)
-        states, controls = np.zeros((1, n)), np.zeros((1, u))
-        states[0, :6] = robot.home
-        still = np.zeros((1, 1 + len(carriers), 3, 6))
-        still[0, :, 0] = np.vstack([robot.home, robot.carrier_home])
-        states[0, 12 : 12 + self._moved.count] = self._moved.along(still[:, 0], still[:, 1:])[0, 0]
-        controls[0, : robot.m] = self._statics
-        A, B, c = np.zeros((1, n, n)), np.zeros((1, n, u)), np.zeros((1, n))
-        about = self._steps[:1], np.zeros(6), carriers[None], states, controls
-        control_stages(self._robot, self._moved.freed, self._moved.tethers, *about, A, B, c)
-        return A[0], B[0]
-
     @override
     def _forget(self) -> None:
         super()._forget()
         self._beside.reset()
         self._watch.reset()
         self.handed_over = self._from_the_start
-        count, n, u = self._sizes
-        self._guess, self._solved = (np.zeros((count + 1, n)), np.zeros((count, u))), np.nan  # and when it was [s]
-        self._is_near = False  # whether the next solution may start from the last
-        self._moved.reset()
         self._preview.reset()
+        self._lay_out(self._stage)
 
     @override
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
-        """Receive the future references for the prediction.
-
-        Parameters
-        ----------
-        references
-            Reference of each period, from `start` [s] on. Accelerations are interpolated linearly, and constant after
-            the last one.
-        period
-            Period [s].
-
-        Raises
-        ------
-        InputError
-            If an argument has a wrong type or value.
-        """
+        """Receive the future references; accelerations are interpolated linearly, and constant after the last one."""
         with self._alone:
             self._preview.follow(references, period, start)
 
@@ -289,8 +281,10 @@ class Predictive(ComputedTorque):
         """Compare the motion with the prediction, and hand over if they differ."""
         if not np.isfinite(self._problems.w).all():
             return
+        if not self._carried.is_later(self._seen):  # of tensions that bore another load
+            self._watch.interrupt()
         cables, m = self._cables[0], self.robot.m
-        otherwise = cables["known"] - cables["then"] if self._has_winches else np.zeros(m)
+        otherwise = cables["known"] - cables["last"] if self._has_winches else np.zeros(m)
         self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
         if self.handed_over is not None and self._beside._settings["reacts"]:
             carriers = np.stack(reference[3:6], axis=1)
@@ -316,11 +310,11 @@ class Predictive(ComputedTorque):
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
         bounds, now = self._problems.bounds[:, 0], self._preview.rows([reference])
         placed = self._moved.now(dt, self._measured[0], self._preview.moved_of(now))
-        if not all(np.isfinite(part).all() for part in (self._problems.w, *now)):
+        if not all(np.isfinite(part).all() for part in (self._problems.w, *now[:2])):
             self._solved = np.nan
             return None
         start = np.concatenate([self._measured[0, 0], *placed])
-        wanted, carriers, planned, ramps, loads = self._preview.at(time, now, start[3:6], reference.load)
+        wanted, carriers, planned, ramps, loads = self._preview.at(time, now, start[3:6])
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
         # Carriers that fly are where they are, not where they should be.
@@ -352,7 +346,7 @@ class Predictive(ComputedTorque):
         if worst <= GOOD:
             states, controls, self._solved = h.states + wanted, h.controls + planned[:-1], time
             self._guess = states, controls
-        elif not time - self._solved <= self._times[-1]:
+        elif not time - self._solved <= self._stages * self._stage + ROUNDING:  # no longer in slow loops
             return None
         pulls = np.minimum(np.maximum(controls[:1, :m], bounds[0]), bounds[1])
         acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]

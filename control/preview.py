@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,24 +18,38 @@ ROUNDING = 1e-9  # of a period
 CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was announced
 
 
+class Rows(NamedTuple):
+    """References, a row each."""
+
+    motions: np.ndarray  # position, rate and acceleration of platform, carriers and moved coordinates, (K, 3, d)
+    tensions: np.ndarray  # (K, m) [N]
+    loads: list[RigidLoad | None]
+
+
 class Preview:
     """Future references, at the beginning of each stage and at the end of the last.
 
     - `robot`: the robot.
-    - `steps`: durations of the stages, (N,) [s].
-    - `moved`: coordinates of carriers that a solution moves.
     - `tensions`: tensions for a reference without tensions, (m,) [N].
     """
 
-    def __init__(self, robot: Robot, steps: np.ndarray, moved: Moved, tensions: np.ndarray):
-        self._robot, self._moved, self._unknown = robot, moved, tensions
-        self._times = np.concatenate([[0.0], np.cumsum(steps)])
-        self._half, self._sixth = steps[:, None] / 2, steps[:, None] ** 2 / 6
+    def __init__(self, robot: Robot, tensions: np.ndarray):
+        self._robot, self._unknown = robot, tensions
         self.reset()
+
+    def lay_out(self, steps: np.ndarray, moved: Moved) -> None:
+        """Set the durations of the stages, (N,) [s], and the coordinates of carriers that a solution moves."""
+        self._moved, self._times = moved, np.concatenate([[0.0], np.cumsum(steps)])
+        self._half, self._sixth = steps[:, None] / 2, steps[:, None] ** 2 / 6
+
+    @property
+    def period(self) -> float:
+        """Return the period of the announced references [s], or 0."""
+        return 0.0 if self._announced is None else self._announced[1]
 
     def reset(self) -> None:
         """Forget the announced references."""
-        self._announced: tuple[float, float, tuple[np.ndarray, np.ndarray], list[RigidLoad | None]] | None = None
+        self._announced: tuple[float, float, Rows] | None = None
 
     def follow(self, references: Sequence[Reference], period: float, start: float) -> None:
         """Receive references, one for each period, from `start` [s] on.
@@ -49,14 +64,10 @@ class Preview:
             raise InputError(f"references must be a list of References, got {shown(references)}")
         period, start = number("period", period, 1e-9, 1e6), number("start", start, -1e9, 1e9)
         with np.errstate(invalid="ignore"):  # of angles that are infinite: the step holds what it has
-            rows = self.rows([as_floats(each, self._robot, None) for each in references])
-        self._announced = start, period, rows, [each.load for each in references]
+            self._announced = start, period, self.rows([as_floats(each, self._robot, None) for each in references])
 
-    def rows(self, references: Sequence[Reference]) -> tuple[np.ndarray, np.ndarray]:
-        """Return motions (K, 3, 6 + 6 c + f) and tensions (K, m).
-
-        Motions are position, rate and acceleration of the platform, of all carriers and of the moved coordinates.
-        """
+    def rows(self, references: Sequence[Reference]) -> Rows:
+        """Return references as rows; motions are (K, 3, 6 + 6 c + f)."""
         count, carriers = len(references), 6 * len(references[0][3])
         motions = np.empty((count, 3, 6 + carriers + self._moved.count))
         for row, reference in zip(motions, references, strict=True):
@@ -68,28 +79,26 @@ class Preview:
             motions[:, 0, 6 : 6 + carriers] = of_carriers[:, 0].reshape(count, -1)
         motions[..., 6 + carriers :] = self._moved.along(platform, of_carriers.swapaxes(1, 2))
         tensions = [self._unknown if each.tensions is None else each.tensions for each in references]
-        return motions, np.array(tensions, dtype=float)
+        return Rows(motions, np.array(tensions, dtype=float), [each.load for each in references])
 
-    def moved_of(self, rows: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    def moved_of(self, rows: Rows) -> np.ndarray:
         """Return position, rate and acceleration of the moved coordinates in the first row, (3, f)."""
-        return rows[0][0, :, rows[0].shape[2] - self._moved.count :]
+        return rows.motions[0, :, rows.motions.shape[2] - self._moved.count :]
 
     def at(
-        self, time: float, now: tuple[np.ndarray, np.ndarray], attitude: np.ndarray, load: RigidLoad | None
+        self, time: float, now: Rows, attitude: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, list[tuple[RigidLoad | None, slice]]]:
         """Return states (N + 1, n), carriers (N + 1, c, 12) and controls (N + 1, u) of the reference at all stages.
 
-        The announced reference is used if it agrees with the current one, which has the `load`; after its end
-        accelerations are constant. The fourth result is the effect of the change of its acceleration on the states
+        The announced reference is used if it agrees with the current one; after its end accelerations are constant. The
+        fourth result is the effect of the change of its acceleration on the states
         within each stage, (N, n): the model holds a control for a whole stage, the robot only for a period, so without
         it the control would be the mean over the stage, half a stage early. The last are the loads, each with stages.
         """
-        count = len(self._half)
-        first, loads = np.zeros(count + 1, dtype=int), [(load, slice(0, count))]
-        if (announced := self._announced_at(time, now)) is None:
-            motions, tensions = rows_at(*now, self._times, first, 1.0)
-        else:
-            (motions, tensions), loads = announced
+        rows, before, after, period = self._chosen(time, now)
+        motions, tensions = rows_at(rows, after, before, period)
+        runs = (list(run) for _, run in groupby(range(len(before) - 1), lambda stage: id(rows.loads[before[stage]])))
+        loads = [(rows.loads[before[run[0]]], slice(run[0], run[-1] + 1)) for run in runs]
         place, rate, acceleration = motions.swapaxes(0, 1)
         moved = motions.shape[2] - self._moved.count
         states = np.concatenate([place[:, :6], rate[:, :6], place[:, moved:], rate[:, moved:]], axis=1)
@@ -101,22 +110,21 @@ class Preview:
         carriers = motions[:, :2, 6:moved].reshape(len(states), 2, -1, 6)
         return states, carriers.swapaxes(1, 2).reshape(len(states), -1, 12), controls, ramps, loads
 
-    def _announced_at(
-        self, time: float, now: tuple[np.ndarray, np.ndarray]
-    ) -> tuple[tuple[np.ndarray, np.ndarray], list[tuple[RigidLoad | None, slice]]] | None:
-        """Return the announced motions, tensions and loads at all stages, or None if the current reference differs."""
-        if self._announced is None:
-            return None
-        start, period, (motions, tensions), loads = self._announced
-        steps = (time + self._times - start) / period
-        before = np.clip(np.floor(steps + ROUNDING), 0, len(motions) - 1).astype(int)
-        announced = rows_at(motions, tensions, period * (steps - before), before, period)
-        off = announced[0][0, 0, :6] - now[0][0, 0, :6]
-        off[3:] -= turns(off[3:])
-        if np.abs(off).max() > CLOSE:
-            return None
-        runs = [list(run) for _, run in groupby(range(len(before) - 1), lambda stage: id(loads[before[stage]]))]
-        return announced, [(loads[before[run[0]]], slice(run[0], run[-1] + 1)) for run in runs]
+    def _chosen(self, time: float, now: Rows) -> tuple[Rows, np.ndarray, np.ndarray, float]:
+        """Return the announced references, or the current one if they differ, and which of them precede the stages.
+
+        The other results are the times since these, (N + 1,) [s], and the period of the references [s].
+        """
+        if self._announced is not None:
+            start, period, rows = self._announced
+            steps = (time + self._times - start) / period
+            before = np.clip(np.floor(steps + ROUNDING), 0, len(rows.loads) - 1).astype(int)
+            after = period * (steps - before)
+            off = rows_at(rows, after[:1], before[:1], period)[0][0, 0, :6] - now.motions[0, 0, :6]
+            off[3:] -= turns(off[3:])
+            if np.abs(off).max() <= CLOSE:
+                return rows, before, after, period
+        return now, np.zeros(len(self._times), dtype=int), self._times, 1.0
 
 
 def turns(off: np.ndarray) -> np.ndarray:
@@ -124,14 +132,13 @@ def turns(off: np.ndarray) -> np.ndarray:
     return 2 * np.pi * np.rint(off / (2 * np.pi))
 
 
-def rows_at(
-    motions: np.ndarray, tensions: np.ndarray, after: np.ndarray, before: np.ndarray, period: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Interpolate references: position, rate and acceleration, (K, 3, d), and tensions, (K, m) [N], every `period` [s].
+def rows_at(rows: Rows, after: np.ndarray, before: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Interpolate references every `period` [s]: return motions (N, 3, d) and tensions (N, m).
 
     The results are those at times `after`, (N,) [s], the rows `before`, (N,). Accelerations and tensions are
     interpolated linearly; after the last reference accelerations are constant.
     """
+    motions, tensions = rows[:2]
     motion, last = motions[before], tensions[before]
     if np.abs(after).max() <= ROUNDING * period:
         return motion, last

@@ -13,7 +13,7 @@ UNSTABLE = (
 )
 LATE = "carriers turn so late that their attitude loop is nearly unstable"
 LOUD = "noise of the measured rates requires more than the tension limits permit: lower bandwidth and observer"
-WINDOW, PAUSE = 0.05, 0.09  # [s]: in which a motion is compared, at least, and at most between two steps
+WINDOW, PAUSE = 0.05, 0.21  # [s]: in which a motion is compared, at least, and at most between two steps
 BLIND, UNCHECKED = 0.015, 0.5  # [s], at most: without a state, and without a comparison
 QUICK, LONG = 0.01, 0.1  # [s]: noise is quicker than what tensions correct, and how long it is heard
 OFTEN = 2.0  # standard deviations of noise have room: one command in twenty is cut off

@@ -1,12 +1,15 @@
-"""Costs of a predictive controller: `Weights`, from bandwidths, `terminal`, after the last stage; and `ripple`."""
+"""Costs of a predictive controller: `Weights`, from bandwidths, `terminal`, after the last stage at home; `ripple`."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from ..core import control_stages
 from ..models.dynamics import dynamics_of
+from ..models.record import record_of
 from ..models.robot import Robot
 from ..statics.distribution import tensions
+from .carrier_references import Moved
 from .settings import Limits
 
 SHARE = 0.05  # of the robot's scale of forces: the tension that costs as much as a carrier at the end of its reach
@@ -52,6 +55,20 @@ def weights(
     pose, rate = bandwidth**4 * of_acceleration, 2 * bandwidth**2 * of_acceleration
     states = np.concatenate([pose, rate, far, 2 * far / carrier_bandwidth**2])
     return Weights(duration * states, duration * np.concatenate([np.ones(robot.m), far / carrier_bandwidth**4]))
+
+
+def stage_at_home(robot: Robot, moved: Moved, stage: float, tensions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return A, (n, n), and B, (n, u), of a stage [s] at rest at home, with tensions (m,) [N]."""
+    n, u, c = 12 + 2 * moved.count, robot.m + moved.count, len(robot.carriers)
+    states, controls, carriers = np.zeros((1, n)), np.zeros((1, u)), np.zeros((1, c, 12))
+    states[0, :6], controls[0, : robot.m], carriers[0, :, :6] = robot.home, tensions, robot.carrier_home
+    still = np.zeros((1, 1 + c, 3, 6))
+    still[0, :, 0] = np.vstack([robot.home, robot.carrier_home])
+    states[0, 12 : 12 + moved.count] = moved.along(still[:, 0], still[:, 1:])[0, 0]
+    A, B, rest = np.zeros((1, n, n)), np.zeros((1, n, u)), np.zeros((1, n))
+    about = np.array([stage]), np.zeros(6), carriers, states, controls
+    control_stages(record_of(robot), moved.freed, moved.tethers, *about, A, B, rest)
+    return A[0], B[0]
 
 
 def ripple(robot: Robot, limits: Limits, bandwidth: np.ndarray) -> np.ndarray | None:

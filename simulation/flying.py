@@ -200,8 +200,12 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
     Raises `InputError` if it is no `Command`, or has wrong shapes, numbers that are not finite or an unknown
     status.
     """
+
+    def wrong(wanted: str, got: object) -> InputError:
+        return InputError(f"controller must return {wanted}, got {got} at t = {time:g} s")
+
     if not isinstance(command, Command):
-        raise InputError(f"controller must return a Command from step, got {shown(command)} at t = {time:g} s")
+        raise wrong("a Command from step", shown(command))
     count, lead = len(robot.carriers), () if flights == 1 else (flights,)
     shapes: dict[str, tuple[int, ...]] = {"tensions": (robot.m,), "answered": ()}
     shapes |= {f"carrier_{part}": (count, 6) for part in ("pose", "velocity", "acceleration")}
@@ -211,25 +215,18 @@ def check_command(command: Any, robot: Robot, flights: int, time: float) -> None
     for name, core in shapes.items():
         values = np.asarray(getattr(command, name))
         if values.shape != (*lead, *core):
-            raise InputError(
-                f"controller must return {name} of shape {(*lead, *core)}, got shape {values.shape} at t = {time:g} s"
-            )
+            raise wrong(f"{name} of shape {(*lead, *core)}", f"shape {values.shape}")
         if values.dtype.kind not in "fiub" or not np.isfinite(values).all():
-            raise InputError(f"controller must return finite {name}, got others at t = {time:g} s")
+            raise wrong(f"finite {name}", "others")
     answered = np.asarray(command.answered)
     if answered.dtype.kind == "f":
-        raise InputError(f"controller must return an integer as answered, got {answered.flat[0]!s} at t = {time:g} s")
+        raise wrong("an integer as answered", answered.flat[0])
     for name, core in (("direction", (6,)), ("shortfall", ()), ("unexplained", ())):  # nan where there is none
         values = np.asarray(getattr(command, name))
         if values.dtype.kind not in "fiub" or values.shape not in ((*lead, *core), core):
-            raise InputError(
-                f"controller must return {name} of shape {(*lead, *core)}, got {shown(getattr(command, name))} "
-                f"at t = {time:g} s"
-            )
+            raise wrong(f"{name} of shape {(*lead, *core)}", shown(getattr(command, name)))
     if not ((answered >= 0) & (answered < len(ANSWERS))).all():
-        raise InputError(
-            f"controller must return answered from 0 to {len(ANSWERS) - 1}, got {answered.max()} at t = {time:g} s"
-        )
+        raise wrong(f"answered from 0 to {len(ANSWERS) - 1}", answered.max())
 
 
 def check_wrench(event: Event, wrench: Any, shape: tuple[int, ...], time: float) -> np.ndarray:

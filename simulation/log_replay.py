@@ -207,9 +207,8 @@ class Replay(Drawn, Reported, Displayed):
         ratios = {name: rms[name] / noise[name] for name in rms}
         first, worst = next(iter(rms)), max(ratios, key=lambda name: ratios[name])
         shown = [first] if ratios[worst] < 2 * max(ratios[first], 1.0) else [first, worst]
-        text = "; ".join(
-            f"{name} residual {_of(name, rms[name])} rms, noise {_of(name, noise[name])}" for name in shown
-        )
+        each = (f"{name} residual {_of(name, rms[name])} rms, noise {_of(name, noise[name])}" for name in shown)
+        text = "; ".join(each)
         if self.windows.recorded.doubt:
             return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
@@ -240,25 +239,16 @@ class Replay(Drawn, Reported, Displayed):
                 if value != getattr(first, name)
             ]
             change = f"residuals of validation windows {before:.3g} times their noise, {after:.3g} times after the fit"
-            facts["fit"] = (
-                f"{', '.join(values)}; {change}"
-                if values
-                else "no parameter reduces the residuals of validation windows"
-            )
+            same = "no parameter reduces the residuals of validation windows"
+            facts["fit"] = f"{', '.join(values)}; {change}" if values else same
         return list(facts.items())
 
     def _residual_table(self) -> Table:
         after = None if self.explained is None else self._rms(self.explained)
-        rows = [
-            [
-                name,
-                _of(name, value),
-                _of(name, noise),
-                f"{value / noise:.2f}",
-                *([_of(name, after[name])] if after else []),
-            ]
-            for (name, value), noise in zip(self.rms().items(), self.matching.noise.values(), strict=True)
-        ]
+        rows = []
+        for (name, value), noise in zip(self.rms().items(), self.matching.noise.values(), strict=True):
+            fitted = [_of(name, after[name])] if after else []
+            rows.append([name, _of(name, value), _of(name, noise), f"{value / noise:.2f}", *fitted])
         columns = ["", "rms", "noise", "ratio", *([f"with {self.found[0].name} fitted"] if after else [])]
         return Table("Residuals, measured minus simulated", columns, rows, (1, 2, 3, 4))
 

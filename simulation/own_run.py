@@ -68,14 +68,5 @@ def simulation_of(plant: Plant, history: History, reference: Any = None, toleran
         Cut(cable=int(i) + 1, at=float(history.times[np.argmax(gone[:, i])])) for i in np.flatnonzero(gone[-1])
     )
     conditions = Experiment(period, 1, references, None, np.zeros(6), Noise(), cuts, keep_out, doubt)
-    return Simulation(
-        robot=robot,
-        conditions=conditions,
-        seed=0,
-        record=record,
-        lasted=count,
-        tolerance=error,
-        wind=None,
-        seconds=np.zeros(0),
-        wall=np.inf,
-    )
+    without_controller = np.zeros(0), np.inf  # seconds and wall time
+    return Simulation(robot, conditions, 0, record, count, error, None, *without_controller)

@@ -164,12 +164,8 @@ def simulate(
             raise InputError(f"faults must be left out with events, whose former name it is, got {shown(former)}")
         warn("faults is called events now; the former name goes with the next release", DeprecationWarning, 2)
         events = former
-    named = {
-        "wind": wind,
-        "noise": noise,
-        "events": None if isinstance(events, tuple) and not events else events,
-        "duration": duration,
-    }
+    happening = None if isinstance(events, tuple) and not events else events
+    named = {"wind": wind, "noise": noise, "events": happening, "duration": duration}
     given |= {name: value for name, value in named.items() if value is not None}
     meets = required("conditions", Conditions() if conditions is None else conditions, Conditions)
     where = required("execution", Execution() if execution is None else execution, Execution)
@@ -291,15 +287,6 @@ def _one(plant: Plant, controller: Controller, experiment: Experiment, seed: int
     start = perf_counter()
     lasted, seconds = fly(plant_of(plant, experiment, seed), [controller], experiment, [seed], record.take)
     wall = perf_counter() - start
-    wind = Orders(plant, experiment, [seed]).wind
-    return Simulation(
-        robot=robot,
-        conditions=experiment,
-        seed=seed,
-        record=record,
-        lasted=int(lasted[0]),
-        tolerance=tolerance,
-        wind=None if wind is None else wind[:, 0],
-        seconds=np.array(seconds),
-        wall=wall,
-    )
+    air = Orders(plant, experiment, [seed]).wind
+    wind, timing = None if air is None else air[:, 0], (np.array(seconds), wall)
+    return Simulation(robot, experiment, seed, record, int(lasted[0]), tolerance, wind, *timing)

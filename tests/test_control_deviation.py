@@ -63,7 +63,8 @@ def test_a_reference_that_jumps_is_reported_until_it_is_reached(make):
         pose = COGIRO.home + np.array([x, 0, 0, 0, 0, yaw])
         tensions = np.full(COGIRO.m, 300.0)
         reference = Reference(pose, np.zeros(6), np.zeros(6), COGIRO.carrier_home, still, still, tensions)
-        assert controller.step(0.1 * k, state, reference).answered in (status, ANSWERS.index("soft wrench"))
+        # So far apart that the motion of this state, which stays where it is, is not compared with the model.
+        assert controller.step(0.3 * k, state, reference).answered in (status, ANSWERS.index("soft wrench"))
 
 
 def test_rows_of_a_batch_have_their_own_status():
@@ -144,7 +145,7 @@ def test_predictions_are_compared_with_rare_states_and_between_failures_of_senso
     assert run.error[: run.lasted][silent].max() < 0.025
 
 
-@pytest.mark.parametrize(("period", "blind"), [(0.1, 0), (0.02, 1)])
+@pytest.mark.parametrize(("period", "blind"), [(0.3, 0), (0.02, 1)])
 def test_motions_that_are_not_compared_with_the_model_are_warned_of_once(period, blind):
     robot = load("cogiro")
     with pytest.warns(UserWarning, match="the motion was not compared with the model of Predictive for 0.") as warned:

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from ...control.computed_torque import CARRIED, ComputedTorque
+from ...control.computed_torque import ComputedTorque
+from ...control.fallback import CARRIED
 from ...control.reference import Reference
 from ...control.state import State
 from ...core import sense

@@ -12,30 +12,22 @@ from ...plant import layout
 
 PARTS = ("plant", "controller", "both")
 CABLES = {"tensions": ("tension", "N"), "forces": ("force", "N"), "lengths": ("length", "m"), "rates": ("rate", "m/s")}
-_MOTION = {  # units of translations and rotations
-    "pose": ("m", "rad"),
-    "velocity": ("m/s", "rad/s"),
-    "acceleration": ("m/s2", "rad/s2"),
-}
+Named = Sequence[tuple[str, str]]  # names and units
+# Units of translations and rotations.
+_MOTION = {"pose": ("m", "rad"), "velocity": ("m/s", "rad/s"), "acceleration": ("m/s2", "rad/s2")}
 _JERK = {"jerk": ("m/s3", "rad/s3")}
+_SIMULATES, _CONTROLS = ("plant", "both"), ("controller", "both")
 # Parts that have a parameter, its name and unit, its place, its least value, and what it is.
 _PARAMETERS = (
-    (("plant", "both"), "plant.mass", "kg", "mass", 1e-9, "mass of the platform"),
-    (("plant", "both"), "plant.longest_step", "s", "longest_step", 1e-9, "longest Runge-Kutta step"),
-    (("plant", "both"), "plant.tension_lag", "s", "plant.tension_lag", 0.0, "lag of commanded tensions"),
-    (("plant", "both"), "plant.winch_bandwidth", "rad/s", "plant.winch_bandwidth", 1e-3, "bandwidth of winches"),
-    (
-        ("plant", "both"),
-        "plant.carrier_bandwidth",
-        "rad/s",
-        "plant.carrier_bandwidth",
-        1e-3,
-        "bandwidth of mobile carriers",
-    ),
-    (PARTS[1:], "controller.bandwidth", "rad/s", "bandwidth", 0.0, "bandwidth of the error dynamics"),
-    (PARTS[1:], "controller.damping", "", "damping", 0.0, "damping ratio of the error dynamics"),
-    (PARTS[1:], "controller.integral", "1/s3", "integral", 0.0, "gain of the integral of errors"),
-    (PARTS[1:], "controller.observer", "rad/s", "controller.observer", 0.0, "bandwidth of estimated disturbances"),
+    (_SIMULATES, "plant.mass", "kg", "mass", 1e-9, "mass of the platform"),
+    (_SIMULATES, "plant.longest_step", "s", "longest_step", 1e-9, "longest Runge-Kutta step"),
+    (_SIMULATES, "plant.tension_lag", "s", "plant.tension_lag", 0.0, "lag of commanded tensions"),
+    (_SIMULATES, "plant.winch_bandwidth", "rad/s", "plant.winch_bandwidth", 1e-3, "bandwidth of winches"),
+    (_SIMULATES, "plant.carrier_bandwidth", "rad/s", "plant.carrier_bandwidth", 1e-3, "bandwidth of mobile carriers"),
+    (_CONTROLS, "controller.bandwidth", "rad/s", "bandwidth", 0.0, "bandwidth of the error dynamics"),
+    (_CONTROLS, "controller.damping", "", "damping", 0.0, "damping ratio of the error dynamics"),
+    (_CONTROLS, "controller.integral", "1/s3", "integral", 0.0, "gain of the integral of errors"),
+    (_CONTROLS, "controller.observer", "rad/s", "controller.observer", 0.0, "bandwidth of estimated disturbances"),
     (("both",), "controller.period", "s", "period", 1e-6, "period of the controller"),
 )
 
@@ -70,19 +62,12 @@ def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str
     moving = [(int(k), f"carrier[{k + 1}]", robot.carriers[k]) for k in np.flatnonzero(bodies != RESTS)]
     rows = [Variable("time", "independent", "s", "time", 0.0, "simulated time")]
 
-    def add(
-        causality: str,
-        named: Sequence[tuple[str, str]],
-        member: str,
-        about: str,
-        first: int = 0,
-        least: float = -np.inf,
-    ) -> None:
+    def add(causality: str, named: Named, member: str, about: str, first: int = 0, least: float = -np.inf) -> None:
         for i, (name, unit) in enumerate(named, first):
             place = f"{member}[{i}]"
             rows.append(Variable(name, causality, unit, place, float(data[member][i]), about, least))
 
-    def cables(name: str, unit: str) -> list[tuple[str, str]]:
+    def cables(name: str, unit: str) -> Named:
         return [(name.format(i + 1), unit) for i in range(robot.m)]
 
     velocity = {name: _MOTION[name] for name in ("pose", "velocity")}
@@ -94,13 +79,12 @@ def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str
     add(sensor, cables("cable[{}].mean_tension", "N"), "mean_tension", about, 0, sensed)
     if simulates:
         add("output", cables("cable[{}].tension", "N"), "tension", "tension")
-        lengths = cables("cable[{}].length", "m") + cables("cable[{}].rate", "m/s")
+        lengths = [*cables("cable[{}].length", "m"), *cables("cable[{}].rate", "m/s")]
         add("output", lengths, "lengths", "distance between the ends along the cable, or its rate")
         if robot.platform.aero:
             add("input", [(f"wind.{axis}", "m/s") for axis in "xyz"], "wind", "velocity of the air")
-        wrench = [
-            (f"wrench.{name}.{axis}", unit) for name, unit in (("force", "N"), ("moment", "N.m")) for axis in "xyz"
-        ]
+        both = (("force", "N"), ("moment", "N.m"))
+        wrench = [(f"wrench.{name}.{axis}", unit) for name, unit in both for axis in "xyz"]
         add("input", wrench, "wrench", "force or moment about the CoM on the platform, besides cables and weight")
     if controls:
         add("input", _motion("reference", _MOTION), "reference", "reference of the platform", 0, np.nan)
@@ -111,15 +95,8 @@ def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str
             add("input", _motion(f"reference.{name}", _JERK), "jerks", about, 6 * k)
         rows.append(Variable("answered", "output", "", "answered", 0.0, "0: as planned, 2: soft wrench, 3: hold"))
     what, unit = CABLES[winches or "tensions"]
-    least = 1e-3 if winches == "lengths" else -np.inf
-    add(
-        order,
-        cables(f"command.{what}[{{}}]", unit),
-        "winches" if winches else "tensions",
-        f"commanded {what}",
-        0,
-        least,
-    )
+    member, least = "winches" if winches else "tensions", 1e-3 if winches == "lengths" else -np.inf
+    add(order, cables(f"command.{what}[{{}}]", unit), member, f"commanded {what}", 0, least)
     for k, name, carrier in moving:
         about = f"command of carrier {carrier.name}"
         if bodies[k] != FREE:
@@ -142,7 +119,7 @@ def variables_of(robot: Robot, part: str, winches: str | None, data: Mapping[str
     return rows
 
 
-def _motion(name: str, orders: Mapping[str, tuple[str, str]]) -> list[tuple[str, str]]:
+def _motion(name: str, orders: Mapping[str, tuple[str, str]]) -> Named:
     """Return names and units of the coordinates of a motion."""
     return [
         (f"{name}.{order}.{coordinate}", units[i // 3])

@@ -22,16 +22,8 @@ _TEMPLATE = Path(__file__).parent / "template"
 _CORE = Path(__file__).parents[2] / "core" / "distribution"
 # In the order in which each finds what it needs above it.
 _SECTIONS = (
-    "towline_core.h",
-    "tolerances.h",
-    "internal.h",
-    "reduction.c",
-    "standard_form.c",
-    "slabs.c",
-    "proof.c",
-    "dual_active_set.c",
-    "certificate.c",
-    "towline_core.c",
+    *("towline_core.h", "tolerances.h", "internal.h", "reduction.c", "standard_form.c", "slabs.c", "proof.c"),
+    *("dual_active_set.c", "certificate.c", "towline_core.c"),
 )
 _FILES = ("towline_step.h", "towline_step.c", "main.c", "Makefile", "README.md")
 _PRECISIONS = ("double", "float")

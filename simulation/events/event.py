@@ -94,7 +94,10 @@ class Event(Part, ABC):
     def check(self, robot: Robot) -> None:
         """Check that it can happen to the robot.
 
-        Raises `InputError` if it cannot: "must ..., got ...".
+        Raises
+        ------
+        InputError
+            If it cannot: "must ..., got ...".
         """
 
     @abstractmethod

@@ -29,21 +29,15 @@ class OfCable(Event, ABC):
 
     @override
     def check(self, robot: Robot) -> None:
-        """Check that the robot has the cable.
-
-        Raises `InputError` if it has not.
-        """
         if not 1 <= self.cable <= robot.m:
             raise InputError(f"must name a cable of {robot.name!r}, 1 to {robot.m}, got {shown(self.cable)}")
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         return self.happened.format(self.cable)
 
     @override
     def begin(self, running: Running) -> None:
-        """Apply the event."""
         running.states = type(self).change(running.plant, running.states, self.cable - 1)
 
 
@@ -75,13 +69,6 @@ class Lose(Event):
 
     @override
     def check(self, robot: Robot) -> None:
-        """Check that the robot has the carrier, with actuators.
-
-        Raises
-        ------
-        InputError
-            If it has not.
-        """
         known = [carrier.name for carrier in robot.carriers if carrier.actuators]
         if self.carrier not in known:
             names = ", ".join(known) or "it has none"
@@ -91,12 +78,10 @@ class Lose(Event):
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         return f"the actuators of {self.carrier} were lost"
 
     @override
     def begin(self, running: Running) -> None:
-        """Apply the event."""
         names = [carrier.name for carrier in running.plant.robot.carriers]
         running.periods.lose(names.index(self.carrier))
 
@@ -111,10 +96,8 @@ class Miss(Event):
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         return f"the controller missed {quantity(self.duration, 's')}"
 
     @override
     def begin(self, running: Running) -> None:
-        """Apply the event."""
         running.silent_until = max(running.silent_until, self.at + self.duration)

@@ -30,13 +30,6 @@ class Carry(RigidLoad, Event):
 
     @override
     def check(self, robot: Robot) -> None:
-        """Check that the robot can carry the load.
-
-        Raises
-        ------
-        InputError
-            If a load without mass has an inertia, or that on a platform that is a point is none.
-        """
         if not self.mass and any(self.inertia):
             raise InputError(f"must have the inertia 0 kg m^2 with the mass 0 kg, got {shown(self.inertia)}")
         if robot.platform.inertia is None and (any(self.com) or any(self.inertia)):
@@ -47,7 +40,6 @@ class Carry(RigidLoad, Event):
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         return f"a load of {quantity(self.mass, 'kg')} was picked up" if self.mass else "the load was released"
 
     @override

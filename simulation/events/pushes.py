@@ -48,13 +48,6 @@ class Push(Lasting):
 
     @override
     def check(self, robot: Robot) -> None:
-        """Check that the robot has this carrier, and that forces move it.
-
-        Raises
-        ------
-        InputError
-            If it has not, or they do not.
-        """
         flying = [carrier.name for carrier in robot.carriers if carrier.body is not None]
         if self.carrier is not None and self.carrier not in flying:
             names = ", ".join(flying) or "it has none"
@@ -68,7 +61,6 @@ class Push(Lasting):
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         sizes = quantity(float(np.linalg.norm(self.force)), "N"), quantity(float(np.linalg.norm(self.moment)), "N m")
         parts = [size for size, part in zip(sizes, (self.force, self.moment), strict=True) if any(part)]
         lasting = "" if self.duration is None else f" for {quantity(self.duration, 's')}"
@@ -109,7 +101,6 @@ class Wall(Lasting):
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         return f"a wall of {quantity(self.stiffness, 'N/m')} appeared"
 
     @override

@@ -28,7 +28,6 @@ class StopReference(Event):
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         return "the reference began to stop"
 
     @override
@@ -64,13 +63,6 @@ class Follow(Event):
 
     @override
     def check(self, robot: Robot) -> None:
-        """Check that the robot can follow the plan.
-
-        Raises
-        ------
-        InputError
-            If it cannot.
-        """
         try:
             self._trajectory(robot)
         except InputError as error:
@@ -78,7 +70,6 @@ class Follow(Event):
 
     @override
     def describe(self, robot: Robot) -> str:
-        """Return what happened."""
         return "the reference became another plan"
 
     @override

@@ -1,0 +1,104 @@
+"""Loops with steps that are far apart: gains and stages for commands that are held so long, and comparisons."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from towline import load, simulate
+from towline.control import ComputedTorque, Predictive, State
+
+PERIODS = [0.05, 0.1, 0.15]
+
+
+def pushed(robot, controller, period):
+    """A push of 3 % of the weight for 0.2 s or one period, at rest at home."""
+    lasting = max(0.2, period)
+    events = [f"push {0.03 * robot.force_scale * 0.2 / lasting} 0 0 at 0.4 for {lasting}"]
+    return simulate(robot, robot.home, controller, duration=4.0, period=period, events=events, tolerance=100.0)
+
+
+def is_stable(gain, damping, period):
+    """Whether a held acceleration -gain x - damping v, for a period, lets a mass come to rest."""
+    held = np.array([[1, period], [0, 1]]) - np.outer([period**2 / 2, period], [gain, damping])
+    return np.abs(np.linalg.eigvals(held)).max() < 1 - 1e-9
+
+
+@pytest.mark.parametrize("period", PERIODS)
+@pytest.mark.parametrize("kind", [ComputedTorque, Predictive])
+@pytest.mark.parametrize("name", ["cogiro", "planar-4"])
+def test_default_gains_hold_a_robot_in_slow_loops(name, kind, period):
+    """A free mass would go 0.03 g 0.2 s 0.2 s / 2 = 6 mm during the push, and go on with 0.06 m/s."""
+    run = pushed(load(name), kind(load(name)), period)
+    assert run.error.max() < 0.006
+    assert run.error[-5:].max() < 1e-3
+    assert run.answered["as planned"] == len(run.error)
+
+
+def test_the_bandwidth_is_lowered_where_held_commands_would_make_the_loop_unstable():
+    robot = load("cogiro")
+    for period in (0.05, 0.07, 0.08, 0.1, 0.2):
+        controller = ComputedTorque(robot)
+        pushed(robot, controller, period)
+        gain, damping = controller._settings["kp"][0], controller._settings["kd"][0]
+        assert is_stable(gain, damping, period)
+        assert (gain == 100.0) == (period <= 0.075)
+        assert is_stable(100.0, 20.0, period) == (period < 0.1)  # what it would be otherwise
+    with pytest.warns(UserWarning, match=r"bandwidth must be at most 6.67 rad/s for steps 0.15 s apart") as told:
+        run = pushed(robot, ComputedTorque(robot, bandwidth=10.0), 0.15)
+    assert len(told) == 1
+    assert run.error[-5:].max() > 0.1  # as the warning says
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pushed(robot, ComputedTorque(robot, bandwidth=6.0), 0.15)
+
+
+def test_given_stages_that_are_shorter_than_the_steps_are_warned_of():
+    robot = load("planar-4")
+    with pytest.warns(UserWarning, match=r"stage must be at least 0.06 s, since steps are so far apart") as told:
+        pushed(robot, Predictive(robot, stage=0.015), 0.06)
+    assert len(told) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pushed(robot, Predictive(robot, stage=0.06), 0.06)
+        pushed(robot, Predictive(robot, stage=0.015, bandwidth=10.0, observer=10.0), 0.06)
+
+
+@pytest.mark.parametrize("kind", [ComputedTorque, Predictive])
+def test_reset_and_single_late_steps_leave_the_usual_gains(kind):
+    robot = load("planar-4")
+    fresh, used, late = kind(robot), kind(robot), kind(robot)
+    pushed(robot, used, 0.2)
+    expected = pushed(robot, fresh, 0.005)
+    np.testing.assert_array_equal(pushed(robot, used, 0.005).record.motions, expected.record.motions)
+    motions = expected.record.motions[0]
+    state = State(motions[0, :6], motions[0, 6:], motions[1:, :6], motions[1:, 6:])
+    for gaps in ([0.0, 0.005, 0.15, 0.005, 0.15, 0.005], [0.0, 0.15, 0.15, 0.005, 0.005]):
+        late.reset()
+        late.follow(expected.references, 0.2)
+        for time in np.cumsum(gaps):
+            late.step(float(time), state, expected.references[0])
+        assert late._longest == fresh._longest
+        np.testing.assert_array_equal(late._settings["kp"], fresh._settings["kp"])
+        assert kind is ComputedTorque or late._steps[0] == fresh._steps[0]
+
+
+@pytest.mark.parametrize("period", [0.1, 0.15, 0.2])
+@pytest.mark.parametrize("name", ["cogiro", "nist-robocrane", "caroca"])
+def test_slow_loops_are_compared_with_the_model(name, period):
+    """Silent along lines with gusts of 2 % of the weight; a cut cable is noticed in two steps."""
+    robot = load(name)
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        along = random.normal(size=3)
+        far = 0.1 * np.ptp(robot.home_anchors, axis=0).max() * along / np.linalg.norm(along)
+        line = {"kind": "line", "start": robot.home[:3].tolist(), "end": (robot.home[:3] + far).tolist()}
+        push = 0.01 * robot.force_scale * np.r_[random.normal(size=3), 0, 0, 0]
+        controller = Predictive(robot)
+        run = simulate(robot, line, controller, duration=4.0, period=period, disturbance=push, tolerance=0.1)
+        assert controller.handed_over is None
+        assert run.passed
+    controller = Predictive(robot)
+    simulate(robot, robot.home, controller, duration=2.0, period=period, events=["cut 1 at 1.0"])
+    assert controller.handed_over is not None
+    assert 1.0 < controller.handed_over.time < 1.0 + 3.01 * period
