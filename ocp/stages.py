@@ -18,7 +18,6 @@ from functools import partial
 from ..base.text import quantity
 from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
 from .audits.violation import cost, relative_violation
-from .global_path.space import Space
 from .global_path.start import motion_past
 from .nlp.rows import Mesh
 from .plan import Plan
@@ -159,7 +158,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
     mesh = Mesh(scenario.task.steps)
     guessed = start is None and not search.knows(mesh)
     # The program alone gets past most places without tensions at rest, unless another formation is what they need.
-    team = bool(Space(scenario).loose)
+    team = bool(scenario.loose)
     collides = False
     if guessed:
         start, collides = motion_past(search, balance=team)

@@ -9,7 +9,6 @@ from ..tasks.ends import carrier_ends, platform_ends
 from ..tasks.paths import WaypointPath
 from ..tasks.scenario import POSITION, Scenario
 from .at_rest import AtRest, Kept, unsure
-from .space import Space
 
 PLACES = 61  # along the usual guess, the first time
 STILL = 1e-9  # [m, rad]: nothing moves, nothing is exceeded
@@ -27,7 +26,7 @@ def is_open(scenario: Scenario) -> bool:
     if not {i for i in POSITION if scenario.robot.dof_mask[i]} <= set(scenario.platform_free):
         return False
     platform, carriers = scenario.references(np.linspace(0.0, scenario.duration, PLACES))
-    loose = Space(scenario).loose
+    loose = scenario.loose
     given = []
     if np.ptp(platform.pose[[0, -1], :3], axis=0).max() <= STILL:  # else they follow the place (`Space`)
         given += [np.delete(platform.pose, scenario.platform_free, axis=1)]

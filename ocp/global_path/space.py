@@ -43,12 +43,6 @@ class Space(Displayed):
     given_ends: np.ndarray | None = None  # (2, count), other than those that follow from the task
 
     @cached_property
-    def loose(self) -> list[int]:
-        """Return the carriers that keep their distance from the platform rather than a position."""
-        free = {owner for owner, coordinate in self.scenario.carrier_free if coordinate in POSITION}
-        return [i for i in sorted(free) if not self.scenario.robot.carriers[i].confined]
-
-    @cached_property
     def turns(self) -> bool:
         """Return whether the formation turns on its own: about a platform that has no yaw."""
         return bool(self.shaped and not self.scenario.robot.dof_mask[5])
@@ -56,7 +50,7 @@ class Space(Displayed):
     @cached_property
     def shaped(self) -> bool:
         """Return whether there is a formation whose shape matters."""
-        return len(self.loose) > 1 and float(np.linalg.norm(self._flat, axis=1).max()) > 0
+        return len(self.scenario.loose) > 1 and float(np.linalg.norm(self._flat, axis=1).max()) > 0
 
     @cached_property
     def count(self) -> int:
@@ -125,8 +119,10 @@ class Space(Displayed):
         else:
             at, carriers = robot.home, robot.carrier_home[:, :3]
         _, attachments = scenario.dynamics.points(at)
-        middles = [attachments[robot.carrier_of_cable == i].mean(axis=0) for i in self.loose]
-        return np.array([carriers[i] - middle for i, middle in zip(self.loose, middles, strict=True)]).reshape(-1, 3)
+        middles = [attachments[robot.carrier_of_cable == i].mean(axis=0) for i in self.scenario.loose]
+        return np.array([carriers[i] - middle for i, middle in zip(self.scenario.loose, middles, strict=True)]).reshape(
+            -1, 3
+        )
 
     @cached_property
     def _flat(self) -> np.ndarray:
@@ -135,7 +131,7 @@ class Space(Displayed):
     @cached_property
     def _shares(self) -> np.ndarray:
         """Return the share of each attachment in the middle of those of a loose carrier, (k, m)."""
-        own = self.scenario.robot.carrier_of_cable == np.array(self.loose)[:, None]
+        own = self.scenario.robot.carrier_of_cable == np.array(self.scenario.loose)[:, None]
         return own / own.sum(axis=1, keepdims=True)
 
     @cached_property
@@ -227,8 +223,10 @@ class Space(Displayed):
         scenario = self.scenario
         platform, carriers = self._without_deviation(configurations)
         platform[:, scenario.platform_free] = configurations[:, : len(scenario.platform_free)]
-        if self.loose:
-            carriers[:, self.loose, :3] = self._formation(platform, configurations[:, len(scenario.platform_free) :])
+        if self.scenario.loose:
+            carriers[:, self.scenario.loose, :3] = self._formation(
+                platform, configurations[:, len(scenario.platform_free) :]
+            )
         return platform, carriers
 
     def _formation(self, platform: np.ndarray, shape: np.ndarray) -> np.ndarray:

@@ -104,6 +104,11 @@ class Block(NamedTuple):
     mapped: Mapped | None = None  # what the values are computed by, where it is a function of places among the unknowns
     slopes: ca.MX | None = None  # the derivatives of values that are linear, (r k, unknowns)
 
+    @classmethod
+    def of(cls, mapped: Mapped, rows: list[Row], stages: np.ndarray) -> Block:
+        """Return the rows of a function of places among the unknowns."""
+        return cls(mapped.values, rows, stages, mapped)
+
     def bounds(self, nodes: np.ndarray, tightening: Mapping[Limit, Tightening]) -> np.ndarray:
         """Return the bounds of the rows, one stage after the other, (r k, 2): tightened where the task permits it.
 
@@ -190,19 +195,28 @@ class Columns:
     - `references`: the reference motions at all points, (18 (1 + c), points), as numbers or parameters.
     - `carried`: loads and columns of the ground, (., nodes).
     - `intervals`: `Grid.intervals`, (2, steps), as numbers or parameters.
+    - `duration`: that of the references [s].
     """
 
     def __init__(
-        self, unknowns: ca.MX, scheme: Scheme, references: ca.DM | ca.MX, carried: np.ndarray, intervals: ca.DM | ca.MX
+        self,
+        unknowns: ca.MX,
+        scheme: Scheme,
+        references: ca.DM | ca.MX,
+        carried: np.ndarray,
+        intervals: ca.DM | ca.MX,
+        duration: float,
     ):
         size, where = scheme.size, np.arange(unknowns.numel()).reshape(-1, unknowns.shape[0]).T
-        self._of_nodes = {"x": unknowns, "p": references, "carried": ca.DM(carried)}
+        lasting = ca.repmat(ca.DM(duration), 1, unknowns.shape[1])
+        self._of_nodes = {"x": unknowns, "p": references, "carried": ca.DM(carried), "duration": lasting}
         self._of_intervals = {
             "x": _groups(unknowns, size),
             "x_end": unknowns[:, size::size],
             "p": _groups(references, size),
             "p_end": references[:, size::size],
             "grid": intervals,
+            "duration": lasting[:, size::size],
         }
         self._at_nodes = where
         self._between = np.vstack([where[:, :-1].T.reshape(-1, len(where) * size).T, where[:, size::size]])

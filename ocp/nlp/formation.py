@@ -100,15 +100,9 @@ def _across(platform: Motion) -> np.ndarray:
     return np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1)
 
 
-def _loose(scenario: Scenario) -> list[int]:
-    """Return the carriers that keep their positions relative to the platform rather than in {G}."""
-    free = {owner for owner, _ in scenario.owners() if owner is not None}
-    return [i for i in free if not scenario.robot.carriers[i].confined]
-
-
 def _span(scenario: Scenario) -> np.ndarray:
     """Return the largest lateral, vertical, yaw and squeeze, (4,); zero where not free."""
-    tube, robot, loose = scenario.task.tube, scenario.robot, _loose(scenario)
+    tube, robot, loose = scenario.task.tube, scenario.robot, scenario.loose
     bodies = [robot.attachments, *(robot.carrier_home[[i], :3] - robot.home[:3] for i in loose)]
     size = float(np.linalg.norm(np.vstack(bodies), axis=1).max())
     moves = set(POSITION) <= set(scenario.platform_free)
@@ -141,7 +135,7 @@ def _placed(scenario: Scenario, references: _References, shape: np.ndarray) -> t
     platform[:, 2] += vertical
     platform[:, 5] += yaw
     cos, sin = np.cos(yaw), np.sin(yaw)
-    for index in _loose(scenario):
+    for index in scenario.loose:
         x, y, z = robot.carrier_home[index, :3] - robot.home[:3]
         offset = np.stack([cos * x - sin * y, sin * x + cos * y, np.full_like(yaw, z)], axis=1)
         aside = (offset * references.across).sum(axis=1)

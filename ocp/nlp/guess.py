@@ -37,7 +37,10 @@ def usual_guess(scenario: Scenario, nodes: np.ndarray) -> Deviation:
 
 def guess_through(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], nodes: np.ndarray) -> Deviation:
     """Return the guess that brings platform (n, 6) and carriers (n, c, 6) to `poses` at `nodes`."""
-    return balanced(scenario, _in_formation(scenario, poses, nodes))
+    platform, carriers = scenario.references(nodes)
+    at_home = np.stack([carrier.pose for carrier in carriers], axis=1)
+    q = scenario.free_of(poses[0] - platform.pose, poses[1] - at_home)
+    return balanced(scenario, _spline(scenario, nodes, q))
 
 
 def balanced(scenario: Scenario, guess: Deviation) -> Deviation:
@@ -50,30 +53,15 @@ def balanced(scenario: Scenario, guess: Deviation) -> Deviation:
 
 def _about_home(scenario: Scenario, nodes: np.ndarray) -> Deviation:
     """Return the deviation that keeps carriers which may go anywhere about the platform as at home."""
-    robot = scenario.robot
-    n = scenario.count
-    q, v, a = (np.zeros((len(nodes), n)) for _ in range(3))
+    robot, loose = scenario.robot, [] if scenario.relative else scenario.loose
+    q, v, a = np.zeros((3, len(nodes), scenario.count))
     platform, carriers = scenario.references(nodes)
     for column, (owner, coordinate) in enumerate(scenario.owners()):
-        if owner is None or scenario.relative or coordinate not in POSITION:
-            continue
-        if not robot.carriers[owner].confined:
-            offset = robot.carrier_home[owner, coordinate] - robot.home[coordinate]
+        if owner is not None and owner in loose and coordinate in POSITION:
             for part, its, own in zip((q, v, a), platform, carriers[owner], strict=True):
                 part[:, column] = its[:, coordinate] - own[:, coordinate]
-            q[:, column] += offset
+            q[:, column] += robot.carrier_home[owner, coordinate] - robot.home[coordinate]
     return Deviation(nodes, q, v, a, np.zeros((len(nodes), robot.m)))
-
-
-def _in_formation(scenario: Scenario, poses: tuple[np.ndarray, np.ndarray], nodes: np.ndarray) -> Deviation:
-    """Return the deviation at `nodes` that brings platform (n, 6) and carriers (n, c, 6) to `poses` there."""
-    platform, carriers = scenario.references(nodes)
-    values = []
-    for owner, coordinate in scenario.owners():
-        mine = poses[0] if owner is None else poses[1][:, owner]
-        reference = platform if owner is None else carriers[owner]
-        values.append(mine[:, coordinate] - reference.pose[:, coordinate])
-    return _spline(scenario, nodes, np.stack(values, axis=1))
 
 
 def _spline(scenario: Scenario, nodes: np.ndarray, q: np.ndarray) -> Deviation:
@@ -98,12 +86,10 @@ def _pulled(scenario: Scenario, guess: Deviation) -> Deviation:
 def _tilted(scenario: Scenario, guess: Deviation) -> Deviation:
     """Return the motion with each carrier tilted as its efforts balance its motion and its cables."""
     A, _ = _balance(scenario, guess)
-    _, carriers = scenario.motion(guess.nodes, guess)
-    q, turned = guess.q.copy(), with_tilts(scenario, A, guess.tensions, carriers.pose, carriers.acceleration)
-    for column, (owner, coordinate) in enumerate(scenario.owners()):
-        if owner is not None:
-            q[:, column] += (turned - carriers.pose)[:, owner, coordinate]
-    return _spline(scenario, guess.nodes, q)
+    platform, carriers = scenario.motion(guess.nodes, guess)
+    turned = with_tilts(scenario, A, guess.tensions, carriers.pose, carriers.acceleration)
+    change = scenario.free_of(np.zeros_like(platform.pose), turned - carriers.pose)
+    return _spline(scenario, guess.nodes, guess.q + change)
 
 
 def with_tilts(

@@ -1,6 +1,6 @@
 """Write the rows of an interval: exact integration, and limits that hold at every time in between."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import chain, pairwise
 from typing import NamedTuple, TypeAlias
@@ -9,25 +9,13 @@ import casadi as ca
 import numpy as np
 
 from ..audits.excess import TENSIONS
-from ..limits import Rate
+from ..limits import Limit, Rate
 from ..tasks import bernstein
 from ..tasks.bernstein import Values
 from ..tasks.scenario import Scenario
 from .layout import DURATION, Layout
 from .part import Constraints, Part, part_of
-from .rows import (
-    OTHER_COSTS,
-    Mesh,
-    Row,
-    bounded,
-    costs_at,
-    in_world,
-    motions,
-    reference_symbols,
-    spread,
-    stretch,
-    swept,
-)
+from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread, stretch
 
 TAKE_UP = 3.0  # cost of a rate on the ground: with so much, tensions rise there nearly linearly
 
@@ -52,10 +40,13 @@ def points(scenario: Scenario, layout: Layout, h: Values, h_given: float, column
     return Points(bernstein.integral(h, first[layout.q], speed), speed, acceleration)
 
 
-def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, grid: np.ndarray) -> Part:
+def interval_of(
+    scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, on_the_way: Mapping[Limit, ca.Function]
+) -> Part:
     """Return cost of jerk and constraints of one interval: integration, and limits at the Bernstein points.
 
-    The functions are for the nodes of these `references`, (18 (1 + c), nodes), and the intervals of `grid`, (2, n).
+    The functions are for the nodes of these `references`, (18 (1 + c), nodes), with the distances that are kept
+    `on_the_way` from point to point.
     """
     robot, scheme = scenario.robot, scenario.scheme
     wide = 18 * (1 + len(robot.carriers))
@@ -64,8 +55,8 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     parameters_end, given_end = reference_symbols("p_end", references)
     columns = [*ca.vertsplit(x, layout.width), _of_leg(scenario, layout, x, x_end, given_end)]
     referred = [*ca.vertsplit(given_references, wide), given_end]
-    numbers, varying = reference_symbols("grid", grid)
-    step, take_up = ca.vertsplit(varying)
+    numbers, duration = ca.SX.sym("grid", 2), ca.SX.sym("duration")
+    step, take_up = ca.vertsplit(numbers)
     given = scenario.duration / mesh.steps
     h = step * stretch(layout, x)
     own = points(scenario, layout, h, given, columns)
@@ -84,7 +75,7 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
     # The mean square of the jerk, and what rates cost.
     jerks = [point / scenario.costs.jerk for point in bernstein.derivative(h, own.acceleration)]
     cost = bernstein.mean_square(jerks, ca.dot)
-    cost += _rate_cost(scenario, layout, h, columns, whole, take_up)
+    cost += _rate_cost(scenario, layout, h, columns, whole, take_up, duration)
     cost *= OTHER_COSTS if mesh.elastic else 1.0
     constraints += _rate_rows(scenario, layout, h, columns, whole)
 
@@ -109,8 +100,8 @@ def interval_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.n
         jerks = [spread(scenario, None) @ column[layout.jerk] / given for column in columns] if scheme.smooth else None
         inner = _total(scenario, h, [point[0] for point in moving()], offset, jerks).speed[1:-1]
         constraints += [bounded(limit, point[:3], None) for limit in speeds for point in inner]
-    unknowns, known = {"x": x, "x_end": x_end}, {"p": parameters, "p_end": parameters_end, "grid": numbers}
-    of_limits = _way_rows(scenario, mesh, layout, columns, whole)
+    known = {"p": parameters, "p_end": parameters_end, "grid": numbers, "duration": duration}
+    unknowns, of_limits = {"x": x, "x_end": x_end}, _way_rows(scenario, layout, columns, whole, on_the_way)
     return part_of("interval", unknowns, known, cost, constraints, scenario.limits, of_limits)
 
 
@@ -163,7 +154,13 @@ def _inner_rows(
 
 
 def _rate_cost(
-    scenario: Scenario, layout: Layout, h: ca.SX | float, columns: list[ca.SX], whole: _Whole, take_up: ca.SX
+    scenario: Scenario,
+    layout: Layout,
+    h: ca.SX | float,
+    columns: list[ca.SX],
+    whole: _Whole,
+    take_up: ca.SX,
+    duration: ca.SX,
 ) -> ca.SX | float:
     """Return what rates from point to point cost.
 
@@ -172,7 +169,7 @@ def _rate_cost(
     objective, robot = scenario.task.objective, scenario.robot
     changing = [ca.SX(0, 1)] * len(columns)
     if scenario.costs.has_rates:
-        changing = [costs_at(scenario, layout, *at)[1] for at in zip(columns, whole(), strict=True)]
+        changing = [costs_at(scenario, layout, duration, *at)[1] for at in zip(columns, whole(), strict=True)]
     if scenario.phases.rest and objective.tension_rate is None:
         gentle = TAKE_UP * take_up * robot.force_scale / (objective.tension or robot.force_scale)
         changing = [ca.vertcat(its, gentle * x[layout.tensions]) for its, x in zip(changing, columns, strict=True)]
@@ -207,12 +204,12 @@ def _rate_rows(
 
 
 def _way_rows(
-    scenario: Scenario, mesh: Mesh, layout: Layout, columns: list[ca.SX], whole: _Whole
+    scenario: Scenario, layout: Layout, columns: list[ca.SX], whole: _Whole, on_the_way: Mapping[Limit, ca.Function]
 ) -> Iterator[tuple[int, Constraints]]:
     """Yield index and constraints of the distances from thin regions on the straight way from point to point."""
-    for limit, on_the_way in swept(scenario, mesh).items():
+    for limit, function in on_the_way.items():
         slack = layout.slack(columns[0], limit)
-        pieces = [bounded(limit, on_the_way(*first, *second), slack) for first, second in pairwise(whole())]
+        pieces = [bounded(limit, function(*first, *second), slack) for first, second in pairwise(whole())]
         values, rows = ([*chain(*parts)] for parts in zip(*pieces, strict=True))
         yield scenario.limits.all.index(limit), (values, rows)
 

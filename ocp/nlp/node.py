@@ -1,6 +1,6 @@
 """Write the rows and the cost of one node: the balance A t = w, and the limits that hold at an instant."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
 import casadi as ca
@@ -8,12 +8,12 @@ import numpy as np
 
 from ...models.rigid_body import aerodynamic_wrench
 from ...models.rotation import rotation
-from ..limits import Rate
+from ..limits import Limit, Rate
 from ..tasks.scenario import Scenario
 from ..tasks.wind_set import decisive_winds
 from .layout import MARGIN, Layout
 from .part import Constraints, Part, part_of
-from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread, swept
+from .rows import OTHER_COSTS, Mesh, Row, bounded, costs_at, in_world, motions, reference_symbols, spread
 
 ACCELERATION = 2  # order of a hull: of lower ones an interval has all points, its ends too
 SLACK_COST = 1e2  # of a missing wrench as large as the weight
@@ -21,14 +21,22 @@ SUPPORT_COST = 1e-8  # of the ground's forces in units of the weight: enough to 
 WIND_COST = 1e-2  # of the tensions in the decisive winds of a box, beside the planned ones
 
 
-def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarray, carried: np.ndarray) -> Part:
+def node_of(
+    scenario: Scenario,
+    mesh: Mesh,
+    layout: Layout,
+    references: np.ndarray,
+    carried: np.ndarray,
+    on_the_way: Mapping[Limit, ca.Function],
+) -> Part:
     """Return cost and constraints of one node: the balance A t = w and the limits that hold at an instant.
 
     The functions are for the nodes of these `references`, (18 (1 + c), nodes), with the load and the columns of the
-    ground of each and extreme loads, `carried` (10 + 6 s + 10 k, nodes), or nothing (0, nodes).
+    ground of each and extreme loads, `carried` (10 + 6 s + 10 k, nodes), or nothing (0, nodes). Limits `on_the_way`
+    are kept between nodes.
     """
     robot, dynamics = scenario.robot, scenario.dynamics
-    x = ca.SX.sym("x", layout.width)
+    x, duration = ca.SX.sym("x", layout.width), ca.SX.sym("duration")
     parameters, reference = reference_symbols("p", references)
     parameters_carried, load = reference_symbols("carried", carried)
     platform, *carriers = motions(scenario, layout, x, reference)
@@ -55,7 +63,7 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
         others = robot.force_scale * x[start : start + robot.m]
         balances.append(((A @ others - w + _in_frame(scenario, less, carriers)) / ca.DM(scale))[moving])
     whole = [ca.vertcat(*body) for body in bodies]
-    cost = _node_cost(scenario, layout, x, costs_at(scenario, layout, x, whole)[0])
+    cost = _node_cost(scenario, layout, x, costs_at(scenario, layout, duration, x, whole)[0])
     if mesh.elastic:
         missing = ca.reshape(x[layout.missing], 6, 1 + layout.winds)
         balances = [each - missing[moving, i] for i, each in enumerate(balances)]
@@ -75,8 +83,8 @@ def node_of(scenario: Scenario, mesh: Mesh, layout: Layout, references: np.ndarr
         constraints.append((inside, [Row("margin", 0.0, np.inf)] * (2 * all_tensions.numel())))
     cost += _slack_cost(scenario, mesh, layout, x)
     state = [*whole, tensions, spread(scenario, None) @ x[layout.q]]
-    of_limits = _limit_rows(scenario, mesh, layout, x, state)
-    known = {"p": parameters, "carried": parameters_carried}
+    of_limits = _limit_rows(scenario, layout, x, state, on_the_way)
+    known = {"p": parameters, "carried": parameters_carried, "duration": duration}
     return part_of("node", {"x": x}, known, cost, constraints, scenario.limits, of_limits)
 
 
@@ -112,13 +120,13 @@ def _slack_cost(scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX) -> ca.
 
 
 def _limit_rows(
-    scenario: Scenario, mesh: Mesh, layout: Layout, x: ca.SX, state: list[ca.SX]
+    scenario: Scenario, layout: Layout, x: ca.SX, state: list[ca.SX], on_the_way: Container[Limit]
 ) -> Iterator[tuple[int, Constraints]]:
     """Yield index and constraints of each limit that holds at a node; `interval` has those between two points."""
     limits = scenario.limits
     if not limits.all:
         return
-    evaluated, on_the_way = limits.function(*state), swept(scenario, mesh)
+    evaluated = limits.function(*state)
     for index, (limit, place) in enumerate(zip(limits, limits.places, strict=True)):
         hull = limit.hull if limit.is_convex else None
         elsewhere = isinstance(limit, Rate) or limit in on_the_way

@@ -19,7 +19,7 @@ are in units of `Robot.force_scale`, the weight, moments over `Robot.length`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -38,7 +38,6 @@ from .grid import Grid, passed
 from .held import eased, held_wrench
 from .interval import points
 from .layout import DURATION, MARGIN, Layout
-from .leaving import Leaving
 from .near import Near, parts
 from .part import Part
 from .rows import Mesh, Row, Tightening, stretch
@@ -159,21 +158,15 @@ def build(
     yet known, so that it has no rows of `leaving`. `stages` are those of the scenario and the mesh; default: new ones.
     """
     steps, scheme, stages = mesh.steps, scenario.scheme, stages or Stages.of(scenario, mesh, movable)
-    layout, grid, references, node, interval = (
-        stages.layout,
-        stages.grid,
-        stages.references,
-        stages.node,
-        stages.interval,
-    )
+    layout, grid, node, interval = stages.layout, stages.grid, stages.node, stages.interval
     near = near or Near.everywhere(scenario, grid.shares)
     times = grid.shares * scenario.duration
-    p, given, intervals = ca.MX.sym("p", 0), ca.DM(references), ca.DM(grid.intervals)
+    p, given, intervals = ca.MX.sym("p", 0), ca.DM(stages.references), ca.DM(grid.intervals)
     if movable:
-        p, given, intervals = _as_parameters(references.shape, steps)
+        p, given, intervals = _as_parameters(stages.references.shape, steps)
     x = ca.MX.sym("x", len(times) * layout.width)
     X = ca.reshape(x, layout.width, len(times))
-    columns = Columns(X, scheme, given, stages.carried, intervals)
+    columns = Columns(X, scheme, given, stages.carried, intervals, scenario.duration)
     costs = [
         (columns.at_nodes(node.cost), grid.weights),
         (columns.between(interval.cost), grid.steps / scenario.duration),
@@ -182,14 +175,16 @@ def build(
     for cost, weights in costs:
         objective += ca.dot(cost.values, ca.DM(weights).T)
 
-    everywhere, between = columns.at_nodes(node.function), columns.between(interval.function)
     local = _near_rows(scenario, near, node, interval, columns)
     blocks = [
         *local,
-        Block(everywhere.values, node.rows, np.arange(len(times)) // scheme.size, everywhere),
-        Block(between.values, interval.rows, np.arange(steps), between),
+        Block.of(columns.at_nodes(node.function), node.rows, np.arange(len(times)) // scheme.size),
+        Block.of(columns.between(interval.function), interval.rows, np.arange(steps)),
         *_single_rows(scenario, layout, X, grid),
-        *_end_rows(stages.ends, columns, scheme.size),
+        *(
+            Block.of(columns.at_nodes(function, np.array([point])), rows, np.array([point // scheme.size]))
+            for function, rows, point in stages.ends
+        ),
     ]
     lower, upper = _simple_bounds(scenario, mesh, layout, times)
     lower_g, upper_g = _bounds(scenario, mesh, grid, blocks)
@@ -208,7 +203,7 @@ def build(
         costs=costs,
         blocks=blocks,
         local=len(local),
-        parameters=_values(references, grid.steps[0]) if movable else np.zeros(0),
+        parameters=_values(stages.references, grid.steps[0]) if movable else np.zeros(0),
     )
 
 
@@ -241,15 +236,8 @@ def _near_rows(scenario: Scenario, near: Near, node: Part, interval: Part, colum
             for where, picked in together.items():
                 chosen = np.flatnonzero(np.frombuffer(where, dtype=bool))
                 mapped = mapped_at(function(tuple(picked)), chosen)
-                blocks.append(Block(mapped.values, [rows[i] for i in picked], chosen // points_of_stage, mapped))
+                blocks.append(Block.of(mapped, [rows[i] for i in picked], chosen // points_of_stage))
     return blocks
-
-
-def _end_rows(ends: list[Leaving], columns: Columns, size: int) -> Iterator[Block]:
-    """Yield the rows of both ends, at points of which each stage has so many."""
-    for function, rows, point in ends:
-        mapped = columns.at_nodes(function, np.array([point]))
-        yield Block(mapped.values, rows, np.array([point // size]), mapped)
 
 
 def _bounds(scenario: Scenario, mesh: Mesh, grid: Grid, blocks: list[Block]) -> tuple[np.ndarray, np.ndarray]:

@@ -135,14 +135,18 @@ def offsets(scenario: Scenario, layout: Layout, x: ca.SX) -> list[ca.SX]:
     return [ca.vec(spread(scenario, owner) @ deviation) for owner in owners]
 
 
-def costs_at(scenario: Scenario, layout: Layout, x: ca.SX, bodies: Sequence[ca.SX]) -> tuple[ca.SX, ca.SX]:
+def costs_at(
+    scenario: Scenario, layout: Layout, duration: ca.SX, x: ca.SX, bodies: Sequence[ca.SX]
+) -> tuple[ca.SX, ca.SX]:
     """Return what costs in column x, and the values whose rates cost, in amounts (`Costs.function`).
 
-    `bodies` are the motions of the platform in {G} and of the carriers, (18, 1) each.
+    `duration` is that of the references [s], `bodies` are the motions of the platform in {G} and of the carriers,
+    (18, 1) each.
     """
     force, place = scenario.robot.force_scale, layout.at(MARGIN)
-    duration, margin = scenario.duration * stretch(layout, x), 0.0 if place is None else force * x[place]
-    inputs = [*bodies, *offsets(scenario, layout, x), force * x[layout.tensions], duration, margin]
+    margin = 0.0 if place is None else force * x[place]
+    times = [duration * stretch(layout, x), margin]
+    inputs = [*bodies, *offsets(scenario, layout, x), force * x[layout.tensions], *times]
     outputs: Any = scenario.costs.function.call(inputs)
     return tuple(outputs)
 

@@ -271,16 +271,17 @@ class _Watch(ca.Callback):
         return True  # without copies: as DM each argument takes longer than all that is done here
 
     def eval_buffer(self, arg: Sequence[memoryview], res: Sequence[memoryview]) -> int:
-        x, f, g, _, lam_g, _ = (np.frombuffer(each) if each is not None else np.zeros(0) for each in arg)
+        x, f, g, lam_g = (np.frombuffer(arg[i]) for i in (0, 1, 2, 4))
         objective = float(f[0])
-        self._keep(x, g, objective)
         # What making up for what g misses would change, to first order.
-        missed = g - np.clip(g, self.program.lower_g, self.program.upper_g)
+        missed = g - np.minimum(np.maximum(g, self.program.lower_g), self.program.upper_g)
+        infeasibility = float(np.abs(missed).max(initial=0.0))
+        if infeasibility <= MET:
+            self._keep(x, g, objective)
         # A product of such long vectors by `@` would start a thread of BLAS, which then waits at full load.
         if objective + (lam_g * missed).sum() < self._better():
             self._since = self.iteration
         if self._progress is not None:
-            infeasibility = float(np.abs(missed).max(initial=0.0))
             self.errands.put(partial(self._progress, self.iteration, objective, infeasibility))
         self.iteration += 1
         self.late = time.perf_counter() > self._deadline

@@ -1,11 +1,13 @@
 """The functions of a program's nodes and intervals: `Stages`.
 
-They are the same for all programs of a scenario with so many steps, wherever these have rows of local limits and
-however their bounds are tightened. Writing and differentiating them is most of the work of building a program.
+They are the same for all programs of a task with the same limits, whatever their number of steps and wherever these
+have rows of local limits, however their bounds are tightened, and along every path that has the same constants. Writing
+and differentiating them is most of the work of building a program.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,13 +21,16 @@ from .layout import Layout
 from .leaving import Leaving, leaving
 from .node import node_of
 from .part import Part
-from .rows import Mesh
+from .rows import Mesh, swept
 
 
 @dataclass(frozen=True)
 class Stages(Displayed):
     """Nodes and intervals of a program as functions, and the numbers of which these are functions too."""
 
+    key: tuple[object, ...]  # what the functions are made of, besides the constants of references and loads
+    scenario: Scenario
+    mesh: Mesh
     layout: Layout
     grid: Grid
     references: np.ndarray  # `reference_motions` at all points
@@ -35,18 +40,38 @@ class Stages(Displayed):
     ends: list[Leaving]
 
     @staticmethod
-    def of(scenario: Scenario, mesh: Mesh, movable: bool = False) -> Stages:
-        """Return those of a scenario on a mesh; with a `movable` one references and lengths of intervals may change."""
-        layout, grid = Layout.of(scenario, mesh.elastic), Grid.of(scenario, mesh.steps)
+    def of(scenario: Scenario, mesh: Mesh, movable: bool = False, known: Iterable[Stages] = ()) -> Stages:
+        """Return those of a scenario on a mesh, with the functions of `known` ones if they are the same.
+
+        With a `movable` one references and lengths of intervals may change.
+        """
+        layout, grid, thin = Layout.of(scenario, mesh.elastic), Grid.of(scenario, mesh.steps), swept(scenario, mesh)
+        # The unknowns of a smooth scheme are in units of an interval's length.
+        unit = (scenario.duration, mesh.steps) if scenario.scheme.smooth else ()
+        same = id(scenario.task), id(scenario.limits), id(scenario.tightened), *map(id, thin)
+        key = *same, scenario.passing, mesh.elastic, mesh.between, *unit
         times = grid.shares * scenario.duration
-        references, carried = reference_motions(scenario, times), _carried(scenario, times)
-        shown, lengths = references, grid.intervals
-        if movable:
-            shown, lengths = _made_to_vary(scenario, references), np.hstack([lengths, lengths * [[2.0], [1.0]]])
-        node = node_of(scenario, mesh, layout, shown, carried)
-        interval = interval_of(scenario, mesh, layout, shown, lengths)
-        ends = [] if movable else leaving(scenario, layout, references)
-        return Stages(layout, grid, references, carried, node, interval, ends)
+        numbers = reference_motions(scenario, times), _carried(scenario, times)
+        shown = _made_to_vary(scenario, numbers[0]) if movable else numbers[0]
+        for its in known:
+            if (
+                its.key == key
+                and _same_constants(its.references, numbers[0])
+                and _same_constants(its.carried, numbers[1])
+            ):
+                node, interval = its.node, its.interval
+                break
+        else:
+            node = node_of(scenario, mesh, layout, shown, numbers[1], thin)
+            interval = interval_of(scenario, mesh, layout, shown, thin)
+        ends = [] if movable else leaving(scenario, layout, numbers[0])
+        return Stages(key, scenario, mesh, layout, grid, *numbers, node, interval, ends)
+
+
+def _same_constants(known: np.ndarray, values: np.ndarray) -> bool:
+    """Return whether what is constant in the columns of `known` has the same value in all of `values`."""
+    constant = np.ptp(known, axis=1) == 0.0
+    return bool((values[constant] == known[constant, :1]).all())
 
 
 def reference_motions(scenario: Scenario, nodes: np.ndarray) -> np.ndarray:

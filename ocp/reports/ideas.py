@@ -128,7 +128,7 @@ def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, m
     platform = np.tile(pose, (len(moved), 1))
     every = np.tile(carriers, (len(moved), 1, 1))
     platform[:, :3] += moved
-    every[:, space.loose, :3] += moved[:, None]
+    every[:, space.scenario.loose, :3] += moved[:, None]
     found = kept(platform, every)
     lowest = float(kept.scenario.robot.home_anchors[:, 2].min())
     below = found.points[..., 2].min(axis=1) < 0

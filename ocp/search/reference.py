@@ -22,6 +22,7 @@ from ..tasks.deviation import Deviation
 from ..tasks.ends import platform_ends
 from ..tasks.paths import AnyPath, LinePath, RestPath, TimedPath, WaypointPath
 from ..tasks.scenario import ATTITUDE, Scenario
+from ..tasks.scheme import LINEAR
 from ..tasks.status import MotionStatus
 from .search import Search
 from .time_law import fastest
@@ -78,7 +79,9 @@ def _better(search: Search) -> tuple[_Candidate | None, float]:
     scenario = search.scenario
     legs = len(scenario.path.points) - 1 if isinstance(scenario.path, WaypointPath) else 1
     mesh = Mesh(min(max(STEPS * legs, FEW), scenario.task.steps))
-    coarse = replace(scenario, task=scenario.task.model_copy(update={"scheme": "linear"}))
+    coarse = scenario
+    if scenario.scheme != LINEAR:
+        coarse = replace(scenario, task=scenario.task.model_copy(update={"scheme": LINEAR.name}))
     with search.stage("reference") as stage:
         own = _solved(search, mesh, coarse, None)
         before = np.inf if own is None else own.objective
@@ -156,6 +159,7 @@ def _passing(search: Search, scenario: Scenario, mesh: Mesh, before: Outcome) ->
 def _solved(search: Search, mesh: Mesh, scenario: Scenario, guess: Deviation | None) -> Outcome | None:
     """Return the optimum of a scenario on the mesh; None if there is none."""
     its = Search(scenario, {}, search.progress, search.seconds_left)
+    its.built = search.built
     outcome = its.solve("reference", mesh, guess, clear=guess is not None)
     search.build_s, search.solve_s = search.build_s + its.build_s, search.solve_s + its.solve_s
     return outcome if outcome.success else None
@@ -166,15 +170,11 @@ def _moved(scenario: Scenario, its: Outcome, nominal: np.ndarray, other: Scenari
 
     `nominal` are the times at which the references of the first one are where they are at the nodes, (k,) [s].
     """
-    nodes, values = its.deviation.nodes, [part.copy() for part in (its.deviation.q, its.deviation.v, its.deviation.a)]
+    before, nodes = its.deviation, its.deviation.nodes
     rate = np.diff(nominal) / np.diff(nodes)
     theirs = scenario.references(nominal)[0].timed(np.append(rate, rate[-1]), np.zeros(len(nodes)))
-    mine = other.references(nodes)[0]
-    for column, (owner, coordinate) in enumerate(scenario.owners()):
-        for value, at, reference in zip(values, theirs, mine, strict=True):
-            if owner is None:
-                value[:, column] += (at - reference)[:, coordinate]
-        if owner is None and coordinate in ATTITUDE:
-            values[0][:, column] -= 2 * np.pi * np.round(values[0][:, column] / (2 * np.pi))
-    q, v, a = values
-    return replace(its.deviation, q=q, v=v, a=a)
+    parts = zip((before.q, before.v, before.a), theirs, other.references(nodes)[0], strict=True)
+    q, v, a = (value + (at - reference) @ scenario.spread(None) for value, at, reference in parts)
+    angles = [column for column, (owner, i) in enumerate(scenario.owners()) if owner is None and i in ATTITUDE]
+    q[:, angles] -= 2 * np.pi * np.round(q[:, angles] / (2 * np.pi))
+    return replace(before, q=q, v=v, a=a)

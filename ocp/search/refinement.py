@@ -54,7 +54,10 @@ def refine(search: Search, outcome: Outcome) -> str:
             further = _tightened(scenario, audit, halved)
         between = tuple(sorted({*mesh.between, *_missed_between(scenario, audit)}))
         finer = _times_finer(scenario, audit)
-        if finer > 1 and scenario.task.scheme is None and _equations_missed(scenario, audit):
+        # Where carriers cannot follow the motion between the nodes. Wrenches that few cables miss are left to finer
+        # meshes: with those, the shortest durations are closer to the least.
+        equations = {limit.name for limit in scenario.limits if limit.is_equation}
+        if finer > 1 and scenario.task.scheme is None and any(excess.limit in equations for excess in audit.excess):
             scenario, finer = search.take_scheme("hermite"), 1
         steps = min(finer * mesh.steps, MOST_STEPS)
         mesh = Mesh(steps, reserve * scenario.robot.force_scale, shrink, further, between)
@@ -94,15 +97,6 @@ def _tightened_again(search: Search, outcome: Outcome, audit: Audit, mesh: Mesh)
             break
         outcome, audit = again, search.audit(again)
     return outcome, audit, mesh
-
-
-def _equations_missed(scenario: Scenario, audit: Audit) -> bool:
-    """Return whether an audit reports that between the nodes carriers cannot follow the motion.
-
-    Wrenches that few cables miss are left to finer meshes: with those, the shortest durations are closer to the least.
-    """
-    equations = {limit.name for limit in scenario.limits if limit.is_equation}
-    return any(excess.limit in equations for excess in audit.excess)
 
 
 def _times_finer(scenario: Scenario, audit: Audit) -> int:

@@ -21,9 +21,8 @@ class Remainder(NamedTuple):
     """The remainder of a motion."""
 
     scenario: Scenario  # it starts as measured
-    guess: (
-        Deviation | None
-    )  # the last plan, with what the carriers are off it decaying; None if the task fixes the motion
+    # The last plan, with what the carriers are off it decaying; None if the task fixes the motion.
+    guess: Deviation | None
 
 
 def _open(ends: Word) -> Word:
@@ -110,11 +109,8 @@ def _offset(whole: Scenario, last: Plan, at: np.ndarray, time: float, state: Ini
     robot = whole.robot
     reference = [part[0] for part in whole.references(np.array([time]))[0]]
     if last.deviation is not None:
-        values = last.deviation.evaluate(at)[:3]
-        for column, (owner, coordinate) in enumerate(whole.owners()):
-            if owner is None:
-                for part, value in zip(reference, values, strict=True):
-                    part[coordinate] += value[0, column]
+        for part, value in zip(reference, last.deviation.evaluate(at)[:3], strict=True):
+            part += value[0] @ whole.spread(None).T
     pose, velocity = np.array(state.pose), np.array(state.velocity)
     acceleration = planned.acceleration[0] if state.acceleration is None else np.array(state.acceleration)
     if state.acceleration is None and state.tensions is not None:
@@ -153,13 +149,9 @@ def _guess(scenario: Scenario, last: Plan, at: np.ndarray, carriers: Motion, set
     initial = scenario.task.initial
     if initial is None or initial.carrier_pose is None or initial.carrier_velocity is None:
         return replace(guess, nodes=nodes)
-    off = np.zeros((3, scenario.count))
-    for column, (owner, coordinate) in enumerate(scenario.owners()):
-        if owner is not None:
-            off[0, column] = initial.carrier_pose[owner][coordinate] - carriers.pose[0, owner, coordinate]
-            off[1, column] = initial.carrier_velocity[owner][coordinate] - carriers.velocity[0, owner, coordinate]
-            if coordinate in ATTITUDE:
-                off[0, column] -= 2 * np.pi * np.round(off[0, column] / (2 * np.pi))
+    away = np.array([initial.carrier_pose, initial.carrier_velocity]) - [carriers.pose[0], carriers.velocity[0]]
+    away[0, :, 3:] -= 2 * np.pi * np.round(away[0, :, 3:] / (2 * np.pi))
+    off = scenario.free_of(np.zeros((3, 6)), np.concatenate([away, np.zeros_like(away[:1])]))
     q, v, a = (mine + more for mine, more in zip((guess.q, guess.v, guess.a), decay(nodes, settle, off), strict=True))
     return replace(guess, nodes=nodes, q=q, v=v, a=a)
 

@@ -70,7 +70,7 @@ class Search:
         self.build_s, self.solve_s = 0.0, 0.0
         self.stages: list[PlannerStep] = []
         self.mesh: Mesh | None = None  # of the program that was solved last
-        self._stages: list[tuple[Scenario, Mesh, Stages]] = []  # of programs that were built
+        self.built: list[Stages] = []  # of programs
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
@@ -79,7 +79,6 @@ class Search:
         """Go on with another scenario, without what is known of the one before."""
         self.scenario = scenario
         self._solvers.clear()
-        self._stages.clear()
         self._audited.clear()
 
     def take_scheme(self, name: SchemeName) -> Scenario:
@@ -87,7 +86,6 @@ class Search:
         task = self.scenario.task.model_copy(update={"scheme": name})
         self.scenario = replace(self.scenario, task=task)
         self._solvers.clear()
-        self._stages.clear()
         return self.scenario
 
     @contextmanager
@@ -258,12 +256,12 @@ class Search:
         return self._build(scenario, mesh, Near.along(scenario, shares, motion, reach))
 
     def _build(self, scenario: Scenario, mesh: Mesh, near: Near | None) -> Program:
-        """Build a program from the stages of an earlier one of the scenario with the same rows, if there is one."""
-        for its, of_mesh, stages in self._stages:
-            if its is scenario and of_mesh.rows == mesh.rows:
+        """Build a program from the stages of earlier ones, as far as they are the same."""
+        for stages in self.built:
+            if stages.scenario is scenario and stages.mesh.rows == mesh.rows:
                 return build(scenario, mesh, near, stages=stages)
-        self._stages.append((scenario, mesh, Stages.of(scenario, mesh)))
-        return build(scenario, mesh, near, stages=self._stages[-1][2])
+        self.built.append(Stages.of(scenario, mesh, known=self.built))
+        return build(scenario, mesh, near, stages=self.built[-1])
 
     def audit(self, outcome: Outcome) -> Audit:
         """Audit the motion of a program's solution, which `best` then chooses from."""

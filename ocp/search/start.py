@@ -71,17 +71,13 @@ def _along(scenario: Scenario, path: AnyPath, carriers: dict[int, AnyPath], seco
     nodes = np.linspace(0.0, seconds, scenario.task.steps + 1)
     there = scenario.along(path, seconds)
     about = initial_guess(there, nodes)
-    values = [part.copy() for part in (about.q, about.v, about.a)]
-    target, _ = there.references(nodes)
     mine, bases = scenario.lasting(seconds).references(nodes)
-    for column, (owner, coordinate) in enumerate(scenario.owners()):
-        for value, at, reference in zip(values, target, mine, strict=True):
-            if owner is None:
-                value[:, column] = (at - reference)[:, coordinate]
-        if owner in carriers:
-            its = carriers[owner].at(nodes, seconds)
-            for value, at, reference in zip(values, its, bases[owner], strict=True):
-                value[:, column] = (at - reference)[:, coordinate]
+    given = [owner is None or owner in carriers for owner, _ in scenario.owners()]
+    theirs = [carriers[i].at(nodes, seconds) if i in carriers else base for i, base in enumerate(bases)]
+    values = []
+    for k, guessed in enumerate((about.q, about.v, about.a)):
+        off = np.stack([its[k] - base[k] for its, base in zip(theirs, bases, strict=True)], axis=1)
+        values.append(np.where(given, scenario.free_of(there.references(nodes)[0][k] - mine[k], off), guessed))
     q, v, a = values
     return _lasting(scenario, Deviation(nodes, q, v, a, about.tensions))
 

@@ -42,7 +42,9 @@ def stopping_within(
         return plan
     span, begun, tried = scenario.duration_range, time.perf_counter(), 0
     short, enough = plan, None  # of two durations, the plan that stops too late and the one that stops in time
-    while tried < ROUNDS and span is not None and plan.stop is not None and not _suffices(plan, seconds):
+    while tried < ROUNDS and span is not None and plan.stop is not None:
+        if plan.feasible and plan.stop.duration >= NEAR * seconds:
+            break
         target = min(_between(short, enough, seconds), span.max)
         if (span.max if enough is None else enough.duration) <= CLOSE * short.duration:
             break
@@ -58,11 +60,6 @@ def stopping_within(
     said = f"{tried} tried" + f", {quantity(best.duration, 's')} suffices" * best.feasible
     stages = (*first.stages, PlannerStep("slower, to stop in time", said, time.perf_counter() - begun))
     return replace(best, stages=stages)
-
-
-def _suffices(plan: Plan, seconds: float) -> bool:
-    """Return whether a plan stops in time, and hardly sooner."""
-    return plan.feasible and plan.stop is not None and plan.stop.duration >= NEAR * seconds
 
 
 def _between(short: Plan, enough: Plan | None, seconds: float) -> float:

@@ -256,6 +256,19 @@ class Scenario(Displayed):
                 matrix[coordinate, column] = 1.0
         return matrix
 
+    def free_of(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
+        """Return the free coordinates among values of the platform (..., 6) and of carriers (..., c, 6), (..., n)."""
+        whole = np.concatenate([platform[..., None, :], carriers], axis=-2)
+        return whole[
+            ..., [0 if owner is None else 1 + owner for owner, _ in self.owners()], [i for _, i in self.owners()]
+        ]
+
+    @cached_property
+    def loose(self) -> list[int]:
+        """Return the carriers that keep their distance from the platform rather than a position."""
+        free = {owner for owner, coordinate in self.carrier_free if coordinate in POSITION}
+        return [i for i in sorted(free) if not self.robot.carriers[i].confined]
+
     def moves(self, hull: Hull) -> bool:
         """Return whether the planner chooses a coordinate that a convex limit is about."""
         return any((hull.carrier, coordinate) in self.owners() for coordinate in hull.coordinates)
