@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -42,23 +42,15 @@ MOST_LINES = 60  # of the table in a report
 SAME = 1e-3  # [N], of a margin that is as large as asked
 
 
-class _Result(NamedTuple):
-    """Describe one result of a row."""
-
-    name: str
-    unit: str
-    about: str
-
-
-_RESULTS = (
-    _Result("status", "", "feasible, infeasible, not-found, or failed: planning raised an error"),
-    _Result("reason", "", "reason why the plan is not feasible"),
-    _Result("cost", "1", "objective of the task, of feasible plans"),
-    _Result("duration", "s", "duration of the motion"),
-    _Result("margin", "N", "smallest distance of any tension from its limits"),
-    _Result("tension_max", "N", "largest tension"),
-    _Result("iterations", "1", "iterations of the last run of the solver"),
-    _Result("seconds", "s", "wall time to plan"),
+_RESULTS = (  # name, unit and description of the results of a row
+    ("status", "", "feasible, infeasible, not-found, or failed: planning raised an error"),
+    ("reason", "", "reason why the plan is not feasible"),
+    ("cost", "1", "objective of the task, of feasible plans"),
+    ("duration", "s", "duration of the motion"),
+    ("margin", "N", "smallest distance of any tension from its limits"),
+    ("tension_max", "N", "largest tension"),
+    ("iterations", "1", "iterations of the last run of the solver"),
+    ("seconds", "s", "wall time to plan"),
 )
 _NUMBERS = ("cost", "duration", "margin", "tension_max")  # what a report shows of each plan
 
