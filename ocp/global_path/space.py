@@ -58,11 +58,6 @@ class Space(Displayed):
         return len(self.scenario.platform_free) + 3 * self.shaped + self.turns
 
     @cached_property
-    def usual_shape(self) -> np.ndarray:
-        """Return the formation as at the start: (xx, xy, yy, turn)."""
-        return np.array([*HOME_SHAPE, 0.0][: 3 + self.turns] if self.shaped else [])
-
-    @cached_property
     def references(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the poses of platform and carriers without deviation at start and end, (2, 6) and (2, c, 6)."""
         platform, carriers = self._given
@@ -103,7 +98,8 @@ class Space(Displayed):
         if self.given_ends is not None:
             return self.given_ends
         free = self.scenario.platform_free
-        ends = np.stack([np.r_[pose[free], self.usual_shape] for pose in self.references[0]])
+        shape = [*HOME_SHAPE, 0.0][: self.count - len(free)]  # xx, xy, yy, turn
+        ends = np.stack([np.r_[pose[free], shape] for pose in self.references[0]])
         for fixed in fixed_values(self.scenario):
             if fixed.order == 0 and fixed.column < len(free):
                 ends[fixed.end, fixed.column] += fixed.value

@@ -186,24 +186,12 @@ def build(
             for function, rows, point in stages.ends
         ),
     ]
-    lower, upper = _simple_bounds(scenario, mesh, layout, times)
-    lower_g, upper_g = _bounds(scenario, mesh, grid, blocks)
     g = ca.vertcat(*(ca.vec(block.values) for block in blocks))
+    problem = {"x": x, "p": p, "f": objective, "g": g}
+    bounds = *_simple_bounds(scenario, mesh, layout, times), *_bounds(scenario, mesh, grid, blocks)
+    values = _values(stages.references, grid.steps[0]) if movable else np.zeros(0)
     return Program(
-        scenario=scenario,
-        mesh=mesh,
-        layout=layout,
-        shares=grid.shares,
-        problem={"x": x, "p": p, "f": objective, "g": g},
-        lower=lower,
-        upper=upper,
-        lower_g=lower_g,
-        upper_g=upper_g,
-        near=near,
-        costs=costs,
-        blocks=blocks,
-        local=len(local),
-        parameters=_values(stages.references, grid.steps[0]) if movable else np.zeros(0),
+        scenario, mesh, layout, grid.shares, problem, *bounds, near, costs, blocks, local=len(local), parameters=values
     )
 
 

@@ -176,17 +176,10 @@ class Solver:
 
     def _outcome(self, x: np.ndarray, objective: float, success: bool, message: str, iterations: int) -> Outcome:
         """Return a run that ended at the unknowns x."""
-        program = self.program
-        deviation = program.read(x)
-        return Outcome(
-            deviation=deviation,
-            duration=float(deviation.nodes[-1]),
-            success=success and bool(np.isfinite(x).all()),
-            message=message,
-            iterations=iterations,
-            slack=program.missing(x),
-            objective=np.nan if program.mesh.elastic else objective,
-        )
+        deviation, success = self.program.read(x), success and bool(np.isfinite(x).all())
+        slack, seconds = self.program.missing(x), float(deviation.nodes[-1])
+        of_task = np.nan if self.program.mesh.elastic else objective
+        return Outcome(deviation, seconds, success, message, iterations, slack, of_task)
 
     def _abandon(self) -> None:
         """Stop the run for which nobody waits; objects that its thread still uses are not used again."""

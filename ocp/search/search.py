@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from operator import itemgetter
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -46,12 +47,6 @@ ENDS = {  # of a run of the solver, by its message; others are quoted
 }
 
 
-class RunningStage:
-    """A stage that is running; it sets its message."""
-
-    message = ""
-
-
 class Search:
     """Solve one scenario's programs, and record the time and the message of each stage.
 
@@ -89,10 +84,10 @@ class Search:
         return self.scenario
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[RunningStage]:
-        """Record what happens inside as a stage."""
+    def stage(self, name: str) -> Iterator[SimpleNamespace]:
+        """Record what happens inside as a stage, which sets its `message`."""
         raise_if_swallowed()
-        start, running = time.perf_counter(), RunningStage()
+        start, running = time.perf_counter(), SimpleNamespace(message="")
         yield running
         self.stages.append(PlannerStep(name, running.message, time.perf_counter() - start))
 

@@ -77,23 +77,21 @@ def read_axes(vary: object) -> tuple[Axis, ...]:
 
 
 def _axis(field: Field, values: object) -> Axis:
-    accepted = "a list of different values as in a task file, at least one"
-    if isinstance(values, str | bytes | Mapping | set) or not isinstance(values, Iterable):
-        raise InputError(f"vary {field.key} must be {accepted}, got {shown(values)}")
-    if isinstance(values, np.ndarray) and not values.ndim:
-        raise InputError(f"vary {field.key} must be {accepted}, got {shown(values)}")
+    must = f"vary {field.key} must be a list of different values as in a task file, at least one"
+    single = isinstance(values, str | bytes | Mapping | set) or (isinstance(values, np.ndarray) and not values.ndim)
+    if single or not isinstance(values, Iterable):
+        raise InputError(f"{must}, got {shown(values)}")
     plain = tuple(_plain(value) for value, _ in zip(values, range(MOST_PLANS + 1), strict=False))
     axis = Axis(field, plain)
     try:
         json.dumps(plain, allow_nan=False)
         coordinates = axis.coordinates.tolist()
     except (TypeError, ValueError, OverflowError, RecursionError):
-        given = "values that no task file has"
-        raise InputError(f"vary {field.key} must be {accepted}, got {given}, {shown(plain)}") from None
+        raise InputError(f"{must}, got values that no task file has, {shown(plain)}") from None
     twice = [value for value, count in Counter(coordinates).items() if count > 1]
     if twice or not plain:
         given = f"{axis.texts[coordinates.index(twice[0])]} twice" if twice else "none"
-        raise InputError(f"vary {field.key} must be {accepted}, got {given}")
+        raise InputError(f"{must}, got {given}")
     return axis
 
 

@@ -57,7 +57,6 @@ def _row(planned: Plan) -> Row:
     """Return the row of a plan; its cost, where no program was solved, is that of the audited tensions."""
     least, largest = (math.nan if value is None else value for value in (planned.margin, planned.tension_max))
     duration, iterations = planned.scenario.duration, planned.iterations
-    if not planned.feasible:
-        return Row(planned.status.value, decisive(planned), math.nan, duration, least, largest, iterations, 0.0)
-    objective = cost(planned) if planned.objective is None else planned.objective
-    return Row(planned.status.value, "", objective, duration, least, largest, iterations, 0.0)
+    reason, objective = ("", planned.objective) if planned.feasible else (decisive(planned), math.nan)
+    objective = cost(planned) if objective is None else objective
+    return Row(planned.status.value, reason, objective, duration, least, largest, iterations, 0.0)
