@@ -53,7 +53,12 @@ def report():
     rows = [("stage " + "x" * 30, "1.2 m/s^2", "a long text " * 8, *("12 345.67 N",) * 4)] * 3
     heads = ("stage", "status", "what it is about", "t_min", "t_max", "margin", "violation")
     facts = html.facts("Tensions", [("smallest", "1.23 N at t = 1.234 s, cable 3"), ("", "and " + "y" * 60)])
-    parts = [facts, html.columns("Stages", heads, rows), html.picture(drawing()), html.file("A file", "z" * 300)]
+    parts = [
+        facts,
+        html.columns("Stages", heads, rows),
+        html.picture(drawing()),
+        html.fold("A file", html.verbatim("z" * 300)),
+    ]
     return html.page("A plan", "feasible", "margin 1.2 N", style.colour(0), parts)
 
 
