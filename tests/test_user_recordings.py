@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline import load, read_measurements
+from towline import InputError, load, read_measurements
 from towline.estimation.calibration import calibrate
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
+from towline.estimation.logs import read_log
 
 from . import user_recordings as user
 from .warm import towline
@@ -224,3 +225,27 @@ def test_a_file_for_each_computer(offsets, tmp_path):
             assert float(size) * (1 if way == "ahead" else -1) == pytest.approx(offsets[i], abs=2e-3)
     logs = [part for file in files for part in ("--log", file)]
     assert "no pose fits" not in towline("pose", robot, *logs, cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize("stamps", [[2.0], [2.0 + 0.01 * k for k in range(20)], [np.nan]])
+def test_a_clock_that_was_set_late_and_a_missing_time(stamps, tmp_path):
+    """A drone stamps its first samples from boot on, which is decades before the others."""
+    robot, (t, x, drones) = user.team_robot(tmp_path), user.team()
+    user.write(tmp_path / "load.csv", ["stamp", *"xyz"], np.column_stack([user.EPOCH + t, x]), form="%.14g")
+    for i, (p, *_) in enumerate(drones):
+        table = np.column_stack([user.EPOCH + t + 0.4 * i, p])
+        if i == 1 and np.isfinite(stamps[0]):
+            table[: len(stamps), 0] = stamps
+        elif i == 1:
+            table[-1, 0] = np.nan
+        user.write(tmp_path / f"cf{i + 1}.csv", ["stamp", *"xyz"], table, form="%.14g")
+    files = [tmp_path / name for name in ("load.csv", "cf1.csv", "cf2.csv")]
+    if np.isnan(stamps[0]):
+        with pytest.raises(InputError, match=r"times must increase from sample to sample, got .* and then nan s at"):
+            read_log(files, robot=tmp_path / robot)
+        return
+    read = read_log(files, robot=tmp_path / robot)
+    (said,) = [note for note in read.notes if "clock" in note]
+    assert float(re.search(r"clock of cf2 is ([\d.]+) s ahead", said)[1]) == pytest.approx(0.4, abs=1e-3)
+    apart = np.linalg.norm(read.measurements.carrier_poses[:, :, :3] - read.measurements.poses[:, None, :3], axis=2)
+    np.testing.assert_allclose(apart, np.broadcast_to([0.82, 0.79], apart.shape), atol=1e-3)

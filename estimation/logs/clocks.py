@@ -23,6 +23,7 @@ STEP, FEWEST, MOST_COMPARED = (
     0.5,
     300,
 )  # [s] of a search, share of the samples that must overlap, and their number
+LONGEST = 1e4  # [s] before and after the middle of a log
 CLEARLY = 0.8  # of the spread of a cable's length, below which another clock is better
 SURELY, LIKE = 10.0, 0.8  # standard deviations of such an offset, and the correlation of speeds
 
@@ -137,7 +138,7 @@ def set_clocks_of_carriers(
             continue
         angles = angles_at(own, reader, found) if found.orientation else np.full_like(position, np.nan)
         poses = np.hstack([position, np.where(np.isfinite(angles), angles, carrier.home[3:])])
-        kept = np.isfinite(position).all(axis=1)
+        kept = np.isfinite(position).all(axis=1) & _lasting(own)
         if kept.sum() < 4:
             continue
         offset = _offset(robot, index, own[kept], poses[kept], seen)
@@ -148,12 +149,17 @@ def set_clocks_of_carriers(
     return notes
 
 
+def _lasting(times: np.ndarray) -> np.ndarray:
+    """Return which times (N,) are near most others: not before a clock was set, as from boot to epoch, nor nan."""
+    return np.asarray(np.abs(times - np.median(np.nan_to_num(times))) <= LONGEST)
+
+
 def _offset(robot: Robot, index: int, times: np.ndarray, poses: np.ndarray, seen: Seen) -> float:
     """Return by how much the clock of a carrier's poses (K, 6) is ahead [s], 0 if that is not clear."""
     from scipy.optimize import minimize_scalar
 
     cables = np.flatnonzero(np.asarray(robot.carrier_of_cable) == index)
-    rows = np.flatnonzero(np.isfinite(seen.poses[:, :3]).all(axis=1))
+    rows = np.flatnonzero(np.isfinite(seen.poses[:, :3]).all(axis=1) & _lasting(seen.times))
     if not len(rows) or not len(cables):
         return 0.0
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_COMPARED).astype(int))]
