@@ -10,6 +10,7 @@ from ..models.record import record_of
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from .as_floats import ROUNDING
+from .late_states import OLDEST
 
 
 class CarriedLoad:
@@ -25,8 +26,8 @@ class CarriedLoad:
 
     def reset(self) -> None:
         """Carry nothing."""
-        self.load, self._since = None, -np.inf
-        self._of_both = self._earlier = self._robot
+        self.load, self._of_both = None, self._robot
+        self._begun = [(-np.inf, self._robot)]  # robots with their loads, as far back as states may be late
 
     def change(self, load: Any, time: float) -> np.ndarray:
         """Carry a load from a time on [s], and return the record of the robot with it.
@@ -36,8 +37,9 @@ class CarriedLoad:
         if load is not None and required("reference.load", load, RigidLoad) == self.load:
             self.load = load  # the same numbers in another object
             return record_of(self._of_both)
-        self.load, self._since, self._earlier = load, time, self._of_both
-        self._of_both = self._robot if load is None else load.on(self._robot)
+        self.load, self._of_both = load, self._robot if load is None else load.on(self._robot)
+        past = sum(ends < time - OLDEST for ends, _ in self._begun[1:])
+        self._begun = [*self._begun[past:], (time, self._of_both)]
         return record_of(self._of_both)
 
     def record(self, load: RigidLoad | None) -> np.ndarray:
@@ -48,13 +50,13 @@ class CarriedLoad:
 
     def records_between(self, start: float, end: float) -> list[tuple[np.ndarray, float]]:
         """Return the records of the robot between two times [s], each with its duration."""
-        change = min(max(self._since, start), end)
-        spans = (self._earlier, change - start), (self._of_both, end - change)
-        return [(record_of(robot), lasting) for robot, lasting in spans if lasting > ROUNDING]
+        times = np.clip([*(begins for begins, _ in self._begun), np.inf], start, end)
+        spans = zip(self._begun, np.diff(times).tolist(), strict=True)
+        return [(record_of(robot), lasting) for (_, robot), lasting in spans if lasting > ROUNDING]
 
     def is_later(self, time: float) -> bool:
         """Return whether a state of this time [s] was measured with this load."""
-        return time > self._since + ROUNDING
+        return time > self._begun[-1][0] + ROUNDING
 
     def continue_observer(self, platform: np.ndarray, bandwidth: float, motions: np.ndarray) -> None:
         """Keep the estimates of an observer, records (N,), for platforms with the momentum of motions (N, 12)."""

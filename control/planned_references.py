@@ -1,7 +1,9 @@
 """References for each period of a controller: `references` from a plan, `references_at` from a trajectory."""
 
 import os
+from collections.abc import Sequence
 from functools import lru_cache
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +12,7 @@ from ..base.errors import InputError
 from ..base.inputs import number, shown
 from ..models.dynamics import dynamics_of
 from ..models.parsing import parse_yaml
+from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from ..solvers import solve_batch
@@ -72,15 +75,19 @@ def _robot(text: str) -> Robot:
 def references_at(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> list[Reference]:
     """Return a reference for each of the times (n,) [s]."""
     platform, carriers = trajectory.at(times)
-    tensions = trajectory.tensions(times) if trajectory.tensions else _tensions_along(robot, platform, carriers)
     loads = [trajectory.load_at(time) for time in times.tolist()] if trajectory.loads else [None] * len(times)
+    tensions = trajectory.tensions(times) if trajectory.tensions else _tensions_along(robot, platform, carriers, loads)
     rows = zip(*platform, *carriers, tensions, loads, strict=True)
     return [Reference(*row) for row in rows]
 
 
-def _tensions_along(robot: Robot, platform: Motion, carriers: Motion) -> np.ndarray:
+def _tensions_along(robot: Robot, platform: Motion, carriers: Motion, loads: Sequence[RigidLoad | None]) -> np.ndarray:
     """Return the smallest tensions for a reference, (n, m) [N]; where none exist, those with the closest wrench."""
-    dynamics, mask = dynamics_of(robot), robot.dof_mask
-    A = dynamics.wrench_matrix(platform[0], carriers[0]) * mask[:, None]
-    w = dynamics.required_wrench(*platform, *carriers) * mask
+    mask, count = robot.dof_mask, len(platform[0])
+    A, w = np.empty((count, 6, robot.m)), np.empty((count, 6))
+    for load, run in groupby(range(count), loads.__getitem__):
+        rows, dynamics = list(run), dynamics_of(robot if load is None else load.on(robot))
+        moving, bases = [part[rows] for part in platform], [part[rows] for part in carriers]
+        A[rows] = dynamics.wrench_matrix(moving[0], bases[0]) * mask[:, None]
+        w[rows] = dynamics.required_wrench(*moving, *bases) * mask
     return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=SOFT).tensions

@@ -24,7 +24,7 @@ from ..models.files import as_robot
 from ..models.parsing import validate
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
-from ..models.trajectory import Trajectory
+from ..models.trajectory import ROUNDING, Trajectory
 from ..plant import Plant
 from ..plant.steps import default_drive, steps_in
 from .command_conversion import Orders
@@ -266,18 +266,16 @@ def _loads(parts: Sequence[tuple[float, Trajectory]]) -> list[Event]:
 
 def _references(robot: Robot, parts: Sequence[tuple[float, Trajectory]], times: np.ndarray) -> list[Reference]:
     """Return the reference at each of the times (n,) [s]."""
-    which = np.maximum(np.searchsorted([begins for begins, _ in parts], times) - 1, 0)
+    which = np.searchsorted([begins for begins, _ in parts], times + ROUNDING, side="right") - 1
     result = [
         reference
         for number, (begins, part) in enumerate(parts)
-        for reference in references_at(robot, part, times[which == number] - begins)
+        for reference in references_at(robot, part, np.maximum(times[which == number] - begins, 0.0))
     ]
     for reference in result:
         for part in reference:
-            if isinstance(
-                part, np.ndarray
-            ):  # a controller that changes them would change what errors are measured from
-                part.flags.writeable = False
+            if isinstance(part, np.ndarray):
+                part.flags.writeable = False  # a controller that changes it would change what errors are measured from
     return result
 
 

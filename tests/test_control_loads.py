@@ -62,6 +62,46 @@ def test_a_planned_load_is_carried_within_a_millimetre(carries, controller, nois
     assert unaware.error.max() > 0.03
 
 
+@pytest.mark.parametrize("kind", [ComputedTorque, Predictive])
+def test_a_load_that_is_released_before_its_pick_up_is_seen(kind):
+    """It is carried for 20 ms, and states are 100 ms late: three robots lie between a state and its step."""
+    at = [COGIRO.home[:3] + np.array(step) for step in ([0, 0, 0], [0.3, 0, 0.1], [0.3003, 0, 0.1], [0.1, 0.1, 0.2])]
+    lines = [{"kind": "line", "start": a.tolist(), "end": b.tolist()} for a, b in itertools.pairwise(at)]
+    lasting = zip(lines, (1.5, 0.02, 1.0), strict=True)
+    phases = [{"name": f"phase-{k}", "path": line, "duration": time} for k, (line, time) in enumerate(lasting)]
+    phases[1]["load"] = BAG
+    run = simulate(COGIRO, plan(COGIRO, {"phases": phases}), kind(COGIRO), noise={"delay": 0.1, "stamped": True})
+    assert run.error.max() < 3e-4
+    assert run.to_dict()["answered"]["as planned"] == len(run.error)
+
+
+@pytest.mark.parametrize("period", [1e-3, 0.01, 0.1])
+def test_a_controller_learns_of_the_load_of_another_plan_when_it_is_picked_up(carries, period):
+    """The second plan begins with its load: the step at its begin names it, as the plant carries it from then on."""
+    start, end = COGIRO.home[:3], COGIRO.home[:3] + np.array([0.3, 0, 0.2])
+    line = {"kind": "line", "start": start.tolist(), "end": end.tolist()}
+    second = plan(COGIRO, {"phases": [{"name": "second", "path": line, "duration": 1.5, "load": BAG}]})
+    named = []
+
+    class Asked(ComputedTorque):
+        def step(self, time, state, reference):
+            named.append((time, reference.load is not None))
+            return super().step(time, state, reference)
+
+    follow = {"kind": "follow", "at": 0.3, "plan": second}
+    simulate(COGIRO, COGIRO.home, Asked(COGIRO), events=[follow], duration=0.6, period=period)
+    assert [loaded for _, loaded in named] == [time > 0.3 - 1e-9 for time, _ in named]
+
+
+def test_tensions_of_a_motion_that_has_none_carry_its_load(carries):
+    bare, bag = (COGIRO.platform.mass, COGIRO.platform.com), (BAG["mass"], BAG["com"])
+    of = references(carries.trajectory.drop_vars("tensions"), PICKED)  # where the platform rests
+    for reference, bodies in zip(of, [[bare], [bare, bag], [bare]], strict=False):
+        missing = balance_of_bodies(reference.pose, reference.tensions, bodies)
+        inertial = sum(mass for mass, _ in bodies) * np.abs(reference.acceleration).max()
+        np.testing.assert_allclose(missing, 0, atol=1e-3 * COGIRO.weight + inertial)
+
+
 def balance_of_bodies(pose, tensions, bodies):
     """Force and moment about the origin of {G} on bodies at rest, from cables and weights, (6,)."""
     anchors = np.array([cable.anchor for cable in COGIRO.cables])
