@@ -17,6 +17,8 @@ from ..limits.limits import Limits
 from ..tasks.deviation import Deviation
 from ..tasks.scenario import Scenario
 
+BEND = 0.25  # of what a point moves in an interval: more than an arc is away from its chord
+
 
 @dataclass(frozen=True)
 class Near(Displayed):
@@ -110,6 +112,14 @@ def _holds(scenario: Scenario, shares: np.ndarray) -> np.ndarray:
 def has_places(scenario: Scenario) -> bool:
     """Return whether any hard limit of a scenario is a distance from a region."""
     return any(is_local(limit) and _is_of_place(limit) for limit in scenario.limits)
+
+
+def jumps(scenario: Scenario, motion: Deviation) -> bool:
+    """Return whether a motion passes through a region between two of its nodes, deeper than a bend of its way would."""
+    nodes = motion.nodes / motion.nodes[-1]
+    shares = np.insert(nodes, np.arange(1, len(nodes)), (nodes[1:] + nodes[:-1]) / 2)
+    slack, moved, _ = _kept(scenario, shares, motion)
+    return bool((slack[:, 1::2] < -BEND * (moved[::2] + moved[1::2])).any())
 
 
 def _kept(scenario: Scenario, shares: np.ndarray, motion: Deviation) -> tuple[np.ndarray, np.ndarray, float]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..nlp.guess import balanced
-from ..nlp.near import has_places
+from ..nlp.near import has_places, jumps
 from ..nlp.rows import MANY, Mesh
 from ..nlp.solver import Outcome
 from ..tasks.deviation import Deviation
@@ -26,7 +26,8 @@ def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bo
     optimal = False
     if coarse is not None:
         outcome = search.solve("coarse program", coarse, near or start, clear=near is not None)
-        optimal = outcome.success
+        # Through a region between its nodes it is on no side of it: finer programs would end far from where they begin.
+        optimal = outcome.success and (search.scenario.count > MANY or not jumps(search.scenario, outcome.deviation))
         near = outcome.deviation if optimal else near
     # Linear distances leave a motion at their bounds. From a small barrier the program would creep along them.
     outcome = search.solve("nonlinear program", mesh, near or start, coarser=optimal, clear=near is not None)
