@@ -266,3 +266,23 @@ def test_a_team_carries_its_load_along_exact_legs_round_a_corner(count):
     assert found.scenario.task.path.timing == "smoother"
     speed = found.scenario.task.path.at(np.linspace(2, 4, 401), 6.0).velocity
     assert np.linalg.norm(speed, axis=1).min() > 0.02  # it does not stop at the corner
+
+
+@pytest.mark.parametrize("kind", ["phases", "sequence"])
+def test_a_team_carries_its_load_along_exact_lines_and_legs_one_after_the_other(kind):
+    """By the usual law the snap jumps where a part ends as well: none was found."""
+    robot = load("multi-quadrotor-3")
+    points = [(robot.home[:3] + offset).tolist() for offset in ([0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0.15])]
+    legs, line = {"kind": "waypoints", "points": points}, {"kind": "line", "start": points[2], "end": points[0]}
+    parts = [{"path": legs, "duration": 6}, {"path": line, "duration": 5}]
+    task = {"base": {"kind": "free"}, "time_limit": 30}
+    if kind == "phases":
+        task["phases"] = [part | {"name": name} for part, name in zip(parts, ("there", "back"), strict=True)]
+    else:
+        task |= {"path": {"kind": "sequence", "parts": parts}}
+    found = plan(robot, task)
+    assert found.feasible
+    assert found.tracking_error_max < 1e-9
+    again = plan(robot, found.scenario.task)  # which says all that was chosen
+    assert again.feasible
+    assert [part.path.timing for part in again.scenario.task.path.parts] == ["smoother", "smoother"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...models import Robot
 from .deviation import Deviation
-from .paths import LinePath, RestPath, WaypointPath
+from .paths import AnyPath, LinePath, RestPath, SequencePath, WaypointPath
 from .scenario import POSITION, Scenario
 from .task import FreeBase, GivenBase, Task
 
@@ -111,16 +111,27 @@ def at_rest_without_acceleration(robot: Robot, owner: int | None, coordinate: in
 
 
 def with_timing(robot: Robot, task: Task) -> Task:
-    """Return a task whose line or legs are smoother where balance determines a team's motion, unless a timing is given.
+    """Return a task whose lines and legs without a timing are smoother, where balance determines a team's motion.
 
-    A team rests at the ends of a line only then. Along legs of waypoints the usual law's snap jumps, and with it the
-    accelerations of the quadrotors, which their thrusts cannot follow.
+    A team rests at the ends of a line only then. Along legs of waypoints, and from one part of a sequence to the next,
+    the usual law's snap jumps, and with it the accelerations of the quadrotors, which their thrusts cannot follow.
     """
     path = task.path
     exact = task.tube.radius == task.tube.turn == 0 and isinstance(task.base, FreeBase)
     team = robot.m < len(robot.platform.dof) and any(carrier.efforts for carrier in robot.carriers)
-    if not (exact and team and isinstance(path, LinePath | WaypointPath) and path.timing is None):
+    if not (exact and team) or (isinstance(path, LinePath) and carrier_ends(task) != "rest"):
         return task
-    if path.shape == "spline" if isinstance(path, WaypointPath) else carrier_ends(task) != "rest":
-        return task
-    return task.model_copy(update={"path": path.model_copy(update={"timing": "smoother"})})
+    if not isinstance(path, SequencePath):
+        return task.model_copy(update={"path": _smoother(path)})
+    parts = tuple(part.model_copy(update={"path": _smoother(part.path)}) for part in path.parts)
+    phases = task.phases and tuple(phase.model_copy(update={"path": _smoother(phase.path)}) for phase in task.phases)
+    return task.model_copy(update={"path": path.model_copy(update={"parts": parts}), "phases": phases})
+
+
+def _smoother(path: AnyPath | None) -> AnyPath | None:
+    """Return a line or legs without a timing as smoother ones, and other paths as they are."""
+    if not isinstance(path, LinePath | WaypointPath) or path.timing is not None:
+        return path
+    if isinstance(path, WaypointPath) and path.shape == "spline":
+        return path
+    return path.model_copy(update={"timing": "smoother"})
