@@ -13,9 +13,11 @@ from towline.estimation.calibration.curvature import curvature
 from towline.estimation.calibration.fit import fit
 from towline.estimation.calibration.geometry import length_of
 from towline.estimation.calibration.normal_equations import NormalEquations, metric
+from towline.estimation.calibration.outliers import autocorrelation
 from towline.estimation.calibration.parameters import OF_CABLE
 from towline.estimation.calibration.solving import model_of
 from towline.models import Dynamics, load
+from towline.solvers import solve_batch
 
 from .robots_as_built import as_built, moved_anchors
 
@@ -165,6 +167,42 @@ def test_forces_in_parts_are_those_of_the_whole_log(monkeypatch):
     for name in ("cost", "S", "b", "Y", "y"):
         one, other = getattr(parts, name), getattr(whole, name)
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max())
+
+
+@pytest.mark.parametrize("groups", [("anchors", "offsets"), ("anchors", "offsets", "scales")], ids=["forces", "scales"])
+def test_parts_with_and_without_poses_count_as_in_the_whole_log(monkeypatch, groups):
+    """Poses of the second half alone are known: tensions then serve in both halves, and so does the open size."""
+    robot, draw, times = load("cogiro"), np.random.default_rng(4), 0.05 * np.arange(120)
+    poses = robot.home + [1, 0.8, 0.4, 0.1, 0.1, 0.2] * np.sin(np.outer(times, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]))
+    dynamics, still = Dynamics(robot), np.zeros_like(poses)
+    A, w = dynamics.wrench_matrix(poses), dynamics.required_wrench(poses, still, still)
+    tensions = solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length).tensions
+    scales = np.linspace(1, 1.02, 8) if "scales" in groups else 1.0
+    readings = scales * dynamics.cable_lengths(poses) + draw.normal(0, 1e-3, (120, 8))
+    sigma = {"position": 1e-3, "rotation": 1e-3, "lengths": 1e-3}
+    known = np.where(np.arange(120)[:, None] < 60, np.nan, poses)
+    log = Measurements(readings, known, sigma=sigma, tensions=None if "scales" in groups else tensions)
+    prior = {"anchors": 0.02, "offsets": 0.05} | ({"scales": 0.05} if "scales" in groups else {})
+    whole = calibrate(robot, log, free=groups, prior=prior)
+    monkeypatch.setattr(model_module, "PART", 17)
+    parts = calibrate(robot, log, free=groups, prior=prior)
+    for name in ("value", "sigma"):
+        one, other = ([getattr(parameter, name) for parameter in result.parameters] for result in (parts, whole))
+        np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-7)
+
+
+def test_scores_of_blocks_are_the_same_in_parts(monkeypatch):
+    """Tensions that grow threefold along a log: the scale of friction is that of the whole log, not of a part."""
+    robot, draw, times = load("cogiro"), np.random.default_rng(5), 0.05 * np.arange(250)
+    poses = robot.home + [1, 0.8, 0.4, 0.1, 0.1, 0.2] * np.sin(np.outer(times, [1.1, 0.7, 0.9, 0.6, 0.8, 0.5]))
+    tensions = draw.uniform(500, 900, (250, 8)) * np.linspace(1, 3, 250)[:, None]
+    sigma = {"position": 1e-3, "rotation": 1e-3}
+    log = Measurements(Dynamics(robot).cable_lengths(poses), poses, times=times, tensions=tensions, sigma=sigma)
+    model = model_of(robot, log, ("anchors", "clock", "mass", "com", "friction"), {})
+    p = int(model.parameters.varies.sum())
+    whole = autocorrelation(model, model.begin(), np.eye(p), p, 1.0)
+    monkeypatch.setattr(model_module, "PART", 60)
+    assert autocorrelation(model, model.begin(), np.eye(p), p, 1.0) == pytest.approx(whole, rel=1e-9)
 
 
 def test_memory_of_a_long_log():

@@ -152,6 +152,11 @@ class Model(Displayed):
         return self.pose_sigmas > 0
 
     @cached_property
+    def size_is_open(self) -> bool:
+        """Return whether unknown poses leave the size open, so that residuals of readings are those by their scale."""
+        return bool(np.isinf(self.pose_sigmas).any())
+
+    @cached_property
     def prior_sigmas(self) -> np.ndarray:
         """Return the standard deviations of the parameters about those of the file, (P,); inf: none."""
         return prior_sigmas(self.parameters, self.prior)
@@ -205,7 +210,11 @@ class Model(Displayed):
             yield slice(None), self, state
             return
         for rows in (slice(first, first + PART) for first in range(0, count, PART)):
-            yield rows, self.only(rows), State(state.x, *(one[rows] for one in state[1:]))
+            part = self.only(rows)
+            balanced = None if self.balanced is None else part.forces
+            # Which poses are known anywhere says how all samples count.
+            vars(part).update(pose_sigmas=self.pose_sigmas[rows], size_is_open=self.size_is_open, balanced=balanced)
+            yield rows, part, State(state.x, *(one[rows] for one in state[1:]))
 
     @cached_property
     def felt_tensions(self) -> FeltTensions | None:
@@ -300,9 +309,8 @@ class Model(Displayed):
         slip, y = self.slips(state.x), self.measurements.lengths.T
         stretch, tensions, by_errors = self._stretch(state)
         scale0 = parameters.table(parameters.first)[:, 7:8]
-        size_is_open = bool(np.isinf(self.pose_sigmas).any())
         scale = table[:, 7:8]
-        ratio, own = (scale0 / scale, scale0) if size_is_open else (np.ones_like(scale), scale)
+        ratio, own = (scale0 / scale, scale0) if self.size_is_open else (np.ones_like(scale), scale)
         inside = self.inside(state)
         weights = self.weights * inside / self.measurements.sigma.lengths
         excess = stretch * run.lengths - table[:, 6:7] - slip - table[:, 9:10] * y**2  # scale times reading
@@ -333,7 +341,7 @@ class Model(Displayed):
         cables = np.empty((m, len(position), OF_CABLE))
         cables[..., :6] = by_length * run.by_geometry[..., :6]
         cables[..., 6] = -gain
-        cables[..., 7] = -gain * (excess / scale if size_is_open else y)
+        cables[..., 7] = -gain * (excess / scale if self.size_is_open else y)
         cables[..., 8] = by_length[..., 0] * run.by_geometry[..., 6]
         cables[..., 9] = -gain * y**2
         by_strain = -gain * stretch**2 * run.lengths

@@ -119,18 +119,18 @@ def autocorrelation(model: Model, state: State, covariance: np.ndarray, rank: in
         J, columns = without_poses(model, found, i)
         total[:, columns] += np.add.reduceat(J * row[:, None], edges, axis=0)
     for rows, part, own in model.parts(state):
-        np.add.at(total, block[rows], _of_samples(part, own, found.equations, rows))
+        np.add.at(total, block[rows], _of_samples(part, own, found.equations, rows, metric(model)))
     # The sums add up to 0 in a minimum, which takes one of them away.
     ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
     return ratio if ratio > 1 + BY_CHANCE else 1.0
 
 
-def _of_samples(model: Model, state: State, equations: NormalEquations, rows: slice) -> np.ndarray:
+def _of_samples(model: Model, state: State, equations: NormalEquations, rows: slice, scale: np.ndarray) -> np.ndarray:
     """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (n, p) [1/m].
 
-    The samples are `rows` of the `equations`.
+    The samples are `rows` of the `equations`, whose `scale` is that of the whole log.
     """
-    derivatives, scale = model.linearised(state)[1], metric(model)
+    derivatives = model.linearised(state)[1]
     varies, forces, seen = model.parameters.varies, derivatives.balance, derivatives.directions
     inverse_root, Y = (None if of is None else of[rows] for of in (equations.inverse_root, equations.Y))
     total = np.zeros((len(model.measurements), int(varies.sum())))
