@@ -93,12 +93,13 @@ class Preview:
         The announced reference is used if it agrees with the current one; after its end accelerations are constant. The
         fourth result is the effect of the change of its acceleration on the states
         within each stage, (N, n): the model holds a control for a whole stage, the robot only for a period, so without
-        it the control would be the mean over the stage, half a stage early. The last are the loads, each with stages.
+        it the control would be the mean over the stage, half a stage early. The last are the loads, each with stages:
+        the current one until the announced ones change.
         """
         rows, before, after, period = self._chosen(time, now)
         motions, tensions = rows_at(rows, after, before, period)
-        runs = (list(run) for _, run in groupby(range(len(before) - 1), lambda stage: id(rows.loads[before[stage]])))
-        loads = [(rows.loads[before[run[0]]], slice(run[0], run[-1] + 1)) for run in runs]
+        runs = [list(run) for _, run in groupby(range(len(before) - 1), lambda stage: rows.loads[before[stage]])]
+        loads = [(rows.loads[before[run[0]]] if run[0] else now.loads[0], slice(run[0], run[-1] + 1)) for run in runs]
         place, rate, acceleration = motions.swapaxes(0, 1)
         moved = motions.shape[2] - self._moved.count
         states = np.concatenate([place[:, :6], rate[:, :6], place[:, moved:], rate[:, moved:]], axis=1)

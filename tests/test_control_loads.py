@@ -102,6 +102,23 @@ def test_tensions_of_a_motion_that_has_none_carry_its_load(carries):
         np.testing.assert_allclose(missing, 0, atol=1e-3 * COGIRO.weight + inertial)
 
 
+@pytest.mark.parametrize("announced", [None, BAG], ids=["not announced", "announced"])
+def test_a_load_that_differs_from_the_announced_one_is_carried(announced):
+    """At rest: the announced references have the motion and another load than the platform has now."""
+    still, carriers, rest = np.zeros(6), COGIRO.carrier_home, np.zeros_like(COGIRO.carrier_home)
+    given = RigidLoad.model_validate({**BAG, "mass": 60.0}) if announced else RigidLoad.model_validate(BAG)
+    plain = Reference(COGIRO.home, still, still, carriers, rest, rest)
+    controller = Predictive(COGIRO)
+    loads = [RigidLoad.model_validate(announced) if announced else None for _ in range(200)]
+    controller.follow([plain._replace(load=each) for each in loads], 0.01)
+    bodies = [(COGIRO.platform.mass, COGIRO.platform.com), (given.mass, given.com)]
+    for k in range(10):
+        command = controller.step(0.01 * k, State(COGIRO.home, still, carriers, rest), plain._replace(load=given))
+        missing = balance_of_bodies(COGIRO.home, command.tensions, bodies)
+        np.testing.assert_allclose(missing, 0, atol=5e-3 * COGIRO.weight)
+    assert controller.handed_over is None
+
+
 def balance_of_bodies(pose, tensions, bodies):
     """Force and moment about the origin of {G} on bodies at rest, from cables and weights, (6,)."""
     anchors = np.array([cable.anchor for cable in COGIRO.cables])
