@@ -358,8 +358,16 @@ def test_wrong_files_are_one_line(case, tmp_path):
 
 
 REFUSED = {
-    "smooth": ({"timing": "smooth"}, "'timing' must be left out of waypoints: write 'shape: spline'"),
-    "uniform": ({"timing": "uniform"}, "'timing' must be left out of waypoints: write nothing"),
+    "smooth": (
+        {"timing": "smooth"},
+        "'timing' must be 'smoother' or left out of waypoints, got 'smooth': write 'shape: spline'",
+    ),
+    "uniform": (
+        {"timing": "uniform"},
+        "'timing' must be 'smoother' or left out of waypoints, got 'uniform': write nothing",
+    ),
+    "capital": ({"timing": "Smoother"}, "path.timing must be 'smoother', got 'Smoother'"),
+    "timing of a spline": ({"timing": "smoother", "shape": "spline"}, "timing must be left out with the shape spline"),
     "near": (
         {"shape": "spline", "points": [[0, 0, 1], [1, 0, 1], [1, 0, 1.0000001], [0, 2, 1]]},
         r"points\[2\] must be",

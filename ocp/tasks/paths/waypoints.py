@@ -79,9 +79,9 @@ class WaypointPath(PathBase):
     def _read(cls, data: Any, info: ValidationInfo) -> Any:
         if not isinstance(data, dict):
             return data
-        if data.get("timing") not in (None, "smoother"):
-            known = GONE.get(str(data["timing"]), GONE["smooth"])
-            raise ValueError(f"'timing' must be left out of waypoints: {known}")
+        timing = data.get("timing")
+        if isinstance(timing, str) and timing in GONE:
+            raise ValueError(f"'timing' must be 'smoother' or left out of waypoints, got {timing!r}: {GONE[timing]}")
         return with_points_of_file(data, info, ("points", "times", "dwell"))
 
     @model_validator(mode="after")
