@@ -1,9 +1,13 @@
 """Programs with the rows of near places only, and with distances that are linear."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from towline import load, plan
+from towline import load, plan, read_task
+from towline.ocp.audits.excess import Excess
 from towline.ocp.nlp.guess import initial_guess, usual_guess
 from towline.ocp.nlp.linear import LinearDistances
 from towline.ocp.nlp.near import Near, is_local, parts
@@ -11,6 +15,8 @@ from towline.ocp.nlp.program import build
 from towline.ocp.nlp.rows import Mesh
 from towline.ocp.planner import Planner
 from towline.ocp.search import search
+from towline.ocp.search.refinement import _tightened
+from towline.ocp.tasks.lay_out import lay_out
 
 PLATFORM = {"platform": 0.05, "cables": None, "carriers": None}
 BALL = {"kind": "sphere", "name": "ball", "centre": [0.32, 0.12, 1.2], "radius": 0.25, **PLATFORM}
@@ -116,3 +122,23 @@ def test_a_tightened_program_has_the_bounds_of_its_mesh_and_starts_from_the_last
     low, high = scenario.bounds()
     assert (again.deviation.tensions >= low + 2.0 - 1e-4).all()
     assert (again.deviation.tensions <= high - 2.0 + 1e-4).all()
+
+
+def test_another_pair_of_one_limit_is_tightened_beyond_what_all_pairs_have():
+    """One share applies to all pairs of quadrotors: less for a second pair changed nothing, and meshes got finer."""
+    task = {
+        "path": {"kind": "rest", "pose": [0, 0, 0]},
+        "duration": 1,
+        "base": {"kind": "free"},
+        "limits": {"carrier_separation": 0.5},
+    }
+    scenario = lay_out(load("multi-quadrotor-3"), read_task(task))
+    (limit,) = [each for each in scenario.limits if each.name == "carrier_separation"]
+    mesh = Mesh(60, further=(("carrier_separation", "quad1 and quad2", 3e-4),))
+    for about, beyond in (("quad2 and quad3", 1e-4), ("quad1 and quad3", 2e-4), ("quad1 and quad2", 1e-4)):
+        excess = Excess.of(limit, limit.labels.index(about), 0.5, limit.low - beyond * limit.scale)
+        tightened = replace(mesh, further=_tightened(scenario, SimpleNamespace(excess=[excess]), mesh.further, 1.1))
+        assert tightened.shrink_of(limit) == pytest.approx(3e-4 + 1.1 * beyond, rel=1e-9)
+    both = [Excess.of(limit, index, 0.5, limit.low - 1e-4 * limit.scale) for index in (0, 1)]
+    together = replace(mesh, further=_tightened(scenario, SimpleNamespace(excess=both), mesh.further, 1.1))
+    assert together.shrink_of(limit) == pytest.approx(4.1e-4, rel=1e-9)

@@ -136,6 +136,8 @@ def _tightened(scenario: Scenario, audit: Audit, before: Shares, factor: float =
     for excess in audit.excess:
         for limit in scenario.limits:
             if limit.name == excess.limit and limit.is_about(excess.about) and limit.tightens:
-                share = shares.get((excess.limit, excess.about), 0.0) + factor * limit.share_beyond(excess.value)
+                # All that a limit is about is reduced by the largest share so far.
+                own = [share for name, about, share in before if name == limit.name and limit.is_about(about)]
+                share = max(own, default=0.0) + factor * limit.share_beyond(excess.value)
                 shares[excess.limit, excess.about] = min(share, LARGEST_SHARE)
     return tuple((*key, share) for key, share in shares.items())
