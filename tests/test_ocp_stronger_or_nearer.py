@@ -289,3 +289,24 @@ def test_a_team_in_a_storm_learns_the_force_of_its_wind():
     force, weight = 0.5 * 1.2 * 0.1 * 40**2, 2.4 * 9.81
     assert text.startswith(f"this one exerts {force:g} N on a platform that weighs {weight:.4g} N")
     assert "(20, 0, 0) m/s exerts a quarter" in text
+
+
+@pytest.mark.parametrize(
+    ("key", "timing"), [("final", "smooth"), ("final", "uniform"), ("initial", "uniform")], ids=lambda it: it
+)
+def test_lines_whose_ends_are_given_as_states_too_have_nearer_ends_and_other_yaws(key, timing):
+    """The state given at an end moves with it: it was refused as one that the path does not have."""
+    robot, seconds = load("the-cable-robot-simulator"), 8.0
+    start, way = np.array(robot.home), np.array([0.1, 0, 0, 0, 0, -1.2])
+    state = {"pose": (start + way if key == "final" else start).tolist()}
+    state["velocity"] = (way / seconds if timing == "uniform" else 0 * way).tolist()
+    path = {"kind": "line", "start": start.tolist(), "end": (start + way).tolist(), "timing": timing}
+    found = plan(robot, {"path": path, "duration": seconds, key: state})
+    named = {each.name: each.plan for each in found.relaxations}
+    assert {"length of the line", "yaw at path.end"} <= set(named)
+    for each in named.values():
+        assert each.feasible
+        row = -1 if key == "final" else 0
+        own = getattr(each.scenario.task, key)
+        assert own.pose == pytest.approx(each.trajectory["pose"].values[row], abs=1e-9)
+        assert own.velocity == pytest.approx(each.trajectory["velocity"].values[row], abs=1e-9)

@@ -96,7 +96,7 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
         end = start + share * way
         nearer = path.model_copy(update={"end": tuple(end.tolist())})
         place = ", ".join(f"{value:.4g}" for value in (np.rad2deg(end[3:]) if turns else end[:3]))
-        varied = lay_out(scenario.robot, scenario.task.model_copy(update={"path": nearer}))
+        varied = _along(scenario, nearer)
         if turns:
             return varied, 100 * share, f"of it, to roll, pitch, yaw ({place}) degrees"
         return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place})"
@@ -134,7 +134,7 @@ def _other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
         path_with_yaws = path.model_copy(update={"start": rows[0], "end": rows[-1]} if line else {"points": rows})
         others = [f"{quantity(yaw, 'rad')} at {names[i]}" for i, yaw in zip(wrong[1:], yaws[1:], strict=True)]
         detail = ", ".join([f"instead of {quantity(given[0], 'rad')}", *others])
-        return lay_out(robot, scenario.task.model_copy(update={"path": path_with_yaws})), float(yaws[0]), detail
+        return _along(scenario, path_with_yaws), float(yaws[0]), detail
 
     found = _largest(search, with_yaws, f"yaw at {names[wrong[0]]}", "rad", up=bool(back[0] > 0))
     return [replace(each, requested=float(given[0])) for each in found]
@@ -149,6 +149,22 @@ def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -
     A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, carriers))[:, axes]
     w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still, wind=scenario.wind))[:, axes]
     return margins(A, w, *scenario.bounds()).reshape(yaws.shape)
+
+
+def _along(scenario: Scenario, path: LinePath | WaypointPath) -> Scenario:
+    """Return the scenario along another path. Where a given state is that of an end of the path, it moves with it."""
+    times, changes = np.array([0.0, scenario.duration]), dict[str, object](path=path)
+    motion = scenario.along(path, scenario.duration).motion(times, None)[0]
+    for row, key in enumerate(("initial", "final")):
+        state, moved = getattr(scenario.task, key), dict[str, tuple[float, ...]]()
+        for name, values in zip(("pose", "velocity", "acceleration"), motion, strict=True):
+            given = None if state is None else getattr(state, name)
+            if given is not None:
+                fixed = ~np.isin(np.arange(6), scenario.platform_free)
+                moved[name] = tuple(np.where(fixed, values[row], given).tolist())
+        if state is not None:
+            changes[key] = state.model_copy(update=moved)
+    return lay_out(scenario.robot, scenario.task.model_copy(update=changes))
 
 
 def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
