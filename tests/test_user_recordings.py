@@ -12,6 +12,7 @@ from towline.estimation.calibration import calibrate
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log
+from towline.estimation.logs.tables import from_csv
 
 from . import user_recordings as user
 from .warm import towline
@@ -249,3 +250,18 @@ def test_a_clock_that_was_set_late_and_a_missing_time(stamps, tmp_path):
     assert float(re.search(r"clock of cf2 is ([\d.]+) s ahead", said)[1]) == pytest.approx(0.4, abs=1e-3)
     apart = np.linalg.norm(read.measurements.carrier_poses[:, :, :3] - read.measurements.poses[:, None, :3], axis=2)
     np.testing.assert_allclose(apart, np.broadcast_to([0.82, 0.79], apart.shape), atol=1e-3)
+
+
+def test_a_first_row_of_data_may_begin_with_an_empty_cell():
+    """As in a CSV of PlotJuggler, where each row has the values of one topic: it was taken for more names."""
+    names = ["length_1 [m]", "length_2 [m]", "time [s]", "x [m]", "z [m]"]
+    numbers = np.random.default_rng(3).uniform(0.1, 2, (6, 5))
+    numbers[::2, :2], numbers[1::2, 3:] = np.nan, np.nan
+    rows = ["", *(",".join("" if np.isnan(value) else repr(float(value)) for value in row) for row in numbers)]
+    for above in ("", "a recording\n", "# of today\n"):
+        table = from_csv((above + ",".join(names) + "\n".join(rows) + "\n").encode(), "topics.csv").topics[""]
+        assert list(table.fields) == [name.split()[0] for name in names]
+        np.testing.assert_array_equal(table.read(list(table.fields)).values, numbers)
+    numbered = ",,1,1\nframe,time [s],x [m],z [m]\n0,0.1,1.5,2\n1,0.2,1.6,2\n"  # markers above names are no data
+    table = from_csv(numbered.encode(), "markers.csv").topics[""]
+    assert list(table.fields) == ["frame", "time", "1/x", "1/z"]

@@ -64,7 +64,7 @@ def one_header(text: str) -> str:
     lines = text[:LONGEST_HEADER].splitlines()[: MOST_ABOVE + 1]
     mark = max(",;\t", key="".join(lines).count)
     table = [[cell.strip().strip('"') for cell in line.split(mark)] for line in lines]
-    first = next((k for k, row in enumerate(table) if _is_data(row)), 0)
+    first = next((k for k, row in enumerate(table) if _is_data(row, *table[k + 1 : k + 2])), 0)
     rows = [
         row
         for row, line in zip(table[:first], lines, strict=False)
@@ -80,10 +80,15 @@ def one_header(text: str) -> str:
     return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines
 
 
-def _is_data(row: Sequence[str]) -> bool:
-    """Return whether at least half of the fields that are not empty are numbers, the first one among them."""
-    numbers = sum(map(_is_number, row))
-    return _is_number(row[0]) and 2 * numbers >= sum(map(bool, row))
+def _is_data(row: Sequence[str], below: Sequence[str] = ()) -> bool:
+    """Return whether at least half of the fields that are not empty are numbers, the first one among them.
+
+    If the first field is empty, all others must be numbers, in the row below too: rows of names may number markers.
+    """
+    filled = [cell for cell in row if cell]
+    if row[0]:
+        return _is_number(row[0]) and 2 * sum(map(_is_number, filled)) >= len(filled)
+    return bool(filled) and all(map(_is_number, filled)) and all(map(_is_number, filter(None, below)))
 
 
 def _is_number(cell: str) -> bool:
