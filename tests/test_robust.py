@@ -184,6 +184,20 @@ def test_no_plan_is_an_answer(tmp_path):
     assert turned.share_of_robots(seed=7).share >= 0.95
 
 
+def test_robots_that_weigh_little_keep_their_limits_too():
+    """The same robot with a millionth of all forces has the same answer."""
+    data = known("wang-flying", 0.01).model_dump()
+    for body in [data["platform"], *data["carriers"]]:
+        for name in {"mass", "inertia"} & body.keys():
+            body[name] = np.multiply(body[name], 1e-6).tolist()
+    for cable in data["cables"]:
+        for name in ("t_min", "t_max", "stiffness", "damping"):
+            cable[name] = 1e-6 * cable[name] if cable[name] is not None else None
+    robot = Robot.model_validate(data)
+    assert plan(robot, HOVER).feasible
+    assert plan(robot, HOVER | {"robust": 0.95}).status.value == "not-found"
+
+
 def test_a_pose_that_only_the_exact_robot_can_hold_is_no_plan_for_others():
     """Six cables of equal geometry span five directions at home: other robots need a wrench there, however small."""
     robot = known("wang-ctmrts-6", 0.005)

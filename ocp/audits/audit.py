@@ -20,7 +20,7 @@ from .drift import Drift, drift
 from .excess import TENSIONS, Excess
 from .instants import instants
 from .peaks import with_peaks
-from .tensions import INDEPENDENT, TOLERANCE, scaled
+from .tensions import INDEPENDENT, scaled, tolerance_of
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     seen = regular if to_show else with_peaks(regular)
     exceeded = excesses(seen) + came_too_near(seen)
     beyond, at = seen.beyond
-    if beyond > TOLERANCE:
+    if beyond > tolerance_of(scenario.robot):
         exceeded.append(Excess(TENSIONS, "platform", at, beyond, 0.0, "N", "exactly"))
     soft = {limit.name for limit in scenario.limits if limit.soft is not None}
     hangs = not (scenario.phases.carry or scenario.phases.rest)

@@ -17,7 +17,7 @@ from ..tasks.scenario import MOST_SAMPLES
 from .checks import LENGTH_TOLERANCE
 from .curvature import between, is_jump, leaves
 from .instants import Instants, instants, joined
-from .tensions import TOLERANCE
+from .tensions import tolerance_of
 
 BESIDE = 2e-9  # of the duration: how far before a jump
 APART = 1e-4  # of the time between two instants: a corner that is nearer to one is as good as at it
@@ -90,7 +90,7 @@ def _open(seen: Instants, jumps: np.ndarray) -> np.ndarray:
     if seen.few:
         low, high = scenario.bounds_at(times)
         for beyond in (low - seen.tensions, seen.tensions - high):
-            spans |= _may_exceed(times, beyond, jumps, -np.inf, 0.0, TOLERANCE)
+            spans |= _may_exceed(times, beyond, jumps, -np.inf, 0.0, tolerance_of(scenario.robot))
         spans |= _may_exceed(times, seen.violation[:, None], jumps, -np.inf, 0.0, seen.tolerance)
     elif (seen.violation <= seen.tolerance).all():
         spans |= _may_be_short(seen, jumps)

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from ...base.display import Displayed
-from .tensions import TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -18,11 +17,12 @@ class RobustMargin(Displayed):
     reach: np.ndarray  # largest deviation of the tensions of these robots at each audited time, (n, m) [N]
     tightened: np.ndarray  # reduction of the limits in the program, (m,) [N]
     violation: np.ndarray  # of the limits by tensions and their spread, (n, m) [N]; 0: inside by the margin or more
+    tolerance: float  # the largest violation that passes [N]
 
     @property
     def holds(self) -> bool:
         """Return whether the fraction of the robots keeps all limits, to first order."""
-        return bool(self.violation.max() <= TOLERANCE)
+        return bool(self.violation.max() <= self.tolerance)
 
     def to_dict(self) -> dict[str, Any]:
         """Return share, factor, and for each cable the largest spread and the reduction of its limits, for JSON."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...models import Robot
 from ...solvers import Certificate, TensionProblem, certify, solve, solve_batch
 from ...statics.distribution import wrench_problem
 from ..tasks.paths import Motion
@@ -35,6 +36,11 @@ class AuditedTensions(NamedTuple):
     row: int | None  # of the certificate
     beyond: float  # [N] beyond the limits within the range of few cables, whose other errors are tolerated
     supports: np.ndarray  # (n, s) [N], forces of the ground
+
+
+def tolerance_of(robot: Robot) -> float:
+    """Return the force that audits of a robot tolerate [N]."""
+    return TOLERANCE * min(robot.force_scale, 1.0)
 
 
 def scaled(scenario: Scenario, wrenches: np.ndarray) -> np.ndarray:
@@ -62,9 +68,8 @@ class Distribution:
         self._bounds = scenario.bounds() if bounds is None else bounds
         self._scaled_A = scaled(scenario, A)
         self.few, self._inverse = _few_and_inverse(self._scaled_A, dof)  # (n, m, 6)
-        self.tolerance = TOLERANCE * min(robot.force_scale, 1.0)
-        if self.few and scenario.count:
-            self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale
+        underactuated = self.few and scenario.count
+        self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if underactuated else tolerance_of(robot)
 
     def unlimited(self, w: np.ndarray) -> np.ndarray:
         """Return the tensions of least norm for the wrenches w (n, 6), whatever the limits, (n, m) [N]."""

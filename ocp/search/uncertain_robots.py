@@ -16,6 +16,7 @@ from ...models import Robot
 from ...statics.robust import Spread, motion_factor
 from ..audits.excess import Excess
 from ..audits.robust_margin import RobustMargin
+from ..audits.tensions import tolerance_of
 from ..plan import Plan
 from ..result import PlannerStep
 from ..tasks.deviation import Deviation
@@ -102,7 +103,8 @@ def _margin(scenario: Scenario, plan: Plan, share: float) -> RobustMargin:
     reach = factor * sigmas
     low, high = _limits(scenario, audit.times)
     outside = np.maximum(low + reach - audit.tensions, audit.tensions + reach - high)
-    return RobustMargin(share, factor, reach, np.zeros(robot.m) + scenario.tightened, np.maximum(outside, 0.0))
+    tightened, violation = np.zeros(robot.m) + scenario.tightened, np.maximum(outside, 0.0)
+    return RobustMargin(share, factor, reach, tightened, violation, tolerance_of(robot))
 
 
 def _limits(scenario: Scenario, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
