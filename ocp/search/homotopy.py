@@ -27,7 +27,7 @@ def from_easier(search: Search, mesh: Mesh, start: Deviation | None, guessed: bo
     if coarse is not None:
         outcome = search.solve("coarse program", coarse, near or start, clear=near is not None)
         # Through a region between its nodes it is on no side of it: finer programs would end far from where they begin.
-        optimal = outcome.success and (search.scenario.count > MANY or not jumps(search.scenario, outcome.deviation))
+        optimal = outcome.success and not jumps(search.scenario, outcome.deviation)
         near = outcome.deviation if optimal else near
     # Linear distances leave a motion at their bounds. From a small barrier the program would creep along them.
     outcome = search.solve("nonlinear program", mesh, near or start, coarser=optimal, clear=near is not None)
