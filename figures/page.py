@@ -65,7 +65,7 @@ def contents(links: Iterable[Link]) -> str:
 def facts(title: str, rows: Iterable[tuple[str, str]], anchor: str = "") -> str:
     """Return a table of named facts with a heading; a fact without a name continues the one before it.
 
-    Where it is folded, a link to `anchor` unfolds it: browsers open what hides the target of a link.
+    A link to `anchor` opens a folded table: browsers unfold what hides the target of a link.
     """
     lines = [
         f'<tr{"" if name else " class=more"}><th scope="row">{_broken(name)}</th><td>{_safe(fact)}</td></tr>'

@@ -234,9 +234,9 @@ class Evaluation:
         return Slopes(lengths[poses.ravel(), cables], self._by_length(poses.ravel(), cables)), cables
 
     def _bounds(self, y: np.ndarray, exact: bool) -> Iterator[tuple[np.ndarray, ByVariables]]:
-        """Yield how far each bound of distances, lengths and heights is kept, (N, k) [m], and a function.
+        """Yield by how much each bound of distances, lengths and heights is kept, (N, k) [m], and its derivatives.
 
-        That returns the derivatives of chosen ones by the variables, from their indices.
+        The derivatives by the variables are a function of the indices of the chosen values.
         """
         room, m = self.room, self._m
         if room.clearance > 0.0:

@@ -27,8 +27,8 @@ def call(function: ca.Function, arguments: dict[str, Any], matrices: tuple[str, 
     """Evaluate `function` on named arguments; the outputs, in order, have the common leading dimensions of the inputs.
 
     - `function`: its input names are the keys of `arguments`; one that is not among them has the Function's default.
-    - `arguments`: arrays of shape (..., *shape of the input), where a column (n, 1) counts as (n,); they broadcast as
-      in NumPy. If one is a CasADi expression all are taken as they are and the outputs are expressions too.
+    - `arguments`: arrays of shape (..., *shape of the input), and (n,) for a column (n, 1); they broadcast as in NumPy.
+      If one is a CasADi expression, all are used as they are, and the outputs are expressions too.
     - `matrices`: outputs that are matrices also when they happen to have one column, as A of one cable.
 
     Raises `InputError` that names the argument whose shape or value does not fit; `SolverError` if CasADi cannot

@@ -14,7 +14,7 @@ from .arrays import Array
 class Motion(NamedTuple):
     """Coordinates (x, y, z, roll, pitch, yaw) of platform and carriers and their first two time derivatives.
 
-    Those of carriers that are None are at home and at rest.
+    Carriers whose coordinates are None are at home and at rest.
     """
 
     pose: Array  # of the platform frame, (..., 6) [m, rad]

@@ -93,7 +93,7 @@ class Overlap(Displayed):
     def shares_of_time(self, left: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return how early each leg starts before its first point and how late it ends after its last, (n - 1,) each.
 
-        In shares of the leg's time, from what is left at the inner points, (n - 2,) [m].
+        Both are shares of the leg's time. `left` is the length that is left at each inner point, (n - 2,) [m].
         """
         early, late = np.zeros(len(lengths)), np.zeros(len(lengths))
         some = np.flatnonzero(left > 0)
