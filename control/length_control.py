@@ -102,8 +102,8 @@ class LengthControl(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
-        The correction needs the pose of the state, and with a lag its velocity. A state with a time is compared with the
-        plan of that time.
+        The correction needs the pose of the state, and with a lag its velocity. A state with a time is compared with
+        the plan of that time.
 
         Raises
         ------
