@@ -27,9 +27,7 @@ void towline_margins(const towline_matrices *matrices, const double *w, ptrdiff_
 
 static double dot(const double *x, const double *y, int n) {
     double total = 0;
-    for (int i = 0; i < n; i++) {
-        total += x[i] * y[i];
-    }
+    for (int i = 0; i < n; i++) { total += x[i] * y[i]; }
     return total;
 }
 
@@ -56,21 +54,15 @@ static double bring_longest(double column[][ROWS], int j, int m, int n) {
 static int has_full_rank(const double *A, int n, int m, double tolerance) {
     double column[CABLES][ROWS], longest = 0;
     for (int c = 0; c < m; c++) {
-        for (int i = 0; i < n; i++) {
-            column[c][i] = A[i * m + c];
-        }
+        for (int i = 0; i < n; i++) { column[c][i] = A[i * m + c]; }
     }
     for (int j = 0; j < n && j < m; j++) {
         const double square = bring_longest(column, j, m, n);
         longest = j == 0 ? square : longest;
-        if (!(square > tolerance * tolerance * longest && square > 0)) {
-            return 0;
-        }
+        if (!(square > tolerance * tolerance * longest && square > 0)) { return 0; }
         for (int c = j + 1; c < m; c++) {
             const double part = dot(column[j], column[c], n) / square;
-            for (int i = 0; i < n; i++) {
-                column[c][i] -= part * column[j][i];
-            }
+            for (int i = 0; i < n; i++) { column[c][i] -= part * column[j][i]; }
         }
     }
     return m >= n;

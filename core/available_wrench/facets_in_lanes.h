@@ -21,14 +21,10 @@ INLINE void take_sets(wrench_sets *s, const towline_matrices *matrices, ptrdiff_
     gather(s->A, matrices->A, (ptrdiff_t)n * m, first, matrices->count, n * m);
     for (int j = 0; j < m; j++) {
         num square = number(0);
-        for (int i = 0; i < n; i++) {
-            square += s->A[i * m + j] * s->A[i * m + j];
-        }
+        for (int i = 0; i < n; i++) { square += s->A[i * m + j] * s->A[i * m + j]; }
         s->per_length[j] = where(square > 0.0, 1.0 / square_root(square), number(0));
     }
-    for (int i = 0; i < n * n; i++) {
-        s->basis[0][i] = number(i % (n + 1) == 0);
-    }
+    for (int i = 0; i < n * n; i++) { s->basis[0][i] = number(i % (n + 1) == 0); }
 }
 
 /* Make the basis of what is orthogonal to one more column, j: reflect that column onto the first vector, and drop it. */
@@ -38,9 +34,7 @@ INLINE void take_out(wrench_sets *s, int depth, int j) {
     num along[ROWS], onto[ROWS], rest = number(0);
     for (int v = 0; v < left; v++) {
         num dot = number(0);
-        for (int i = 0; i < n; i++) {
-            dot += basis[v * n + i] * s->A[i * m + j];
-        }
+        for (int i = 0; i < n; i++) { dot += basis[v * n + i] * s->A[i * m + j]; }
         along[v] = dot * s->per_length[j];
         rest += v > 0 ? along[v] * along[v] : number(0);
     }
@@ -51,15 +45,11 @@ INLINE void take_out(wrench_sets *s, int depth, int j) {
     const num factor = where(square > 0.0, 2.0 / square, number(0));
     for (int i = 0; i < n; i++) {
         num dot = number(0);
-        for (int v = 0; v < left; v++) {
-            dot += basis[v * n + i] * along[v];
-        }
+        for (int v = 0; v < left; v++) { dot += basis[v * n + i] * along[v]; }
         onto[i] = factor * dot;
     }
     for (int v = 1; v < left; v++) {
-        for (int i = 0; i < n; i++) {
-            s->basis[depth + 1][(v - 1) * n + i] = basis[v * n + i] - onto[i] * along[v];
-        }
+        for (int i = 0; i < n; i++) { s->basis[depth + 1][(v - 1) * n + i] = basis[v * n + i] - onto[i] * along[v]; }
     }
 }
 
@@ -69,9 +59,7 @@ INLINE void support(const wrench_sets *s, const num *normal, const double *low, 
     *least = *most = number(0);
     for (int j = 0; j < s->m; j++) {
         num pull = number(0);
-        for (int i = 0; i < s->n; i++) {
-            pull += normal[i] * s->A[i * s->m + j];
-        }
+        for (int i = 0; i < s->n; i++) { pull += normal[i] * s->A[i * s->m + j]; }
         const num at_low = pull * low[j], at_high = pull * high[j];
         *least += smaller(at_low, at_high);
         *most += larger(at_low, at_high);
@@ -81,21 +69,15 @@ INLINE void support(const wrench_sets *s, const num *normal, const double *low, 
 /* Write `size` numbers of each lane, `per` from one to the next. */
 INLINE void put(double *to, const num *from, int lanes, ptrdiff_t per, int size) {
     for (int lane = 0; lane < lanes; lane++) {
-        for (int i = 0; i < size; i++) {
-            to[lane * per + i] = ((const double *)from)[LANES * i + lane];
-        }
+        for (int i = 0; i < size; i++) { to[lane * per + i] = ((const double *)from)[LANES * i + lane]; }
     }
 }
 
 /* Find the next subset of `size` columns; return the first place that has another one, or -1 after the last. */
 INLINE int next_subset(int *columns, int size, int m) {
     int place = size - 1;
-    while (place >= 0 && columns[place] == m - size + place) {
-        place--;
-    }
-    for (int i = place; i >= 0 && i < size; i++) {
-        columns[i] = i == place ? columns[i] + 1 : columns[i - 1] + 1;
-    }
+    while (place >= 0 && columns[place] == m - size + place) { place--; }
+    for (int i = place; i >= 0 && i < size; i++) { columns[i] = i == place ? columns[i] + 1 : columns[i - 1] + 1; }
     return place;
 }
 
@@ -108,14 +90,10 @@ void FORM(facets_of_rows)(const towline_matrices *matrices, const double *low, c
     for (ptrdiff_t first = 0; first < matrices->count; first += LANES) {
         const int lanes = matrices->count - first < LANES ? (int)(matrices->count - first) : LANES;
         int columns[ROWS], depth = 0;
-        for (int i = 0; i < n - 1; i++) {
-            columns[i] = i;
-        }
+        for (int i = 0; i < n - 1; i++) { columns[i] = i; }
         take_sets(&s, matrices, first);
         for (ptrdiff_t k = 0; k < facets; k++) {
-            for (; depth < n - 1; depth++) {
-                take_out(&s, depth, columns[depth]);
-            }
+            for (; depth < n - 1; depth++) { take_out(&s, depth, columns[depth]); }
             const num *normal = s.basis[n - 1];
             support(&s, normal, low, high, &down, &up);
             put(normals + (first * facets + k) * n, normal, lanes, facets * n, n);

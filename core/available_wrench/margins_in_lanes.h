@@ -32,9 +32,7 @@ typedef struct {
 INLINE void reduce(gale_dual *g) {
     const int n = g->n, m = g->m;
     for (int i = 0; i < m; i++) {
-        for (int j = 0; j < m; j++) {
-            g->Q[i][j] = number(i == j);
-        }
+        for (int j = 0; j < m; j++) { g->Q[i][j] = number(i == j); }
     }
     for (int c = 0; c < n; c++) {
         num v[FEW], square = number(0);
@@ -48,23 +46,15 @@ INLINE void reduce(gale_dual *g) {
         const num factor = where(length > 0.0, 1.0 / length, number(0));
         for (int j = c; j < n; j++) {
             num along = number(0);
-            for (int i = c; i < m; i++) {
-                along += v[i] * g->R[i][j];
-            }
+            for (int i = c; i < m; i++) { along += v[i] * g->R[i][j]; }
             along *= factor;
-            for (int i = c; i < m; i++) {
-                g->R[i][j] -= along * v[i];
-            }
+            for (int i = c; i < m; i++) { g->R[i][j] -= along * v[i]; }
         }
         for (int i = 0; i < m; i++) {
             num along = number(0);
-            for (int j = c; j < m; j++) {
-                along += g->Q[i][j] * v[j];
-            }
+            for (int j = c; j < m; j++) { along += g->Q[i][j] * v[j]; }
             along *= factor;
-            for (int j = c; j < m; j++) {
-                g->Q[i][j] -= along * v[j];
-            }
+            for (int j = c; j < m; j++) { g->Q[i][j] -= along * v[j]; }
         }
     }
 }
@@ -83,9 +73,7 @@ INLINE void take_dual(gale_dual *g, const num *A, const num *w, const double *lo
         num t0 = number(0);
         for (int i = n - 1; i >= 0; i--) {
             num left = g->Q[c][i];
-            for (int k = i + 1; k < n; k++) {
-                left -= g->R[i][k] * g->H[c][k];
-            }
+            for (int k = i + 1; k < n; k++) { left -= g->R[i][k] * g->H[c][k]; }
             g->H[c][i] = left / g->R[i][i];
             t0 += g->H[c][i] * w[i];
         }
@@ -93,9 +81,7 @@ INLINE void take_dual(gale_dual *g, const num *A, const num *w, const double *lo
         g->dn[c] = low[c] - t0;
         for (int e = 0; e <= c; e++) {
             g->G[c][e] = number(0);
-            for (int i = 0; i < n; i++) {
-                g->G[c][e] += g->H[c][i] * g->H[e][i];
-            }
+            for (int i = 0; i < n; i++) { g->G[c][e] += g->H[c][i] * g->H[e][i]; }
         }
         inverse_size += g->G[c][c];
     }
@@ -109,12 +95,8 @@ INLINE void take_minors(gale_dual *g) {
     g->minor[0] = number(1);
     for (int set = 1; set < 1 << m; set++) {
         int size = 0;
-        for (int c = 0; c < m; c++) {
-            size += set >> c & 1;
-        }
-        if (size > m - n) {
-            continue;
-        }
+        for (int c = 0; c < m; c++) { size += set >> c & 1; }
+        if (size > m - n) { continue; }
         num sum = number(0), sign = number(size % 2 ? 1 : -1);
         for (int c = 0; c < m; c++) {
             if (set >> c & 1) {
@@ -138,9 +120,7 @@ INLINE num reserve(const gale_dual *g, int others, num *square) {
             most += larger(at_high, at_low);
             least += smaller(at_high, at_low);
             num cross = number(0);
-            for (int e = 0; e < count; e++) {
-                cross += p[e] * g->G[c][cable[e]];
-            }
+            for (int e = 0; e < count; e++) { cross += p[e] * g->G[c][cable[e]]; }
             size += x * (x * g->G[c][c] + 2.0 * cross);
             *square += x * x;
             cable[count++] = c;
@@ -181,9 +161,7 @@ void FORM(margins_of_rows)(const towline_matrices *matrices, const double *w, pt
     for (ptrdiff_t first = 0; first < matrices->count; first += LANES) {
         const int lanes = matrices->count - first < LANES ? (int)(matrices->count - first) : LANES;
         int columns[ROWS];
-        for (int i = 0; i < n; i++) {
-            columns[i] = i;
-        }
+        for (int i = 0; i < n; i++) { columns[i] = i; }
         gather(A, matrices->A, (ptrdiff_t)n * m, first, matrices->count, n * m);
         gather(demand, w, w_per, first, matrices->count, n);
         take_dual(&g, A, demand, low, high);
@@ -193,13 +171,9 @@ void FORM(margins_of_rows)(const towline_matrices *matrices, const double *w, pt
         start_least(&least);
         for (ptrdiff_t k = 0; k < facets; k++) {
             int others = (1 << m) - 1;
-            for (int i = 0; i < n - 1; i++) {
-                others &= ~(1 << columns[i]);
-            }
+            for (int i = 0; i < n - 1; i++) { others &= ~(1 << columns[i]); }
             take_reserve(&g, others, &value, &least);
-            if (reserves) {
-                put(reserves + first * facets + k, &value, lanes, facets, 1);
-            }
+            if (reserves) { put(reserves + first * facets + k, &value, lanes, facets, 1); }
             next_subset(columns, n - 1, m);
         }
         refuse_unsure(&g, &least);

@@ -11,9 +11,7 @@ static const double *numbers_of(towline_column column, ptrdiff_t row) {
 
 /* Write `count` numbers, or NAN where there are none. */
 static void write(double *to, const double *from, int count, int are_there) {
-    for (int i = 0; i < count; i++) {
-        to[i] = are_there ? from[i] : (double)NAN;
-    }
+    for (int i = 0; i < count; i++) { to[i] = are_there ? from[i] : (double)NAN; }
 }
 
 /* Solve one row by the solver of one problem. */
@@ -52,21 +50,15 @@ static void solve_in_lanes(const towline_batch *batch, ptrdiff_t rows) {
     (void)batch;
     (void)rows;
 #else
-    if (batch->m >= batch->n || batch->rho > 0) {
-        BEST_FORM(solve_in_lanes, batch, rows);
-    }
+    if (batch->m >= batch->n || batch->rho > 0) { BEST_FORM(solve_in_lanes, batch, rows); }
 #endif
 }
 
 ptrdiff_t towline_solve_batch(const towline_batch *batch, ptrdiff_t rows, int lanes) {
     ptrdiff_t optimal = 0;
-    if (lanes) {
-        solve_in_lanes(batch, rows);
-    }
+    if (lanes) { solve_in_lanes(batch, rows); }
     for (ptrdiff_t row = 0; row < rows; row++) {
-        if (batch->status[row] == TOWLINE_UNSURE) {
-            solve_row(batch, row);
-        }
+        if (batch->status[row] == TOWLINE_UNSURE) { solve_row(batch, row); }
         optimal += batch->status[row] == TOWLINE_OPTIMAL;
     }
     return optimal;

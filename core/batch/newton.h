@@ -41,9 +41,7 @@ typedef struct {
 INLINE void pulls_along(const matrices *M, const num *d, num *pulls) {
     for (int c = 0; c < M->m; c++) {
         num total = number(0);
-        for (int i = 0; i < M->n; i++) {
-            total += M->B[i * M->m + c] * d[i];
-        }
+        for (int i = 0; i < M->n; i++) { total += M->B[i * M->m + c] * d[i]; }
         pulls[c] = total;
     }
 }
@@ -61,9 +59,7 @@ INLINE mask evaluate(newton *f, demands *p, const matrices *M) {
     for (int i = 0; i < M->n; i++) {
         const num given_up = f->soft * f->y[i];
         num r = p->b[i] - given_up;
-        for (int c = 0; c < M->m; c++) {
-            r -= M->B[i * M->m + c] * p->s[c];
-        }
+        for (int c = 0; c < M->m; c++) { r -= M->B[i * M->m + c] * p->s[c]; }
         f->r[i] = r;
         terms += magnitude(given_up);
         error = larger(magnitude(r), error);
@@ -74,12 +70,8 @@ INLINE mask evaluate(newton *f, demands *p, const matrices *M) {
 /* Return where a direction, of such pulls, proves that the wrench is out of reach. */
 INLINE mask prove_along(demands *p, const matrices *M, mask chosen, const num *d, const num *pulls) {
     num demand = number(0), support = number(0);
-    for (int i = 0; i < M->n; i++) {
-        demand += d[i] * p->b[i];
-    }
-    for (int c = 0; c < M->m; c++) {
-        support += pulls[c] * where(pulls[c] > 0.0, p->high[c], p->low[c]);
-    }
+    for (int i = 0; i < M->n; i++) { demand += d[i] * p->b[i]; }
+    for (int c = 0; c < M->m; c++) { support += pulls[c] * where(pulls[c] > 0.0, p->high[c], p->low[c]); }
     const mask promising = chosen & (demand - support > PROMISING * demand);
     return any(promising) ? prove(p, M, promising, d) : promising;
 }
@@ -89,14 +81,10 @@ INLINE void make_H(newton *f, const matrices *M) {
     const int n = M->n, m = M->m;
     for (int i = 0; i < n; i++) {
         num row[CABLES];
-        for (int c = 0; c < m; c++) {
-            row[c] = f->free[c] * M->B[i * m + c];
-        }
+        for (int c = 0; c < m; c++) { row[c] = f->free[c] * M->B[i * m + c]; }
         for (int j = 0; j <= i; j++) {
             num total = number(0);
-            for (int c = 0; c < m; c++) {
-                total += row[c] * M->B[j * m + c];
-            }
+            for (int c = 0; c < m; c++) { total += row[c] * M->B[j * m + c]; }
             f->H[i * n + j] = total;
         }
     }
@@ -109,17 +97,13 @@ INLINE num factor(newton *f, const matrices *M) {
     make_H(f, M);
     for (int j = 0; j < n; j++) {
         num pivot = H[j * n + j] + f->damping;
-        for (int e = 0; e < j; e++) {
-            pivot -= H[j * n + e] * H[e * n + j];
-        }
+        for (int e = 0; e < j; e++) { pivot -= H[j * n + e] * H[e * n + j]; }
         least = smaller(pivot, least);
         const num inverse = 1.0 / larger(pivot, 0.5 * f->damping);
         H[j * n + j] = inverse;
         for (int i = j + 1; i < n; i++) {
             num x = H[i * n + j];
-            for (int e = 0; e < j; e++) {
-                x -= H[i * n + e] * H[e * n + j];
-            }
+            for (int e = 0; e < j; e++) { x -= H[i * n + e] * H[e * n + j]; }
             H[i * n + j] = x;
             H[j * n + i] = x * inverse;
         }
@@ -141,9 +125,7 @@ INLINE num least_eigenvalue(const newton *f, int n) {
         trace += H[j * n + j];
         for (int i = j + 1; i < n; i++) {
             num x = number(0);
-            for (int e = j; e < i; e++) {
-                x -= H[e * n + i] * column[e];
-            }
+            for (int e = j; e < i; e++) { x -= H[e * n + i] * column[e]; }
             column[i] = x;
             trace += x * x * H[i * n + i];
         }
@@ -157,15 +139,11 @@ INLINE void find_step(newton *f, int n) {
     num *x = f->step;
     for (int i = 0; i < n; i++) {
         x[i] = f->r[i];
-        for (int e = 0; e < i; e++) {
-            x[i] -= H[e * n + i] * x[e];
-        }
+        for (int e = 0; e < i; e++) { x[i] -= H[e * n + i] * x[e]; }
     }
     for (int i = n - 1; i >= 0; i--) {
         x[i] *= H[i * n + i];
-        for (int e = i + 1; e < n; e++) {
-            x[i] -= H[i * n + e] * x[e];
-        }
+        for (int e = i + 1; e < n; e++) { x[i] -= H[i * n + e] * x[e]; }
     }
 }
 
@@ -193,9 +171,7 @@ INLINE num length_of_step(const newton *f, const demands *p, const matrices *M) 
     for (int turn = 0; turn < ON_THE_WAY; turn++) {
         const num slope = (first - length * curve) + slope_at(f, p, M->m, length, &bend);
         const mask too_far = slope < -CLIMBS * start, searching = too_far | (right < INFINITY);
-        if (!any(searching)) {
-            break;
-        }
+        if (!any(searching)) { break; }
         right = where(too_far, length, right);
         left = where(too_far, left, length);
         const num better = length + slope / (curve + bend), middle = 0.5 * (left + right);
@@ -206,21 +182,13 @@ INLINE num length_of_step(const newton *f, const demands *p, const matrices *M) 
 
 /* Begin at the multipliers of the least norm without limits. Where H lacks a rank "infeasible" may be wrong: stop. */
 INLINE num begin(newton *f, const demands *p, const matrices *M) {
-    for (int c = 0; c < M->m; c++) {
-        f->free[c] = number(1);
-    }
-    for (int i = 0; i < M->n; i++) {
-        f->r[i] = p->b[i];
-    }
+    for (int c = 0; c < M->m; c++) { f->free[c] = number(1); }
+    for (int i = 0; i < M->n; i++) { f->r[i] = p->b[i]; }
     const num least = factor(f, M);
     find_step(f, M->n);
     f->going &= f->step[0] <= INFINITY;
-    if (f->soft == 0) {
-        f->going &= least_eigenvalue(f, M->n) > SMALL_IN_H * f->size;
-    }
-    for (int i = 0; i < M->n; i++) {
-        f->y[i] = f->step[i];
-    }
+    if (f->soft == 0) { f->going &= least_eigenvalue(f, M->n) > SMALL_IN_H * f->size; }
+    for (int i = 0; i < M->n; i++) { f->y[i] = f->step[i]; }
     return least;
 }
 
@@ -229,13 +197,9 @@ INLINE num take_step(newton *f, demands *p, const matrices *M) {
     const num least = factor(f, M);
     find_step(f, M->n);
     pulls_along(M, f->step, f->change);
-    if (f->soft == 0) {
-        f->going &= ~prove_along(p, M, f->going, f->step, f->change);
-    }
+    if (f->soft == 0) { f->going &= ~prove_along(p, M, f->going, f->step, f->change); }
     const num length = length_of_step(f, p, M);
-    for (int i = 0; i < M->n; i++) {
-        f->y[i] = where(f->going, f->y[i] + length * f->step[i], f->y[i]);
-    }
+    for (int i = 0; i < M->n; i++) { f->y[i] = where(f->going, f->y[i] + length * f->step[i], f->y[i]); }
     return least;
 }
 
@@ -251,25 +215,17 @@ INLINE void prove_out_of_reach(newton *f, demands *p, const matrices *M, int ste
 /* Find s in a few steps; where they do not decide, the lane is in doubt. */
 INLINE void solve_by_newton(demands *p, const matrices *M, double soft) {
     newton f = {.soft = soft, .going = p->good};
-    for (int i = 0; i < M->n * M->m; i++) {
-        f.size += M->B[i] * M->B[i];
-    }
+    for (int i = 0; i < M->n * M->m; i++) { f.size += M->B[i] * M->B[i]; }
     f.size /= M->n;
     f.damping = DAMPING * f.size + soft;
     num least = begin(&f, p, M);
     for (int step = 0; step <= STEPS; step++) {
         mask met = f.going & evaluate(&f, p, M);
-        if (soft == 0) {
-            met &= least > SMALL_IN_H * f.size;
-        }
+        if (soft == 0) { met &= least > SMALL_IN_H * f.size; }
         f.found |= met;
         f.going &= ~met;
-        if (soft == 0 && any(f.going)) {
-            prove_out_of_reach(&f, p, M, step);
-        }
-        if (step == STEPS || !any(f.going)) {
-            break;
-        }
+        if (soft == 0 && any(f.going)) { prove_out_of_reach(&f, p, M, step); }
+        if (step == STEPS || !any(f.going)) { break; }
         least = take_step(&f, p, M);
     }
     if (soft > 0 && any(f.found)) { /* r = y / rho is what is missing of the wrench: more than there is, or a trade */

@@ -40,22 +40,16 @@ typedef struct {
 
 /* The number i of each row that a lane has. */
 INLINE num taken(towline_column column, const ptrdiff_t *row, int i) {
-    if (column.per == 0) {
-        return number(column.of[i]);
-    }
+    if (column.per == 0) { return number(column.of[i]); }
     num x = number(0);
-    for (int lane = 0; lane < LANES; lane++) {
-        ((double *)&x)[lane] = column.of[row[lane] * column.per + i];
-    }
+    for (int lane = 0; lane < LANES; lane++) { ((double *)&x)[lane] = column.of[row[lane] * column.per + i]; }
     return x;
 }
 
 /* Find the units in which cables have equal weights. */
 INLINE void take_weights(matrices *M, const towline_batch *batch, const ptrdiff_t *row) {
     num heaviest = number(0), lightest = number(INFINITY);
-    for (int c = 0; c < M->m; c++) {
-        M->unit[c] = M->per_unit[c] = number(1);
-    }
+    for (int c = 0; c < M->m; c++) { M->unit[c] = M->per_unit[c] = number(1); }
     for (int c = 0; c < M->m && batch->weights.of; c++) {
         const num weight = taken(batch->weights, row, c);
         M->unit[c] = weight;
@@ -98,9 +92,7 @@ INLINE void take_wrenches(demands *p, const matrices *M, const towline_batch *ba
         p->Sw[r] = n == 6 && r >= 3 ? w * M->per_length : w;
         square += p->Sw[r] * p->Sw[r];
         p->b[r] = p->Sw[r];
-        for (int c = 0; c < m; c++) {
-            p->b[r] -= M->SA[r * m + c] * p->t_ref[c];
-        }
+        for (int c = 0; c < m; c++) { p->b[r] -= M->SA[r * m + c] * p->t_ref[c]; }
     }
     p->good &= square < LARGEST * LARGEST;
     p->required = square_root(square);
@@ -135,9 +127,7 @@ INLINE num wrench_error(const demands *p, const matrices *M) {
     num square = number(0);
     for (int r = 0; r < M->n; r++) {
         num total = -p->Sw[r];
-        for (int c = 0; c < M->m; c++) {
-            total += M->SA[r * M->m + c] * p->s[c];
-        }
+        for (int c = 0; c < M->m; c++) { total += M->SA[r * M->m + c] * p->s[c]; }
         square += total * total;
     }
     return square_root(square);

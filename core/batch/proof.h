@@ -35,9 +35,7 @@ INLINE void add_reach(reach *of_all, const demands *p, const matrices *M, const 
 /* Keep the directions, in the rows of S A, where chosen and proven; return where. */
 INLINE mask prove(demands *p, const matrices *M, mask chosen, const num *direction) {
     num d[ROWS], square = number(0), demand = number(0);
-    for (int i = 0; i < M->n; i++) {
-        square += direction[i] * direction[i];
-    }
+    for (int i = 0; i < M->n; i++) { square += direction[i] * direction[i]; }
     const mask usable = chosen & (square > 0.0) & (square < LARGEST * LARGEST * LARGEST * LARGEST);
     const num unit = 1.0 / square_root(where(usable, square, number(1)));
     for (int i = 0; i < M->n; i++) {
@@ -45,9 +43,7 @@ INLINE mask prove(demands *p, const matrices *M, mask chosen, const num *directi
         demand += d[i] * p->Sw[i];
     }
     reach all = {number(0), number(0), usable, (mask){0}};
-    for (int c = 0; c < M->m; c++) {
-        add_reach(&all, p, M, d, c);
-    }
+    for (int c = 0; c < M->m; c++) { add_reach(&all, p, M, d, c); }
     const num shortfall = demand - all.support, doubt = CLEAR * (FEASIBILITY * p->required + ROUNDING * all.rounded);
     const mask proven = all.usable & all.pulls & (shortfall > doubt);
     p->proven |= proven;

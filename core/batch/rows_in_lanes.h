@@ -15,9 +15,7 @@ INLINE void put_row(const towline_batch *batch, const demands *p, const mask *me
                     int lane) {
     const int soft = batch->rho > 0, good = p->good[lane] != 0, optimal = good && (*met)[lane] != 0;
     const int proven = p->proven[lane] != 0 && !optimal, solved = optimal || (soft && good);
-    if (!solved && !proven) {
-        return;
-    }
+    if (!solved && !proven) { return; }
     const num info[2] = {p->support, p->shortfall};
     batch->status[row] = optimal ? TOWLINE_OPTIMAL : soft ? TOWLINE_INACCURATE : TOWLINE_INFEASIBLE;
     put(batch->tensions, p->s, row, lane, batch->m, solved);
@@ -33,9 +31,7 @@ INLINE int next_rows(const towline_batch *batch, ptrdiff_t rows, ptrdiff_t *next
         row[count] = *next;
         count += batch->status[*next] == TOWLINE_UNSURE;
     }
-    for (int lane = count; lane < LANES && count > 0; lane++) {
-        row[lane] = row[count - 1];
-    }
+    for (int lane = count; lane < LANES && count > 0; lane++) { row[lane] = row[count - 1]; }
     return count;
 }
 
@@ -51,9 +47,7 @@ void FORM(solve_in_lanes)(const towline_batch *batch, ptrdiff_t rows) {
     while ((count = next_rows(batch, rows, &next, row)) > 0) {
         if (!ready) {
             take_matrices(&M, batch, row);
-            if (by_slabs) {
-                reduce(&M);
-            }
+            if (by_slabs) { reduce(&M); }
             ready = shared;
         }
         take_demands(&p, &M, batch, row);
@@ -63,8 +57,6 @@ void FORM(solve_in_lanes)(const towline_batch *batch, ptrdiff_t rows) {
             solve_by_newton(&p, &M, batch->rho > 0 ? 1 / batch->rho : 0);
         }
         judge(&p, &M, &met, &error);
-        for (int lane = 0; lane < count; lane++) {
-            put_row(batch, &p, &met, &error, row[lane], lane);
-        }
+        for (int lane = 0; lane < count; lane++) { put_row(batch, &p, &met, &error, row[lane], lane); }
     }
 }

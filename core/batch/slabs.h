@@ -99,9 +99,7 @@ INLINE void exclude(optimum *o, const matrices *M, const edge *e, int i, mask em
 INLINE void move(optimum *o, const edge *e, const cut *start, const cut *stop) {
     const num inside = between(start->x, number(0), stop->x);
     const num x = where(start->x > stop->x, 0.5 * (start->x + stop->x), inside);
-    for (int i = 0; i < 2; i++) {
-        o->z[i] = where(e->moves, e->base[i] + x * e->along[i], o->z[i]);
-    }
+    for (int i = 0; i < 2; i++) { o->z[i] = where(e->moves, e->base[i] + x * e->along[i], o->z[i]); }
     /* z is the sum of the two normals, each times its multiplier. */
     const mask up = x > 0.0, down = x < 0.0;
     const num other = where(up, x / start->slope, where(down, x / stop->slope, number(0)));
@@ -117,9 +115,7 @@ INLINE void take_slab(optimum *o, const demands *p, const matrices *M, int i) {
     const num a[2] = {M->normal[0][i], M->normal[1][i]}, s = p->s[i], low = p->low[i], high = p->high[i];
     const num value = s + times_normal(M, i, o->z);
     const mask below = value < low - o->slack, outside = (below | (value > high + o->slack)) & o->good;
-    if (!any(outside)) {
-        return;
-    }
+    if (!any(outside)) { return; }
     const num square = a[0] * a[0] + a[1] * a[1];
     const mask cuts = square > PARALLEL * PARALLEL, fixed = outside & ~cuts;
     /* Nothing moves this s, and it is beyond its limit. */
@@ -144,18 +140,14 @@ INLINE void take_slab(optimum *o, const demands *p, const matrices *M, int i) {
         }
     }
     const mask empty = e.moves & o->good & (start.x - stop.x > o->slack);
-    if (any(empty)) {
-        exclude(o, M, &e, i, empty, &start, &stop);
-    }
+    if (any(empty)) { exclude(o, M, &e, i, empty, &start, &stop); }
     move(o, &e, &start, &stop);
 }
 
 /* Find s, where the matrices are reduced. */
 INLINE void solve_by_slabs(demands *p, const matrices *M) {
     optimum o = {.slack = SLACK * larger(least_norm(p, M), p->size), .good = p->good & M->good};
-    for (int i = 0; i < M->m; i++) {
-        take_slab(&o, p, M, i);
-    }
+    for (int i = 0; i < M->m; i++) { take_slab(&o, p, M, i); }
     num total = number(0);
     for (int c = 0; c < M->m; c++) {
         p->s[c] += times_normal(M, c, o.z);

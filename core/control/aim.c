@@ -22,9 +22,7 @@ static void write_lack(const towline_stages *stages, int k, int m, int moved, do
     for (int i = 0; i < 6; i++) {
         const double by = (i < 3 ? 1 : length) / stages->steps[k];
         double missing = wanted[n * (k + 1) + 6 + i] - entry(stages->c, k, 0, 6 + i);
-        for (int j = 0; j < n; j++) {
-            missing -= entry(stages->A, k, 6 + i, j) * wanted[n * k + j];
-        }
+        for (int j = 0; j < n; j++) { missing -= entry(stages->A, k, 6 + i, j) * wanted[n * k + j]; }
         for (int j = 0; j < count; j++) {
             missing -= entry(stages->B, k, 6 + i, j) * planned[count * k + j];
             of->gain[i][j] = by * (j < m ? entry(stages->B, k, 6 + i, j) : entry(stages->A, k, 6 + i, MOTION + j - m));
@@ -39,20 +37,14 @@ static void least_squares(const lack *of, int count, const double *efforts, doub
     for (int i = 0; i < 6; i++) {
         for (int other = 0; other < 6; other++) {
             gram[i][other] = 0;
-            for (int j = 0; j < count; j++) {
-                gram[i][other] += of->gain[i][j] * of->gain[other][j] / efforts[j];
-            }
+            for (int j = 0; j < count; j++) { gram[i][other] += of->gain[i][j] * of->gain[other][j] / efforts[j]; }
         }
         gram[i][6] = of->missing[i];
         largest = fmax(largest, gram[i][i]);
     }
-    for (int i = 0; i < 6; i++) {
-        gram[i][i] += fmax(ALMOST * largest, 1e-200);
-    }
+    for (int i = 0; i < 6; i++) { gram[i][i] += fmax(ALMOST * largest, 1e-200); }
     solve_positive(gram);
-    for (int i = 0; i < 6; i++) {
-        forces[i] = gram[i][6];
-    }
+    for (int i = 0; i < 6; i++) { forces[i] = gram[i][6]; }
 }
 
 void towline_aim(towline_stages stages, int cables, int moved, double length, const double *efforts, double *wanted,
@@ -65,17 +57,13 @@ void towline_aim(towline_stages stages, int cables, int moved, double length, co
         least_squares(&of, count, efforts, forces);
         for (int j = 0; j < count; j++) {
             double change = 0;
-            for (int i = 0; i < 6; i++) {
-                change += of.gain[i][j] * forces[i] / efforts[j];
-            }
+            for (int i = 0; i < 6; i++) { change += of.gain[i][j] * forces[i] / efforts[j]; }
             if (j < m) {
                 planned[count * k + j] += change;
                 continue;
             }
             wanted[n * k + MOTION + j - m] += change;
-            if (k == stages.count - 1) {
-                wanted[n * (k + 1) + MOTION + j - m] += change;
-            }
+            if (k == stages.count - 1) { wanted[n * (k + 1) + MOTION + j - m] += change; }
         }
     }
 }

@@ -40,14 +40,10 @@ static void anchor_by_coordinate(const double *from, int coordinate, double *mov
 static void add_column(const cable_run *run, double tension, int coordinate, double far, double scale, double *column) {
     const double length = run->length;
     double from[3], moves[3], force[3], moment[3];
-    for (int j = 0; j < 3; j++) {
-        from[j] = run->carrier_arm[j] + length * run->pull[j];
-    }
+    for (int j = 0; j < 3; j++) { from[j] = run->carrier_arm[j] + length * run->pull[j]; }
     anchor_by_coordinate(from, coordinate, moves);
     const double along = dot(run->pull, moves), stiffness = far * tension / length;
-    for (int j = 0; j < 3; j++) {
-        force[j] = stiffness * (moves[j] - along * run->pull[j]);
-    }
+    for (int j = 0; j < 3; j++) { force[j] = stiffness * (moves[j] - along * run->pull[j]); }
     cross(run->arm, force, moment);
     for (int j = 0; j < 3; j++) {
         column[j] += force[j];
@@ -79,31 +75,21 @@ static void least_effort(const towline_robot *robot, double share, const double 
         gram[j][6] = by * missing[j];
         for (int k = 0; k < 6; k++) {
             double sum = 0;
-            for (int i = 0; i < m; i++) {
-                sum += A[j * m + i] * A[k * m + i];
-            }
+            for (int i = 0; i < m; i++) { sum += A[j * m + i] * A[k * m + i]; }
             gram[j][k] = share * share * by * (k < 3 ? 1 : scale) * sum;
-            for (int c = 0; c < 6 * robot->carriers; c++) {
-                gram[j][k] += columns[c][j] * columns[c][k];
-            }
+            for (int c = 0; c < 6 * robot->carriers; c++) { gram[j][k] += columns[c][j] * columns[c][k]; }
         }
         largest = fmax(largest, gram[j][j]);
     }
-    for (int j = 0; j < 6; j++) {
-        gram[j][j] += DAMPED * largest + 1e-30;
-    }
+    for (int j = 0; j < 6; j++) { gram[j][j] += DAMPED * largest + 1e-30; }
     solve_positive(gram);
-    for (int j = 0; j < 6; j++) {
-        x[j] = gram[j][6];
-    }
+    for (int j = 0; j < 6; j++) { x[j] = gram[j][6]; }
 }
 
 /* Let an offset go towards where it is wanted, by a lag of second order, for `dt` [s]; return its acceleration. */
 static double follow(const towline_controller *controller, double dt, double wanted, double *offset, double *rate) {
     const double bandwidth = controller->carrier_bandwidth, most = controller->carrier_acceleration;
-    if (!(dt > 0)) {
-        return 0;
-    }
+    if (!(dt > 0)) { return 0; }
     const double bend = fmin(fmax(bandwidth * (bandwidth * (wanted - *offset) - 2 * *rate), -most), most);
     *rate += dt * bend;
     *offset += dt * *rate;
@@ -114,9 +100,7 @@ static double follow(const towline_controller *controller, double dt, double wan
 static void add_offset(double turn, const double *offset, double *coordinates) {
     double sine, cosine;
     sine_and_cosine(turn, &sine, &cosine);
-    for (int k = 0; k < 3; k++) {
-        coordinates[k] += offset[k];
-    }
+    for (int k = 0; k < 3; k++) { coordinates[k] += offset[k]; }
     coordinates[3] += cosine * offset[3] + sine * offset[4];
     coordinates[4] += cosine * offset[4] - sine * offset[3];
     coordinates[5] += offset[5];
@@ -134,9 +118,7 @@ void towline_compensate(const towline_robot *robot, const towline_controller *co
         for (int k = 0; k < 6; k++) {
             const double reach = controller->reach[c][k];
             double change = 0;
-            for (int j = 0; j < 6; j++) {
-                change += columns[6 * c + k][j] * x[j];
-            }
+            for (int j = 0; j < 6; j++) { change += columns[6 * c + k][j] * x[j]; }
             const double wanted = (controller->corrects ? memory->offset[k] : 0) + change * reach;
             bends[k] =
                 follow(controller, dt, fmin(fmax(wanted, -reach), reach), &memory->offset[k], &memory->offset_rate[k]);

@@ -31,20 +31,14 @@ typedef struct {
 INLINE void put_bodies(const towline_robot *robot, const double *motions, configuration *at) {
     at->platform = attitude_of(motions + 3);
     turn_constant(at->platform.R, robot->com, at->com);
-    for (int i = 0; i < 3; i++) {
-        at->position[i] = motions[i] + at->com[i];
-    }
-    for (int c = 0; c < robot->carriers; c++) {
-        at->carrier[c] = attitude_of(motions + MOTION * (1 + c) + 3);
-    }
+    for (int i = 0; i < 3; i++) { at->position[i] = motions[i] + at->com[i]; }
+    for (int c = 0; c < robot->carriers; c++) { at->carrier[c] = attitude_of(motions + MOTION * (1 + c) + 3); }
 }
 
 /* From the platform's CoM to the attachment of a cable. */
 INLINE void arm_of(const towline_robot *robot, const configuration *at, int cable, double *arm) {
     turn_constant(at->platform.R, robot->cable[cable].attachment, arm);
-    for (int i = 0; i < 3; i++) {
-        arm[i] -= at->com[i];
-    }
+    for (int i = 0; i < 3; i++) { arm[i] -= at->com[i]; }
 }
 
 /* Run the cables from carriers at positions that are `per` numbers apart. */
@@ -70,9 +64,7 @@ INLINE void run_cables(const towline_robot *robot, const double *positions, ptrd
         }
         const int runs = found.length > SHORTEST && dot(found.pull, found.pull) > 0.5; /* not of nan */
         run->length = runs ? found.length : 0;
-        for (int j = 0; j < 3; j++) {
-            run->pull[j] = runs ? found.pull[j] : 0;
-        }
+        for (int j = 0; j < 3; j++) { run->pull[j] = runs ? found.pull[j] : 0; }
     }
 }
 
@@ -100,9 +92,7 @@ INLINE void wrench_matrix(const towline_robot *robot, const configuration *at, d
 INLINE void wrench_of(const towline_robot *robot, const double *A, const double *tensions, double *w) {
     for (int k = 0; k < 6; k++) {
         w[k] = 0;
-        for (int i = 0; i < robot->cables; i++) {
-            w[k] += A[k * robot->cables + i] * tensions[i];
-        }
+        for (int i = 0; i < robot->cables; i++) { w[k] += A[k * robot->cables + i] * tensions[i]; }
     }
 }
 

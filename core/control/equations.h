@@ -9,15 +9,11 @@ INLINE void solve_positive(double gram[6][7]) {
     for (int k = 0; k < 6; k++) {
         for (int j = k + 1; j < 6; j++) {
             const double factor = gram[j][k] / gram[k][k];
-            for (int i = k; i < 7; i++) {
-                gram[j][i] -= factor * gram[k][i];
-            }
+            for (int i = k; i < 7; i++) { gram[j][i] -= factor * gram[k][i]; }
         }
     }
     for (int k = 5; k >= 0; k--) {
-        for (int i = k + 1; i < 6; i++) {
-            gram[k][6] -= gram[k][i] * gram[i][6];
-        }
+        for (int i = k + 1; i < 6; i++) { gram[k][6] -= gram[k][i] * gram[i][6]; }
         gram[k][6] /= gram[k][k];
     }
 }

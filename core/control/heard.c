@@ -23,9 +23,7 @@ static void hear(double elapsed, double little, double highest, towline_cable_me
     }
     cable->reported += share * (cable->measured - cable->reported);
     if (cable->is_cut) {
-        if (cable->reported >= ENOUGH * little) {
-            cable->is_cut = 0, cable->commanded = cable->reported;
-        }
+        if (cable->reported >= ENOUGH * little) { cable->is_cut = 0, cable->commanded = cable->reported; }
         return;
     }
     cable->commanded += share * (cable->then - cable->commanded);
@@ -52,9 +50,7 @@ static int are_silent(const towline_robot *robot, const towline_controller *cont
     int commanded = 0;
     for (int i = 0; i < robot->cables; i++) {
         const towline_cable_memory *cable = &cables[i];
-        if (!(cable->measured <= LITTLE * fmax(cable->then, 0))) {
-            return 0; /* also where a report is no number */
-        }
+        if (!(cable->measured <= LITTLE * fmax(cable->then, 0))) { return 0; /* also where a report is no number */ }
         commanded |= cable->then >= SOMETHING * controller->limits[i].high;
     }
     return commanded;
@@ -63,9 +59,7 @@ static int are_silent(const towline_robot *robot, const towline_controller *cont
 int towline_write_bounds(const towline_robot *robot, const towline_controller *controller, double dt,
                          towline_cable_memory *cables, double *low, double *high) {
     const int silent = are_silent(robot, controller, cables);
-    for (int i = 0; silent && i < robot->cables; i++) {
-        cables[i].measured = cables[i].then;
-    }
+    for (int i = 0; silent && i < robot->cables; i++) { cables[i].measured = cables[i].then; }
     for (int i = 0; i < robot->cables; i++) {
         const towline_limits *limits = &controller->limits[i];
         towline_cable_memory *cable = &cables[i];

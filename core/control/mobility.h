@@ -34,9 +34,7 @@ INLINE mobility mobility_at(const towline_robot *robot, const configuration *at)
     }
     const double inverse = 1 / adjugate((const double (*)[3])inertia, by.turning);
     for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++) {
-            by.turning[i][k] *= inverse * freedom[3 + i] * freedom[3 + k];
-        }
+        for (int k = 0; k < 3; k++) { by.turning[i][k] *= inverse * freedom[3 + i] * freedom[3 + k]; }
     }
     return by;
 }
@@ -44,12 +42,8 @@ INLINE mobility mobility_at(const towline_robot *robot, const configuration *at)
 /* Write the acceleration of the pose by a wrench, both (6). */
 INLINE void accelerate(const mobility *by, const double *w, double *acceleration) {
     double *turning = acceleration + 3;
-    for (int i = 0; i < 3; i++) {
-        turning[i] = dot(by->turning[i], w + 3);
-    }
-    for (int i = 0; i < 3; i++) {
-        acceleration[i] = by->lightness[i] * w[i] + dot(by->carried[i], turning);
-    }
+    for (int i = 0; i < 3; i++) { turning[i] = dot(by->turning[i], w + 3); }
+    for (int i = 0; i < 3; i++) { acceleration[i] = by->lightness[i] * w[i] + dot(by->carried[i], turning); }
 }
 
 /* Write the acceleration of the pose with tensions and a disturbance, at a velocity. */
@@ -59,9 +53,7 @@ INLINE void acceleration_at(const towline_robot *robot, const mobility *by, cons
     double needed[6], w[6];
     wrench_of(robot, A, tensions, w);
     required_wrench(robot, motion, motion + 6, rest, NULL, needed);
-    for (int k = 0; k < 6; k++) {
-        w[k] += disturbance[k] - needed[k];
-    }
+    for (int k = 0; k < 6; k++) { w[k] += disturbance[k] - needed[k]; }
     accelerate(by, w, acceleration);
 }
 

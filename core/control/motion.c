@@ -21,8 +21,6 @@ void towline_move_on(const towline_robot *robot, double dt, int parts, const dou
         const mobility by = mobility_at(robot, &at);
         acceleration_at(robot, &by, motion, A, tensions + per * part, disturbance, acceleration);
         move_body(dt, acceleration, motion);
-        for (int c = 0; c < robot->carriers; c++) {
-            move_body(dt, accelerations + 6 * c, motion + MOTION * (1 + c));
-        }
+        for (int c = 0; c < robot->carriers; c++) { move_body(dt, accelerations + 6 * c, motion + MOTION * (1 + c)); }
     }
 }

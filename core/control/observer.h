@@ -11,9 +11,7 @@ INLINE void momentum_of(const towline_robot *robot, const attitude *at, const do
     body_rate(at, velocity + 3, omega);
     turn(at->R, omega, rate);
     cross(rate, com, around);
-    for (int i = 0; i < 3; i++) {
-        momentum[i] = robot->mass * (velocity[i] + around[i]);
-    }
+    for (int i = 0; i < 3; i++) { momentum[i] = robot->mass * (velocity[i] + around[i]); }
     constant_times(robot->body[0].inertia, omega, spin);
     turn(at->R, spin, momentum + 3);
 }

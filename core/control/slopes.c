@@ -39,9 +39,7 @@ static void body_slopes(const attitude *at, const double *rates, const double *b
 static void add_cross(const double *a, const double *b, double *c) {
     double product[3];
     cross(a, b, product);
-    for (int i = 0; i < 3; i++) {
-        c[i] += product[i];
-    }
+    for (int i = 0; i < 3; i++) { c[i] += product[i]; }
 }
 
 void towline_wrench_slopes(const towline_robot *robot, const attitude *at, const double *velocity,
@@ -73,18 +71,14 @@ void towline_wrench_slopes(const towline_robot *robot, const attitude *at, const
         add_cross(slope[k].axis, moment, torque);
         turn(at->R, force, slopes[k]);
         turn(at->R, torque, slopes[k] + 3);
-        for (int i = 0; i < 3; i++) {
-            slopes[k][i] *= robot->mass;
-        }
+        for (int i = 0; i < 3; i++) { slopes[k][i] *= robot->mass; }
     }
 }
 
 /* The second derivative of a straight cable's length, (1 - u u') / l. */
 static void straight_curvature(const cable_run *run, double curvature[3][3]) {
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            curvature[i][j] = ((i == j) - run->pull[i] * run->pull[j]) / run->length;
-        }
+        for (int j = 0; j < 3; j++) { curvature[i][j] = ((i == j) - run->pull[i] * run->pull[j]) / run->length; }
     }
 }
 
@@ -96,22 +90,14 @@ static void sheave_curvature(double r, const double *d, const double *axis, cons
                              double curvature[3][3]) {
     const double up = dot(d, axis);
     double out[3], n[3], y[3];
-    for (int i = 0; i < 3; i++) {
-        out[i] = d[i] - up * axis[i];
-    }
+    for (int i = 0; i < 3; i++) { out[i] = d[i] - up * axis[i]; }
     const double a = sqrt(dot(out, out)), s = sqrt(a * a - 2 * r * a + up * up);
-    for (int i = 0; i < 3; i++) {
-        out[i] /= a;
-    }
+    for (int i = 0; i < 3; i++) { out[i] /= a; }
     const double sine = -dot(run->pull, out), cosine = -dot(run->pull, axis);
     cross(axis, out, y);
+    for (int i = 0; i < 3; i++) { n[i] = cosine * out[i] - sine * axis[i]; }
     for (int i = 0; i < 3; i++) {
-        n[i] = cosine * out[i] - sine * axis[i];
-    }
-    for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            curvature[i][j] = n[i] * n[j] / s + sine / a * y[i] * y[j];
-        }
+        for (int j = 0; j < 3; j++) { curvature[i][j] = n[i] * n[j] / s + sine / a * y[i] * y[j]; }
     }
 }
 
@@ -127,16 +113,12 @@ tensioned towline_tensioned(const towline_robot *robot, const configuration *at,
         double d[3], axis[3];
         turn_constant(at->carrier[given->carrier].R, given->anchor, d);
         turn_constant(at->carrier[given->carrier].R, given->axis, axis);
-        for (int i = 0; i < 3; i++) {
-            d[i] = run->carrier_arm[i] - d[i];
-        }
+        for (int i = 0; i < 3; i++) { d[i] = run->carrier_arm[i] - d[i]; }
         sheave_curvature(given->radius, d, axis, run, result.stiffness);
     }
     for (int i = 0; i < 3; i++) {
         result.force[i] = tension * run->pull[i];
-        for (int j = 0; j < 3; j++) {
-            result.stiffness[i][j] *= tension;
-        }
+        for (int j = 0; j < 3; j++) { result.stiffness[i][j] *= tension; }
     }
     return result;
 }

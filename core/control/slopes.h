@@ -22,9 +22,7 @@ tensioned towline_tensioned(const towline_robot *robot, const configuration *at,
 /* Add to a wrench what a displacement (3) of the attachment from the anchor changes. */
 INLINE void add_displacement(const tensioned *cable, const double *arm, const double *displacement, double *w) {
     double force[3], moment[3];
-    for (int i = 0; i < 3; i++) {
-        force[i] = -dot(cable->stiffness[i], displacement);
-    }
+    for (int i = 0; i < 3; i++) { force[i] = -dot(cable->stiffness[i], displacement); }
     cross(arm, force, moment);
     for (int i = 0; i < 3; i++) {
         w[i] += force[i];

@@ -62,24 +62,16 @@ static void put_stage(const towline_robot *robot, towline_moved moved, const dou
 static void add_platform_slopes(const stage *it, int carrier, int along, const tensioned *cable, const cable_run *run,
                                 const double axes[3][3], double slope[6][6]) {
     double from_origin[3], displacement[3], turned[3];
-    for (int i = 0; i < 3; i++) {
-        from_origin[i] = it->at.com[i] + run->arm[i];
-    }
+    for (int i = 0; i < 3; i++) { from_origin[i] = it->at.com[i] + run->arm[i]; }
     for (int k = 0; k < 3; k++) {
         const double unit[3] = {k == 0, k == 1, k == 2};
-        if (!along) {
-            add_displacement(cable, run->arm, unit, slope[k]);
-        }
+        if (!along) { add_displacement(cable, run->arm, unit, slope[k]); }
         cross(axes[k], from_origin, displacement);
-        for (int i = 0; i < 3; i++) {
-            displacement[i] -= it->by_angle[carrier][k][i];
-        }
+        for (int i = 0; i < 3; i++) { displacement[i] -= it->by_angle[carrier][k][i]; }
         add_displacement(cable, run->arm, displacement, slope[3 + k]);
         cross(axes[k], run->arm, displacement); /* the arm turns */
         cross(displacement, cable->force, turned);
-        for (int i = 0; i < 3; i++) {
-            slope[3 + k][3 + i] += turned[i];
-        }
+        for (int i = 0; i < 3; i++) { slope[3 + k][3 + i] += turned[i]; }
     }
 }
 
@@ -145,9 +137,7 @@ static void write_slopes(const towline_robot *robot, towline_moved moved, const 
         }
     }
     for (int j = 0; j < count; j++) {
-        for (int i = 0; i < 6; i++) {
-            it->slope[j][i] *= robot->freedom[i] * (j < MOTION ? robot->freedom[j % 6] : 1);
-        }
+        for (int i = 0; i < 6; i++) { it->slope[j][i] *= robot->freedom[i] * (j < MOTION ? robot->freedom[j % 6] : 1); }
     }
 }
 
@@ -168,18 +158,14 @@ static void write_stage(const towline_robot *robot, int moved, double dt, const 
     for (int j = 0; j < MOTION + moved; j++) {
         accelerate(&it->by, it->slope[j], gain);
         write_column(dt, gain, A, A_row, j);
-        for (int i = 0; i < 6; i++) {
-            left[i] -= gain[i] * x[j];
-        }
+        for (int i = 0; i < 6; i++) { left[i] -= gain[i] * x[j]; }
     }
     for (int j = 0; j < m; j++) {
         const double w[6] = {it->A[j],         it->A[m + j],     it->A[2 * m + j],
                              it->A[3 * m + j], it->A[4 * m + j], it->A[5 * m + j]};
         accelerate(&it->by, w, gain);
         write_column(dt, gain, B, B_row, j);
-        for (int i = 0; i < 6; i++) {
-            left[i] -= gain[i] * u[j];
-        }
+        for (int i = 0; i < 6; i++) { left[i] -= gain[i] * u[j]; }
     }
     write_column(dt, left, c, 1, 0);
     for (int i = 0; i < 6; i++) {

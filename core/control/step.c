@@ -15,9 +15,7 @@
 static void observe_platform(const towline_robot *robot, const towline_controller *controller, double since,
                              const configuration *at, const double *velocity, const towline_row *row) {
     double tensions[TOWLINE_MOST_CABLES], momentum[6], pull[6];
-    for (int i = 0; i < robot->cables; i++) {
-        tensions[i] = row->cables[i].known;
-    }
+    for (int i = 0; i < robot->cables; i++) { tensions[i] = row->cables[i].known; }
     wrench_of(robot, row->A, tensions, pull);
     momentum_of(robot, &at->platform, at->com, velocity, momentum);
     for (int k = 0; k < 6; k++) {
@@ -35,9 +33,7 @@ static void wanted_acceleration(const towline_controller *controller, double dt,
     towline_platform_memory *memory = row->platform;
     for (int k = 0; k < 6; k++) {
         const double error = k < 3 ? reference[k] - measured[k] : turn_between(measured[k], reference[k]);
-        if (memory->integrates) {
-            memory->integral[k] += dt * error;
-        }
+        if (memory->integrates) { memory->integral[k] += dt * error; }
         wanted[k] = reference[12 + k] + controller->kp[k] * error + controller->ki[k] * memory->integral[k] +
                     controller->kd[k] * (reference[6 + k] - measured[6 + k]);
     }
@@ -52,13 +48,9 @@ static void planned_disturbance(const towline_robot *robot, const towline_row *r
     double motions[MOTION * (1 + TOWLINE_MOST_CARRIERS)], A[6 * TOWLINE_MOST_CABLES], given[6];
     int planned = 0;
     configuration at;
-    for (int i = 0; i < robot->cables; i++) {
-        planned |= row->t_ref[i] != 0;
-    }
+    for (int i = 0; i < robot->cables; i++) { planned |= row->t_ref[i] != 0; }
     memset(missing, 0, 6 * sizeof *missing);
-    if (!planned) {
-        return;
-    }
+    if (!planned) { return; }
     memcpy(motions, row->reference, MOTION * sizeof *motions);
     for (int c = 0; c < robot->carriers; c++) {
         memcpy(motions + MOTION * (1 + c), row->carriers + 18 * c, MOTION * sizeof *motions);
@@ -67,9 +59,7 @@ static void planned_disturbance(const towline_robot *robot, const towline_row *r
     wrench_matrix(robot, &at, A);
     wrench_of(robot, A, row->t_ref, given);
     required_wrench(robot, row->reference, row->reference + 6, row->reference + 12, NULL, missing);
-    for (int k = 0; k < 6; k++) {
-        missing[k] -= given[k];
-    }
+    for (int k = 0; k < 6; k++) { missing[k] -= given[k]; }
 }
 
 /* Order carriers to help the tensions. */
@@ -79,14 +69,10 @@ static void move_carriers(const towline_robot *robot, const towline_controller *
     if (controller->corrects) {
         double given[6];
         wrench_of(robot, row->A, row->t_ref, given);
-        for (int k = 0; k < 6; k++) {
-            missing[k] = row->w[k] - given[k];
-        }
+        for (int k = 0; k < 6; k++) { missing[k] = row->w[k] - given[k]; }
     } else {
         planned_disturbance(robot, row, missing);
-        for (int k = 0; k < 6; k++) {
-            missing[k] = robot->freedom[k] * (missing[k] - row->platform->disturbance[k]);
-        }
+        for (int k = 0; k < 6; k++) { missing[k] = robot->freedom[k] * (missing[k] - row->platform->disturbance[k]); }
     }
     towline_compensate(robot, controller, dt, at, row->A, missing, row);
 }
@@ -98,12 +84,8 @@ void towline_write_problem(const towline_robot *robot, const towline_controller 
     const int silent = towline_write_bounds(robot, controller, dt, row.cables, row.low, row.high);
     row.platform->silent = silent ? row.platform->silent + 1 : 0;
     if (!is_usable(robot, &row)) {
-        for (int k = 0; k < 6; k++) {
-            row.w[k] = NAN;
-        }
-        if (controller->reacts) {
-            towline_add_offsets(robot, &row);
-        }
+        for (int k = 0; k < 6; k++) { row.w[k] = NAN; }
+        if (controller->reacts) { towline_add_offsets(robot, &row); }
         return;
     }
     if (row.late && (since > 0 || dt == 0)) {
@@ -115,13 +97,7 @@ void towline_write_problem(const towline_robot *robot, const towline_controller 
     wrench_matrix(robot, &at, row.A);
     wanted_acceleration(controller, dt, &row, wanted);
     required_wrench(robot, row.measured, row.measured + 6, wanted, NULL, row.w);
-    if (!row.late) {
-        observe_platform(robot, controller, since, &at, row.measured + 6, &row);
-    }
-    for (int k = 0; k < 6; k++) {
-        row.w[k] = robot->freedom[k] * (row.w[k] - row.platform->disturbance[k]);
-    }
-    if (controller->reacts) {
-        move_carriers(robot, controller, dt, &at, &row);
-    }
+    if (!row.late) { observe_platform(robot, controller, since, &at, row.measured + 6, &row); }
+    for (int k = 0; k < 6; k++) { row.w[k] = robot->freedom[k] * (row.w[k] - row.platform->disturbance[k]); }
+    if (controller->reacts) { move_carriers(robot, controller, dt, &at, &row); }
 }

@@ -34,9 +34,7 @@ static void to_axes(const towline_tether *tether, const tethered *carrier, const
         carrier->cosine * v[1] - carrier->sine * v[0],
         v[2],
     };
-    for (int i = 0; i < 3; i++) {
-        y[i] = dot(tether->axes[i], level);
-    }
+    for (int i = 0; i < 3; i++) { y[i] = dot(tether->axes[i], level); }
 }
 
 /* The mean of the arms of a carrier's cables. */
@@ -46,9 +44,7 @@ static void middle_of(const towline_robot *robot, const towline_tether *tether, 
     memset(middle, 0, 3 * sizeof *middle);
     for (int j = 0; j < tether->cables; j++) {
         arm_of(robot, at, tether->cable[j], arm);
-        for (int i = 0; i < 3; i++) {
-            middle[i] += arm[i] / tether->cables;
-        }
+        for (int i = 0; i < 3; i++) { middle[i] += arm[i] / tether->cables; }
     }
 }
 
@@ -58,9 +54,7 @@ static void cable_vector(const towline_robot *robot, const configuration *at, co
     double arm[3], anchor[3];
     arm_of(robot, at, cable, arm);
     turn_constant(at->carrier[robot->cable[cable].carrier].R, robot->cable[cable].anchor, anchor);
-    for (int i = 0; i < 3; i++) {
-        to_anchor[i] = position[i] + anchor[i] - at->position[i] - arm[i];
-    }
+    for (int i = 0; i < 3; i++) { to_anchor[i] = position[i] + anchor[i] - at->position[i] - arm[i]; }
 }
 
 /*
@@ -84,9 +78,7 @@ static equations equations_at(const towline_robot *robot, const towline_tether *
     }
     const double determinant = adjugate((const double (*)[3])rows, of.inverse);
     const double inverse = fabs(determinant) < 1e-300 ? 0 : 1 / determinant;
-    for (int i = 0; i < 9; i++) {
-        of.inverse[i / 3][i % 3] *= inverse;
-    }
+    for (int i = 0; i < 9; i++) { of.inverse[i / 3][i % 3] *= inverse; }
     return of;
 }
 
@@ -94,13 +86,9 @@ static equations equations_at(const towline_robot *robot, const towline_tether *
 static double limit(const towline_tether *tether, double *y) {
     const int free = coordinates_of(tether);
     double square = 0;
-    for (int i = 0; i < free; i++) {
-        square += y[i] * y[i];
-    }
+    for (int i = 0; i < free; i++) { square += y[i] * y[i]; }
     const double far = sqrt(square);
-    for (int i = 0; i < free && far > tether->farthest; i++) {
-        y[i] *= tether->farthest / far;
-    }
+    for (int i = 0; i < free && far > tether->farthest; i++) { y[i] *= tether->farthest / far; }
     return far;
 }
 
@@ -114,25 +102,19 @@ tethered towline_tethered_at(const towline_robot *robot, const towline_tether *t
     memcpy(y, tether->at_home, sizeof carrier.y);
     memcpy(y, coordinates, (size_t)free * sizeof *y);
     limit(tether, y);
-    if (free == 2) {
-        y[2] = copysign(sqrt(tether->length[0] * tether->length[0] - y[0] * y[0] - y[1] * y[1]), y[2]);
-    }
+    if (free == 2) { y[2] = copysign(sqrt(tether->length[0] * tether->length[0] - y[0] * y[0] - y[1] * y[1]), y[2]); }
     middle_of(robot, tether, at, middle);
     for (int round = 0; round < ROUNDS; round++) {
         double change = 0;
         from_axes(tether, &carrier, y, off);
-        for (int i = 0; i < 3; i++) {
-            carrier.position[i] = at->position[i] + middle[i] + off[i];
-        }
+        for (int i = 0; i < 3; i++) { carrier.position[i] = at->position[i] + middle[i] + off[i]; }
         const equations of = equations_at(robot, tether, at, &carrier, missing);
         for (int i = 0; i < 3; i++) {
             const double step = dot(of.inverse[i], missing);
             y[i] += step;
             change += fabs(step);
         }
-        if (change <= EXACT * tether->length[0]) {
-            break;
-        }
+        if (change <= EXACT * tether->length[0]) { break; }
     }
     return carrier;
 }
@@ -171,31 +153,23 @@ void towline_tethered_slopes(const towline_robot *robot, const towline_tether *t
             cable_vector(robot, at, carrier->position, tether->cable[j], to_anchor);
             rows[free + j] = dot(to_anchor, turned) - dot(to_anchor, moved);
         }
-        for (int i = 0; i < 3; i++) {
-            y[i] = dot(of.inverse[i], rows);
-        }
+        for (int i = 0; i < 3; i++) { y[i] = dot(of.inverse[i], rows); }
         double own[3], by_com[3];
         from_axes(tether, carrier, y, own);
         cross(axes[angle], at->com, by_com);
-        for (int i = 0; i < 3; i++) {
-            by_angle[angle][i] = by_com[i] + moved[i] + own[i];
-        }
+        for (int i = 0; i < 3; i++) { by_angle[angle][i] = by_com[i] + moved[i] + own[i]; }
     }
     for (int j = 0; j < free; j++) {
         double slope[3];
         limit_slope(tether, coordinates, j, slope);
-        for (int i = 0; i < 3; i++) {
-            y[i] = dot(of.inverse[i], slope);
-        }
+        for (int i = 0; i < 3; i++) { y[i] = dot(of.inverse[i], slope); }
         from_axes(tether, carrier, y, by_coordinate[j]);
     }
 }
 
 static int count_of(int tethered, const towline_tether *tethers) {
     int count = 0;
-    for (int k = 0; k < tethered; k++) {
-        count += coordinates_of(&tethers[k]);
-    }
+    for (int k = 0; k < tethered; k++) { count += coordinates_of(&tethers[k]); }
     return count;
 }
 
@@ -211,9 +185,7 @@ static void put_after(const towline_robot *robot, double s, const double *platfo
                       double *motions, configuration *at) {
     for (int i = 0; i < 6; i++) {
         motions[i] = after(s, platform, per, i);
-        for (int c = 0; c < robot->carriers; c++) {
-            motions[MOTION * (1 + c) + i] = after(s, carriers + 18 * c, 6, i);
-        }
+        for (int c = 0; c < robot->carriers; c++) { motions[MOTION * (1 + c) + i] = after(s, carriers + 18 * c, 6, i); }
     }
     put_bodies(robot, motions, at);
 }
@@ -244,9 +216,7 @@ void towline_tethered_coordinates(const towline_robot *robot, int count, const t
             tethered carrier;
             set_heading(&at, &carrier);
             middle_of(robot, tether, &at, off);
-            for (int i = 0; i < 3; i++) {
-                off[i] = position[i] - at.position[i] - off[i];
-            }
+            for (int i = 0; i < 3; i++) { off[i] = position[i] - at.position[i] - off[i]; }
             to_axes(tether, &carrier, off, y);
             memcpy(next, y, (size_t)coordinates_of(tether) * sizeof *y);
             next += coordinates_of(tether);
@@ -263,9 +233,7 @@ void towline_tethered_carriers(const towline_robot *robot, int count, const towl
     for (int s = 0; s < 3; s++) {
         const double *next = coordinates;
         put_after(robot, (s - 1) * STEP_OF_TIME, motion, 6 + free, carriers, put, &at);
-        for (int i = 0; i < free; i++) {
-            coordinates[i] = after((s - 1) * STEP_OF_TIME, motion, 6 + free, 6 + i);
-        }
+        for (int i = 0; i < free; i++) { coordinates[i] = after((s - 1) * STEP_OF_TIME, motion, 6 + free, 6 + i); }
         for (int k = 0; k < count; k++) {
             const tethered carrier = towline_tethered_at(robot, &tethers[k], &at, next);
             memcpy(found[s][k], carrier.position, sizeof carrier.position);

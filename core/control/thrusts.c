@@ -57,9 +57,7 @@ static void observe_carrier(const flier *it, double dt, const towline_cable_memo
     const double mass = it->body->mass[0];
     double thrust[3] = {0, 0, 0}, known[3], moment[3] = {0, 0, 0};
     for (int a = 0; a < it->body->actuators; a++) {
-        for (int k = 0; k < 3; k++) {
-            thrust[k] += given[a] * it->body->actuator[a].wrench[k];
-        }
+        for (int k = 0; k < 3; k++) { thrust[k] += given[a] * it->body->actuator[a].wrench[k]; }
     }
     turn(it->at->carrier[it->index].R, thrust, known);
     const ptrdiff_t per = sizeof(towline_cable_memory) / sizeof(double);
@@ -83,9 +81,7 @@ static void needed_force(const flier *it, const double *tensions, double *force,
     }
     double pull[3] = {0, 0, 0};
     add_pull(it, tensions, 1, pull, moment);
-    for (int k = 0; k < 3; k++) {
-        force[k] -= pull[k];
-    }
+    for (int k = 0; k < 3; k++) { force[k] -= pull[k]; }
 }
 
 /* Write e, in the carrier's axes: from the thrust's axis to F, beyond a right angle as far as at one, and to the yaw. */
@@ -96,12 +92,8 @@ static void rotation_to(const flier *it, const double *force, double *e) {
     cross(axis, force, from_axis);
     const double size = fmax(sqrt(dot(force, force)), NO_FORCE);
     double sine = 1;
-    if (dot(axis, force) < 0) {
-        sine = fmax(sqrt(dot(from_axis, from_axis)) / size, NO_FORCE);
-    }
-    for (int k = 0; k < 3; k++) {
-        from_axis[k] /= size * sine;
-    }
+    if (dot(axis, force) < 0) { sine = fmax(sqrt(dot(from_axis, from_axis)) / size, NO_FORCE); }
+    for (int k = 0; k < 3; k++) { from_axis[k] /= size * sine; }
     turn_back(R, from_axis, e);
     e[2] += axis[2] * turn_between(it->motion[5], it->order[5]);
 }
@@ -117,9 +109,7 @@ static double wrench_of_carrier(const flier *it, const double *tensions, double 
     body_rate(at, it->order + 9, wanted);
     body_rate(at, it->order + 15, bent);
     body_rate(at, it->motion + 9, rate);
-    for (int k = 0; k < 3; k++) {
-        ordered[k] = h * (h * e[k] + 2 * (wanted[k] - rate[k])) + bent[k];
-    }
+    for (int k = 0; k < 3; k++) { ordered[k] = h * (h * e[k] + 2 * (wanted[k] - rate[k])) + bent[k]; }
     constant_times(inertia, ordered, moment);
     constant_times(inertia, rate, spin);
     cross(rate, spin, gyroscopic);
@@ -140,9 +130,7 @@ static void command(const flier *it, double dt, const double *wrench, double acr
     for (int a = 0; a < it->body->actuators; a++) {
         const towline_actuator *limits = &it->body->actuator[a];
         double wanted = 0;
-        for (int k = 0; k < 6; k++) {
-            wanted += it->controller->by_wrench[it->index][a][k] * wrench[k];
-        }
+        for (int k = 0; k < 6; k++) { wanted += it->controller->by_wrench[it->index][a][k] * wrench[k]; }
         const double inside = wanted < limits->low ? limits->low : wanted > limits->high ? limits->high : wanted;
         if (isfinite(inside)) {
             double *smooth = &it->memory->wanted[a];
@@ -155,9 +143,7 @@ static void command(const flier *it, double dt, const double *wrench, double acr
     }
     it->memory->limited += fmin(dt / WINDOW, 1) * (limited - it->memory->limited);
     it->memory->lacking = fmax(fabs(wrench[2] - thrust), it->memory->limited > MOSTLY ? across : 0);
-    for (int k = 0; k < 3 && !followed; k++) {
-        it->memory->ordered[k] = NAN;
-    }
+    for (int k = 0; k < 3 && !followed; k++) { it->memory->ordered[k] = NAN; }
 }
 
 double towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
@@ -177,9 +163,7 @@ double towline_write_thrusts(const towline_robot *robot, const towline_controlle
         double wrench[6], *actuation = flight.actuation + most * c;
         memcpy(ordered[c], it.memory->ordered, sizeof ordered[c]);
         if (body->actuators > 0) {
-            if (measured) {
-                observe_carrier(&it, dt, flight.cables, actuation);
-            }
+            if (measured) { observe_carrier(&it, dt, flight.cables, actuation); }
             const double across = wrench_of_carrier(&it, flight.tensions, wrench);
             command(&it, dt, wrench, across, actuation);
             lacking = fmax(lacking, it.memory->lacking); /* not a number that is none */

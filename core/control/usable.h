@@ -8,18 +8,14 @@
 INLINE int are_numbers(const double *x, int count) {
     const double largest = 1e9; /* [m, rad, m/s, rad/s, N]: squares of larger ones would become infinite */
     int yes = 1;
-    for (int i = 0; i < count; i++) {
-        yes &= fabs(x[i]) <= largest; /* no for nan */
-    }
+    for (int i = 0; i < count; i++) { yes &= fabs(x[i]) <= largest; /* no for nan */ }
     return yes;
 }
 
 /* Of motions (1 + c, 12) and tensions. */
 INLINE int is_measured(const towline_robot *robot, const double *motions, const towline_cable_memory *cables) {
     int yes = are_numbers(motions, MOTION * (1 + robot->carriers));
-    for (int i = 0; i < robot->cables; i++) {
-        yes &= are_numbers(&cables[i].measured, 1);
-    }
+    for (int i = 0; i < robot->cables; i++) { yes &= are_numbers(&cables[i].measured, 1); }
     return yes;
 }
 

@@ -7,49 +7,33 @@
  */
 static void write_direction(form *f, int worst, real side, real *d) {
     const int rank = f->rank;
-    for (int j = 0; j < rank && worst < 0; j++) {
-        reflect(f, j, f->push);
-    }
-    for (int i = 0; i < f->n; i++) {
-        d[i] = 0;
-    }
+    for (int j = 0; j < rank && worst < 0; j++) { reflect(f, j, f->push); }
+    for (int i = 0; i < f->n; i++) { d[i] = 0; }
     for (int j = rank - 1; j >= 0; j--) {
         real x = worst < 0 ? f->push[j] : -side * f->L[worst * ROWS + j];
-        for (int i = j + 1; i < rank; i++) {
-            x -= f->L[i * ROWS + j] * d[f->order[i]];
-        }
+        for (int i = j + 1; i < rank; i++) { x -= f->L[i * ROWS + j] * d[f->order[i]]; }
         d[f->order[j]] = x / f->L[j * ROWS + j];
     }
-    if (worst >= 0) {
-        d[f->order[worst]] = side;
-    }
+    if (worst >= 0) { d[f->order[worst]] = side; }
 }
 
 /* Return the largest singular value of B, that of L, to a percent or so, by 20 steps of the power method. */
 static real largest_singular_value(const form *f) {
     real x[ROWS], y[ROWS], size = 0;
-    for (int j = 0; j < f->rank; j++) {
-        x[j] = 1;
-    }
+    for (int j = 0; j < f->rank; j++) { x[j] = 1; }
     for (int t = 0; t < 20; t++) {
         real square = 0;
         for (int j = 0; j < f->n; j++) { /* y = L x */
             y[j] = 0;
-            for (int i = 0; i <= j && i < f->rank; i++) {
-                y[j] += f->L[j * ROWS + i] * x[i];
-            }
+            for (int i = 0; i <= j && i < f->rank; i++) { y[j] += f->L[j * ROWS + i] * x[i]; }
         }
         for (int i = 0; i < f->rank; i++) { /* x = L^T y */
             x[i] = 0;
-            for (int j = i; j < f->n; j++) {
-                x[i] += f->L[j * ROWS + i] * y[j];
-            }
+            for (int j = i; j < f->n; j++) { x[i] += f->L[j * ROWS + i] * y[j]; }
             square += x[i] * x[i];
         }
         size = root(square);
-        for (int i = 0; i < f->rank; i++) {
-            x[i] /= size;
-        }
+        for (int i = 0; i < f->rank; i++) { x[i] /= size; }
     }
     return root(size);
 }
@@ -62,9 +46,7 @@ static int is_small_but_not_zero(const form *f, int worst, const real *direction
     const real *left = f->B + worst * f->width;
     const real pull = dot(left, left, f->width);
     real square = 0;
-    for (int i = 0; i < f->n; i++) {
-        square += direction[i] * direction[i];
-    }
+    for (int i = 0; i < f->n; i++) { square += direction[i] * direction[i]; }
     return f->rank > 0 && root(pull / square) > RANK * largest_singular_value(f);
 }
 
@@ -76,19 +58,13 @@ static towline_status prove_outside(form *f, const towline_problem *problem, con
                                     real missing, towline_answer *answer) {
     write_direction(f, worst, missing > 0 ? (real)1 : (real)-1, answer->direction);
     const towline_status proven = towline_proves_infeasible(f, problem, known, answer);
-    if (proven != TOWLINE_INFEASIBLE || f->columns == problem->m) {
-        return proven;
-    }
+    if (proven != TOWLINE_INFEASIBLE || f->columns == problem->m) { return proven; }
     const real support = answer->support, shortfall = answer->shortfall;
     real direction[ROWS];
-    for (int i = 0; i < f->n; i++) {
-        direction[i] = answer->direction[i];
-    }
+    for (int i = 0; i < f->n; i++) { direction[i] = answer->direction[i]; }
     towline_standard_form(f, problem, 0, 1);
     f->rank = towline_reduce(f, 1);
-    if (f->rank < 0) {
-        return TOWLINE_INACCURATE;
-    }
+    if (f->rank < 0) { return TOWLINE_INACCURATE; }
     towline_least_norm(f, &worst, &missing);
     if (magnitude(missing) > OUTSIDE * known->required) {
         write_direction(f, worst, missing > 0 ? (real)1 : (real)-1, answer->direction);
@@ -97,9 +73,7 @@ static towline_status prove_outside(form *f, const towline_problem *problem, con
     }
     answer->support = support;
     answer->shortfall = shortfall;
-    for (int i = 0; i < f->n; i++) {
-        answer->direction[i] = direction[i];
-    }
+    for (int i = 0; i < f->n; i++) { answer->direction[i] = direction[i]; }
     return TOWLINE_INFEASIBLE;
 }
 

@@ -32,9 +32,7 @@ typedef struct {
 /* Rotate two rows of the basis such that entry i of the second one vanishes; return 0 if that of both does. */
 static int rotate(real *restrict x, real *restrict y, int i, int width) {
     const real length = root(x[i] * x[i] + y[i] * y[i]);
-    if (length == 0) {
-        return 0;
-    }
+    if (length == 0) { return 0; }
     const real cosine = x[i] / length, sine = y[i] / length;
     for (int e = 0; e < width; e += 4) { /* as in `dot` */
         const real a = x[e], b = x[e + 1], c = x[e + 2], d = x[e + 3];
@@ -58,9 +56,7 @@ static int drop(form *f, active_set *set, int leaving) {
     for (int j = leaving; j < set->count; j++) { /* rotate the entry below the diagonal away */
         set->active[j] = set->active[j + 1];
         set->multiplier[j] = set->multiplier[j + 1];
-        if (!rotate(f->basis + j * width, f->basis + (j + 1) * width, set->active[j], width)) {
-            return 0;
-        }
+        if (!rotate(f->basis + j * width, f->basis + (j + 1) * width, set->active[j], width)) { return 0; }
     }
     return 1;
 }
@@ -88,12 +84,8 @@ static outcome enter(form *f, active_set *set, int p, real side) {
         real r[CABLES], beyond = 0, least = 1;
         real *along = f->basis + set->count * width; /* what of n_p the active normals do not span, once rotated */
         f->inner++;
-        for (int c = set->count + 1; c < k; c++) {
-            rotate(along, f->basis + c * width, p, width);
-        }
-        if (set->count < k) {
-            beyond = along[p] * along[p];
-        }
+        for (int c = set->count + 1; c < k; c++) { rotate(along, f->basis + c * width, p, width); }
+        if (set->count < k) { beyond = along[p] * along[p]; }
         for (int j = set->count - 1; j >= 0; j--) { /* of normals times their sides */
             const real *row = f->basis + j * width;
             real total = side * row[p];
@@ -115,9 +107,7 @@ static outcome enter(form *f, active_set *set, int p, real side) {
         const int independent = beyond > rounding * rounding;
         if (!independent && leaving < 0) {
             f->push[p] = -side;
-            for (int j = 0; j < set->count; j++) {
-                f->push[set->active[j]] = set->side[set->active[j]] * r[j];
-            }
+            for (int j = 0; j < set->count; j++) { f->push[set->active[j]] = set->side[set->active[j]] * r[j]; }
             return EXCLUDED;
         }
         int full = 0;
@@ -129,9 +119,7 @@ static outcome enter(form *f, active_set *set, int p, real side) {
             }
             add_to(f->s, length * side * along[p], along, width);
         }
-        for (int j = 0; j < set->count; j++) {
-            set->multiplier[j] -= length * r[j];
-        }
+        for (int j = 0; j < set->count; j++) { set->multiplier[j] -= length * r[j]; }
         own += length;
         if (full) {
             set->active[set->count] = p;
@@ -140,18 +128,14 @@ static outcome enter(form *f, active_set *set, int p, real side) {
             set->count++;
             return REACHED;
         }
-        if (!drop(f, set, leaving)) {
-            return DOUBTFUL;
-        }
+        if (!drop(f, set, leaving)) { return DOUBTFUL; }
     }
 }
 
 outcome towline_dual_active_set(form *f) {
     active_set set;
     set.count = 0;
-    for (int i = 0; i < f->cables; i++) {
-        set.side[i] = 0;
-    }
+    for (int i = 0; i < f->cables; i++) { set.side[i] = 0; }
     for (int t = 0; t < STEPS(f->columns); t++) {
         real side = 0;
         const int p = most_violated(f, &set, &side);
@@ -164,9 +148,7 @@ outcome towline_dual_active_set(form *f) {
         }
         f->steps++;
         const outcome entered = enter(f, &set, p, side);
-        if (entered != REACHED) {
-            return entered;
-        }
+        if (entered != REACHED) { return entered; }
     }
     return DOUBTFUL;
 }

@@ -21,18 +21,14 @@ static real sensitivity(const form *f, const int *active, const real *side, int 
     for (int j = 0; j < count; j++) {
         real *own = Q + j * width;
         x[j] = side[active[j]];
-        for (int e = 0; e < width; e++) {
-            own[e] = e < k ? f->basis[e * f->width + active[j]] : 0;
-        }
+        for (int e = 0; e < width; e++) { own[e] = e < k ? f->basis[e * f->width + active[j]] : 0; }
         for (int i = 0; i < j; i++) {
             const real along = dot(Q + i * width, own, width);
             add_to(own, -along, Q + i * width, width);
             x[j] -= along * x[i];
         }
         const real length = root(dot(own, own, width));
-        for (int e = 0; e < k; e++) {
-            own[e] /= length;
-        }
+        for (int e = 0; e < k; e++) { own[e] /= length; }
         x[j] /= length;
         square += x[j] * x[j];
     }
@@ -48,14 +44,10 @@ int towline_proves_optimum(const form *f, const int *active, const real *side, c
     const real square = dot(f->s, f->s, f->width), size = root(square);
     for (int j = 0; j < count; j++) {
         const int i = active[j];
-        if (!(multiplier[j] >= -STATIONARY * size)) {
-            return 0;
-        }
+        if (!(multiplier[j] >= -STATIONARY * size)) { return 0; }
         /* Rounding moves a limit relative to the limit itself, at most by the slack. */
         const real moved = smaller(f->slack, SLACK * larger(magnitude(f->low[i]), magnitude(f->high[i])));
-        if (multiplier[j] * moved > DECISIVE * square) {
-            return 0;
-        }
+        if (multiplier[j] * moved > DECISIVE * square) { return 0; }
     }
     if (MARGINS && f->margin > 0 &&
         !(f->margin * sensitivity(f, active, side, count) <= ACCURACY * scale_of_tensions(f))) {
@@ -64,12 +56,8 @@ int towline_proves_optimum(const form *f, const int *active, const real *side, c
     for (int e = 0; e < f->k; e++) {
         const real *row = f->basis + e * f->width;
         real rest = dot(row, f->s, f->width);
-        for (int j = 0; j < count; j++) {
-            rest -= multiplier[j] * side[active[j]] * row[active[j]];
-        }
-        if (!(magnitude(rest) <= STATIONARY * size)) {
-            return 0;
-        }
+        for (int j = 0; j < count; j++) { rest -= multiplier[j] * side[active[j]] * row[active[j]]; }
+        if (!(magnitude(rest) <= STATIONARY * size)) { return 0; }
     }
     return 1;
 }
@@ -83,9 +71,7 @@ measure towline_measure(const form *f, const towline_problem *problem, const rea
     }
     known.required = root(known.required);
     real squares[CABLES]; /* of the columns of S A */
-    for (int c = 0; c < problem->m; c++) {
-        squares[c] = 0;
-    }
+    for (int c = 0; c < problem->m; c++) { squares[c] = 0; }
     for (int i = 0; i < problem->n; i++) {
         for (int c = 0; c < problem->m; c++) {
             const real x = problem->A[i * problem->m + c] * f->scale[i];
@@ -124,20 +110,12 @@ real towline_correction(const form *f, const towline_problem *problem, const rea
         }
         real bound = ((exact ? magnitude(error) : 0) + UNIT_ROUNDOFF * rounded) * f->scale[f->order[j]];
         if (j >= f->rank) {
-            for (int i = 0; i < f->rank; i++) {
-                bound += magnitude(row[i]);
-            }
-            for (int i = 0; i < f->columns; i++) {
-                bound += magnitude(f->B[j * f->width + i]);
-            }
-            if (bound > 0) {
-                return (real)INFINITY;
-            }
+            for (int i = 0; i < f->rank; i++) { bound += magnitude(row[i]); }
+            for (int i = 0; i < f->columns; i++) { bound += magnitude(f->B[j * f->width + i]); }
+            if (bound > 0) { return (real)INFINITY; }
             continue;
         }
-        for (int i = 0; i < j; i++) {
-            bound += magnitude(row[i]) * y[i];
-        }
+        for (int i = 0; i < j; i++) { bound += magnitude(row[i]) * y[i]; }
         y[j] = bound / magnitude(row[j]);
         square += y[j] * y[j];
     }
@@ -152,9 +130,7 @@ int towline_proves_feasible(const form *f, const towline_problem *problem, const
     const real change = towline_correction(f, problem, t, 1);
     for (int c = 0; c < f->columns; c++) {
         const int i = f->moving[c];
-        if (!(smaller(t[i] - problem->t_min[i], problem->t_max[i] - t[i]) >= change * f->unit[c])) {
-            return 0;
-        }
+        if (!(smaller(t[i] - problem->t_min[i], problem->t_max[i] - t[i]) >= change * f->unit[c])) { return 0; }
     }
     return change <= ACCURACY * scale_of_tensions(f);
 }
@@ -162,12 +138,8 @@ int towline_proves_feasible(const form *f, const towline_problem *problem, const
 /* x -= (v . x) v */
 static void take_away(real *x, const real *v, int n) {
     real along = 0;
-    for (int i = 0; i < n; i++) {
-        along += v[i] * x[i];
-    }
-    for (int i = 0; i < n; i++) {
-        x[i] -= along * v[i];
-    }
+    for (int i = 0; i < n; i++) { along += v[i] * x[i]; }
+    for (int i = 0; i < n; i++) { x[i] -= along * v[i]; }
 }
 
 /*
@@ -188,29 +160,15 @@ static void turn_away(const form *f, const towline_problem *problem, real *d) {
             square += v[i] * v[i];
         }
         const int limited = magnitude(problem->t_min[c]) <= LARGEST && magnitude(problem->t_max[c]) <= LARGEST;
-        if (limited || !(magnitude(pull) <= NEGLIGIBLE * root(square))) {
-            continue;
-        }
-        for (int j = 0; j < count; j++) {
-            take_away(v, basis[j], n);
-        }
-        for (int i = 0; i < n; i++) {
-            left += v[i] * v[i];
-        }
-        if (left <= DEPENDENT * DEPENDENT * square) {
-            continue;
-        }
-        if (!(left > RANK * square)) {
-            return;
-        }
-        for (int i = 0; i < n; i++) {
-            v[i] /= root(left);
-        }
+        if (limited || !(magnitude(pull) <= NEGLIGIBLE * root(square))) { continue; }
+        for (int j = 0; j < count; j++) { take_away(v, basis[j], n); }
+        for (int i = 0; i < n; i++) { left += v[i] * v[i]; }
+        if (left <= DEPENDENT * DEPENDENT * square) { continue; }
+        if (!(left > RANK * square)) { return; }
+        for (int i = 0; i < n; i++) { v[i] /= root(left); }
         count++;
     }
-    for (int j = 0; j < count; j++) {
-        take_away(d, basis[j], n);
-    }
+    for (int j = 0; j < count; j++) { take_away(d, basis[j], n); }
 }
 
 /*
@@ -228,16 +186,10 @@ towline_status towline_proves_infeasible(const form *f, const towline_problem *p
     real demand = 0, support = 0, rounding = known->rounding;
     towline_status status = TOWLINE_SINGULAR;
     real square = 0;
-    for (int i = 0; i < n; i++) {
-        square += d[i] * d[i];
-    }
-    if (!(0 < square && square < (real)INFINITY)) {
-        return TOWLINE_INACCURATE;
-    }
+    for (int i = 0; i < n; i++) { square += d[i] * d[i]; }
+    if (!(0 < square && square < (real)INFINITY)) { return TOWLINE_INACCURATE; }
     const real per_length = 1 / root(square);
-    for (int i = 0; i < n; i++) {
-        d[i] *= per_length;
-    }
+    for (int i = 0; i < n; i++) { d[i] *= per_length; }
     turn_away(f, problem, d);
     for (int i = 0; i < n; i++) {
         d[i] *= f->scale[i];
@@ -253,9 +205,7 @@ towline_status towline_proves_infeasible(const form *f, const towline_problem *p
         }
         norm = root(norm);
         const real limit = pull > 0 ? problem->t_max[c] : problem->t_min[c];
-        if (magnitude(pull) > NEGLIGIBLE * norm) {
-            status = TOWLINE_INFEASIBLE;
-        }
+        if (magnitude(pull) > NEGLIGIBLE * norm) { status = TOWLINE_INFEASIBLE; }
         if (magnitude(limit) <= LARGEST) { /* what it gives is known, and counts at any size */
             support += pull * limit;
             rounding += REACH_OF_PULL * magnitude(pull * limit) + REACH_OF_TERMS * terms * magnitude(limit);

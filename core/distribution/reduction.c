@@ -54,12 +54,8 @@ int towline_reduce(form *f, int cut) {
         swap_rows(f, j, best); /* also a row with itself: no processor can predict that */
         squares[best] = squares[j];
         const real length = root(dot(v, v, width)), first = j > 0 ? magnitude(f->L[0]) : length;
-        if (length == 0) {
-            return j;
-        }
-        if (cut && length <= SURE_PIVOT * first) {
-            return length <= SMALL_PIVOT * first ? j : -1;
-        }
+        if (length == 0) { return j; }
+        if (cut && length <= SURE_PIVOT * first) { return length <= SMALL_PIVOT * first ? j : -1; }
         const real head = v[j], pivot = (real)(1 - 2 * (head > 0)) * length;
         f->L[j * ROWS + j] = pivot;
         v[j] = head - pivot;
@@ -82,17 +78,11 @@ int towline_reduce(form *f, int cut) {
 void towline_turn_back(form *f, real *s, int dimensions) {
     for (int e = 0; e < dimensions; e++) {
         real *row = f->basis + e * f->width;
-        for (int c = 0; c < f->width; c++) {
-            row[c] = 0;
-        }
+        for (int c = 0; c < f->width; c++) { row[c] = 0; }
         row[f->rank + e] = 1;
     }
     for (int j = f->rank - 1; j >= 0; j--) {
-        if (s) {
-            reflect(f, j, s);
-        }
-        for (int e = 0; e < dimensions; e++) {
-            reflect(f, j, f->basis + e * f->width);
-        }
+        if (s) { reflect(f, j, s); }
+        for (int e = 0; e < dimensions; e++) { reflect(f, j, f->basis + e * f->width); }
     }
 }

@@ -50,12 +50,8 @@ outcome towline_slabs(form *f) {
     real multiplier[2] = {0, 0};
     real rests[2] = {0, 0}; /* and at which limit */
     int count = 0;
-    for (int i = 0; i < cables; i++) {
-        side[i] = 0;
-    }
-    for (int i = f->k * f->width; i < 2 * f->width; i++) {
-        f->basis[i] = 0;
-    }
+    for (int i = 0; i < cables; i++) { side[i] = 0; }
+    for (int i = f->k * f->width; i < 2 * f->width; i++) { f->basis[i] = 0; }
     for (int t = 0; t <= cables; t++) {
         int worst = -1;
         real most = f->slack;
@@ -65,9 +61,7 @@ outcome towline_slabs(form *f) {
             worst = violation > most ? i : worst; /* nothing branches, as in `largest` of reduction.c */
             most = larger(violation, most);
         }
-        if (worst < 0) {
-            break;
-        }
+        if (worst < 0) { break; }
         f->steps++;
         const real a[2] = {normal[0][worst], normal[1][worst]};
         const real square = a[0] * a[0] + a[1] * a[1];
@@ -100,9 +94,7 @@ outcome towline_slabs(form *f) {
             start = from.x > start.x ? from : start;
             stop = to.x < stop.x ? to : stop;
         }
-        if (start.x - stop.x > f->slack) {
-            return exclude(f, worst, a, square, &start, &stop);
-        }
+        if (start.x - stop.x > f->slack) { return exclude(f, worst, a, square, &start, &stop); }
         const real x = start.x > stop.x ? (start.x + stop.x) / 2 : between(start.x, 0, stop.x);
         z[0] = base[0] + x * along[0];
         z[1] = base[1] + x * along[1];
@@ -125,9 +117,7 @@ outcome towline_slabs(form *f) {
         multiplier[0] = pull * side[worst];
         rests[0] = side[worst];
     }
-    for (int i = 0; i < f->columns; i++) {
-        f->s[i] += normal[0][i] * z[0] + normal[1][i] * z[1];
-    }
+    for (int i = 0; i < f->columns; i++) { f->s[i] += normal[0][i] * z[0] + normal[1][i] * z[1]; }
     for (int j = 0; j < count; j++) {
         const int i = active[j];
         side[i] = rests[j];

@@ -4,9 +4,7 @@
 /* Whether a cable adds to the wrench at all: one that does not stays at its reference, and is not chosen. */
 static int pulls(const towline_problem *problem, int c) {
     for (int i = 0; i < problem->n; i++) {
-        if (problem->A[i * problem->m + c] != 0) {
-            return 1;
-        }
+        if (problem->A[i * problem->m + c] != 0) { return 1; }
     }
     return 0;
 }
@@ -19,9 +17,7 @@ real towline_standard_form(form *f, const towline_problem *problem, real rho, in
     const int n = problem->n, m = problem->m;
     real t[CABLES]; /* at s = 0 */
     real heaviest = 0, size = 0;
-    for (int c = 0; c < m; c++) {
-        heaviest = larger(heaviest, weight(problem, c));
-    }
+    for (int c = 0; c < m; c++) { heaviest = larger(heaviest, weight(problem, c)); }
     f->n = n;
     f->columns = 0;
     for (int c = 0; c < m; c++) {
@@ -52,28 +48,18 @@ real towline_standard_form(form *f, const towline_problem *problem, real rho, in
         const real scale = problem->n == 6 && i >= 3 ? per_length : 1;
         const real *own = problem->A + i * m;
         real rest = problem->w[i];
-        for (int c = 0; c < m; c++) {
-            rest -= own[c] * t[c];
-        }
+        for (int c = 0; c < m; c++) { rest -= own[c] * t[c]; }
         f->scale[i] = scale;
         f->b[i] = rest * scale;
         real *row = f->B + i * f->width;
         if (f->cables == m) { /* all cables, in their order: several entries at once */
-            for (int c = 0; c < m; c++) {
-                row[c] = own[c] * scale * f->unit[c];
-            }
+            for (int c = 0; c < m; c++) { row[c] = own[c] * scale * f->unit[c]; }
         } else {
-            for (int c = 0; c < f->cables; c++) {
-                row[c] = own[f->moving[c]] * scale * f->unit[c];
-            }
+            for (int c = 0; c < f->cables; c++) { row[c] = own[f->moving[c]] * scale * f->unit[c]; }
         }
-        for (int c = f->cables; c < f->width; c++) {
-            row[c] = c == f->cables + i && c < f->columns ? f->unit[c] : 0;
-        }
+        for (int c = f->cables; c < f->width; c++) { row[c] = c == f->cables + i && c < f->columns ? f->unit[c] : 0; }
     }
-    for (int c = 0; c < FILLED(f->cables); c++) {
-        f->push[c] = 0;
-    }
+    for (int c = 0; c < FILLED(f->cables); c++) { f->push[c] = 0; }
     f->steps = f->inner = 0;
     f->margin = 0;
     return size;
@@ -91,9 +77,7 @@ real towline_least_norm(form *f, int *worst, real *missing) {
     for (int j = 0; j < f->n; j++) {
         const real *row = f->L + j * ROWS;
         real x = f->b[f->order[j]];
-        for (int i = 0; i < j && i < f->rank; i++) {
-            x -= row[i] * f->s[i];
-        }
+        for (int i = 0; i < j && i < f->rank; i++) { x -= row[i] * f->s[i]; }
         if (j < f->rank) {
             f->s[j] = x / row[j];
             square += f->s[j] * f->s[j];
@@ -102,9 +86,7 @@ real towline_least_norm(form *f, int *worst, real *missing) {
             *worst = j;
         }
     }
-    for (int c = f->rank; c < f->width; c++) {
-        f->s[c] = 0;
-    }
+    for (int c = f->rank; c < f->width; c++) { f->s[c] = 0; }
     towline_turn_back(f, f->s, f->k <= 2 ? f->k : 0);
     return root(square);
 }
@@ -118,9 +100,7 @@ outcome towline_enter_limits(form *f) {
     for (int c = 0; c < f->cables; c++) {
         outside |= (f->s[c] < f->low[c] - f->slack) | (f->s[c] > f->high[c] + f->slack);
     }
-    if (!outside) {
-        return REACHED;
-    }
+    if (!outside) { return REACHED; }
     if (f->k <= 2) { /* of so few dimensions there is a basis already */
         return towline_slabs(f);
     }

@@ -52,25 +52,16 @@ static int are_below_largest(const real *x, int count) {
         c += x[i + 2] * x[i + 2];
         d += x[i + 3] * x[i + 3];
     }
-    for (; i < count; i++) {
-        a += x[i] * x[i];
-    }
-    if ((a + b) + (c + d) < LARGEST * LARGEST) {
-        return 1;
-    }
-    for (i = 0; i < count && magnitude(x[i]) < LARGEST; i++) {
-    }
+    for (; i < count; i++) { a += x[i] * x[i]; }
+    if ((a + b) + (c + d) < LARGEST * LARGEST) { return 1; }
+    for (i = 0; i < count && magnitude(x[i]) < LARGEST; i++) {}
     return i == count;
 }
 
 static int is_valid(const towline_problem *problem) {
     const int n = problem->n, m = problem->m;
-    if (n < 1 || n > TOWLINE_ROWS || m < 1 || m > TOWLINE_CABLES) {
-        return 0;
-    }
-    if (!(problem->length >= 1 / HEAVIEST && problem->length <= HEAVIEST)) {
-        return 0;
-    }
+    if (n < 1 || n > TOWLINE_ROWS || m < 1 || m > TOWLINE_CABLES) { return 0; }
+    if (!(problem->length >= 1 / HEAVIEST && problem->length <= HEAVIEST)) { return 0; }
     real heaviest = 0, lightest = HEAVIEST;
     int wrong = 0;
     for (int c = 0; c < m; c++) {
@@ -108,9 +99,7 @@ static int move_limits_inwards(form *f, const towline_problem *problem, real *t)
     for (int c = 0; c < f->cables; c++) {
         f->low[c] += f->margin;
         f->high[c] -= f->margin;
-        if (!(f->low[c] <= f->high[c])) {
-            return 0;
-        }
+        if (!(f->low[c] <= f->high[c])) { return 0; }
     }
     return 1;
 }
@@ -120,9 +109,7 @@ static real wrench_error(const form *f, const towline_problem *problem, const re
     real square = 0;
     for (int i = 0; i < problem->n; i++) {
         real error = -problem->w[i];
-        for (int c = 0; c < problem->m; c++) {
-            error += problem->A[i * problem->m + c] * t[c];
-        }
+        for (int c = 0; c < problem->m; c++) { error += problem->A[i * problem->m + c] * t[c]; }
         error *= f->scale[i];
         square += error * error;
     }
@@ -147,14 +134,10 @@ static void refine(form *f, const towline_problem *problem, real *t) {
     }
     for (int i = 0; i < problem->n; i++) {
         real rest = problem->w[i];
-        for (int c = 0; c < problem->m; c++) {
-            rest -= problem->A[i * problem->m + c] * t[c];
-        }
+        for (int c = 0; c < problem->m; c++) { rest -= problem->A[i * problem->m + c] * t[c]; }
         f->b[i] = rest * f->scale[i];
     }
-    if (!(towline_least_norm(f, &worst, &missing) <= STATIONARY * size)) {
-        return;
-    }
+    if (!(towline_least_norm(f, &worst, &missing) <= STATIONARY * size)) { return; }
     for (int i = 0; i < f->cables; i++) {
         const int c = f->moving[i];
         if (problem->t_min[c] < t[c] && t[c] < problem->t_max[c]) {
@@ -169,19 +152,13 @@ static towline_status solve_exactly(form *f, const towline_problem *problem, tow
     real missing, *t = answer->tensions;
     answer->soft = answer->soft_is_proven = answer->steps = answer->inner = 0;
     answer->residual = answer->support = answer->shortfall = 0;
-    if (!is_valid(problem)) {
-        return TOWLINE_INVALID;
-    }
+    if (!is_valid(problem)) { return TOWLINE_INVALID; }
     const real size = towline_standard_form(f, problem, 0, 0);
     f->rank = towline_reduce(f, 1);
-    if (f->rank < 0) {
-        return TOWLINE_INACCURATE;
-    }
+    if (f->rank < 0) { return TOWLINE_INACCURATE; }
     f->k = f->columns - f->rank;
     f->slack = SLACK * larger(size, towline_least_norm(f, &worst, &missing));
-    if (MARGINS && !move_limits_inwards(f, problem, t)) {
-        return TOWLINE_INACCURATE;
-    }
+    if (MARGINS && !move_limits_inwards(f, problem, t)) { return TOWLINE_INACCURATE; }
     const outcome met = towline_enter_limits(f);
     answer->steps = f->steps;
     answer->inner = f->inner;
@@ -228,9 +205,7 @@ static outcome solve_softly(form *f, const towline_problem *problem, real rho, t
 towline_status towline_solve_always(const towline_problem *problem, towline_real rho, towline_answer *answer) {
     form f;
     answer->status = solve_exactly(&f, problem, answer);
-    if (!is_in_range(rho)) {
-        answer->status = TOWLINE_INVALID;
-    }
+    if (!is_in_range(rho)) { answer->status = TOWLINE_INVALID; }
     if (answer->status != TOWLINE_OPTIMAL && answer->status != TOWLINE_INVALID) {
         solve_softly(&f, problem, rho, answer); /* without proof: these tensions are what there is */
     }
@@ -242,9 +217,7 @@ towline_status towline_solve_soft(const towline_problem *problem, towline_real r
     form f;
     answer->soft = answer->soft_is_proven = answer->steps = answer->inner = 0;
     answer->residual = answer->support = answer->shortfall = 0;
-    if (!is_valid(problem) || !is_in_range(rho)) {
-        return answer->status = TOWLINE_INVALID;
-    }
+    if (!is_valid(problem) || !is_in_range(rho)) { return answer->status = TOWLINE_INVALID; }
     answer->soft_is_proven = solve_softly(&f, problem, rho, answer) == REACHED;
     const measure known = towline_measure(&f, problem, answer->tensions);
     if (answer->residual <= FEASIBILITY * known.required + ROUNDING * known.rounding) {
@@ -254,9 +227,7 @@ towline_status towline_solve_soft(const towline_problem *problem, towline_real r
         answer->direction[i] = f.s[f.cables + i];
     }
     answer->status = towline_proves_infeasible(&f, problem, &known, answer);
-    if (answer->status == TOWLINE_SINGULAR) {
-        answer->status = TOWLINE_INACCURATE;
-    }
+    if (answer->status == TOWLINE_SINGULAR) { answer->status = TOWLINE_INACCURATE; }
     return answer->status;
 }
 #endif

@@ -38,9 +38,7 @@ void horizon_reduce(const towline_horizon *h) {
             reduced[i] += product->upper[at] / t->upper[at] - product->lower[at] / t->lower[at];
         }
     }
-    if (h->p > 0) {
-        reduce_rows(h);
-    }
+    if (h->p > 0) { reduce_rows(h); }
 }
 
 static void expand_bounds(const towline_horizon *h) {
@@ -78,7 +76,5 @@ static void expand_rows(const towline_horizon *h) {
 
 void horizon_expand(const towline_horizon *h) {
     expand_bounds(h);
-    if (h->p > 0) {
-        expand_rows(h);
-    }
+    if (h->p > 0) { expand_rows(h); }
 }

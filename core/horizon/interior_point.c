@@ -24,9 +24,7 @@ static double product_ahead(const towline_horizon *h, int i, double length) {
 static double total_ahead(const towline_horizon *h, double length) {
     double sum[4] = {0, 0, 0, 0};
     for (int i = 0; i < h->pairs; i += 4) {
-        for (int j = 0; j < 4; j++) {
-            sum[j] += h->exists.lower[i + j] * product_ahead(h, i + j, length);
-        }
+        for (int j = 0; j < 4; j++) { sum[j] += h->exists.lower[i + j] * product_ahead(h, i + j, length); }
     }
     return (sum[0] + sum[2]) + (sum[1] + sum[3]);
 }
@@ -54,9 +52,7 @@ static double step_length(const towline_horizon *h) {
     const double *value = h->at.slack.lower, *change = h->step.slack.lower; /* multipliers follow slacks */
     double worst[4] = {1e-3, 1e-3, 1e-3, 1e-3};
     for (int i = 0; i < 2 * h->pairs; i += 4) {
-        for (int j = 0; j < 4; j++) {
-            worst[j] = larger(-change[i + j] / value[i + j], worst[j]);
-        }
+        for (int j = 0; j < 4; j++) { worst[j] = larger(-change[i + j] / value[i + j], worst[j]); }
     }
     return 1 / larger(larger(worst[0], worst[1]), larger(worst[2], worst[3]));
 }
@@ -72,9 +68,7 @@ static double central_step(const towline_horizon *h, double length, double pairs
             }
         }
         const double least = smaller(smaller(smallest[0], smallest[1]), smaller(smallest[2], smallest[3]));
-        if (least >= APART * total_ahead(h, length) / pairs) {
-            break;
-        }
+        if (least >= APART * total_ahead(h, length) / pairs) { break; }
         length *= 0.9;
     }
     return length;
@@ -84,12 +78,8 @@ static void move(const towline_horizon *h, double length) {
     horizon_write_costates(h);
     double *restrict at = h->at.z;
     const double *step = h->step.z;
-    for (int i = 0; i < h->size; i++) {
-        at[i] += length * step[i];
-    }
-    for (int i = 0; i < h->rows; i++) {
-        h->off[i] *= 1 - length;
-    }
+    for (int i = 0; i < h->size; i++) { at[i] += length * step[i]; }
+    for (int i = 0; i < h->rows; i++) { h->off[i] *= 1 - length; }
 }
 
 /* Replace the iterate by the next, by a step along the central path if `central`. */
@@ -121,9 +111,7 @@ static void iterate(const towline_horizon *h, double pairs, int central) {
 static void begin(const towline_horizon *h, towline_beginning beginning) {
     towline_residuals unused;
     double error = INFINITY;
-    if (beginning == TOWLINE_SHIFTED) {
-        horizon_shift(h);
-    }
+    if (beginning == TOWLINE_SHIFTED) { horizon_shift(h); }
     if (beginning != TOWLINE_COLD) {
         horizon_begin(h, 1);
         error = horizon_measure(h, &unused);
@@ -148,9 +136,7 @@ static void finish_multipliers(const towline_horizon *h) {
 /* Return whether the trajectory of the controls, which is what matters, is as good; else restore the iterate. */
 static int rounds_off(const towline_horizon *h, double tolerance, towline_residuals *residuals) {
     horizon_roll_out(h);
-    if (horizon_measure(h, residuals) <= tolerance) {
-        return 1;
-    }
+    if (horizon_measure(h, residuals) <= tolerance) { return 1; }
     copy(h->at.z, h->best.z, h->size);
     horizon_measure(h, residuals);
     return 0;
@@ -192,9 +178,7 @@ towline_horizon_result towline_solve_horizon(const towline_horizon *h, towline_b
     }
     result.iterations = count;
     if (!result.converged) {
-        if (best < INFINITY) {
-            restore_best(h);
-        }
+        if (best < INFINITY) { restore_best(h); }
         horizon_roll_out(h);
         horizon_measure(h, &result.residuals);
     }

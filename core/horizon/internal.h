@@ -34,15 +34,11 @@ static inline matrix cost_to_go(const towline_horizon *h, int k) {
 }
 
 static inline void set(double *numbers, int count, double value) {
-    for (int i = 0; i < count; i++) {
-        numbers[i] = value;
-    }
+    for (int i = 0; i < count; i++) { numbers[i] = value; }
 }
 
 static inline void copy(double *to, const double *from, int count) {
-    for (int i = 0; i < count; i++) {
-        to[i] = from[i];
-    }
+    for (int i = 0; i < count; i++) { to[i] = from[i]; }
 }
 
 /* The larger, or the second where one of them is no number. */

@@ -6,15 +6,11 @@ static void add(const towline_horizon *h, double *numbers, matrix x, const doubl
     double *moved = h->work + h->wp;
     set(moved, x.rows, 0);
     h->algebra->add_product(moved, x, z);
-    for (int i = 0; i < x.rows; i++) {
-        numbers[i] += sign * moved[i];
-    }
+    for (int i = 0; i < x.rows; i++) { numbers[i] += sign * moved[i]; }
 }
 
 static void subtract(double *numbers, const double *others, int count) {
-    for (int i = 0; i < count; i++) {
-        numbers[i] -= others[i];
-    }
+    for (int i = 0; i < count; i++) { numbers[i] -= others[i]; }
 }
 
 void towline_horizon_relative_to(const towline_horizon *h, const double *states, const double *controls) {

@@ -94,9 +94,7 @@ static void measure_rows(const towline_horizon *h, int k) {
 static int are_finite(const double *numbers, int count) {
     double sum[4] = {0, 0, 0, 0};
     for (int i = 0; i < count; i += 4) {
-        for (int j = 0; j < 4; j++) {
-            sum[j] += 0 * numbers[i + j];
-        }
+        for (int j = 0; j < 4; j++) { sum[j] += 0 * numbers[i + j]; }
     }
     return sum[0] + sum[1] + sum[2] + sum[3] == 0;
 }
@@ -106,17 +104,13 @@ static double largest_ratio(const double *error, const double *scale, int count)
     double so_far = 0;
     for (int i = 0; i < count; i++) {
         const double ratio = error[i] / scale[i];
-        if (!(ratio <= so_far)) {
-            so_far = ratio > so_far ? ratio : INFINITY;
-        }
+        if (!(ratio <= so_far)) { so_far = ratio > so_far ? ratio : INFINITY; }
     }
     return so_far;
 }
 
 static void add_floor(double *scale, int count) {
-    for (int i = 0; i < count; i++) {
-        scale[i] += FLOOR;
-    }
+    for (int i = 0; i < count; i++) { scale[i] += FLOOR; }
 }
 
 /* Finish the scales. That of a control has its range, but no more of it than an unlimited control would use. */
@@ -132,9 +126,7 @@ static void finish_scales(const towline_horizon *h) {
         scale->control[i] += used + FLOOR;
         h->worst.control[i] /= scale->gradient[i];
     }
-    for (int i = 0; i < h->p; i++) {
-        h->worst.row[i] /= scale->force[i];
-    }
+    for (int i = 0; i < h->p; i++) { h->worst.row[i] /= scale->force[i]; }
 }
 
 static void clear(const towline_horizon *h, const towline_extremes *extremes) {
@@ -149,15 +141,11 @@ double horizon_measure(const towline_horizon *h, towline_residuals *residuals) {
     const towline_extremes *worst = &h->worst, *scale = &h->scale;
     clear(h, worst);
     clear(h, scale);
-    for (int k = 0; k <= h->N; k++) {
-        measure_gradient(h, k);
-    }
+    for (int k = 0; k <= h->N; k++) { measure_gradient(h, k); }
     for (int k = 0; k < h->N; k++) {
         measure_controls(h, k);
         measure_dynamics(h, k);
-        if (h->p > 0) {
-            measure_rows(h, k);
-        }
+        if (h->p > 0) { measure_rows(h, k); }
     }
     if (!are_finite(h->gradient, (h->N + 1) * h->wp) || !are_finite(h->gap, (h->N + 1) * h->np) ||
         !are_finite(h->value, h->rows)) {

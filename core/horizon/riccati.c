@@ -18,9 +18,7 @@ static int width_of(const towline_horizon *h, int k) { return k > 0 ? h->w : h->
 
 static void copy_lower_from_upper(matrix a) {
     for (int i = 1; i < a.rows; i++) {
-        for (int j = 0; j < i; j++) {
-            *entry(a, i, j) = *entry(a, j, i);
-        }
+        for (int j = 0; j < i; j++) { *entry(a, i, j) = *entry(a, j, i); }
     }
 }
 
@@ -28,9 +26,7 @@ static void copy_lower_from_upper(matrix a) {
 static void add_soft_rows(const towline_horizon *h, int k, matrix M) {
     const matrix E = soft_rows_of(h, k, M.columns), EW = {h->EW, h->p, M.columns, h->wp};
     for (int j = 0; j < h->p; j++) {
-        for (int i = 0; i < h->wp; i++) {
-            *entry(EW, j, i) = h->steep[k * h->pp + j] * *entry(E, j, i);
-        }
+        for (int i = 0; i < h->wp; i++) { *entry(EW, j, i) = h->steep[k * h->pp + j] * *entry(E, j, i); }
     }
     const product weighted = {M, M, E, EW, 1.0, 1};
     h->algebra->multiply(&weighted);
@@ -50,9 +46,7 @@ static void add_bounds(const towline_horizon *h, int k, matrix M) {
 void horizon_factorise(const towline_horizon *h) {
     const int n = h->n, m = h->m;
     const matrix last = block(hessian_of(h, h->N, h->w), m, m, n, n), P_end = cost_to_go(h, h->N);
-    for (int i = 0; i < n; i++) {
-        copy(row_of(P_end, i), row_of(last, i), n);
-    }
+    for (int i = 0; i < n; i++) { copy(row_of(P_end, i), row_of(last, i), n); }
     copy_lower_from_upper(P_end);
     for (int k = h->N - 1; k >= 0; k--) {
         const int width = width_of(h, k);
@@ -61,9 +55,7 @@ void horizon_factorise(const towline_horizon *h) {
         const product PG = {T, NONE, cost_to_go(h, k + 1), G, 1.0, 0}, H_and_GPG = {M, H, G, T, 1.0, 1};
         h->algebra->multiply(&PG);
         h->algebra->multiply(&H_and_GPG);
-        if (h->p > 0) {
-            add_soft_rows(h, k, M);
-        }
+        if (h->p > 0) { add_soft_rows(h, k, M); }
         add_bounds(h, k, M);
         h->algebra->factorise(U, h->inverse + k * h->mp, M);
         if (k > 0) {
@@ -79,9 +71,7 @@ void horizon_solve_upper(const towline_horizon *h, int k, double *v, double *out
     const matrix U = factor_of(h, k, h->m);
     for (int i = h->m - 1; i >= 0; i--) {
         out[i] = -v[i] * h->inverse[k * h->mp + i];
-        for (int j = 0; j < i; j++) {
-            v[j] += *entry(U, j, i) * out[i];
-        }
+        for (int j = 0; j < i; j++) { v[j] += *entry(U, j, i) * out[i]; }
     }
 }
 
@@ -98,9 +88,7 @@ static void backward(const towline_horizon *h, int same_gap) {
             set(P_gap, h->np, 0);
             h->algebra->add_transposed_product(P_gap, cost_to_go(h, k + 1), h->gap + (k + 1) * h->np);
         }
-        for (int i = 0; i < n; i++) {
-            v[i] = P_gap[i] + h->P_vector[(k + 1) * h->np + i];
-        }
+        for (int i = 0; i < n; i++) { v[i] = P_gap[i] + h->P_vector[(k + 1) * h->np + i]; }
         h->algebra->add_transposed_product(gradient, dynamics_of(h, k, width), v);
         h->algebra->solve_lower(gradient, h->zeta + k * h->mp, U, h->inverse + k * h->mp);
         copy(h->P_vector + k * h->np, gradient + m, n);
@@ -116,9 +104,7 @@ static void forward(const towline_horizon *h) {
         double *z = h->step.z + k * h->wp, *x = z + h->wp + m;
         copy(v, h->zeta + k * h->mp, m);
         set(z, m, 0);
-        if (k > 0) {
-            h->algebra->add_product(v, factor_of(h, k, h->w), z);
-        }
+        if (k > 0) { h->algebra->add_product(v, factor_of(h, k, h->w), z); }
         horizon_solve_upper(h, k, v, z);
         copy(x, h->gap + (k + 1) * h->np, n);
         h->algebra->add_product(x, dynamics_of(h, k, h->w), z);

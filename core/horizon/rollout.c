@@ -9,9 +9,7 @@ static void write_controls(const towline_horizon *h, int k, double *off) {
     double *v = h->work, *u = h->at.z + k * h->wp;
     set(v, h->m, 0);
     set(off, h->m, 0);
-    if (k > 0) {
-        h->algebra->add_product(v, factor_of(h, k, h->w), off);
-    }
+    if (k > 0) { h->algebra->add_product(v, factor_of(h, k, h->w), off); }
     horizon_solve_upper(h, k, v, off);
     for (int i = 0; i < h->m; i++) {
         const double low = h->u_min[k * h->mp + i], high = h->u_max[k * h->mp + i];
@@ -19,9 +17,7 @@ static void write_controls(const towline_horizon *h, int k, double *off) {
         if (!(fabs(wanted) < TOWLINE_HUGE)) { /* no gains, after an iteration that failed */
             wanted = u[i];
         }
-        if (!(fabs(wanted) < TOWLINE_HUGE)) {
-            wanted = 0;
-        }
+        if (!(fabs(wanted) < TOWLINE_HUGE)) { wanted = 0; }
         wanted = wanted < low ? low : wanted;
         u[i] = wanted > high ? high : wanted;
     }

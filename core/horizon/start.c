@@ -27,9 +27,7 @@ static void fill_missing(const towline_horizon *h) {
     const double *exists = h->exists.lower;
     double *slack = h->at.slack.lower, *multiplier = h->at.multiplier.lower;
     for (int i = 0; i < h->pairs; i++) {
-        if (exists[i] == 0) {
-            slack[i] = multiplier[i] = 1;
-        }
+        if (exists[i] == 0) { slack[i] = multiplier[i] = 1; }
     }
 }
 
@@ -37,9 +35,7 @@ static void fill_missing(const towline_horizon *h) {
 static void mirror(const towline_horizon *h, int k) {
     const matrix H = hessian_of(h, k, h->w);
     for (int i = 0; i < h->m; i++) {
-        for (int j = h->m; j < h->w; j++) {
-            *entry(H, j, i) = *entry(H, i, j);
-        }
+        for (int j = h->m; j < h->w; j++) { *entry(H, j, i) = *entry(H, i, j); }
     }
 }
 
@@ -50,18 +46,12 @@ static void set_curvature(const towline_horizon *h) {
     set(h->curvature, m, 0);
     for (int k = 0; k < h->N; k++) {
         const matrix H = hessian_of(h, k, h->w), following = hessian_of(h, k + 1, h->w), B = dynamics_of(h, k, m);
-        for (int i = 0; i < m; i++) {
-            sum[i] = *entry(H, i, i);
-        }
+        for (int i = 0; i < m; i++) { sum[i] = *entry(H, i, i); }
         for (int j = 0; j < h->n; j++) {
             const double *b = row_of(B, j), Q = *entry(following, m + j, m + j);
-            for (int i = 0; i < m; i++) {
-                sum[i] += Q * (b[i] * b[i]);
-            }
+            for (int i = 0; i < m; i++) { sum[i] += Q * (b[i] * b[i]); }
         }
-        for (int i = 0; i < m; i++) {
-            h->curvature[i] = larger(sum[i], h->curvature[i]);
-        }
+        for (int i = 0; i < m; i++) { h->curvature[i] = larger(sum[i], h->curvature[i]); }
     }
 }
 
@@ -69,12 +59,8 @@ double horizon_set_limits(const towline_horizon *h) {
     double count = 2.0 * h->p * h->N;
     set(h->range, h->m, 0);
     for (int k = 0; k < h->N; k++) {
-        for (int i = 0; i < h->m; i++) {
-            count += set_bounds(h, k * h->mp + i, h->range + i);
-        }
-        for (int i = 0; i < h->p; i++) {
-            h->exists.row[k * h->pp + i] = h->exists.excess[k * h->pp + i] = 1;
-        }
+        for (int i = 0; i < h->m; i++) { count += set_bounds(h, k * h->mp + i, h->range + i); }
+        for (int i = 0; i < h->p; i++) { h->exists.row[k * h->pp + i] = h->exists.excess[k * h->pp + i] = 1; }
         mirror(h, k);
     }
     set_curvature(h);
@@ -106,9 +92,7 @@ static void push_inside(const towline_horizon *h, double margin) {
         for (int i = 0; i < h->m; i++) {
             const double low = h->low[k * h->mp + i], high = h->high[k * h->mp + i];
             double distance = margin > 0 ? margin * (high - low) : 0;
-            if (distance == INFINITY) {
-                distance = margin * larger(fabs(u[i]), 1);
-            }
+            if (distance == INFINITY) { distance = margin * larger(fabs(u[i]), 1); }
             u[i] = larger(smaller(u[i], high - distance), low + distance);
         }
     }
@@ -191,9 +175,7 @@ static void begin_pairs(const towline_horizon *h) {
             multiplier->lower[at] = larger(force[i], 0) + centre / slack->lower[at];
             multiplier->upper[at] = larger(-force[i], 0) + centre / slack->upper[at];
         }
-        for (int i = 0; i < h->p; i++) {
-            begin_row(h, k * h->pp + i, centre);
-        }
+        for (int i = 0; i < h->p; i++) { begin_row(h, k * h->pp + i, centre); }
     }
 }
 
@@ -206,9 +188,7 @@ void horizon_begin_cold(const towline_horizon *h) {
     horizon_reduce(h);
     horizon_substitute(h, 0);
     horizon_write_costates(h);
-    for (int i = 0; i < 2 * (h->N + 1) * h->wp; i++) {
-        h->at.z[i] += h->step.z[i];
-    }
+    for (int i = 0; i < 2 * (h->N + 1) * h->wp; i++) { h->at.z[i] += h->step.z[i]; }
     push_inside(h, 0.1);
     set(h->at.multiplier.lower, 2 * h->bounds, 0);
     horizon_measure(h, &unused);
@@ -244,15 +224,9 @@ static void push_row(const towline_horizon *h, double value, int i, int at, doub
 void horizon_begin_warm(const towline_horizon *h, double part) {
     for (int k = 0; k < h->N; k++) {
         double *z = h->at.z + k * h->wp, *value = h->work;
-        for (int i = 0; i < h->m; i++) {
-            push_control(h, z + i, i, k * h->mp + i, part);
-        }
-        for (int i = 0; i < h->p; i++) {
-            value[i] = -h->d[k * h->pp + i];
-        }
+        for (int i = 0; i < h->m; i++) { push_control(h, z + i, i, k * h->mp + i, part); }
+        for (int i = 0; i < h->p; i++) { value[i] = -h->d[k * h->pp + i]; }
         h->algebra->add_product(value, soft_rows_of(h, k, h->w), z);
-        for (int i = 0; i < h->p; i++) {
-            push_row(h, value[i], i, k * h->pp + i, part);
-        }
+        for (int i = 0; i < h->p; i++) { push_row(h, value[i], i, k * h->pp + i, part); }
     }
 }

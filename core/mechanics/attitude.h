@@ -27,9 +27,7 @@ INLINE attitude attitude_of(const num *angles) {
         cp * sr,
         cp * cr, /* */
     };
-    for (int i = 0; i < 9; i++) {
-        at.R[i] = R[i];
-    }
+    for (int i = 0; i < 9; i++) { at.R[i] = R[i]; }
     at.sin_roll = sr, at.cos_roll = cr, at.sin_pitch = sp, at.cos_pitch = cp;
     return at;
 }

@@ -18,9 +18,7 @@ INLINE num segment_distance(const num *p, const num *p_end, const num *q, const 
     num s = where(beside > 1e-14 * a * e, share((b * f - c * e) / beside), number(0));
     const num t = where(e > 0.0, share((b * s + f) / e), number(0));
     s = where(a > 0.0, share((b * t - c) / a), number(0));
-    for (int i = 0; i < 3; i++) {
-        gap[i] = between[i] + s * along[i] - t * across[i];
-    }
+    for (int i = 0; i < 3; i++) { gap[i] = between[i] + s * along[i] - t * across[i]; }
     return square_root(dot(gap, gap));
 }
 

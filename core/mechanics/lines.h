@@ -22,9 +22,7 @@ INLINE line straight_line(const num *d) {
     line run;
     run.length = square_root(dot(d, d));
     const num inverse = -1.0 / run.length;
-    for (int i = 0; i < 3; i++) {
-        run.pull[i] = d[i] * inverse;
-    }
+    for (int i = 0; i < 3; i++) { run.pull[i] = d[i] * inverse; }
     run.wrap = number(0);
     return run;
 }
@@ -45,9 +43,7 @@ INLINE line line_over_sheave(double r, const num *d, const num *k, int measured)
     const num sine = (straight * out + r * up) * inverse, cosine = (straight * up - r * out) * inverse;
     const num along = sine / distance;
     line run;
-    for (int i = 0; i < 3; i++) {
-        run.pull[i] = -(along * across[i] + cosine * k[i]);
-    }
+    for (int i = 0; i < 3; i++) { run.pull[i] = -(along * across[i] + cosine * k[i]); }
     run.wrap = number(0), run.length = straight;
     if (measured) {
         run.wrap = 3.14159265358979323846 - angle_of(straight, number(r)) - angle_of(up, out);
@@ -110,9 +106,7 @@ INLINE void turning_axes(const attitude *at, num axes[3][3]) {
         {number(0), at->cos_roll, -at->sin_roll},
         {-at->sin_pitch, at->sin_roll * at->cos_pitch, at->cos_roll * at->cos_pitch},
     };
-    for (int angle = 0; angle < 3; angle++) {
-        turn(at->R, P[angle], axes[angle]);
-    }
+    for (int angle = 0; angle < 3; angle++) { turn(at->R, P[angle], axes[angle]); }
 }
 
 /* A row of the Jacobian of the lengths with respect to the pose; `arm` is the attachment less the frame's origin. */
@@ -131,9 +125,7 @@ INLINE void length_by_geometry(const line *run, const attitude *platform, const 
     turn_back(carrier->R, run->pull, row);
     turn_back(platform->R, run->pull, row + 3);
     sine_and_cosine(run->wrap, &sine, &cosine);
-    for (int i = 3; i < 6; i++) {
-        row[i] = -row[i];
-    }
+    for (int i = 3; i < 6; i++) { row[i] = -row[i]; }
     /*
      * The arc about a centre at rest becomes longer by the wrap, and the centre moves across the axis, which takes the
      * sine. Where the cable leaves the sheave may vary freely, since the length is stationary there.
@@ -147,14 +139,10 @@ INLINE void lines_at(const towline_robot *robot, const num *pose, const num *car
     attitudes at = attitudes_of(pose, carriers);
     num com[3], axes[3][3] = {{number(0)}}; /* else compilers warn: they do not see that J alone reads the axes */
     turn_constant(at.platform.R, robot->com, com);
-    if (want.J) {
-        turning_axes(&at.platform, axes);
-    }
+    if (want.J) { turning_axes(&at.platform, axes); }
     for (int i = 0; i < m; i++) {
         const placed_cable here = place_cable(&robot->cable[i], pose, carriers, measured, &at);
-        if (want.lengths) {
-            want.lengths[i] = here.run.length;
-        }
+        if (want.lengths) { want.lengths[i] = here.run.length; }
         if (want.A) {
             const num arm[3] = {here.arm[0] - com[0], here.arm[1] - com[1], here.arm[2] - com[2]};
             num moment[3];
@@ -164,15 +152,9 @@ INLINE void lines_at(const towline_robot *robot, const num *pose, const num *car
                 want.A[(3 + j) * m + i] = moment[j];
             }
         }
-        for (int j = 0; want.anchors && j < 3; j++) {
-            want.anchors[3 * i + j] = here.anchor[j];
-        }
-        if (want.J) {
-            length_by_pose(&here.run, here.arm, (const num(*)[3])axes, want.J + 6 * i);
-        }
-        if (want.sensitivity) {
-            length_by_geometry(&here.run, &at.platform, &at.carrier, want.sensitivity + 7 * i);
-        }
+        for (int j = 0; want.anchors && j < 3; j++) { want.anchors[3 * i + j] = here.anchor[j]; }
+        if (want.J) { length_by_pose(&here.run, here.arm, (const num(*)[3])axes, want.J + 6 * i); }
+        if (want.sensitivity) { length_by_geometry(&here.run, &at.platform, &at.carrier, want.sensitivity + 7 * i); }
     }
 }
 

@@ -34,9 +34,7 @@ INLINE void required_wrench(const towline_robot *robot, const num *pose, const n
     constant_times(inertia, omega, spin);
     constant_times(inertia, alpha, moment);
     cross(omega, spin, gyroscopic);
-    for (int i = 0; i < 3; i++) {
-        moment[i] += gyroscopic[i];
-    }
+    for (int i = 0; i < 3; i++) { moment[i] += gyroscopic[i]; }
     turn(at.R, moment, w + 3);
     if (wind) {
         const num speed[3] = {velocity[0] + around[0], velocity[1] + around[1], velocity[2] + around[2]};

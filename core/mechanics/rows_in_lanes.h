@@ -42,9 +42,7 @@ void FORM(required_wrench_of_rows)(const towline_robot *robot, ptrdiff_t rows, t
         gather(pose, motion.pose, 6, first, rows, 6);
         gather(velocity, motion.velocity, 6, first, rows, 6);
         gather(acceleration, motion.acceleration, 6, first, rows, 6);
-        if (motion.wind) {
-            gather(wind, motion.wind, wind_per, first, rows, 3);
-        }
+        if (motion.wind) { gather(wind, motion.wind, wind_per, first, rows, 3); }
         required_wrench(robot, pose, velocity, acceleration, motion.wind ? wind : NULL, wrench);
         scatter(w, wrench, first, rows, 6);
     }

@@ -34,14 +34,10 @@ INLINE turning turning_over_sheave(double r, const placed_cable *cable) {
     const num *k = cable->axis, *pull = cable->run.pull;
     const num up = dot(cable->span, k), cosine = -dot(pull, k);
     num across[3], n[3], f[3];
-    for (int i = 0; i < 3; i++) {
-        across[i] = cable->span[i] - up * k[i];
-    }
+    for (int i = 0; i < 3; i++) { across[i] = cable->span[i] - up * k[i]; }
     const num distance = square_root(dot(across, across)), inverse = 1.0 / distance;
     const num straight = square_root(distance * distance - (2 * r) * distance + up * up);
-    for (int i = 0; i < 3; i++) {
-        across[i] *= inverse; /* e */
-    }
+    for (int i = 0; i < 3; i++) { across[i] *= inverse; /* e */ }
     const num sine = -dot(pull, across);
     cross(k, across, f);
     turning how;
@@ -50,9 +46,7 @@ INLINE turning turning_over_sheave(double r, const placed_cable *cable) {
         how.by_radius[i] = (1.0 - cosine) / straight * n[i];
     }
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) {
-            how.T[3 * i + j] = n[i] * n[j] / straight + sine * inverse * f[i] * f[j];
-        }
+        for (int j = 0; j < 3; j++) { how.T[3 * i + j] = n[i] * n[j] / straight + sine * inverse * f[i] * f[j]; }
     }
     return how;
 }
@@ -96,9 +90,7 @@ INLINE void columns_by_geometry(const towline_robot *robot, const num *pose, con
         }
         change_of_column(here.run.pull, arm, how.by_radius, still, changes[6]);
         for (int row = 0; row < 6; row++) {
-            for (int column = 0; column < 7; column++) {
-                S[42 * i + 7 * row + column] = changes[column][row];
-            }
+            for (int column = 0; column < 7; column++) { S[42 * i + 7 * row + column] = changes[column][row]; }
         }
     }
 }
@@ -114,9 +106,7 @@ INLINE void wrench_by_motions(const towline_robot *robot, const num *pose, const
     attitudes at = attitudes_of(pose, carriers);
     num com[3];
     turn_constant(at.platform.R, robot->com, com);
-    for (int i = 0; i < 36; i++) {
-        D[i] = number(0);
-    }
+    for (int i = 0; i < 36; i++) { D[i] = number(0); }
     for (int i = 0; i < robot->cables; i++) {
         const placed_cable here = place_cable(&robot->cable[i], pose, carriers, 0, &at);
         const turning how = turning_of(&robot->cable[i], &here);
@@ -124,14 +114,10 @@ INLINE void wrench_by_motions(const towline_robot *robot, const num *pose, const
         for (int column = 0; column < 6; column++) {
             num swing[3], moved[3], turned[3], change[6];
             cross(motions[column].rate, arm, swing);
-            for (int j = 0; j < 3; j++) {
-                moved[j] = motions[column].velocity[j] + swing[j];
-            }
+            for (int j = 0; j < 3; j++) { moved[j] = motions[column].velocity[j] + swing[j]; }
             turn(how.T, moved, turned);
             change_of_column(here.run.pull, arm, turned, swing, change);
-            for (int row = 0; row < 6; row++) {
-                D[6 * row + column] += tensions[i] * change[row];
-            }
+            for (int row = 0; row < 6; row++) { D[6 * row + column] += tensions[i] * change[row]; }
         }
     }
 }
@@ -155,9 +141,7 @@ INLINE void twists_of_pose(const towline_robot *robot, const num *pose, twist *m
     twists_of_axes(motions);
     for (int angle = 0; angle < 3; angle++) {
         cross(axes[angle], com, motions[3 + angle].velocity);
-        for (int j = 0; j < 3; j++) {
-            motions[3 + angle].rate[j] = axes[angle][j];
-        }
+        for (int j = 0; j < 3; j++) { motions[3 + angle].rate[j] = axes[angle][j]; }
     }
 }
 

@@ -40,17 +40,13 @@ INLINE num between(num low, num x, num high) { return smaller(larger(low, x), hi
 
 /* Through a pointer: compilers make one instruction of this, and slow code of `x[lane] = sqrt(x[lane])`. */
 INLINE num square_root(num x) {
-    for (int lane = 0; lane < LANES; lane++) {
-        ((double *)&x)[lane] = sqrt(((const double *)&x)[lane]);
-    }
+    for (int lane = 0; lane < LANES; lane++) { ((double *)&x)[lane] = sqrt(((const double *)&x)[lane]); }
     return x;
 }
 
 INLINE int any(mask chosen) {
     int64_t all = 0;
-    for (int lane = 0; lane < LANES; lane++) {
-        all |= chosen[lane];
-    }
+    for (int lane = 0; lane < LANES; lane++) { all |= chosen[lane]; }
     return all != 0;
 }
 
@@ -62,18 +58,14 @@ INLINE num from_bits(bits b) { return (num)b; }
 INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, ptrdiff_t rows, int size) {
     for (int lane = 0; lane < LANES; lane++) {
         const ptrdiff_t row = first + lane < rows ? first + lane : rows - 1;
-        for (int i = 0; i < size; i++) {
-            ((double *)to)[LANES * i + lane] = from[row * per + i];
-        }
+        for (int i = 0; i < size; i++) { ((double *)to)[LANES * i + lane] = from[row * per + i]; }
     }
 }
 
 /* Write `size` numbers of each lane to its row, `size` from one to the next; NULL: they are not wanted. */
 INLINE void scatter(double *to, const num *from, ptrdiff_t first, ptrdiff_t rows, int size) {
     for (int lane = 0; to && lane < LANES && first + lane < rows; lane++) {
-        for (int i = 0; i < size; i++) {
-            to[(first + lane) * size + i] = ((const double *)from)[LANES * i + lane];
-        }
+        for (int i = 0; i < size; i++) { to[(first + lane) * size + i] = ((const double *)from)[LANES * i + lane]; }
     }
 }
 

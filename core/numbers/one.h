@@ -41,9 +41,7 @@ INLINE void gather(num *to, const double *from, ptrdiff_t per, ptrdiff_t first, 
 
 INLINE void scatter(double *to, const num *from, ptrdiff_t first, ptrdiff_t rows, int size) {
     (void)rows;
-    if (to) {
-        memcpy(to + first * size, from, (size_t)size * sizeof *to);
-    }
+    if (to) { memcpy(to + first * size, from, (size_t)size * sizeof *to); }
 }
 
 INLINE bits bits_of(num x) {

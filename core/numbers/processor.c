@@ -17,13 +17,9 @@ static int kind_of_processor(void) {
     enum { OSXSAVE = 1 << 27, AVX = 1 << 28, AVX2 = 1 << 5, AVX512F = 1 << 16, AVX512DQ = 1 << 17 };
     enum { YMM = 0x6, ZMM = 0xe6 };
     uint32_t a, b, c, d;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & OSXSAVE) || !(c & AVX)) {
-        return 0;
-    }
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & OSXSAVE) || !(c & AVX)) { return 0; }
     const uint64_t saved = saved_registers();
-    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || !(b & AVX2) || (saved & YMM) != YMM) {
-        return 0;
-    }
+    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || !(b & AVX2) || (saved & YMM) != YMM) { return 0; }
     return (b & AVX512F) && (b & AVX512DQ) && (saved & ZMM) == ZMM ? 2 : 1;
 }
 

@@ -27,9 +27,7 @@ static void impose_attitude(const double *angles, const double *rates, const dou
                             body_motion *change) {
     double sine[3], cosine[3]; /* of half the angles */
     attitude at;
-    for (int i = 0; i < 3; i++) {
-        sine_and_cosine(0.5 * angles[i], &sine[i], &cosine[i]);
-    }
+    for (int i = 0; i < 3; i++) { sine_and_cosine(0.5 * angles[i], &sine[i], &cosine[i]); }
     const double sr = sine[0], cr = cosine[0], sp = sine[1], cp = cosine[1], sy = sine[2], cy = cosine[2];
     now->quaternion[0] = cr * cp * cy + sr * sp * sy;
     now->quaternion[1] = sr * cp * cy - cr * sp * sy;
@@ -51,9 +49,7 @@ static int impose(const carrier_path *path, body_motion *now, body_motion *chang
         change->velocity[i] = path->moves ? acceleration_on(c, time) : 0;
     }
     if (time != 0 && !path->turns) {
-        for (int i = 0; i < 3; i++) {
-            now->rate[i] = change->rate[i] = 0;
-        }
+        for (int i = 0; i < 3; i++) { now->rate[i] = change->rate[i] = 0; }
         return 0;
     }
     for (int i = 0; i < 3; i++) {
@@ -86,9 +82,7 @@ static void place_bodies(plant *p, motion *now, motion *change, double time) {
             set_lead(&p->path[b - 1], &p->lead[b - 1], time);
         }
         p->body[b].turned = turned;
-        if (turned) {
-            set_attitude(&now->body[b], &p->body[b]);
-        }
+        if (turned) { set_attitude(&now->body[b], &p->body[b]); }
     }
 }
 
@@ -97,9 +91,7 @@ static void shorten(double *x, double most) {
     const double square = dot(x, x);
     if (square > most * most) {
         const double share = most / sqrt(square);
-        for (int i = 0; i < 3; i++) {
-            x[i] *= share;
-        }
+        for (int i = 0; i < 3; i++) { x[i] *= share; }
     }
 }
 
@@ -114,21 +106,15 @@ static void follow(const towline_body *body, const body_motion *lead, double ban
                    double *acceleration) {
     const double rate = 0.5 * bandwidth, most = 0.8 * body->acceleration_max;
     double away[3], wanted[3], share = rate;
-    for (int i = 0; i < 3; i++) {
-        away[i] = lead->position[i] - now->position[i];
-    }
+    for (int i = 0; i < 3; i++) { away[i] = lead->position[i] - now->position[i]; }
     const double square = dot(away, away);
     if (square * (rate * rate * rate * rate) > most * most) {
         const double distance = sqrt(square);
         share = sqrt(most * (2 * distance - most / (rate * rate))) / distance;
     }
-    for (int i = 0; i < 3; i++) {
-        wanted[i] = lead->velocity[i] + share * away[i];
-    }
+    for (int i = 0; i < 3; i++) { wanted[i] = lead->velocity[i] + share * away[i]; }
     shorten(wanted, body->speed_max);
-    for (int i = 0; i < 3; i++) {
-        acceleration[i] = lead->rate[i] + 4 * rate * (wanted[i] - now->velocity[i]);
-    }
+    for (int i = 0; i < 3; i++) { acceleration[i] = lead->rate[i] + 4 * rate * (wanted[i] - now->velocity[i]); }
     shorten(acceleration, body->acceleration_max);
 }
 
@@ -138,9 +124,7 @@ static void move_bodies(const plant *p, const motion *now, motion *change) {
         const towline_body *body = &p->robot->body[b];
         const body_motion *at = &now->body[b];
         body_motion *by = &change->body[b];
-        if (body->motion != TOWLINE_FREE && body->motion != TOWLINE_LAGGED) {
-            continue;
-        }
+        if (body->motion != TOWLINE_FREE && body->motion != TOWLINE_LAGGED) { continue; }
         memcpy(by->position, at->velocity, sizeof by->position);
         if (body->motion == TOWLINE_LAGGED) {
             follow(body, &p->lead[b - 1], p->settings->carrier_bandwidth, at, by->velocity);
@@ -150,9 +134,7 @@ static void move_bodies(const plant *p, const motion *now, motion *change) {
         double turned[3];
         cross(v, at->rate, turned);
         by->quaternion[0] = -0.5 * dot(v, at->rate);
-        for (int i = 0; i < 3; i++) {
-            by->quaternion[1 + i] = 0.5 * (w * at->rate[i] + turned[i]);
-        }
+        for (int i = 0; i < 3; i++) { by->quaternion[1 + i] = 0.5 * (w * at->rate[i] + turned[i]); }
     }
 }
 
@@ -162,9 +144,7 @@ static void accelerate_bodies(const plant *p, const motion *now, motion *change)
         const towline_body *body = &p->robot->body[b];
         const double *rate = now->body[b].rate;
         double spin[3], gyroscopic[3], moment[3];
-        if (body->motion != TOWLINE_FREE) {
-            continue;
-        }
+        if (body->motion != TOWLINE_FREE) { continue; }
         turn(body->inertia, rate, spin);
         cross(rate, spin, gyroscopic);
         turn_back(p->body[b].R, p->body[b].moment, moment);
@@ -182,9 +162,7 @@ static void normalise(const plant *p, motion *now) {
         double *q = now->body[b].quaternion;
         if (is_free(p, b)) {
             const double inverse = 1 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-            for (int i = 0; i < 4; i++) {
-                q[i] *= inverse;
-            }
+            for (int i = 0; i < 4; i++) { q[i] *= inverse; }
         }
     }
 }

@@ -19,9 +19,7 @@
 static void run_straight(cable_now *on, const double *d, const double *w) {
     const double length = sqrt(dot(d, d)), inverse = length > NO_LENGTH ? 1 / length : 0;
     const double rate = dot(d, w) * inverse;
-    for (int i = 0; i < 3; i++) {
-        on->pull[i] = -d[i] * inverse;
-    }
+    for (int i = 0; i < 3; i++) { on->pull[i] = -d[i] * inverse; }
     on->length = length;
     on->length_rate = rate;
     on->curvature = (dot(w, w) - rate * rate) * inverse;
@@ -32,22 +30,16 @@ static void run_over_sheave(cable_now *on, double r, const double *d, const doub
     const double *k = on->axis, up = dot(d, k);
     double e[3] = {d[0] - up * k[0], d[1] - up * k[1], d[2] - up * k[2]}, side[3];
     const double distance = larger(sqrt(dot(e, e)), 1e-12), out = distance - r, inverse = 1 / distance;
-    for (int i = 0; i < 3; i++) {
-        e[i] *= inverse;
-    }
+    for (int i = 0; i < 3; i++) { e[i] *= inverse; }
     /* Inside of the sheave there is no tangent; then the free part has no length. */
     const double straight = sqrt(larger(distance * distance - 2 * distance * r + up * up, 1e-18));
     const double share = 1 / (out * out + up * up);
     /* The free part runs along sine e + cosine k. */
     const double sine = (straight * out + r * up) * share, cosine = (straight * up - r * out) * share;
-    for (int i = 0; i < 3; i++) {
-        on->pull[i] = -(sine * e[i] + cosine * k[i]);
-    }
+    for (int i = 0; i < 3; i++) { on->pull[i] = -(sine * e[i] + cosine * k[i]); }
     /* The angle of the free part from the axis, -pi/2 to 2 pi: negative where B is above the sheave, near its axis. */
     double wrap = angle_of(sine, cosine);
-    if (wrap < 0 && up < 0) {
-        wrap += 2 * 3.14159265358979323846;
-    }
+    if (wrap < 0 && up < 0) { wrap += 2 * 3.14159265358979323846; }
     on->length = r * wrap + straight;
     on->length_rate = sine * dot(e, w) + cosine * dot(k, w);
     cross(k, e, side);
@@ -68,9 +60,7 @@ static void set_lines(plant *p, const motion *now) {
         double arm[3], carrier_arm[3], d[3], w[3], moved[3];
         if (on_carrier->turned) {
             turn(on_carrier->R, cable->anchor, on->anchor);
-            if (cable->radius != 0) {
-                turn(on_carrier->R, cable->axis, on->axis);
-            }
+            if (cable->radius != 0) { turn(on_carrier->R, cable->axis, on->axis); }
         }
         turn(on_platform.R, p->attachment[i], arm);
         cross(on_platform.omega, arm, w);
@@ -79,9 +69,7 @@ static void set_lines(plant *p, const motion *now) {
             d[j] = carrier_arm[j] - on->anchor[j];
         }
         cross(on_carrier->omega, carrier_arm, moved);
-        for (int j = 0; j < 3; j++) {
-            w[j] += platform.velocity[j] - carrier->velocity[j] - moved[j];
-        }
+        for (int j = 0; j < 3; j++) { w[j] += platform.velocity[j] - carrier->velocity[j] - moved[j]; }
         if (cable->radius == 0) {
             run_straight(on, d, w);
         } else {

@@ -41,9 +41,7 @@ static coordinates coordinates_of(const body_motion *body) {
     const double *q = body->quaternion, *rate = body->rate;
     coordinates at = {{body->position[0], body->position[1], body->position[2], 0, 0, 0},
                       {body->velocity[0], body->velocity[1], body->velocity[2], rate[0], rate[1], rate[2]}};
-    if (q[1] == 0 && q[2] == 0 && q[3] == 0) {
-        return at;
-    }
+    if (q[1] == 0 && q[2] == 0 && q[3] == 0) { return at; }
     /* The last row of R, and its first column. */
     const double minus_sine = 2 * (q[1] * q[3] - q[0] * q[2]);
     const double rolled = 2 * (q[2] * q[3] + q[0] * q[1]), upright = 1 - 2 * (q[1] * q[1] + q[2] * q[2]);
@@ -66,9 +64,7 @@ static int continues(const body_motion *body, const carrier_command *to, double 
     for (int i = 0; i < 6; i++) {
         const double p = to->pose[i], v = to->velocity[i];
         double gap = at.position[i] - p, faster = at.velocity[i] - v;
-        if (i >= 3) {
-            gap -= 2 * PI * floor(0.5 + gap / (2 * PI));
-        }
+        if (i >= 3) { gap -= 2 * PI * floor(0.5 + gap / (2 * PI)); }
         if (i == 3) { /* translation and rotation each have moved some way */
             sudden |= away > way;
             away = way = 0;
@@ -94,16 +90,12 @@ static int leads_on(const carrier_command *from, const carrier_command *to, doub
         const double gap = to->pose[i] - from->pose[i] - period * (v + 0.5 * period * a);
         const double faster = to->velocity[i] - v - period * a;
         if (i == 3) {
-            if (away > way) {
-                return 0;
-            }
+            if (away > way) { return 0; }
             away = way = 0;
         }
         away += fabs(gap);
         way += period * (fabs(v) + fabs(to->velocity[i]) + 0.5 * period * fabs(a));
-        if (6 * fabs(gap) + 4 * period * fabs(faster) > SUDDEN * period * period) {
-            return 0;
-        }
+        if (6 * fabs(gap) + 4 * period * fabs(faster) > SUDDEN * period * period) { return 0; }
     }
     return !(away > way);
 }
@@ -135,9 +127,7 @@ static void set_paths(plant *p, const motion *now, const carrier_command *comman
                       double period) {
     for (int k = 0; k < p->robot->carriers; k++) {
         const int32_t moved_by = p->robot->body[1 + k].motion;
-        if (moved_by != TOWLINE_IMPOSED && moved_by != TOWLINE_LAGGED) {
-            continue;
-        }
+        if (moved_by != TOWLINE_IMPOSED && moved_by != TOWLINE_LAGGED) { continue; }
         const int imposed = moved_by == TOWLINE_IMPOSED;
         carrier_path *path = &p->path[k];
         coordinates off;

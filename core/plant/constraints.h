@@ -41,9 +41,7 @@ static void set_inverse_inertias(plant *p) {
 static void set_yielding(const plant *p, int b, const double *arm, const double *pull, yielding *by) {
     cross(arm, pull, by->moment);
     turn(p->body[b].inverse_inertia, by->moment, by->turned);
-    for (int i = 0; i < 3; i++) {
-        by->moved[i] = p->robot->body[b].inverse_mass[i] * pull[i];
-    }
+    for (int i = 0; i < 3; i++) { by->moved[i] = p->robot->body[b].inverse_mass[i] * pull[i]; }
 }
 
 /* What a body adds to G for two cables that pull on it. */
@@ -59,18 +57,12 @@ static void set_gram(plant *p) {
     for (int i = 0; i < p->cables; i++) {
         cable_now *one = &p->cable[i];
         const int owner = owner_of(p, i);
-        if (!taut->candidate[i]) {
-            continue;
-        }
+        if (!taut->candidate[i]) { continue; }
         set_yielding(p, 0, one->arm, one->pull, &one->platform);
-        if (is_free(p, owner)) {
-            set_yielding(p, owner, one->carrier_arm, one->pull, &one->carrier);
-        }
+        if (is_free(p, owner)) { set_yielding(p, owner, one->carrier_arm, one->pull, &one->carrier); }
         for (int j = 0; j <= i; j++) {
             const cable_now *other = &p->cable[j];
-            if (!taut->candidate[j]) {
-                continue;
-            }
+            if (!taut->candidate[j]) { continue; }
             double total = coupling(one, &one->platform, &other->platform);
             if (owner == owner_of(p, j) && is_free(p, owner)) {
                 total += coupling(one, &one->carrier, &other->carrier);
@@ -81,9 +73,7 @@ static void set_gram(plant *p) {
         trace += taut->gram[i][i];
         lengths += one->length;
     }
-    for (int i = 0; i < p->cables; i++) {
-        taut->give[i] = GIVING * trace * p->cable[i].length / lengths;
-    }
+    for (int i = 0; i < p->cables; i++) { taut->give[i] = GIVING * trace * p->cable[i].length / lengths; }
 }
 
 /* Acceleration in {G} of the point of body `b` at `arm` from its position. */
@@ -93,16 +83,12 @@ static void accelerate_point(const plant *p, const motion *change, int b, const 
     cross(body->turning, arm, tangential);
     cross(body->omega, arm, around);
     cross(body->omega, around, centripetal);
-    for (int i = 0; i < 3; i++) {
-        acceleration[i] = change->body[b].velocity[i] + tangential[i] + centripetal[i];
-    }
+    for (int i = 0; i < 3; i++) { acceleration[i] = change->body[b].velocity[i] + tangential[i] + centripetal[i]; }
 }
 
 /* Write d2e/dt2 [m/s^2] for the accelerations in `change` as the right-hand side for the candidates. */
 static void set_stretch_accelerations(plant *p, const motion *change) {
-    for (int b = 0; b < p->bodies; b++) {
-        turn(p->body[b].R, change->body[b].rate, p->body[b].turning);
-    }
+    for (int b = 0; b < p->bodies; b++) { turn(p->body[b].R, change->body[b].rate, p->body[b].turning); }
     for (int i = 0; i < p->cables; i++) {
         const cable_now *on = &p->cable[i];
         const int owner = owner_of(p, i);
@@ -114,9 +100,7 @@ static void set_stretch_accelerations(plant *p, const motion *change) {
         accelerate_point(p, change, 0, on->arm, a);
         accelerate_point(p, change, owner, on->carrier_arm, carrier_a);
         cross(p->body[owner].omega, on->drift, coriolis);
-        for (int j = 0; j < 3; j++) {
-            a[j] -= carrier_a[j] + 2 * coriolis[j];
-        }
+        for (int j = 0; j < 3; j++) { a[j] -= carrier_a[j] + 2 * coriolis[j]; }
         p->taut.right[i] = on->curvature - dot(on->pull, a) - change->rate[i];
     }
 }
@@ -128,15 +112,11 @@ static int append(constraints *taut, int one) {
     for (int b = 0; b < at; b++) {
         const double *other = taut->factor[b];
         double total = taut->gram[one][taut->picked[b]];
-        for (int k = 0; k < b; k++) {
-            total -= row[k] * other[k];
-        }
+        for (int k = 0; k < b; k++) { total -= row[k] * other[k]; }
         row[b] = total * taut->inverse_diagonal[b];
         left -= row[b] * row[b];
     }
-    if (!(left > DEPENDENT * taut->gram[one][one])) {
-        return 0;
-    }
+    if (!(left > DEPENDENT * taut->gram[one][one])) { return 0; }
     row[at] = sqrt(left);
     taut->inverse_diagonal[at] = 1 / row[at];
     taut->picked[at] = one;
@@ -147,15 +127,11 @@ static int append(constraints *taut, int one) {
 /* Replace x by what the factor times its transpose makes x of. */
 static void solve_factored(const constraints *taut, double *x) {
     for (int a = 0; a < taut->count; a++) {
-        for (int k = 0; k < a; k++) {
-            x[a] -= taut->factor[a][k] * x[k];
-        }
+        for (int k = 0; k < a; k++) { x[a] -= taut->factor[a][k] * x[k]; }
         x[a] *= taut->inverse_diagonal[a];
     }
     for (int a = taut->count - 1; a >= 0; a--) {
-        for (int k = a + 1; k < taut->count; k++) {
-            x[a] -= taut->factor[k][a] * x[k];
-        }
+        for (int k = a + 1; k < taut->count; k++) { x[a] -= taut->factor[k][a] * x[k]; }
         x[a] *= taut->inverse_diagonal[a];
     }
 }
@@ -167,22 +143,16 @@ static void solve_factored(const constraints *taut, double *x) {
  */
 static void solve_picked(const constraints *taut, int rounds, double *z) {
     double step[CABLES];
-    for (int a = 0; a < taut->count; a++) {
-        z[a] = taut->right[taut->picked[a]];
-    }
+    for (int a = 0; a < taut->count; a++) { z[a] = taut->right[taut->picked[a]]; }
     solve_factored(taut, z);
     for (int round = 1; round < rounds; round++) {
         for (int a = 0; a < taut->count; a++) {
             const double *row = taut->gram[taut->picked[a]];
             step[a] = taut->right[taut->picked[a]];
-            for (int b = 0; b < taut->count; b++) {
-                step[a] -= row[taut->picked[b]] * z[b];
-            }
+            for (int b = 0; b < taut->count; b++) { step[a] -= row[taut->picked[b]] * z[b]; }
         }
         solve_factored(taut, step);
-        for (int a = 0; a < taut->count; a++) {
-            z[a] += step[a];
-        }
+        for (int a = 0; a < taut->count; a++) { z[a] += step[a]; }
     }
 }
 
@@ -192,26 +162,18 @@ static void solve_pulling(plant *p) {
     double z[CABLES];
     solve_picked(taut, REFINED, z);
     memset(taut->solution, 0, (size_t)p->cables * sizeof taut->solution[0]);
-    for (int a = 0; a < taut->count; a++) {
-        taut->solution[taut->picked[a]] = z[a];
-    }
+    for (int a = 0; a < taut->count; a++) { taut->solution[taut->picked[a]] = z[a]; }
 }
 
 /* Factor G over the pulling cables without stiffness, but for those that depend on others. */
 static void factor_pulling(plant *p) {
     constraints *taut = &p->taut;
-    if (taut->holds) {
-        return;
-    }
-    for (int i = 0; i < p->cables; i++) {
-        taut->candidate[i] = never_stretches(p, i) && p->cable[i].mode == PULLS;
-    }
+    if (taut->holds) { return; }
+    for (int i = 0; i < p->cables; i++) { taut->candidate[i] = never_stretches(p, i) && p->cable[i].mode == PULLS; }
     set_gram(p);
     taut->count = 0;
     for (int i = 0; i < p->cables; i++) {
-        if (taut->candidate[i]) {
-            append(taut, i);
-        }
+        if (taut->candidate[i]) { append(taut, i); }
     }
     taut->holds = 1;
 }
@@ -243,19 +205,13 @@ static void bring_inside(plant *p, int *barred, double *x) {
                 first = a;
             }
         }
-        for (int a = 0; a < taut->count; a++) {
-            x[a] += share * (z[a] - x[a]);
-        }
-        if (first < 0) {
-            return;
-        }
+        for (int a = 0; a < taut->count; a++) { x[a] += share * (z[a] - x[a]); }
+        if (first < 0) { return; }
         drop(taut, first, x);
         for (int i = 0; i < p->cables; i++) { /* what depended on the one that goes may not any more */
             barred[i] = !taut->candidate[i];
         }
-        for (int a = 0; a < taut->count; a++) {
-            barred[taut->picked[a]] = 1;
-        }
+        for (int a = 0; a < taut->count; a++) { barred[taut->picked[a]] = 1; }
     }
 }
 
@@ -265,9 +221,7 @@ static int most_violated(const plant *p, const int *barred, const double *x, dou
     int best = -1;
     for (int i = 0; i < p->cables; i++) {
         double left = barred[i] ? 0 : taut->right[i];
-        for (int a = 0; a < taut->count && !barred[i]; a++) {
-            left -= taut->gram[i][taut->picked[a]] * x[a];
-        }
+        for (int a = 0; a < taut->count && !barred[i]; a++) { left -= taut->gram[i][taut->picked[a]] * x[a]; }
         if (left > most) {
             best = i;
             most = left;
@@ -289,9 +243,7 @@ static void solve_non_negative(plant *p) {
     taut->holds = 0;
     for (int tried = 0; tried < 10 * p->cables + 20; tried++) {
         const int best = most_violated(p, barred, x, 1e-13 * largest);
-        if (best < 0) {
-            break;
-        }
+        if (best < 0) { break; }
         barred[best] = 1;
         if (append(taut, best)) {
             x[taut->count - 1] = 0;

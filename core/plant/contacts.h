@@ -16,9 +16,7 @@ static double cable_violation(const plant *p, const motion *now, int i) {
         return on->mode == PULLS ? -on->tension * (robot->length_scale / robot->force_scale)
                                  : on->stretch - CAUGHT_LENGTH * robot->length_scale;
     }
-    if (on->mode == SLACK) {
-        return on->stretch;
-    }
+    if (on->mode == SLACK) { return on->stretch; }
     const double pull = on->spring * now->length[i] / robot->cable[i].stiffness;
     return on->mode == PULLS ? -pull : larger(-on->stretch, pull);
 }
@@ -30,9 +28,7 @@ static int can_stick(const plant *p, int i) {
 
 /* By how much a winch is beyond its mode [m]. */
 static double winch_violation(const plant *p, const motion *now, int i) {
-    if (p->cable[i].slip != 0) {
-        return -p->cable[i].slip * now->rate[i];
-    }
+    if (p->cable[i].slip != 0) { return -p->cable[i].slip * now->rate[i]; }
     const double beyond = fabs(drive_force(p, i)) - p->robot->cable[i].winch_friction;
     return beyond * (p->robot->length_scale / p->robot->force_scale);
 }
@@ -55,21 +51,15 @@ static double graze_of(const plant *p, const double *stretch, const double *rate
     for (int i = 0; i < p->cables; i++) {
         const double e0 = stretch[i], d0 = step * rate[i];
         const double e1 = p->cable[i].stretch, d1 = step * p->cable[i].stretch_rate;
-        if (p->cable[i].mode != SLACK || !(d0 > 0 && d1 < 0)) {
-            continue;
-        }
+        if (p->cable[i].mode != SLACK || !(d0 > 0 && d1 < 0)) { continue; }
         /* Where the cubic through both ends has no slope: a root of a s^2 + b s + d0. */
         const double a = 6 * (e0 - e1) + 3 * (d0 + d1), b = -6 * (e0 - e1) - 4 * d0 - 2 * d1;
         const double q = -0.5 * (b + copysign(sqrt(larger(b * b - 4 * a * d0, 0)), b));
         double s = q != 0 ? d0 / q : 0;
-        if (!(0 < s && s < 1)) {
-            s = a != 0 ? q / a : 0;
-        }
+        if (!(0 < s && s < 1)) { s = a != 0 ? q / a : 0; }
         if (0 < s && s < 1) {
             const double top = e0 + s * s * (3 - 2 * s) * (e1 - e0) + s * (1 - s) * ((1 - s) * d0 - s * d1);
-            if (top > 0) {
-                return s * step;
-            }
+            if (top > 0) { return s * step; }
         }
     }
     return step;
@@ -78,9 +68,7 @@ static double graze_of(const plant *p, const double *stretch, const double *rate
 /* Return which slack cable is beyond its mode by `most`, or -1. */
 static int caught_of(const plant *p, double most) {
     for (int i = 0; i < p->cables; i++) {
-        if (p->cable[i].mode == SLACK && p->cable[i].beyond == most) {
-            return i;
-        }
+        if (p->cable[i].mode == SLACK && p->cable[i].beyond == most) { return i; }
     }
     return -1;
 }
@@ -99,12 +87,8 @@ static double rise_of(double e0, double d0, double e1, double d1) {
 /* Return the direction in which a winch slips, or 0 where friction holds it at the tension of its cable. */
 static int slip_of(const plant *p, const motion *now, int i) {
     const double speed = now->rate[i], force = drive_force(p, i), friction = p->robot->cable[i].winch_friction;
-    if (speed != 0) {
-        return speed > 0 ? 1 : -1;
-    }
-    if (fabs(force) > friction || friction == 0) {
-        return signbit(force) ? -1 : 1;
-    }
+    if (speed != 0) { return speed > 0 ? 1 : -1; }
+    if (fabs(force) > friction || friction == 0) { return signbit(force) ? -1 : 1; }
     return 0;
 }
 
@@ -117,9 +101,7 @@ static int begin_to_slip(plant *p, const motion *now) {
             slipped |= p->cable[i].slip != 0;
         }
     }
-    if (slipped) {
-        p->taut.holds = 0;
-    }
+    if (slipped) { p->taut.holds = 0; }
     return slipped;
 }
 
@@ -148,24 +130,16 @@ static void set_slip(plant *p, const motion *now, int i) {
 /* Choose the modes of a state, with the impacts that this needs, and write its derivative and tensions. */
 static void begin_contacts(plant *p, motion *now, motion *change, double time) {
     set_geometry(p, now, change, time);
-    if (p->settings->drive != TOWLINE_TENSIONS) {
-        set_modes(p);
-    }
-    for (int i = 0; i < p->cables && p->settings->drive == TOWLINE_FORCES; i++) {
-        set_slip(p, now, i);
-    }
+    if (p->settings->drive != TOWLINE_TENSIONS) { set_modes(p); }
+    for (int i = 0; i < p->cables && p->settings->drive == TOWLINE_FORCES; i++) { set_slip(p, now, i); }
     settle(p, now, change, time, PARTING);
 }
 
 /* The next mode of an elastic cable that is beyond its own. */
 static contact next_mode(const cable_now *on) {
     const int stretched = on->stretch > 0;
-    if (on->mode == PULLS) {
-        return stretched ? LIMP : SLACK;
-    }
-    if (on->spring > 0 && (stretched || on->mode == SLACK)) {
-        return PULLS;
-    }
+    if (on->mode == PULLS) { return stretched ? LIMP : SLACK; }
+    if (on->spring > 0 && (stretched || on->mode == SLACK)) { return PULLS; }
     return on->mode == SLACK ? LIMP : SLACK;
 }
 
@@ -173,18 +147,12 @@ static contact next_mode(const cable_now *on) {
 static void change_contacts(plant *p, motion *now, motion *change, double time, double parting) {
     for (int i = 0; i < p->cables; i++) {
         cable_now *on = &p->cable[i];
-        if (on->beyond > 0 && !never_stretches(p, i)) {
-            on->mode = next_mode(on);
-        }
-        if (on->sliding > 0) {
-            now->rate[i] = 0;
-        }
+        if (on->beyond > 0 && !never_stretches(p, i)) { on->mode = next_mode(on); }
+        if (on->sliding > 0) { now->rate[i] = 0; }
     }
     set_geometry(p, now, change, time);
     for (int i = 0; i < p->cables; i++) {
-        if (p->cable[i].sliding > 0) {
-            set_slip(p, now, i);
-        }
+        if (p->cable[i].sliding > 0) { set_slip(p, now, i); }
     }
     settle(p, now, change, time, parting);
 }

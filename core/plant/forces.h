@@ -25,9 +25,7 @@ static void set_geometry(plant *p, motion *now, motion *change, double time) {
 static void set_modes(plant *p) {
     for (int i = 0; i < p->cables; i++) {
         cable_now *on = &p->cable[i];
-        if (never_stretches(p, i)) {
-            continue;
-        }
+        if (never_stretches(p, i)) { continue; }
         if (on->stretch <= 0 || p->condition[i] == TOWLINE_CUT) {
             on->mode = SLACK;
         } else {
@@ -66,15 +64,11 @@ static void constrain(plant *p, const motion *now, motion *change, double time) 
     set_stretch_accelerations(p, change);
     solve_pulling(p);
     for (int i = 0; i < p->cables; i++) {
-        if (taut->candidate[i]) {
-            p->cable[i].tension = taut->solution[i];
-        }
+        if (taut->candidate[i]) { p->cable[i].tension = taut->solution[i]; }
     }
     pull_bodies(p, taut->candidate);
     accelerate_bodies(p, now, change);
-    if (p->has_winches) {
-        move_winches(p, now, change, time);
-    }
+    if (p->has_winches) { move_winches(p, now, change, time); }
 }
 
 /* Write the derivative of a motion whose geometry is written, and all tensions. */
@@ -89,21 +83,15 @@ static void set_forces(plant *p, const motion *now, motion *change, double time)
     pull_bodies(p, NULL);
     move_bodies(p, now, change);
     accelerate_bodies(p, now, change);
-    if (p->has_winches) {
-        move_winches(p, now, change, time);
-    }
-    if (constrained) {
-        constrain(p, now, change, time);
-    }
+    if (p->has_winches) { move_winches(p, now, change, time); }
+    if (constrained) { constrain(p, now, change, time); }
 }
 
 /* Write the derivative of a motion; elastic cables pull by their elongation unless contacts are located. */
 static void evaluate(plant *p, motion *now, motion *change, double time) {
     set_geometry(p, now, change, time);
     p->taut.holds = 0;
-    if (!p->settings->located && p->settings->drive != TOWLINE_TENSIONS) {
-        set_modes(p);
-    }
+    if (!p->settings->located && p->settings->drive != TOWLINE_TENSIONS) { set_modes(p); }
     set_forces(p, now, change, time);
 }
 

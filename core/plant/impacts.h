@@ -20,17 +20,13 @@ static void shift_body(const plant *p, motion *now, int b, double size, const yi
     body_motion *body = &now->body[b];
     double *moved = positions ? body->position : body->velocity;
     const double turned[3] = {size * by->turned[0], size * by->turned[1], size * by->turned[2]};
-    for (int i = 0; i < 3; i++) {
-        moved[i] += size * by->moved[i];
-    }
+    for (int i = 0; i < 3; i++) { moved[i] += size * by->moved[i]; }
     if (positions) {
         rotate(body->quaternion, turned);
     } else {
         double rate[3];
         turn_back(p->body[b].R, turned, rate);
-        for (int i = 0; i < 3; i++) {
-            body->rate[i] += rate[i];
-        }
+        for (int i = 0; i < 3; i++) { body->rate[i] += rate[i]; }
     }
 }
 
@@ -40,18 +36,12 @@ static void shift(const plant *p, motion *now, int positions) {
         const cable_now *on = &p->cable[i];
         const double size = p->taut.solution[i];
         const int owner = owner_of(p, i);
-        if (size == 0) {
-            continue;
-        }
+        if (size == 0) { continue; }
         *(positions ? &now->length[i] : &now->rate[i]) += size * winch_yielding(p, i);
         shift_body(p, now, 0, size, &on->platform, positions);
-        if (is_free(p, owner)) {
-            shift_body(p, now, owner, -size, &on->carrier, positions);
-        }
+        if (is_free(p, owner)) { shift_body(p, now, owner, -size, &on->carrier, positions); }
     }
-    if (positions) {
-        normalise(p, now);
-    }
+    if (positions) { normalise(p, now); }
 }
 
 /* Write elongations, or their rates, as the right-hand side for the candidates. */
@@ -79,18 +69,14 @@ static void choose_touching(plant *p, double least_rate) {
 
 static int any_too_long(const plant *p) {
     for (int i = 0; i < p->cables; i++) {
-        if (is_intact(p, i) && p->cable[i].stretch > CAUGHT_LENGTH * p->robot->length_scale) {
-            return 1;
-        }
+        if (is_intact(p, i) && p->cable[i].stretch > CAUGHT_LENGTH * p->robot->length_scale) { return 1; }
     }
     return 0;
 }
 
 static int any_candidate_stretches(const plant *p) {
     for (int i = 0; i < p->cables; i++) {
-        if (p->taut.candidate[i] && p->cable[i].stretch_rate > STILL) {
-            return 1;
-        }
+        if (p->taut.candidate[i] && p->cable[i].stretch_rate > STILL) { return 1; }
     }
     return 0;
 }
@@ -100,18 +86,12 @@ static int as_before(const plant *p) {
     for (int i = 0; i < p->cables; i++) {
         const cable_now *on = &p->cable[i];
         const int pulls = on->mode == PULLS;
-        if (!never_stretches(p, i)) {
-            continue;
-        }
+        if (!never_stretches(p, i)) { continue; }
         if (!is_intact(p, i)) {
-            if (pulls) {
-                return 0;
-            }
+            if (pulls) { return 0; }
         } else if (pulls) {
             const double most = TOUCHING_LENGTH * p->robot->length_scale;
-            if (on->tension <= 0 || fabs(on->stretch) > most || fabs(on->stretch_rate) > STILL) {
-                return 0;
-            }
+            if (on->tension <= 0 || fabs(on->stretch) > most || fabs(on->stretch_rate) > STILL) { return 0; }
         } else if (on->stretch > -RESTING_LENGTH * p->robot->length_scale) {
             return 0;
         }
@@ -121,9 +101,7 @@ static int as_before(const plant *p) {
 
 static int any_pushes(const plant *p) {
     for (int i = 0; i < p->cables; i++) {
-        if (never_stretches(p, i) && p->cable[i].mode == PULLS && p->cable[i].tension <= 0) {
-            return 1;
-        }
+        if (never_stretches(p, i) && p->cable[i].mode == PULLS && p->cable[i].tension <= 0) { return 1; }
     }
     return 0;
 }
@@ -133,26 +111,20 @@ static void collide(plant *p, motion *now, motion *change, double time) {
     for (int tried = 0; tried <= MOST_SHIFTS; tried++) { /* positions until they fit, and then velocities */
         const int positions = tried < MOST_SHIFTS && any_too_long(p);
         choose_touching(p, -1e300);
-        if (!positions && !any_candidate_stretches(p)) {
-            return;
-        }
+        if (!positions && !any_candidate_stretches(p)) { return; }
         set_gram(p);
         set_right(p, positions);
         solve_non_negative(p);
         shift(p, now, positions);
         set_geometry(p, now, change, time);
-        if (!positions) {
-            return;
-        }
+        if (!positions) { return; }
     }
 }
 
 /* Bring the elongations of the pulling cables without stiffness, and their rates, back to zero. */
 static void hold(plant *p, motion *now, motion *change, double time) {
     factor_pulling(p); /* the positions hardly change it */
-    if (p->taut.count == 0) {
-        return;
-    }
+    if (p->taut.count == 0) { return; }
     for (int positions = 1; positions >= 0; positions--) {
         set_right(p, positions);
         solve_pulling(p);
@@ -169,14 +141,10 @@ static void hold(plant *p, motion *now, motion *change, double time) {
 static void resolve(plant *p, motion *now, motion *change, double time, double parting) {
     if (parting == PARTING && as_before(p)) {
         set_forces(p, now, change, time);
-        if (!any_pushes(p)) {
-            return;
-        }
+        if (!any_pushes(p)) { return; }
     }
     for (int i = 0; i < p->cables; i++) {
-        if (never_stretches(p, i)) {
-            p->cable[i].mode = SLACK;
-        }
+        if (never_stretches(p, i)) { p->cable[i].mode = SLACK; }
     }
     collide(p, now, change, time);
     set_forces(p, now, change, time);
@@ -193,9 +161,7 @@ static void resolve(plant *p, motion *now, motion *change, double time, double p
             p->taut.holds = 0;
         }
     }
-    if (parting > PARTING) {
-        hold(p, now, change, time);
-    }
+    if (parting > PARTING) { hold(p, now, change, time); }
     set_forces(p, now, change, time);
 }
 

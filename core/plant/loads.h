@@ -12,9 +12,7 @@ static void set_thrusts(plant *p, const carrier_command *command) {
         for (int a = 0; a < TOWLINE_MOST_ACTUATORS; a++) {
             const towline_actuator *actuator = &body->actuator[a];
             const double value = between(actuator->low, command[k].actuation[a], actuator->high);
-            for (int i = 0; i < 6; i++) {
-                p->thrust[k][i] += value * actuator->wrench[i];
-            }
+            for (int i = 0; i < 6; i++) { p->thrust[k][i] += value * actuator->wrench[i]; }
         }
     }
 }
@@ -32,9 +30,7 @@ static void load_bodies(plant *p, const motion *now) {
     const towline_robot *robot = p->robot;
     for (int b = 0; b < p->bodies; b++) {
         body_now *on = &p->body[b];
-        if (!is_free(p, b)) {
-            continue;
-        }
+        if (!is_free(p, b)) { continue; }
         const double *wrench = b > 0 ? p->on_carriers[b - 1].wrench : p->on_platform->wrench;
         memcpy(on->force, wrench, sizeof on->force);
         memcpy(on->moment, wrench + 3, sizeof on->moment);
@@ -47,13 +43,9 @@ static void load_bodies(plant *p, const motion *now) {
                 on->moment[i] += moment[i];
             }
         }
-        for (int i = 0; i < 3; i++) {
-            on->force[i] += robot->body[b].mass[i] * robot->gravity[i];
-        }
+        for (int i = 0; i < 3; i++) { on->force[i] += robot->body[b].mass[i] * robot->gravity[i]; }
     }
-    if (p->on_platform->air != 0) {
-        add_air(p, now->body[0].velocity, p->body[0].force);
-    }
+    if (p->on_platform->air != 0) { add_air(p, now->body[0].velocity, p->body[0].force); }
 }
 
 /* Add the pull of the cables that are chosen, 1, or of all (NULL), to the bodies that feel it. */
@@ -62,12 +54,8 @@ static void pull_bodies(plant *p, const int *chosen) {
     for (int i = 0; i < p->cables; i++) {
         const cable_now *on = &p->cable[i];
         double pull[3], moment[3];
-        if (on->tension == 0 || (chosen && !chosen[i])) {
-            continue;
-        }
-        for (int j = 0; j < 3; j++) {
-            pull[j] = on->tension * on->pull[j];
-        }
+        if (on->tension == 0 || (chosen && !chosen[i])) { continue; }
+        for (int j = 0; j < 3; j++) { pull[j] = on->tension * on->pull[j]; }
         cross(on->arm, pull, moment);
         for (int j = 0; j < 3; j++) {
             platform->force[j] += pull[j];

@@ -41,9 +41,7 @@ static void run_row(plant *p, const towline_run *run, const double *state, const
     motion now;
     step_memory memory;
     take_state(p, state, &now);
-    for (int k = 0; k < SLOPES; k++) {
-        clear(p, &memory.slope[k]);
-    }
+    for (int k = 0; k < SLOPES; k++) { clear(p, &memory.slope[k]); }
     for (ptrdiff_t k = 0; k < run->steps; k++) {
         const double *row = commands + k * width;
         begin_command(p, &now, row, k + 1 < run->commands ? row + width : NULL, run->period);

@@ -7,12 +7,8 @@
 static kind kind_of(const towline_robot *robot, const towline_plant *settings) {
     kind found = ELASTIC;
     for (int i = 0; i < robot->cables && settings->drive != TOWLINE_TENSIONS; i++) {
-        if (robot->cable[i].stiffness == 0) {
-            return CONSTRAINED;
-        }
-        if (settings->drive == TOWLINE_FORCES && robot->cable[i].winch_friction > 0) {
-            found = WITH_FRICTION;
-        }
+        if (robot->cable[i].stiffness == 0) { return CONSTRAINED; }
+        if (settings->drive == TOWLINE_FORCES && robot->cable[i].winch_friction > 0) { found = WITH_FRICTION; }
     }
     return found;
 }
@@ -28,9 +24,7 @@ static void set_plant(plant *p, const towline_robot *robot, const towline_plant 
     p->has_winches = 0;
     for (int i = 0; i < p->cables; i++) {
         p->has_winches |= robot->cable[i].has_winch;
-        for (int j = 0; j < 3; j++) {
-            p->attachment[i][j] = robot->cable[i].attachment[j] - robot->com[j];
-        }
+        for (int j = 0; j < 3; j++) { p->attachment[i][j] = robot->cable[i].attachment[j] - robot->com[j]; }
     }
 }
 
@@ -53,9 +47,7 @@ static void take_state(plant *p, const double *row, motion *now) {
     const double *references = row + TOWLINE_BODY_NUMBERS * p->bodies + 2 * m;
     take_motion(p, row, now);
     memcpy(p->reference, references, (size_t)m * sizeof references[0]);
-    for (int i = 0; i < m; i++) {
-        p->condition[i] = condition_of(references[m + i]);
-    }
+    for (int i = 0; i < m; i++) { p->condition[i] = condition_of(references[m + i]); }
     memset(p->body, 0, (size_t)p->bodies * sizeof p->body[0]);
     memset(p->cable, 0, (size_t)m * sizeof p->cable[0]);
     p->taut.holds = 0;
@@ -75,15 +67,11 @@ static void record_state(const plant *p, const motion *now, double *row) {
     memcpy(cables, now->length, (size_t)m * sizeof cables[0]);
     memcpy(cables + m, now->rate, (size_t)m * sizeof cables[0]);
     memcpy(cables + 2 * m, p->reference, (size_t)m * sizeof cables[0]);
-    for (int i = 0; i < m; i++) {
-        cables[3 * m + i] = p->condition[i];
-    }
+    for (int i = 0; i < m; i++) { cables[3 * m + i] = p->condition[i]; }
 }
 
 static void record_tensions(const plant *p, double *row) {
-    for (int i = 0; i < p->cables; i++) {
-        row[i] = p->cable[i].tension;
-    }
+    for (int i = 0; i < p->cables; i++) { row[i] = p->cable[i].tension; }
 }
 
 #endif

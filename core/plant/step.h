@@ -28,9 +28,7 @@ typedef struct {
 
 /* to = from + h slope, for n numbers. */
 INLINE void move_numbers(int n, const double *from, double h, const double *slope, double *to) {
-    for (int i = 0; i < n; i++) {
-        to[i] = from[i] + h * slope[i];
-    }
+    for (int i = 0; i < n; i++) { to[i] = from[i] + h * slope[i]; }
 }
 
 /* The same for all that is integrated. Imposed carriers are where their path is, and some rest. */
@@ -39,9 +37,7 @@ static void move_on(const plant *p, const motion *from, double h, const motion *
         const body_motion *x = &from->body[b], *dx = &slope->body[b];
         body_motion *y = &to->body[b];
         const int32_t moved_by = p->robot->body[b].motion;
-        if (moved_by != TOWLINE_FREE && moved_by != TOWLINE_LAGGED) {
-            continue;
-        }
+        if (moved_by != TOWLINE_FREE && moved_by != TOWLINE_LAGGED) { continue; }
         move_numbers(3, x->position, h, dx->position, y->position);
         move_numbers(3, x->velocity, h, dx->velocity, y->velocity);
         if (moved_by == TOWLINE_FREE) {
@@ -54,9 +50,7 @@ static void move_on(const plant *p, const motion *from, double h, const motion *
 }
 
 INLINE void sum_numbers(int n, const double *a, const double *b, const double *c, double *d) {
-    for (int i = 0; i < n; i++) {
-        d[i] = a[i] + 2 * (b[i] + c[i]) + d[i];
-    }
+    for (int i = 0; i < n; i++) { d[i] = a[i] + 2 * (b[i] + c[i]) + d[i]; }
 }
 
 /* Add up the slopes with the weights of Runge and Kutta, 6 times the mean, into the last of them. */
@@ -93,16 +87,10 @@ static double attempt(plant *p, const motion *from, step_memory *of, double time
     move_on(p, from, step / 6, &slope[3], trial);
     normalise(p, trial);
     p->taut.holds = 0;
-    if (!p->locates) {
-        return 0;
-    }
+    if (!p->locates) { return 0; }
     set_geometry(p, trial, &slope[4], time + step);
-    if (p->kind == CONSTRAINED) {
-        hold(p, trial, &slope[4], time + step);
-    }
-    if (p->kind != ELASTIC) {
-        set_forces(p, trial, &slope[4], time + step);
-    }
+    if (p->kind == CONSTRAINED) { hold(p, trial, &slope[4], time + step); }
+    if (p->kind != ELASTIC) { set_forces(p, trial, &slope[4], time + step); }
     return largest_violation(p, trial);
 }
 
@@ -138,9 +126,7 @@ static double locate(plant *p, const motion *from, step_memory *of, double time,
             middle = step > 0.25 * width ? 0.5 * (low + high) : middle;
             width = step;
         }
-        if (!(low < middle && middle < high)) {
-            middle = 0.5 * (low + high);
-        }
+        if (!(low < middle && middle < high)) { middle = 0.5 * (low + high); }
         const double found = attempt(p, from, of, time, middle);
         last = middle;
         if (found > 0) {
@@ -158,9 +144,7 @@ static double locate(plant *p, const motion *from, step_memory *of, double time,
             keep_stretches(p, of);
         }
     }
-    if (last != high) {
-        attempt(p, from, of, time, high);
-    }
+    if (last != high) { attempt(p, from, of, time, high); }
     return high;
 }
 

@@ -29,9 +29,7 @@ static double acceleration_by_force(const plant *p, const motion *now, int i) {
     const double speed = now->rate[i], fastest = cable->winch_speed_max;
     const int slip = p->cable[i].slip;
     const double result = (drive_force(p, i) - slip * cable->winch_friction) / cable->winch_inertia;
-    if (slip == 0 || (speed >= fastest && result > 0) || (speed <= -fastest && result < 0)) {
-        return 0;
-    }
+    if (slip == 0 || (speed >= fastest && result > 0) || (speed <= -fastest && result < 0)) { return 0; }
     return result;
 }
 
@@ -70,17 +68,13 @@ static void take_command(plant *p, motion *now, double period) {
     for (int i = 0; i < p->cables; i++) {
         const int follows = p->robot->cable[i].winch_inertia == 0;
         if (p->settings->drive == TOWLINE_TENSIONS) {
-            if (p->settings->tension_lag == 0) {
-                now->length[i] = larger(p->commanded[i], 0);
-            }
+            if (p->settings->tension_lag == 0) { now->length[i] = larger(p->commanded[i], 0); }
         } else if (!works(p, i)) {
             now->rate[i] = 0;
         } else if (p->settings->drive == TOWLINE_LENGTHS) {
             p->commanded[i] = larger(p->commanded[i], SHORTEST);
             p->cable[i].reference_rate = (p->commanded[i] - p->reference[i]) / period;
-            if (follows) {
-                now->rate[i] = (p->commanded[i] - now->length[i]) / period;
-            }
+            if (follows) { now->rate[i] = (p->commanded[i] - now->length[i]) / period; }
         } else if (p->settings->drive == TOWLINE_RATES && follows) {
             now->rate[i] = p->commanded[i];
         }

@@ -25,9 +25,7 @@ INLINE void add_product(num factor, const num *a, const num *arm, const double *
         v[3 + j] = v[3 + j] * free[3 + j];
     }
     for (int j = 0; j < 6; j++) {
-        for (int k = 0; k <= j; k++) {
-            matrix[under(j, k)] += factor * v[j] * v[k];
-        }
+        for (int k = 0; k <= j; k++) { matrix[under(j, k)] += factor * v[j] * v[k]; }
     }
 }
 

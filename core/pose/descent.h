@@ -77,9 +77,7 @@ INLINE mask set_trial(const descent *task, lanes *of) {
 INLINE void descend(const towline_robot *robot, ptrdiff_t rows, towline_lengths measured, towline_poses results) {
     const descent task = descent_of(robot, rows, measured);
     lanes of;
-    if (rows < 1) {
-        return;
-    }
+    if (rows < 1) { return; }
     begin(&task, results.poses, &of);
     while (any(of.going)) {
         mask well;

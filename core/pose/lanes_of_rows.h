@@ -37,29 +37,21 @@ INLINE mask negated(mask chosen) { return chosen == 0; }
 
 /* Set `size` numbers where chosen. */
 INLINE void choose(mask chosen, const num *yes, num *result, int size) {
-    for (int i = 0; i < size; i++) {
-        result[i] = where(chosen, yes[i], result[i]);
-    }
+    for (int i = 0; i < size; i++) { result[i] = where(chosen, yes[i], result[i]); }
 }
 
 /* Through a pointer: compilers make slow code of `x[lane] = ...` */
 INLINE void set_lane(num *to, int lane, const double *from, int size) {
-    for (int i = 0; i < size; i++) {
-        ((double *)to)[LANES * i + lane] = from[i];
-    }
+    for (int i = 0; i < size; i++) { ((double *)to)[LANES * i + lane] = from[i]; }
 }
 
 INLINE void read_lane(const num *from, int lane, double *to, int size) {
-    for (int i = 0; i < size; i++) {
-        to[i] = ((const double *)from)[LANES * i + lane];
-    }
+    for (int i = 0; i < size; i++) { to[i] = ((const double *)from)[LANES * i + lane]; }
 }
 
 INLINE descent descent_of(const towline_robot *robot, ptrdiff_t rows, towline_lengths measured) {
     double most = 0;
-    for (int i = 0; i < robot->cables; i++) {
-        most = measured.weights[i] > most ? measured.weights[i] : most;
-    }
+    for (int i = 0; i < robot->cables; i++) { most = measured.weights[i] > most ? measured.weights[i] : most; }
     const double size = size_of_platform(robot), nothing = NEGLIGIBLE / most;
     const descent task = {robot, rows, measured, size, (nothing > ROUNDING ? nothing : ROUNDING) * size};
     return task;
@@ -74,9 +66,7 @@ INLINE void next_rows(const descent *task, const double *poses, mask ended, lane
     for (int lane = 0; lane < LANES; lane++) {
         double busy;
         read_lane(&left, lane, &busy, 1);
-        if (busy > 0) {
-            continue;
-        }
+        if (busy > 0) { continue; }
         /* Without a next row the lane computes the last one once more, for nobody. */
         const ptrdiff_t row = of->next < task->rows ? of->next : task->rows - 1;
         busy = of->next < task->rows;
@@ -85,13 +75,9 @@ INLINE void next_rows(const descent *task, const double *poses, mask ended, lane
         set_lane(&left, lane, &busy, 1);
         set_lane(of->start, lane, poses + 6 * row, 6);
         set_lane(of->lengths, lane, task->measured.lengths + m * row, m);
-        if (!placed) {
-            set_lane(of->carriers, lane, task->measured.carriers + per * row, 6 * task->robot->carriers);
-        }
+        if (!placed) { set_lane(of->carriers, lane, task->measured.carriers + per * row, 6 * task->robot->carriers); }
     }
-    if (!placed) {
-        place_origins(task->robot, of->carriers, &of->from);
-    }
+    if (!placed) { place_origins(task->robot, of->carriers, &of->from); }
     const place start = place_of(of->start);
     choose(ended, start.x, of->trial.x, 3);
     choose(ended, start.R, of->trial.R, 9);
@@ -111,12 +97,8 @@ INLINE void begin(const descent *task, const double *poses, lanes *of) {
     of->now = 0;
     of->going = of->sound = of->curved = none;
     of->cost = of->damping = of->taken = of->length = of->before = number(0);
-    for (int i = 0; i < 3; i++) {
-        of->trial.x[i] = of->at.x[i] = number(0);
-    }
-    for (int i = 0; i < 9; i++) {
-        of->trial.R[i] = of->at.R[i] = number(0);
-    }
+    for (int i = 0; i < 3; i++) { of->trial.x[i] = of->at.x[i] = number(0); }
+    for (int i = 0; i < 9; i++) { of->trial.R[i] = of->at.R[i] = number(0); }
     next_rows(task, poses, all, of);
 }
 
@@ -146,15 +128,11 @@ INLINE void end_rows(const descent *task, mask ended, mask final, mask well, lan
     num written = where(ended, number(1), number(0));
     choose(final, of->trial.x, of->at.x, 3);
     choose(final, of->trial.R, of->at.R, 9);
-    for (int i = 0; i < 3; i++) {
-        pose[i] = of->at.x[i];
-    }
+    for (int i = 0; i < 3; i++) { pose[i] = of->at.x[i]; }
     set_angles(of->at.R, task->measured.free, of->start + 3, pose + 3);
     for (int i = 0; i < m; i++) {
         num after = here->e[i];
-        for (int j = 0; j < 6; j++) {
-            after += here->J[6 * i + j] * of->step[j];
-        }
+        for (int j = 0; j < 6; j++) { after += here->J[6 * i + j] * of->step[j]; }
         errors[i] = where(final, after, here->e[i]);
     }
     for (int lane = 0; lane < LANES; lane++) {

@@ -27,12 +27,8 @@ typedef struct {
 INLINE place place_of(const num *pose) {
     const attitude at = attitude_of(pose + 3);
     place there;
-    for (int i = 0; i < 3; i++) {
-        there.x[i] = pose[i];
-    }
-    for (int i = 0; i < 9; i++) {
-        there.R[i] = at.R[i];
-    }
+    for (int i = 0; i < 3; i++) { there.x[i] = pose[i]; }
+    for (int i = 0; i < 9; i++) { there.R[i] = at.R[i]; }
     return there;
 }
 
@@ -49,9 +45,7 @@ INLINE void place_origins(const towline_robot *robot, const num *carriers, origi
         }
         turn_constant(carrier.R, cable->anchor, from->anchor + 3 * i);
         turn_constant(carrier.R, cable->axis, from->axis + 3 * i);
-        for (int j = 0; j < 3; j++) {
-            from->anchor[3 * i + j] += origin[j];
-        }
+        for (int j = 0; j < 3; j++) { from->anchor[3 * i + j] += origin[j]; }
     }
 }
 
@@ -83,9 +77,7 @@ INLINE void reach_over_sheave(double r, const num *d, const num *k, reach *to) {
     const num wrap = angle_of(sine, cosine);
     to->length = to->straight + r * where(wrap < 0, wrap + 6.28318530717958647692, wrap);
     const num e[3] = {out_of_axis[0] * by_distance, out_of_axis[1] * by_distance, out_of_axis[2] * by_distance};
-    for (int i = 0; i < 3; i++) {
-        to->n[i] = sine * e[i] + cosine * k[i];
-    }
+    for (int i = 0; i < 3; i++) { to->n[i] = sine * e[i] + cosine * k[i]; }
     cross(k, e, to->across);
     to->turning = sine * by_distance - 1.0 / to->straight;
 }
@@ -95,9 +87,7 @@ INLINE void reach_of(const towline_robot *robot, int i, const place *at, const o
     const towline_cable *cable = &robot->cable[i];
     num d[3];
     turn_constant(at->R, cable->attachment, to->arm);
-    for (int j = 0; j < 3; j++) {
-        d[j] = at->x[j] + to->arm[j] - from->anchor[3 * i + j];
-    }
+    for (int j = 0; j < 3; j++) { d[j] = at->x[j] + to->arm[j] - from->anchor[3 * i + j]; }
     if (cable->radius == 0) {
         reach_straight(d, to);
     } else {

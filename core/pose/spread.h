@@ -11,22 +11,14 @@
 INLINE void orthogonalise(num *J, int m, const double *free, num R[6][6]) {
     for (int j = 0; j < 6; j++) {
         num square = number(0);
-        for (int i = 0; i < m; i++) {
-            square += J[6 * i + j] * J[6 * i + j];
-        }
+        for (int i = 0; i < m; i++) { square += J[6 * i + j] * J[6 * i + j]; }
         R[j][j] = free[j] == 0 ? number(1) : square_root(square);
         const num by_length = 1.0 / R[j][j];
-        for (int i = 0; i < m; i++) {
-            J[6 * i + j] = J[6 * i + j] * by_length;
-        }
+        for (int i = 0; i < m; i++) { J[6 * i + j] = J[6 * i + j] * by_length; }
         for (int k = j + 1; k < 6; k++) {
             num along = number(0);
-            for (int i = 0; i < m; i++) {
-                along += J[6 * i + j] * J[6 * i + k];
-            }
-            for (int i = 0; i < m; i++) {
-                J[6 * i + k] -= along * J[6 * i + j];
-            }
+            for (int i = 0; i < m; i++) { along += J[6 * i + j] * J[6 * i + k]; }
+            for (int i = 0; i < m; i++) { J[6 * i + k] -= along * J[6 * i + j]; }
             R[j][k] = along;
         }
     }
@@ -38,9 +30,7 @@ INLINE void invert_upper(num R[6][6], num inverse[6][6]) {
         inverse[i][i] = 1.0 / R[i][i];
         for (int j = i + 1; j < 6; j++) {
             num total = number(0);
-            for (int k = i; k < j; k++) {
-                total += inverse[i][k] * R[k][j];
-            }
+            for (int k = i; k < j; k++) { total += inverse[i][k] * R[k][j]; }
             inverse[i][j] = -total / R[j][j];
         }
     }
@@ -63,18 +53,14 @@ INLINE void set_covariance(num *J, int m, const double *free, double size, num *
     orthogonalise(J, m, free, R);
     invert_upper(R, inverse);
     for (int i = 0; i < 6; i++) {
-        for (int j = i; j < 6; j++) {
-            spread += inverse[i][j] * inverse[i][j] * free[i];
-        }
+        for (int j = i; j < 6; j++) { spread += inverse[i][j] * inverse[i][j] * free[i]; }
     }
     const mask determined = squares * spread < most;
     for (int i = 0; i < 6; i++) {
         for (int j = i; j < 6; j++) {
             const double unit = (i < 3 ? 1.0 : 1.0 / size) * (j < 3 ? 1.0 : 1.0 / size);
             num total = number(0);
-            for (int k = j; k < 6; k++) {
-                total += inverse[i][k] * inverse[j][k];
-            }
+            for (int k = j; k < 6; k++) { total += inverse[i][k] * inverse[j][k]; }
             const int moves = free[i] > 0 && free[j] > 0;
             total = moves ? where(determined, total * unit, number(HUGE_VAL)) : number(0);
             covariance[6 * i + j] = covariance[6 * j + i] = total;

@@ -33,13 +33,9 @@ INLINE num deviations_at(const towline_robot *robot, const place *at, const orig
 
 /* Row j of the lower triangle of J^T J; compilers unroll it, since j is known where it is called. */
 INLINE void normal_row(const num *J, int m, int j, num *row) {
-    for (int k = 0; k <= j; k++) {
-        row[k] = number(0);
-    }
+    for (int k = 0; k <= j; k++) { row[k] = number(0); }
     for (int i = 0; i < m; i++) {
-        for (int k = 0; k <= j; k++) {
-            row[k] += J[6 * i + j] * J[6 * i + k];
-        }
+        for (int k = 0; k <= j; k++) { row[k] += J[6 * i + j] * J[6 * i + k]; }
     }
 }
 
@@ -52,25 +48,19 @@ INLINE void normal_matrix(const num *J, int m, const double *free, num *matrix) 
     normal_row(J, m, 4, matrix + under(4, 0));
     normal_row(J, m, 5, matrix + under(5, 0));
     for (int j = 0; j < 6; j++) {
-        if (free[j] == 0) {
-            matrix[under(j, j)] = number(1);
-        }
+        if (free[j] == 0) { matrix[under(j, j)] = number(1); }
     }
 }
 
 /* Solve row j of L x = b, with inverses on the diagonal of L; x has the rows before, and b from there on. */
 INLINE void forward(const num *L, int j, num *x) {
-    for (int k = 0; k < j; k++) {
-        x[j] -= L[under(j, k)] * x[k];
-    }
+    for (int k = 0; k < j; k++) { x[j] -= L[under(j, k)] * x[k]; }
     x[j] *= L[under(j, j)];
 }
 
 /* The same of L^T x = b, from the last row on. */
 INLINE void backward(const num *L, int j, num *x) {
-    for (int k = j + 1; k < 6; k++) {
-        x[j] -= L[under(k, j)] * x[k];
-    }
+    for (int k = j + 1; k < 6; k++) { x[j] -= L[under(k, j)] * x[k]; }
     x[j] *= L[under(j, j)];
 }
 
@@ -97,23 +87,13 @@ INLINE mask factorise(num damping, num *L) {
 /* Set the step (6), the solution of L L^T step = -J^T e. */
 INLINE void set_step(const deviations *of, int m, const num *L, num *step) {
     num x[6];
-    for (int j = 0; j < 6; j++) {
-        x[j] = number(0);
-    }
+    for (int j = 0; j < 6; j++) { x[j] = number(0); }
     for (int i = 0; i < m; i++) {
-        for (int j = 0; j < 6; j++) {
-            x[j] -= of->J[6 * i + j] * of->e[i];
-        }
+        for (int j = 0; j < 6; j++) { x[j] -= of->J[6 * i + j] * of->e[i]; }
     }
-    for (int j = 0; j < 6; j++) {
-        forward(L, j, x);
-    }
-    for (int j = 5; j >= 0; j--) {
-        backward(L, j, x);
-    }
-    for (int j = 0; j < 6; j++) {
-        step[j] = x[j];
-    }
+    for (int j = 0; j < 6; j++) { forward(L, j, x); }
+    for (int j = 5; j >= 0; j--) { backward(L, j, x); }
+    for (int j = 0; j < 6; j++) { step[j] = x[j]; }
 }
 
 /*

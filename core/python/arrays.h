@@ -38,17 +38,13 @@ static inline int view_of(PyObject *array, Py_buffer *view, int flags) {
     view->ndim = own->dimensions;
     view->shape = own->shape;
     view->strides = own->strides;
-    for (int i = 0; i < own->dimensions; i++) {
-        view->len *= own->shape[i];
-    }
+    for (int i = 0; i < own->dimensions; i++) { view->len *= own->shape[i]; }
     return 0;
 }
 
 /* Return the numbers of an array, which the caller releases, or NULL with an exception. */
 static inline double *numbers_of(PyObject *array, Py_buffer *view, int writable, Py_ssize_t *size) {
-    if (view_of(array, view, writable ? PyBUF_WRITABLE : PyBUF_SIMPLE) < 0) {
-        return NULL;
-    }
+    if (view_of(array, view, writable ? PyBUF_WRITABLE : PyBUF_SIMPLE) < 0) { return NULL; }
     *size = view->len / DOUBLE;
     return view->buf;
 }
@@ -63,9 +59,7 @@ typedef struct {
 
 static inline void release(arrays *given) {
     for (int i = 0; i < given->count; i++) {
-        if (given->of[i]) {
-            PyBuffer_Release(&given->view[i]);
-        }
+        if (given->of[i]) { PyBuffer_Release(&given->view[i]); }
     }
 }
 
@@ -126,14 +120,10 @@ static inline const towline_robot *robot_of(const arrays *given) {
         return NULL;
     }
     for (int b = 0; b <= robot->carriers; b++) {
-        if (robot->body[b].actuators < 0 || robot->body[b].actuators > TOWLINE_MOST_ACTUATORS) {
-            return NULL;
-        }
+        if (robot->body[b].actuators < 0 || robot->body[b].actuators > TOWLINE_MOST_ACTUATORS) { return NULL; }
     }
     for (int i = 0; i < robot->cables; i++) {
-        if (robot->cable[i].carrier < 0 || robot->cable[i].carrier >= robot->carriers) {
-            return NULL;
-        }
+        if (robot->cable[i].carrier < 0 || robot->cable[i].carrier >= robot->carriers) { return NULL; }
     }
     return robot;
 }

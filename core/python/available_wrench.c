@@ -17,9 +17,7 @@ TOWLINE_PY(facets) {
     enum { A, LOW, HIGH, NORMALS, LEAST, MOST_, ALL };
     arrays given;
     towline_matrices matrices;
-    if (!take(&given, arguments, count, ALL, NORMALS)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, NORMALS)) { return NULL; }
     const Py_ssize_t m = given.size[LOW], rows = given.size[LEAST];
     const Py_ssize_t n = rows > 0 ? given.size[NORMALS] / rows : 0;
     int fits = matrices_of(&given, A, n, m, &matrices);
@@ -37,17 +35,13 @@ TOWLINE_PY(margins) {
     enum { A, W, LOW, HIGH, MARGINS, RESERVES, ALL };
     arrays given;
     towline_matrices matrices;
-    if (!take(&given, arguments, count, ALL, MARGINS)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, MARGINS)) { return NULL; }
     const Py_ssize_t m = given.size[LOW], rows = given.size[MARGINS];
     const Py_ssize_t n = rows > 0 && m > 0 ? given.size[A] / (rows * m) : 0;
     int fits = matrices_of(&given, A, n, m, &matrices) && matrices.count == rows && m >= n && given.of[W] &&
                given.of[HIGH] && m <= TOWLINE_MARGIN_CABLES && given.size[HIGH] == m &&
                (given.size[W] == n || given.size[W] == n * rows);
-    if (fits && given.of[RESERVES]) {
-        fits = given.size[RESERVES] == rows * towline_facets_of((int)n, (int)m);
-    }
+    if (fits && given.of[RESERVES]) { fits = given.size[RESERVES] == rows * towline_facets_of((int)n, (int)m); }
     FINISH(&given, fits,
            towline_margins(&matrices, given.of[W], given.size[W] == n ? 0 : n, given.of[LOW], given.of[HIGH],
                            given.of[MARGINS], given.of[RESERVES]));
@@ -64,9 +58,7 @@ TOWLINE_PY(full_rank) {
     }
     const Py_ssize_t n = PyLong_AsSsize_t(arguments[N]);
     const double tolerance = PyFloat_AsDouble(arguments[TOLERANCE]);
-    if (PyErr_Occurred() || !take(&given, arguments + BEFORE, count - BEFORE, ALL, FULL)) {
-        return NULL;
-    }
+    if (PyErr_Occurred() || !take(&given, arguments + BEFORE, count - BEFORE, ALL, FULL)) { return NULL; }
     const Py_ssize_t per = given.size[FULL] > 0 ? given.size[A] / given.size[FULL] : 0;
     const int fits = n > 0 && matrices_of(&given, A, n, per / n, &matrices) && matrices.count == given.size[FULL];
     FINISH(&given, fits, towline_full_rank(&matrices, tolerance, given.of[FULL]));

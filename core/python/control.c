@@ -26,9 +26,7 @@ static int has_shape(const Py_buffer *view, Py_ssize_t rows, const place *at) {
 /* Copy an array of each row, or of all rows, to its place; return 0 with an exception if it is no such array. */
 static int put(PyObject *array, Py_ssize_t rows, place at) {
     Py_buffer view;
-    if (view_of(array, &view, PyBUF_STRIDED_RO | PyBUF_FORMAT) < 0) {
-        return 0;
-    }
+    if (view_of(array, &view, PyBUF_STRIDED_RO | PyBUF_FORMAT) < 0) { return 0; }
     const int fits = has_shape(&view, rows, &at);
     if (!fits) {
         PyErr_SetString(PyExc_ValueError, "the array must be of float64 and of the shape that fits the robot");
@@ -52,9 +50,7 @@ static int put(PyObject *array, Py_ssize_t rows, place at) {
 /* Whether the arrays of a call, as far as they are there, have so many rows of their sizes. */
 static int have_rows(const arrays *given, int first, int last, Py_ssize_t rows, const Py_ssize_t *sizes) {
     int fits = 1;
-    for (int i = first; i < last; i++) {
-        fits = fits && (!given->of[i] || given->size[i] == rows * sizes[i]);
-    }
+    for (int i = first; i < last; i++) { fits = fits && (!given->of[i] || given->size[i] == rows * sizes[i]); }
     return fits;
 }
 
@@ -117,9 +113,7 @@ TOWLINE_PY(control_take) {
         PyErr_SetString(PyExc_TypeError, "the function takes a state, a reference and arrays");
         return NULL;
     }
-    if (!take(&given, arguments + 2, count - 2, ALL, MEASURED)) {
-        return NULL;
-    }
+    if (!take(&given, arguments + 2, count - 2, ALL, MEASURED)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     const Py_ssize_t rows = given.size[REFERENCE] / ORDER;
     int fits = robot && given.of[MEASURED] && given.of[CABLES] && given.of[REFERENCE] && given.of[T_REF];
@@ -128,15 +122,11 @@ TOWLINE_PY(control_take) {
         const Py_ssize_t sizes[ALL] = {0, MOTION * (1 + c), m * PER_CABLE, ORDER, ORDER * c, m};
         fits = have_rows(&given, MEASURED, ALL, rows, sizes);
     }
-    if (!fits) {
-        return done(&given, 0);
-    }
+    if (!fits) { return done(&given, 0); }
     fits = put_state(state, robot, rows, given.of[MEASURED], given.of[CABLES]) &&
            put_reference(reference, robot, rows, given.of[REFERENCE], given.of[CARRIERS], given.of[T_REF]);
     release(&given);
-    if (!fits) {
-        return NULL;
-    }
+    if (!fits) { return NULL; }
     Py_RETURN_NONE;
 }
 
@@ -155,9 +145,7 @@ static const towline_controller *controller_of(const arrays *given) {
 
 /* Take numbers before the arrays of a call; return 0 with an exception if one is none. */
 static int take_numbers(PyObject *const *arguments, Py_ssize_t count, int wanted, double *numbers) {
-    for (int i = 0; i < wanted && i < count; i++) {
-        numbers[i] = PyFloat_AsDouble(arguments[i]);
-    }
+    for (int i = 0; i < wanted && i < count; i++) { numbers[i] = PyFloat_AsDouble(arguments[i]); }
     return !PyErr_Occurred();
 }
 
@@ -212,9 +200,7 @@ static Py_ssize_t count_far(const double *measured, Py_ssize_t motions, const do
     Py_ssize_t near = 0;
     for (Py_ssize_t row = 0; row < rows; row++, measured += motions, wanted += ORDER) {
         double off[6];
-        for (int i = 0; i < 6; i++) {
-            off[i] = measured[i] - wanted[i];
-        }
+        for (int i = 0; i < 6; i++) { off[i] = measured[i] - wanted[i]; }
         near += off[0] * off[0] + off[1] * off[1] + off[2] * off[2] <= most[0] * most[0] && fabs(off[3]) <= most[1] &&
                 fabs(off[4]) <= most[1] && fabs(off[5]) <= most[1];
     }
@@ -307,12 +293,8 @@ TOWLINE_PY(control_step) {
     }
     Py_BEGIN_ALLOW_THREADS;
     write_problems(robot, controller, numbers[DT], numbers[SINCE], rows, &given, at);
-    for (Py_ssize_t row = 0; row < rows; row++) {
-        at.status[row] = TOWLINE_UNSURE;
-    }
-    if (solves && m <= TOWLINE_CABLES) {
-        optimal = solve_all(at, rows, robot->cables, numbers[LENGTH], solves > 1);
-    }
+    for (Py_ssize_t row = 0; row < rows; row++) { at.status[row] = TOWLINE_UNSURE; }
+    if (solves && m <= TOWLINE_CABLES) { optimal = solve_all(at, rows, robot->cables, numbers[LENGTH], solves > 1); }
     for (Py_ssize_t i = 0; i < rows * m; i++) {
         missing += cables[i].is_cut != 0;
         cables[i].last = optimal == rows ? at.tensions[i] : cables[i].last;
@@ -337,9 +319,7 @@ TOWLINE_PY(control_thrusts) {
     const towline_controller *controller = controller_of(&given);
     double *const *of = given.of;
     int fits = robot && controller;
-    for (int i = MEASURED; i < ALL; i++) {
-        fits = fits && (of[i] || i == TURNING);
-    }
+    for (int i = MEASURED; i < ALL; i++) { fits = fits && (of[i] || i == TURNING); }
     if (fits) {
         const Py_ssize_t m = robot->cables, c = robot->carriers, motions = MOTION * (1 + c);
         const Py_ssize_t rows = given.size[TENSIONS] / m, each = c * towline_most_actuators(robot);

@@ -7,25 +7,17 @@
 
 /* Solve a problem of A, w, t_min, t_max, t_ref, weights and length, one after another; return the status. */
 static int solve(const double *data, Py_ssize_t size, double *t, Py_ssize_t m, double *direction, Py_ssize_t n) {
-    if (m < 1 || n < 1 || size != n * m + n + 4 * m + 1) {
-        return -1;
-    }
-    if (m > TOWLINE_CABLES || n > TOWLINE_ROWS) {
-        return (int)TOWLINE_UNSURE; /* the core has no room for it */
-    }
+    if (m < 1 || n < 1 || size != n * m + n + 4 * m + 1) { return -1; }
+    if (m > TOWLINE_CABLES || n > TOWLINE_ROWS) { return (int)TOWLINE_UNSURE; /* the core has no room for it */ }
     const double *w = data + n * m, *limits = w + n;
     const towline_problem problem = {(int)n,         (int)m,         data,          w, limits, limits + m,
                                      limits + 2 * m, limits + 3 * m, limits[4 * m], 0};
     towline_answer answer;
     const towline_status status = towline_solve(&problem, &answer);
     if (status == TOWLINE_OPTIMAL) {
-        for (int c = 0; c < m; c++) {
-            t[c] = answer.tensions[c];
-        }
+        for (int c = 0; c < m; c++) { t[c] = answer.tensions[c]; }
     } else if (direction && (status == TOWLINE_INFEASIBLE || status == TOWLINE_SINGULAR)) {
-        for (int i = 0; i < n; i++) {
-            direction[i] = answer.direction[i];
-        }
+        for (int i = 0; i < n; i++) { direction[i] = answer.direction[i]; }
     }
     return (int)status;
 }
@@ -43,15 +35,9 @@ TOWLINE_PY(solve_packed) {
         double *t = numbers_of(arguments[1], &tensions, 1, &m);
         if (t) {
             double *direction = count == 3 ? numbers_of(arguments[2], &proof, 1, &n) : NULL;
-            if (count == 2) {
-                n = (size - 4 * m - 1) / (m + 1);
-            }
-            if (count == 2 || direction) {
-                status = solve(data, size, t, m, direction, n);
-            }
-            if (direction) {
-                PyBuffer_Release(&proof);
-            }
+            if (count == 2) { n = (size - 4 * m - 1) / (m + 1); }
+            if (count == 2 || direction) { status = solve(data, size, t, m, direction, n); }
+            if (direction) { PyBuffer_Release(&proof); }
             PyBuffer_Release(&tensions);
         }
         PyBuffer_Release(&given);
@@ -82,9 +68,7 @@ static int is_batch(const arrays *given, Py_ssize_t n, Py_ssize_t m) {
         const int equal_weights = i == WEIGHTS && given->size[i] == 0;
         fits = equal_weights ? per == 0 : has(given, i, per, sizes[i], rows);
     }
-    for (int i = TENSIONS; fits && i < ARRAYS; i++) {
-        fits = has(given, i, sizes[i], sizes[i], rows);
-    }
+    for (int i = TENSIONS; fits && i < ARRAYS; i++) { fits = has(given, i, sizes[i], sizes[i], rows); }
     return fits;
 }
 
@@ -102,9 +86,7 @@ TOWLINE_PY(solve_rows) {
     const long n = PyLong_AsLong(arguments[N]), m = PyLong_AsLong(arguments[M]);
     const double rho = PyFloat_AsDouble(arguments[RHO]);
     const int in_lanes = PyObject_IsTrue(arguments[IN_LANES]);
-    if (PyErr_Occurred() || !take(&given, arguments + BEFORE, count - BEFORE, ARRAYS, TENSIONS)) {
-        return NULL;
-    }
+    if (PyErr_Occurred() || !take(&given, arguments + BEFORE, count - BEFORE, ARRAYS, TENSIONS)) { return NULL; }
     Py_ssize_t optimal = 0;
     const int fits = is_batch(&given, n, m);
     if (fits) {

@@ -14,9 +14,7 @@ PyObject *towline_py_finite(PyObject *module, PyObject *array) {
     const uint64_t exponent = (uint64_t)0x7ff
                               << 52; /* all of its bits are set in infinities and in what is no number */
     Py_buffer view;
-    if (view_of(array, &view, PyBUF_SIMPLE) < 0) {
-        return NULL;
-    }
+    if (view_of(array, &view, PyBUF_SIMPLE) < 0) { return NULL; }
     const char *bytes = view.buf; /* of numbers at any address: arrays need not be aligned */
     int finite = 1;
     for (Py_ssize_t at = 0; at + DOUBLE <= view.len; at += DOUBLE) {
@@ -31,9 +29,7 @@ PyObject *towline_py_finite(PyObject *module, PyObject *array) {
 PyObject *towline_py_extent(PyObject *module, PyObject *array) {
     (void)module;
     Py_buffer view;
-    if (view_of(array, &view, PyBUF_SIMPLE) < 0) {
-        return NULL;
-    }
+    if (view_of(array, &view, PyBUF_SIMPLE) < 0) { return NULL; }
     const char *bytes = view.buf;
     double least = INFINITY, largest = -INFINITY;
     for (Py_ssize_t at = 0; at + DOUBLE <= view.len; at += DOUBLE) {

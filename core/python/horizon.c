@@ -8,9 +8,7 @@
 static int whole_numbers(PyObject *const *arguments, int count, int *numbers) {
     for (int i = 0; i < count; i++) {
         const long number = PyLong_AsLong(arguments[i]);
-        if (number == -1 && PyErr_Occurred()) {
-            return 0;
-        }
+        if (number == -1 && PyErr_Occurred()) { return 0; }
         numbers[i] = number < 0 ? -1 : number > 1000000 ? 1000000 : (int)number;
     }
     return 1;
@@ -24,9 +22,7 @@ static Py_ssize_t sizes_of(PyObject *const *arguments, Py_ssize_t count, Py_ssiz
         PyErr_Format(PyExc_TypeError, "the function takes %zd arguments, got %zd", wanted, count);
         return -1;
     }
-    if (!whole_numbers(arguments, SIZES, sizes)) {
-        return -1;
-    }
+    if (!whole_numbers(arguments, SIZES, sizes)) { return -1; }
     const ptrdiff_t size = towline_horizon_size(sizes[STAGES], sizes[STATES], sizes[CONTROLS], sizes[SOFT]);
     if (size == 0) {
         PyErr_SetString(PyExc_ValueError,
@@ -48,9 +44,7 @@ TOWLINE_PY(horizon_size) {
 
 /* Take arrays of which the first is the memory of a horizon; return 0 with an exception if it has other numbers. */
 static int take_memory(arrays *given, PyObject *const *arguments, int wanted, Py_ssize_t size) {
-    if (!take(given, arguments, wanted, wanted, 0)) {
-        return 0;
-    }
+    if (!take(given, arguments, wanted, wanted, 0)) { return 0; }
     if (!has_size(given, 0, size)) {
         PyErr_Format(PyExc_ValueError, "the memory must have %zd numbers, got %zd", size, given->size[0]);
         release(given);
@@ -63,9 +57,7 @@ TOWLINE_PY(horizon_places) {
     int sizes[SIZES];
     arrays given;
     const Py_ssize_t size = sizes_of(arguments, count, SIZES + 1, sizes);
-    if (size < 0 || !take_memory(&given, arguments + SIZES, 1, size)) {
-        return NULL;
-    }
+    if (size < 0 || !take_memory(&given, arguments + SIZES, 1, size)) { return NULL; }
     const double *memory = given.of[0];
     const towline_horizon h = horizon_in(sizes, 0, given.of[0]);
     const struct {
@@ -92,9 +84,7 @@ TOWLINE_PY(horizon_places) {
     PyObject *places = PyDict_New();
     for (size_t i = 0; places && i < sizeof arrays_of_problem / sizeof *arrays_of_problem; i++) {
         PyObject *place = PyLong_FromSsize_t(arrays_of_problem[i].at - memory);
-        if (!place || PyDict_SetItemString(places, arrays_of_problem[i].name, place) < 0) {
-            Py_CLEAR(places);
-        }
+        if (!place || PyDict_SetItemString(places, arrays_of_problem[i].name, place) < 0) { Py_CLEAR(places); }
         Py_XDECREF(place);
     }
     release(&given);
@@ -132,13 +122,9 @@ TOWLINE_PY(horizon_solve) {
     int whole[WHOLE];
     arrays given;
     const Py_ssize_t size = sizes_of(arguments, count, ALL, whole);
-    if (size < 0 || !whole_numbers(arguments, WHOLE, whole)) {
-        return NULL;
-    }
+    if (size < 0 || !whole_numbers(arguments, WHOLE, whole)) { return NULL; }
     const double tolerance = PyFloat_AsDouble(arguments[TOLERANCE]);
-    if (PyErr_Occurred() || !take_memory(&given, arguments + MEMORY, ALL - MEMORY, size)) {
-        return NULL;
-    }
+    if (PyErr_Occurred() || !take_memory(&given, arguments + MEMORY, ALL - MEMORY, size)) { return NULL; }
     double *residuals = given.of[1];
     towline_horizon_result result = {{0, 0, 0, 0}, 0, 0};
     const int fits = has_size(&given, 1, 4);

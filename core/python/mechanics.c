@@ -19,9 +19,7 @@ typedef struct {
 /* Take the arrays of a call, of which those from `results` on are written to; return 0 with an exception if one is none. */
 static int take_call(call *to, PyObject *const *arguments, Py_ssize_t count, int wanted, int results) {
     const arrays *given = &to->given;
-    if (!take(&to->given, arguments, count, wanted, results)) {
-        return 0;
-    }
+    if (!take(&to->given, arguments, count, wanted, results)) { return 0; }
     const towline_robot *robot = robot_of(given);
     const Py_ssize_t carriers = robot ? 6 * robot->carriers : 0, rows = given->size[POSES] / 6;
     const int shared = given->size[CARRIERS] == carriers;
@@ -36,9 +34,7 @@ static int take_call(call *to, PyObject *const *arguments, Py_ssize_t count, int
 TOWLINE_PY(lines) {
     enum { LENGTHS = PLACES, A, J, ANCHORS, SENSITIVITY, ALL };
     call of;
-    if (!take_call(&of, arguments, count, ALL, LENGTHS)) {
-        return NULL;
-    }
+    if (!take_call(&of, arguments, count, ALL, LENGTHS)) { return NULL; }
     double *const *to = of.given.of;
     for (int i = LENGTHS; i < ALL; i++) {
         const Py_ssize_t per_cable[] = {1, 6, 6, 3, 7};
@@ -51,9 +47,7 @@ TOWLINE_PY(lines) {
 TOWLINE_PY(ends) {
     enum { ANCHORS = PLACES, ATTACHMENTS, ALL };
     call of;
-    if (!take_call(&of, arguments, count, ALL, ANCHORS)) {
-        return NULL;
-    }
+    if (!take_call(&of, arguments, count, ALL, ANCHORS)) { return NULL; }
     double *const *to = of.given.of;
     of.fits &= has_size(&of.given, ANCHORS, 3 * of.cables) && has_size(&of.given, ATTACHMENTS, 3 * of.cables);
     FINISH(&of.given, of.fits, towline_ends(of.robot, of.at, to[ANCHORS], to[ATTACHMENTS]));
@@ -62,9 +56,7 @@ TOWLINE_PY(ends) {
 TOWLINE_PY(cable_distances) {
     enum { DISTANCES = PLACES, ALL };
     call of;
-    if (!take_call(&of, arguments, count, ALL, DISTANCES)) {
-        return NULL;
-    }
+    if (!take_call(&of, arguments, count, ALL, DISTANCES)) { return NULL; }
     of.fits = of.fits && has_size(&of.given, DISTANCES, of.cables * (of.robot->cables - 1) / 2);
     FINISH(&of.given, of.fits, towline_cable_distances(of.robot, of.at, of.given.of[DISTANCES]));
 }
@@ -72,9 +64,7 @@ TOWLINE_PY(cable_distances) {
 TOWLINE_PY(columns_by_geometry) {
     enum { S = PLACES, ALL };
     call of;
-    if (!take_call(&of, arguments, count, ALL, S)) {
-        return NULL;
-    }
+    if (!take_call(&of, arguments, count, ALL, S)) { return NULL; }
     of.fits &= has_size(&of.given, S, 42 * of.cables);
     FINISH(&of.given, of.fits, towline_columns_by_geometry(of.robot, of.at, of.given.of[S]));
 }
@@ -83,9 +73,7 @@ TOWLINE_PY(columns_by_geometry) {
 static PyObject *wrench_derivative(PyObject *const *arguments, Py_ssize_t count, int by_axes) {
     enum { TENSIONS = PLACES, D, ALL };
     call of;
-    if (!take_call(&of, arguments, count, ALL, D)) {
-        return NULL;
-    }
+    if (!take_call(&of, arguments, count, ALL, D)) { return NULL; }
     double *const *to = of.given.of;
     of.fits &= has_size(&of.given, TENSIONS, of.cables) && has_size(&of.given, D, 36 * of.at.rows);
     FINISH(&of.given, of.fits, towline_wrench_by_pose(of.robot, of.at, to[TENSIONS], by_axes, to[D]));
@@ -98,9 +86,7 @@ TOWLINE_PY(wrench_by_axes) { return wrench_derivative(arguments, count, 1); }
 TOWLINE_PY(required_wrench) {
     enum { VELOCITIES = POSES + 1, ACCELERATIONS, WIND, W, ALL };
     arrays given;
-    if (!take(&given, arguments, count, ALL, W)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, W)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     const Py_ssize_t rows = given.size[POSES] / 6, numbers = 6 * rows;
     const int shared = given.size[WIND] == 3;

@@ -7,9 +7,7 @@
 /* Read whole numbers, and return 0 with an exception if one is none from 1 to `most`. */
 static int whole_number(PyObject *argument, Py_ssize_t most, Py_ssize_t *number) {
     *number = PyLong_AsSsize_t(argument);
-    if (*number == -1 && PyErr_Occurred()) {
-        return 0;
-    }
+    if (*number == -1 && PyErr_Occurred()) { return 0; }
     if (*number < 1 || *number > most) {
         PyErr_Format(PyExc_ValueError, "steps, substeps and keep must be from 1 to %zd, got %zd", most, *number);
         return 0;
@@ -34,9 +32,7 @@ TOWLINE_PY(run_plant) {
     }
     const towline_robot *robot = robot_of(&given);
     int fits = robot && given.of[SETTINGS] && given.view[SETTINGS].len == (Py_ssize_t)sizeof(towline_plant);
-    for (int i = STATES; i < ARRAYS; i++) {
-        fits = fits && given.of[i];
-    }
+    for (int i = STATES; i < ARRAYS; i++) { fits = fits && given.of[i]; }
     Py_ssize_t rows = 0, commands = steps;
     if (fits) {
         const Py_ssize_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
@@ -56,9 +52,7 @@ TOWLINE_PY(run_plant) {
 TOWLINE_PY(sense) {
     enum { ROBOT, STATES, MOTIONS, LENGTHS, ALL };
     arrays given;
-    if (!take(&given, arguments, count, ALL, MOTIONS)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, MOTIONS)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     const Py_ssize_t size = robot ? towline_plant_state_size(robot) : 1, rows = given.size[STATES] / size;
     const int fits = robot && has_size(&given, STATES, rows * size) &&
@@ -75,14 +69,10 @@ TOWLINE_PY(winch_lengths) {
         return NULL;
     }
     const double period = PyFloat_AsDouble(arguments[PERIOD]);
-    if ((period == -1 && PyErr_Occurred()) || !take(&given, arguments, ARRAYS, ARRAYS, LAST_RATES)) {
-        return NULL;
-    }
+    if ((period == -1 && PyErr_Occurred()) || !take(&given, arguments, ARRAYS, ARRAYS, LAST_RATES)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     int fits = robot != NULL;
-    for (int i = STATES; i < ARRAYS; i++) {
-        fits = fits && given.of[i];
-    }
+    for (int i = STATES; i < ARRAYS; i++) { fits = fits && given.of[i]; }
     if (fits) {
         const Py_ssize_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
         const Py_ssize_t rows = given.size[STATES] / size, m = robot->cables;

@@ -14,9 +14,7 @@ static int carriers_fit(const towline_robot *robot, Py_ssize_t size, Py_ssize_t 
 TOWLINE_PY(pose_from_lengths) {
     enum { ROBOT, CARRIERS, LENGTHS, WEIGHTS, FREE, DAMPING, POSES, ERRORS, STEPS, ALL };
     arrays given;
-    if (!take(&given, arguments, count, ALL, POSES)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, POSES)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     int fits = robot != NULL;
     if (fits) {
@@ -40,9 +38,7 @@ TOWLINE_PY(pose_from_lengths) {
 TOWLINE_PY(pose_covariance) {
     enum { ROBOT, CARRIERS, WEIGHTS, POSES, COVARIANCES, ALL };
     arrays given;
-    if (!take(&given, arguments, count, ALL, COVARIANCES)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, COVARIANCES)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     int fits = robot && given.size[POSES] % 6 == 0;
     if (fits) {
@@ -63,9 +59,7 @@ TOWLINE_PY(pose_covariance) {
 TOWLINE_PY(one_pose_from_lengths) {
     enum { ROBOT, CARRIERS, LENGTHS, SIGMA, POSE, RESIDUALS, COVARIANCE, ALL };
     arrays given;
-    if (!take(&given, arguments, count, ALL, POSE)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, POSE)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     const int m = robot ? robot->cables : 0;
     double weights[TOWLINE_MOST_CABLES], steps = 0, *residuals = given.of[RESIDUALS];
@@ -73,15 +67,11 @@ TOWLINE_PY(one_pose_from_lengths) {
                      given.size[SIGMA] == m && given.size[POSE] == 6 && given.size[RESIDUALS] == m &&
                      given.size[COVARIANCE] == 36;
     if (fits) {
-        for (int i = 0; i < m; i++) {
-            weights[i] = 1 / given.of[SIGMA][i];
-        }
+        for (int i = 0; i < m; i++) { weights[i] = 1 / given.of[SIGMA][i]; }
         const towline_lengths measured = {given.of[CARRIERS], 0, given.of[LENGTHS], weights, robot->freedom, 0};
         towline_pose_from_lengths(robot, 1, measured, (towline_poses){given.of[POSE], residuals, &steps});
         towline_pose_covariance(robot, 1, measured, given.of[POSE], given.of[COVARIANCE]);
-        for (int i = 0; i < m; i++) {
-            residuals[i] *= given.of[SIGMA][i];
-        }
+        for (int i = 0; i < m; i++) { residuals[i] *= given.of[SIGMA][i]; }
     }
     PyObject *none = done(&given, fits);
     Py_XDECREF(none);

@@ -19,9 +19,7 @@ typedef struct {
 /* Take matrices (N, rows, columns), or rows (N, columns), whose columns are side by side; return 0 with an exception. */
 static int take_matrices(PyObject *array, matrices *to) {
     to->taken = view_of(array, &to->view, PyBUF_STRIDES | PyBUF_WRITABLE) == 0;
-    if (!to->taken) {
-        return 0;
-    }
+    if (!to->taken) { return 0; }
     const Py_buffer *view = &to->view;
     const int last = view->ndim - 1;
     if (last < 1 || last > 2 || view->itemsize != DOUBLE || (view->shape[last] > 1 && view->strides[last] != DOUBLE)) {
@@ -45,9 +43,7 @@ typedef struct {
 static void release_dynamics(dynamics *from) {
     matrices *const all[] = {&from->A, &from->B, &from->c};
     for (int i = 0; i < 3; i++) {
-        if (all[i]->taken) {
-            PyBuffer_Release(&all[i]->view);
-        }
+        if (all[i]->taken) { PyBuffer_Release(&all[i]->view); }
     }
 }
 
@@ -87,9 +83,7 @@ static int tethers_of(const arrays *given, int index, const towline_robot *robot
             return -1;
         }
         for (int j = 0; j < tether->cables; j++) {
-            if (tether->cable[j] < 0 || tether->cable[j] >= robot->cables) {
-                return -1;
-            }
+            if (tether->cable[j] < 0 || tether->cable[j] >= robot->cables) { return -1; }
         }
     }
     return (int)count;
@@ -99,15 +93,11 @@ static int tethers_of(const arrays *given, int index, const towline_robot *robot
 static int moved_of(const arrays *given, int freed, int tethers, const towline_robot *robot, towline_moved *moved) {
     const Py_ssize_t count = given->size[freed] / 2;
     const int tethered = tethers_of(given, tethers, robot);
-    if (count > MOST_MOVED || tethered < 0 || given->size[freed] % 2) {
-        return 0;
-    }
+    if (count > MOST_MOVED || tethered < 0 || given->size[freed] % 2) { return 0; }
     *moved = (towline_moved){(int)count, (const void *)given->of[freed], tethered, (const void *)given->of[tethers]};
     for (Py_ssize_t f = 0; f < count; f++) {
         const int64_t carrier = moved->coordinates[2 * f], coordinate = moved->coordinates[2 * f + 1];
-        if (carrier < 0 || carrier >= robot->carriers || coordinate < 0 || coordinate >= 6) {
-            return 0;
-        }
+        if (carrier < 0 || carrier >= robot->carriers || coordinate < 0 || coordinate >= 6) { return 0; }
     }
     return towline_moved_count(*moved) <= MOST_MOVED;
 }
@@ -117,9 +107,7 @@ TOWLINE_PY(control_stages) {
     arrays given;
     dynamics to;
     towline_moved moved;
-    if (!take(&given, arguments, count - 3, ALL, ALL)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count - 3, ALL, ALL)) { return NULL; }
     if (!take_dynamics(arguments + ALL, &to)) {
         release(&given);
         return NULL;
@@ -147,9 +135,7 @@ TOWLINE_PY(control_aim) {
     enum { STEPS, EFFORTS, WANTED, PLANNED, ALL };
     arrays given;
     dynamics of;
-    if (!take(&given, arguments + FIRST, count - FIRST, ALL, WANTED)) {
-        return NULL;
-    }
+    if (!take(&given, arguments + FIRST, count - FIRST, ALL, WANTED)) { return NULL; }
     const double length = PyFloat_AsDouble(arguments[LENGTH]);
     if (PyErr_Occurred() || !take_dynamics(arguments + A, &of)) {
         release(&given);
@@ -158,9 +144,7 @@ TOWLINE_PY(control_aim) {
     const Py_ssize_t stages = of.A.stages, n = of.A.columns, u = of.B.columns;
     const Py_ssize_t moved = (n - STATES) / 2, sizes[ALL] = {stages, u, (1 + stages) * n, (1 + stages) * u};
     int fits = u > moved && u - moved <= TOWLINE_MOST_CABLES;
-    for (int i = 0; i < ALL; i++) {
-        fits = fits && given.of[i] && given.size[i] == sizes[i];
-    }
+    for (int i = 0; i < ALL; i++) { fits = fits && given.of[i] && given.size[i] == sizes[i]; }
     if (fits) {
         towline_aim(stages_of(&of, given.of[STEPS]), (int)(u - moved), (int)moved, length, given.of[EFFORTS],
                     given.of[WANTED], given.of[PLANNED]);
@@ -172,9 +156,7 @@ TOWLINE_PY(control_aim) {
 TOWLINE_PY(control_coordinates) {
     enum { ROBOT, TETHERS, MOTIONS, COORDINATES, ALL };
     arrays given;
-    if (!take(&given, arguments, count, ALL, COORDINATES)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, COORDINATES)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     const int tethered = robot ? tethers_of(&given, TETHERS, robot) : -1;
     int fits = tethered >= 0;
@@ -194,9 +176,7 @@ TOWLINE_PY(control_coordinates) {
 TOWLINE_PY(control_carriers) {
     enum { ROBOT, TETHERS, MOTION, CARRIERS, ALL };
     arrays given;
-    if (!take(&given, arguments, count, ALL, CARRIERS)) {
-        return NULL;
-    }
+    if (!take(&given, arguments, count, ALL, CARRIERS)) { return NULL; }
     const towline_robot *robot = robot_of(&given);
     const int tethered = robot ? tethers_of(&given, TETHERS, robot) : -1;
     int fits = tethered >= 0 && given.size[CARRIERS] == ORDER * robot->carriers;
@@ -204,9 +184,7 @@ TOWLINE_PY(control_carriers) {
         const towline_tether *tethers = (const void *)given.of[TETHERS];
         const int free = towline_moved_count((towline_moved){0, NULL, tethered, tethers});
         fits = given.size[MOTION] == 3 * (6 + free);
-        if (fits) {
-            towline_tethered_carriers(robot, tethered, tethers, given.of[MOTION], given.of[CARRIERS]);
-        }
+        if (fits) { towline_tethered_carriers(robot, tethered, tethers, given.of[MOTION], given.of[CARRIERS]); }
     }
     return done(&given, fits);
 }

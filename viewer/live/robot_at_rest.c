@@ -46,16 +46,12 @@ static double row_scale(int i) { return i < 3 ? 1 : 1 / page.length; }
 
 static double dot6(const double *x, const double *y) {
     double total = 0;
-    for (int i = 0; i < ROWS; i++) {
-        total += x[i] * y[i];
-    }
+    for (int i = 0; i < ROWS; i++) { total += x[i] * y[i]; }
     return total;
 }
 
 static void subtract6(double *x, double factor, const double *y) {
-    for (int i = 0; i < ROWS; i++) {
-        x[i] -= factor * y[i];
-    }
+    for (int i = 0; i < ROWS; i++) { x[i] -= factor * y[i]; }
 }
 
 static void geometry(void) {
@@ -72,9 +68,7 @@ static void wrench(void) {
     required_wrench_of_rows_one(&robot, 1, at_rest, 0, page.w);
     for (int i = 0; i < ROWS; i++) {
         page.w[i] *= robot.freedom[i];
-        for (int c = 0; c < robot.cables; c++) {
-            page.A[i * robot.cables + c] *= robot.freedom[i];
-        }
+        for (int c = 0; c < robot.cables; c++) { page.A[i * robot.cables + c] *= robot.freedom[i]; }
     }
 }
 
@@ -91,9 +85,7 @@ static towline_problem problem_of_pose(void) {
 }
 
 static void column(int c, double *a) {
-    for (int i = 0; i < ROWS; i++) {
-        a[i] = row_scale(i) * page.A[i * robot.cables + c];
-    }
+    for (int i = 0; i < ROWS; i++) { a[i] = row_scale(i) * page.A[i * robot.cables + c]; }
 }
 
 /*
@@ -107,46 +99,34 @@ static void orthogonal_part(double *x, const int *chosen) {
         double a[ROWS];
         column(c, a);
         const double length = sqrt(dot6(a, a));
-        for (int k = 0; chosen[c] && k < 2 * rank; k++) {
-            subtract6(a, dot6(a, basis[k % rank]), basis[k % rank]);
-        }
+        for (int k = 0; chosen[c] && k < 2 * rank; k++) { subtract6(a, dot6(a, basis[k % rank]), basis[k % rank]); }
         const double left = sqrt(dot6(a, a));
         if (chosen[c] && left > DEPENDENT * length) {
-            for (int i = 0; i < ROWS; i++) {
-                basis[rank][i] = a[i] / left;
-            }
+            for (int i = 0; i < ROWS; i++) { basis[rank][i] = a[i] / left; }
             rank++;
         }
     }
-    for (int k = 0; k < 2 * rank; k++) {
-        subtract6(x, dot6(x, basis[k % rank]), basis[k % rank]);
-    }
+    for (int k = 0; k < 2 * rank; k++) { subtract6(x, dot6(x, basis[k % rank]), basis[k % rank]); }
 }
 
 /* Set direction, support and shortfall to those along x (6), if the shortfall grows. */
 static void offer(const double *x) {
     double direction[ROWS], support = 0, demand = 0;
     const double size = sqrt(dot6(x, x));
-    if (!(size > 0)) {
-        return;
-    }
+    if (!(size > 0)) { return; }
     for (int i = 0; i < ROWS; i++) {
         direction[i] = row_scale(i) * x[i] / size;
         demand += direction[i] * page.w[i];
     }
     for (int c = 0; c < robot.cables; c++) {
         double pull = 0;
-        for (int i = 0; i < ROWS; i++) {
-            pull += direction[i] * page.A[i * robot.cables + c];
-        }
+        for (int i = 0; i < ROWS; i++) { pull += direction[i] * page.A[i * robot.cables + c]; }
         support += pull * (pull > 0 ? page.t_max[c] : page.t_min[c]);
     }
     if (demand - support > page.shortfall) {
         page.shortfall = demand - support;
         page.support = support;
-        for (int i = 0; i < ROWS; i++) {
-            page.direction[i] = direction[i];
-        }
+        for (int i = 0; i < ROWS; i++) { page.direction[i] = direction[i]; }
     }
 }
 
@@ -160,9 +140,7 @@ static void sharpen(const towline_problem *problem, int singular) {
     double missing[ROWS];
     int inside[MOST];
     towline_solve_soft(problem, 1e12, &nearest);
-    for (int i = 0; i < ROWS; i++) {
-        missing[i] = row_scale(i) * page.w[i];
-    }
+    for (int i = 0; i < ROWS; i++) { missing[i] = row_scale(i) * page.w[i]; }
     for (int c = 0; c < robot.cables; c++) {
         const double t = nearest.tensions[c];
         inside[c] = singular || (page.t_min[c] < t && t < page.t_max[c]);
@@ -182,9 +160,7 @@ static void capacity_margin(void) {
     int n = 0;
     for (int i = 0; i < ROWS; i++) {
         if (robot.freedom[i] != 0) {
-            for (int c = 0; c < m; c++) {
-                A[n * m + c] = row_scale(i) * page.A[i * m + c];
-            }
+            for (int c = 0; c < m; c++) { A[n * m + c] = row_scale(i) * page.A[i * m + c]; }
             w[n++] = row_scale(i) * page.w[i];
         }
     }
@@ -202,15 +178,11 @@ EXPORT("solve") int page_solve(void) {
     const towline_problem problem = problem_of_pose();
     towline_answer answer;
     const towline_status status = towline_solve(&problem, &answer);
-    for (int c = 0; c < robot.cables; c++) {
-        page.tensions[c] = answer.tensions[c];
-    }
+    for (int c = 0; c < robot.cables; c++) { page.tensions[c] = answer.tensions[c]; }
     page.shortfall = 0;
     if (status == TOWLINE_INFEASIBLE || status == TOWLINE_SINGULAR) {
         double proven[ROWS];
-        for (int i = 0; i < ROWS; i++) {
-            proven[i] = answer.direction[i] / row_scale(i);
-        }
+        for (int i = 0; i < ROWS; i++) { proven[i] = answer.direction[i] / row_scale(i); }
         offer(proven);
         sharpen(&problem, status == TOWLINE_SINGULAR);
     }
@@ -222,12 +194,8 @@ EXPORT("solve") int page_solve(void) {
 static int solve(double M[][UNKNOWNS], double *b, int n) {
     for (int k = 0; k < n; k++) {
         int best = k;
-        for (int i = k + 1; i < n; i++) {
-            best = fabs(M[i][k]) > fabs(M[best][k]) ? i : best;
-        }
-        if (!(fabs(M[best][k]) > 0)) {
-            return 0;
-        }
+        for (int i = k + 1; i < n; i++) { best = fabs(M[i][k]) > fabs(M[best][k]) ? i : best; }
+        if (!(fabs(M[best][k]) > 0)) { return 0; }
         for (int j = 0; j < n; j++) {
             const double x = M[k][j];
             M[k][j] = M[best][j];
@@ -238,16 +206,12 @@ static int solve(double M[][UNKNOWNS], double *b, int n) {
         b[best] = x;
         for (int i = k + 1; i < n; i++) {
             const double factor = M[i][k] / M[k][k];
-            for (int j = k; j < n; j++) {
-                M[i][j] -= factor * M[k][j];
-            }
+            for (int j = k; j < n; j++) { M[i][j] -= factor * M[k][j]; }
             b[i] -= factor * b[k];
         }
     }
     for (int k = n - 1; k >= 0; k--) {
-        for (int j = k + 1; j < n; j++) {
-            b[k] -= M[k][j] * b[j];
-        }
+        for (int j = k + 1; j < n; j++) { b[k] -= M[k][j] * b[j]; }
         b[k] /= M[k][k];
     }
     return 1;
@@ -265,9 +229,7 @@ EXPORT("hang") int page_hang(void) {
     wrench();
     const towline_problem problem = problem_of_pose();
     towline_solve_soft(&problem, 1e8, &start);
-    for (int c = 0; c < m; c++) {
-        pull[c] = start.tensions[c];
-    }
+    for (int c = 0; c < m; c++) { pull[c] = start.tensions[c]; }
     for (int step = 0; step < MOST_STEPS; step++) {
         const towline_places at = {1, page.pose, page.carriers, 0};
         const towline_lines want = {.lengths = page.lengths, .A = page.A, .J = J};
@@ -277,9 +239,7 @@ EXPORT("hang") int page_hang(void) {
         double M[UNKNOWNS][UNKNOWNS] = {{0}}, b[UNKNOWNS], missing = 0, apart = 0, longest = 0;
         int place[ROWS], n = 0;
         for (int i = 0; i < ROWS; i++) {
-            if (robot.freedom[i] != 0) {
-                place[n++] = i;
-            }
+            if (robot.freedom[i] != 0) { place[n++] = i; }
         }
         for (int r = 0; r < n; r++) {
             const int i = place[r];
@@ -288,38 +248,24 @@ EXPORT("hang") int page_hang(void) {
                 M[r][n + c] = row_scale(i) * page.A[i * m + c];
                 b[r] -= M[r][n + c] * pull[c];
             }
-            for (int k = 0; k < n; k++) {
-                M[r][k] = row_scale(i) * D[6 * i + place[k]];
-            }
+            for (int k = 0; k < n; k++) { M[r][k] = row_scale(i) * D[6 * i + place[k]]; }
             missing = fmax(missing, fabs(b[r]));
         }
         for (int c = 0; c < m; c++) {
             b[n + c] = page.kept[c] - page.lengths[c];
-            for (int k = 0; k < n; k++) {
-                M[n + c][k] = J[6 * c + place[k]];
-            }
+            for (int k = 0; k < n; k++) { M[n + c][k] = J[6 * c + place[k]]; }
             apart = fmax(apart, fabs(b[n + c]));
         }
         if (missing < THERE * robot.force_scale && apart < THERE * page.length) {
             int taut = 1;
-            for (int c = 0; c < m; c++) {
-                taut = taut && pull[c] >= -THERE * robot.force_scale;
-            }
+            for (int c = 0; c < m; c++) { taut = taut && pull[c] >= -THERE * robot.force_scale; }
             return taut;
         }
-        if (!solve(M, b, n + m)) {
-            return 0;
-        }
-        for (int k = 0; k < n; k++) {
-            longest = fmax(longest, fabs(b[k]) / (place[k] < 3 ? page.length : 1));
-        }
+        if (!solve(M, b, n + m)) { return 0; }
+        for (int k = 0; k < n; k++) { longest = fmax(longest, fabs(b[k]) / (place[k] < 3 ? page.length : 1)); }
         const double share = longest > LARGEST_TURN ? LARGEST_TURN / longest : 1;
-        for (int k = 0; k < n; k++) {
-            page.pose[place[k]] += share * b[k];
-        }
-        for (int c = 0; c < m; c++) {
-            pull[c] += share * b[n + c];
-        }
+        for (int k = 0; k < n; k++) { page.pose[place[k]] += share * b[k]; }
+        for (int c = 0; c < m; c++) { pull[c] += share * b[n + c]; }
     }
     return 0;
 }

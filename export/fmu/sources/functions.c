@@ -14,16 +14,12 @@ typedef struct {
 } instance;
 
 static fmi3Status refuse(const instance *it, fmi3String reason) {
-    if (it->logs && it->log) {
-        it->log(it->environment, fmi3Error, "logStatusError", reason);
-    }
+    if (it->logs && it->log) { it->log(it->environment, fmi3Error, "logStatusError", reason); }
     return fmi3Error;
 }
 
 static fmi3Status enter(instance *it, unit_mode from, unit_mode to) {
-    if (it->unit.mode != (int32_t)from) {
-        return refuse(it, "the function is not allowed in this mode");
-    }
+    if (it->unit.mode != (int32_t)from) { return refuse(it, "the function is not allowed in this mode"); }
     it->unit.mode = to;
     return fmi3OK;
 }
@@ -100,9 +96,7 @@ FMI3_FUNCTION fmi3Status fmi3SetFloat64(fmi3Instance it, const fmi3ValueReferenc
             return refuse(it, "there is no variable of this reference, or not one number for each");
         }
         const unit_variable *variable = &towline_unit_variables[references[i]];
-        if (variable->set == UNIT_READ) {
-            return refuse(it, "outputs and time cannot be set");
-        }
+        if (variable->set == UNIT_READ) { return refuse(it, "outputs and time cannot be set"); }
         if (variable->set == UNIT_FINITE && !(isfinite(values[i]) && values[i] >= variable->least)) {
             return refuse(it, "a value is not finite, or less than the smallest allowed one");
         }
@@ -118,9 +112,7 @@ FMI3_FUNCTION fmi3Status fmi3DoStep(fmi3Instance it, fmi3Float64 time, fmi3Float
     (void)never_returns;
     *needs_event = *ends = *early = false;
     *last_time = time;
-    if (self->unit.mode != UNIT_STEPPING) {
-        return refuse(self, "steps are allowed in step mode only");
-    }
+    if (self->unit.mode != UNIT_STEPPING) { return refuse(self, "steps are allowed in step mode only"); }
     if (!towline_unit_step(&self->unit, time, step)) {
         return refuse(self, "the motion diverges, use smaller steps; or the step is not a positive time");
     }
@@ -130,9 +122,7 @@ FMI3_FUNCTION fmi3Status fmi3DoStep(fmi3Instance it, fmi3Float64 time, fmi3Float
 
 FMI3_FUNCTION fmi3Status fmi3GetFMUState(fmi3Instance it, fmi3FMUState *state) {
     *state = *state ? *state : malloc(sizeof(towline_unit));
-    if (!*state) {
-        return refuse(it, "no memory is left");
-    }
+    if (!*state) { return refuse(it, "no memory is left"); }
     memcpy(*state, &((instance *)it)->unit, sizeof(towline_unit));
     return fmi3OK;
 }
@@ -160,9 +150,7 @@ FMI3_FUNCTION fmi3Status fmi3SerializedFMUStateSize(fmi3Instance it, fmi3FMUStat
 }
 
 FMI3_FUNCTION fmi3Status fmi3SerializeFMUState(fmi3Instance it, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-    if (size != sizeof(towline_unit)) {
-        return refuse(it, "the size is not that of a state");
-    }
+    if (size != sizeof(towline_unit)) { return refuse(it, "the size is not that of a state"); }
     memcpy(bytes, state, size);
     return fmi3OK;
 }
@@ -174,9 +162,7 @@ FMI3_FUNCTION fmi3Status fmi3DeserializeFMUState(fmi3Instance it, const fmi3Byte
         return refuse(it, "the bytes are not a state of this unit");
     }
     *state = *state ? *state : malloc(size);
-    if (!*state) {
-        return refuse(it, "no memory is left");
-    }
+    if (!*state) { return refuse(it, "no memory is left"); }
     memcpy(*state, bytes, size);
     return fmi3OK;
 }

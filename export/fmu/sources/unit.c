@@ -14,9 +14,7 @@ static const double ROUNDING = 1e-9; /* of a step */
 
 static int are_finite(const double *x, ptrdiff_t count) {
     double sum = 0;
-    for (ptrdiff_t i = 0; i < count; i++) {
-        sum += x[i] - x[i];
-    }
+    for (ptrdiff_t i = 0; i < count; i++) { sum += x[i] - x[i]; }
     return sum == 0;
 }
 
@@ -32,9 +30,7 @@ static int is_given(const towline_unit *unit, const towline_problem *problem, co
     for (int k = 0; k < 6; k++) {
         freedom += unit->known.freedom[k];
         missing[k] = problem->w[k];
-        for (int i = 0; i < m; i++) {
-            missing[k] -= problem->A[k * m + i] * answer->tensions[i];
-        }
+        for (int i = 0; i < m; i++) { missing[k] -= problem->A[k * m + i] * answer->tensions[i]; }
         missing[k] /= k < 3 ? 1 : unit->length;
         square += missing[k] * missing[k];
     }
@@ -44,12 +40,8 @@ static int is_given(const towline_unit *unit, const towline_problem *problem, co
     }
     for (int i = 0; i < m; i++) {
         double along = 0;
-        for (int k = 0; k < 6; k++) {
-            along += missing[k] / (k < 3 ? 1 : unit->length) * problem->A[k * m + i];
-        }
-        if (!(fabs(along) <= unit->negligible)) {
-            return 0;
-        }
+        for (int k = 0; k < 6; k++) { along += missing[k] / (k < 3 ? 1 : unit->length) * problem->A[k * m + i]; }
+        if (!(fabs(along) <= unit->negligible)) { return 0; }
     }
     return square <= unit->carried * unit->carried;
 }
@@ -63,9 +55,7 @@ static int solve(const towline_unit *unit, const towline_problem *problem, doubl
         tensions[i] =
             status == TOWLINE_INVALID ? fmin(fmax(wanted, problem->t_min[i]), problem->t_max[i]) : answer.tensions[i];
     }
-    if (status == TOWLINE_INVALID) {
-        return HOLD;
-    }
+    if (status == TOWLINE_INVALID) { return HOLD; }
     return status == TOWLINE_OPTIMAL || is_given(unit, problem, &answer) ? PLANNED : SOFT;
 }
 
@@ -159,9 +149,7 @@ static int simulate(towline_unit *unit, double step) {
     const double substeps = ceil(step / unit->longest_step - ROUNDING);
     double commands[2 * UNIT_COMMAND] = {0}, history[2 * UNIT_STATE], tensions[2 * UNIT_CABLES];
     int leads = 0;
-    if (!(substeps <= MOST_STEPS)) {
-        return 0;
-    }
+    if (!(substeps <= MOST_STEPS)) { return 0; }
     commands[0] = robot->has_aero;
     memcpy(commands + 1, unit->wind, sizeof unit->wind);
     memcpy(commands + 4, unit->wrench, sizeof unit->wrench);
@@ -177,9 +165,7 @@ static int simulate(towline_unit *unit, double step) {
     }
     const towline_run run = {1, 1 + leads, 1, 1, substeps < 1 ? 1 : (int32_t)substeps, step};
     towline_plant_run(robot, &unit->plant, &run, unit->state, commands, history, tensions);
-    if (!are_finite(history, 2 * size) || !are_finite(tensions, 2 * m)) {
-        return 0;
-    }
+    if (!are_finite(history, 2 * size) || !are_finite(tensions, 2 * m)) { return 0; }
     memcpy(unit->state, history + size, (size_t)size * sizeof *history);
     for (ptrdiff_t i = 0; i < m; i++) {
         unit->tension[i] = tensions[m + i];
@@ -190,9 +176,7 @@ static int simulate(towline_unit *unit, double step) {
 }
 
 void towline_unit_sense(towline_unit *unit) {
-    if (unit->simulates) {
-        towline_plant_sense(&unit->robot, 1, unit->state, unit->measured, unit->lengths);
-    }
+    if (unit->simulates) { towline_plant_sense(&unit->robot, 1, unit->state, unit->measured, unit->lengths); }
 }
 
 /* ---- Both. ---- */
@@ -215,23 +199,17 @@ static void apply_parameters(towline_unit *unit) {
 int towline_unit_step(towline_unit *unit, double time, double step) {
     const int both = unit->simulates && unit->controls;
     const double count = both ? fmax(1, floor(step / unit->period + 0.5)) : 1, part = step / count;
-    if (!(step > 0 && count <= MOST_STEPS) || !are_finite(&time, 1) || !are_finite(&step, 1)) {
-        return 0;
-    }
+    if (!(step > 0 && count <= MOST_STEPS) || !are_finite(&time, 1) || !are_finite(&step, 1)) { return 0; }
     apply_parameters(unit);
     for (int k = 0; k < count; k++) {
         const double now = time + k * part, since = unit->has_begun ? now - unit->last_time : 0;
         if (unit->controls) {
-            if (unit->has_begun && !(since > 0)) {
-                return 0;
-            }
+            if (unit->has_begun && !(since > 0)) { return 0; }
             control(unit, since);
             unit->last_time = now;
             unit->has_begun = 1;
         }
-        if (unit->simulates && !simulate(unit, part)) {
-            return 0;
-        }
+        if (unit->simulates && !simulate(unit, part)) { return 0; }
     }
     unit->time = time + step;
     return 1;
