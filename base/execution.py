@@ -45,23 +45,15 @@ class ExecutionOptions(TypedDict, total=False):
 class Execution:
     """Workers and checkpoint of many jobs.
 
-    Attributes
-    ----------
-    workers
-        Processes of this machine that share the jobs; 1: this process. Results do not depend on it.
-    scheduler
-        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
-    checkpoint
-        File to which results are written every few seconds.
-    resume
-        True to continue the checkpoint if the file exists. It must belong to the same jobs.
-    progress
-        Function that is called with (jobs done, jobs in total, those with a good result).
+    Attributes:
+        workers: Processes of this machine that share the jobs; 1: this process. Results do not depend on it.
+        scheduler: Address of a Dask scheduler whose workers are used instead (extra `cluster`).
+        checkpoint: File to which results are written every few seconds.
+        resume: True to continue the checkpoint if the file exists. It must belong to the same jobs.
+        progress: Function that is called with (jobs done, jobs in total, those with a good result).
 
-    Raises
-    ------
-    InputError
-        If a field has a wrong value.
+    Raises:
+        InputError: If a field has a wrong value.
     """
 
     workers: int = 1
@@ -78,10 +70,8 @@ class Execution:
     def check_alone(self) -> None:
         """Check that no field is set that applies only to many runs.
 
-        Raises
-        ------
-        InputError
-            If one is.
+        Raises:
+            InputError: If one is.
         """
         if self.workers != 1:
             raise InputError(f"workers must be 1 without runs, got {self.workers}")

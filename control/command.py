@@ -15,32 +15,25 @@ NOWHERE.flags.writeable = NOTHING.flags.writeable = False
 class Command(NamedTuple):
     """A command. Arrays have the leading dimension of the state.
 
-    Attributes
-    ----------
-    tensions
-        (..., m) [N], inside their limits and rate limits; small for a cable that is treated as cut.
-    carrier_pose, carrier_velocity, carrier_acceleration
-        Commanded motion of the carriers, (..., c, 6). Flying carriers follow `actuation` instead.
-    answered
-        (...), status of the step, an index of `ANSWERS`: tensions give the required wrench ("as planned"); an earlier
-        solution is used ("shifted plan"); tensions with the closest wrench ("soft wrench"); the last command is held
-        ("hold"); computed torque, because the robot does not move as predicted ("not as modelled"); or tensions as
-        planned, but the platform is more than a tenth of the cables' length or 0.5 rad off ("off the reference").
-    direction, shortfall
-        If no tensions inside the limits and rates give the required wrench: the direction of the missing wrench,
-        (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying carrier has too
-        little thrust for them, or does not turn as ordered because its actuators were at their limits for most of the
-        last 0.1 s, only the size.
-    actuation
-        Commands to the actuators of each carrier, (..., c, a); None if no carrier has any.
-    unexplained
-        Mean acceleration of the platform that was not predicted, (...) [m/s^2], angles times the robot's length; nan
-        from controllers that do not predict.
-    lengths
-        Unstrained lengths for winches that take them, (..., m) [m], instead of the tensions, which are then those that
-        are expected; default: None.
-    released
-        Cables that their carriers release, (..., m) of bool; default: None.
+    Attributes:
+        tensions: (..., m) [N], inside their limits and rate limits; small for a cable that is treated as cut.
+        carrier_pose, carrier_velocity, carrier_acceleration: Commanded motion of the carriers, (..., c, 6). Flying
+            carriers follow `actuation` instead.
+        answered: (...), status of the step, an index of `ANSWERS`: tensions give the required wrench ("as planned"); an
+            earlier solution is used ("shifted plan"); tensions with the closest wrench ("soft wrench"); the last
+            command is held ("hold"); computed torque, because the robot does not move as predicted ("not as modelled");
+            or tensions as planned, but the platform is more than a tenth of the cables' length or 0.5 rad off ("off the
+            reference").
+        direction, shortfall: If no tensions inside the limits and rates give the required wrench: the direction of the
+            missing wrench, (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying
+            carrier has too little thrust for them, or does not turn as ordered because its actuators were at their
+            limits for most of the last 0.1 s, only the size.
+        actuation: Commands to the actuators of each carrier, (..., c, a); None if no carrier has any.
+        unexplained: Mean acceleration of the platform that was not predicted, (...) [m/s^2], angles times the robot's
+            length; nan from controllers that do not predict.
+        lengths: Unstrained lengths for winches that take them, (..., m) [m], instead of the tensions, which are then
+            those that are expected; default: None.
+        released: Cables that their carriers release, (..., m) of bool; default: None.
     """
 
     tensions: np.ndarray

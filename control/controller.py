@@ -14,13 +14,10 @@ class Controller(ABC):
     A controller may have memory (integrals, the last command), which `reset` clears; a simulation calls it first. For
     an example see docs/adding-a-controller.md.
 
-    Attributes
-    ----------
-    batches
-        True if `step` accepts states with a leading dimension, a robot in each row, and treats every row independently.
-        Otherwise each of many runs uses a copy.
-    drive
-        Type of command of the plant that `simulate` uses, see `Plant`; default: chosen by the robot.
+    Attributes:
+        batches: True if `step` accepts states with a leading dimension, a robot in each row, and treats every row
+            independently. Otherwise each of many runs uses a copy.
+        drive: Type of command of the plant that `simulate` uses, see `Plant`; default: chosen by the robot.
     """
 
     batches = False
@@ -30,33 +27,23 @@ class Controller(ABC):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the command from now until the next step.
 
-        Parameters
-        ----------
-        time
-            Time of the step [s], later than that of the last one.
-        state, reference
-            Measured state, and desired motion at this time.
+        Args:
+            time: Time of the step [s], later than that of the last one.
+            state, reference: Measured state, and desired motion at this time.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong type, shape or value, or another thread uses the controller.
+        Raises:
+            InputError: If an argument has a wrong type, shape or value, or another thread uses the controller.
         """
 
     def follow(self, references: Sequence[Reference], period: float, start: float = 0.0) -> None:
         """Receive the future references; the default ignores them.
 
-        Parameters
-        ----------
-        references
-            Reference of each period, from `start` [s] on; the last one holds afterwards.
-        period
-            Period [s].
+        Args:
+            references: Reference of each period, from `start` [s] on; the last one holds afterwards.
+            period: Period [s].
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong type or value.
+        Raises:
+            InputError: If an argument has a wrong type or value.
         """
         return
 

@@ -72,23 +72,16 @@ class FaultTolerant(Controller):
     construction for the loss of each carrier, see `statics.formation`. If there is none, a warning gives the missing
     wrench, and nothing changes when that carrier is lost.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file, with flying carriers alone and cables of
-        fixed length.
-    options
-        Arguments of `Predictive`, for the team and for the remaining carriers.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file, with flying carriers alone and
+            cables of fixed length.
+        options: Arguments of `Predictive`, for the team and for the remaining carriers.
 
-    Attributes
-    ----------
-    lost
-        Time and description of a loss, a `HandOver`; None without one.
+    Attributes:
+        lost: Time and description of a loss, a `HandOver`; None without one.
 
-    Raises
-    ------
-    InputError
-        If the robot has other carriers or winches, or an argument has a wrong value.
+    Raises:
+        InputError: If the robot has other carriers or winches, or an argument has a wrong value.
     """
 
     def __init__(self, robot: Robot | str | os.PathLike[str], **options: Any):

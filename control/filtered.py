@@ -33,18 +33,13 @@ class Filtered(Controller):
 
     The velocities of measured states are not used. A pose that equals the last one is treated as a held reading.
 
-    Parameters
-    ----------
-    controller
-        Controller that receives the estimated states.
-    filter
-        `estimation.PoseFilter` of the platform's poses, with their standard deviations, or a filter with its methods.
-        It receives the reference, so that it filters the error to it.
+    Args:
+        controller: Controller that receives the estimated states.
+        filter: `estimation.PoseFilter` of the platform's poses, with their standard deviations, or a filter with its
+            methods. It receives the reference, so that it filters the error to it.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type.
+    Raises:
+        InputError: If an argument has a wrong type.
     """
 
     def __init__(self, controller: Controller, filter: Filter):

@@ -34,29 +34,22 @@ class LengthControl(Controller):
     follow from the lengths; they are not controlled. With a lag, e and its integral are those at that time, to first
     order.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
-    stiffness
-        E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does not
-        stretch (also the default of a cable without a value in the file, if there are no more cables than degrees of
-        freedom).
-    lag
-        Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time, and
-        their corrections with as much lead.
-    proportional, integral
-        P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the measured pose, 4 and 10 if
-        it is current, 0.3 and 2 up to 20 ms, less beyond. For a late pose without its `time` of measurement, give the
-        gains for its age: with larger ones, oscillations of the platform on its cables grow.
-    most
-        Largest correction of a length [m]; default: 5 % of the robot's length. There the integral stops, and the
-        status is "hold".
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
+        stiffness: E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does
+            not stretch (also the default of a cable without a value in the file, if there are no more cables than
+            degrees of freedom).
+        lag: Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time,
+            and their corrections with as much lead.
+        proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the
+            measured pose, 4 and 10 if it is current, 0.3 and 2 up to 20 ms, less beyond. For a late pose without its
+            `time` of measurement, give the gains for its age: with larger ones, oscillations of the platform on its
+            cables grow.
+        most: Largest correction of a length [m]; default: 5 % of the robot's length. There the integral stops, and the
+            status is "hold".
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value, the robot has flying carriers, or its cables have fixed lengths.
+    Raises:
+        InputError: If an argument has a wrong value, the robot has flying carriers, or its cables have fixed lengths.
     """
 
     batches = True
@@ -105,10 +98,8 @@ class LengthControl(Controller):
         The correction needs the pose of the state, and with a lag its velocity. A state with a time is compared with
         the plan of that time.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong shape or value, or no tensions are planned for cables that stretch.
+        Raises:
+            InputError: If an argument has a wrong shape or value, or no tensions are planned for cables that stretch.
         """
         rows = rows_of(required("state", state, State))
         state = as_floats(state, self.robot, rows)

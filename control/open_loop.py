@@ -19,16 +19,12 @@ from .state import State
 class OpenLoop(Controller):
     """Command the planned tensions, or the lowest ones, and the planned motion of the carriers: a baseline.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly, because
-        flying requires feedback.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly,
+            because flying requires feedback.
 
-    Raises
-    ------
-    InputError
-        If the robot has flying carriers.
+    Raises:
+        InputError: If the robot has flying carriers.
     """
 
     batches = True

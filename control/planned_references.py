@@ -33,19 +33,13 @@ def references(
 
     Reference k is that of the plan at the time start + k period. The last one is the first at or after the plan's end.
 
-    Parameters
-    ----------
-    plan
-        A `Plan`, a `Stop`, another object with a `trajectory`, such a dataset, or the NetCDF file of one.
-    period
-        Period of the controller [s].
-    start
-        Time in the plan at which the references begin [s].
+    Args:
+        plan: A `Plan`, a `Stop`, another object with a `trajectory`, such a dataset, or the NetCDF file of one.
+        period: Period of the controller [s].
+        start: Time in the plan at which the references begin [s].
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or value, or there are more than a million periods.
+    Raises:
+        InputError: If an argument has a wrong type or value, or there are more than a million periods.
     """
     robot, trajectory = planned(plan)
     assert trajectory.duration is not None  # of samples

@@ -63,48 +63,38 @@ class Predictive(ComputedTorque):
     from the start, with a warning, if the loop is unstable at home because carriers turn before they accelerate, as
     with cables that begin below their CoM.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file. A carrier may have at most three cables
-        of fixed length.
-    bandwidth
-        Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose. Default: 40,
-        but less if carriers correct errors: 8 for teams with cables of fixed length, 6 for towing robots with winches.
-        At most 1.2 / `stage` has an effect.
-    stages, stage
-        Number of stages, and duration of each [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may leave their
-        reference, which is slower, of 0.025 s if carriers correct errors. If the first two steps, or three in a row,
-        and the references of `follow` are more than twice as far apart, up to 0.21 s, a stage lasts as long as a step.
-        A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
-    reach
-        Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft scale, not
-        a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's weight. With cables
-        of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables' length if carriers
-        correct errors. A flying carrier that does not correct errors is moved by the compensation of `ComputedTorque`,
-        not by the solution.
-    carrier_bandwidth, carrier_acceleration
-        Bandwidth with which carriers return to their reference [rad/s] (default: 2, but 6 if carriers correct errors),
-        and their largest acceleration in addition to the reference's [m/s^2 and rad/s^2].
-    tube
-        Largest distance of the platform from its reference [m] (default: no limit).
-    keep_out
-        Bodies in {G} that the platform's frame and attachments should avoid, as in a task's `keep_out`. Exact penalties
-        enforce tube and bodies wherever the tensions allow. The reference may pass through a body.
-    observer
-        Bandwidth of the estimates of disturbances [rad/s], 0: none. Default: 60, but 20 if carriers correct errors.
-    rate, place, attitude, patience, tension_loop, tension_lag, rotor_lag, sensors
-        See `ComputedTorque`. The sensors never make a bandwidth larger than its default.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file. A carrier may have at most three
+            cables of fixed length.
+        bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
+            Default: 40, but less if carriers correct errors: 8 for teams with cables of fixed length, 6 for towing
+            robots with winches. At most 1.2 / `stage` has an effect.
+        stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may
+            leave their reference, which is slower, of 0.025 s if carriers correct errors. If the first two steps, or
+            three in a row, and the references of `follow` are more than twice as far apart, up to 0.21 s, a stage lasts
+            as long as a step. A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
+        reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
+            scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's
+            weight. With cables of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables'
+            length if carriers correct errors. A flying carrier that does not correct errors is moved by the
+            compensation of `ComputedTorque`, not by the solution.
+        carrier_bandwidth, carrier_acceleration: Bandwidth with which carriers return to their reference [rad/s]
+            (default: 2, but 6 if carriers correct errors), and their largest acceleration in addition to the
+            reference's [m/s^2 and rad/s^2].
+        tube: Largest distance of the platform from its reference [m] (default: no limit).
+        keep_out: Bodies in {G} that the platform's frame and attachments should avoid, as in a task's `keep_out`. Exact
+            penalties enforce tube and bodies wherever the tensions allow. The reference may pass through a body.
+        observer: Bandwidth of the estimates of disturbances [rad/s], 0: none. Default: 60, but 20 if carriers correct
+            errors.
+        rate, place, attitude, patience, tension_loop, tension_lag, rotor_lag, sensors: See `ComputedTorque`. The
+            sensors never make a bandwidth larger than its default.
 
-    Attributes
-    ----------
-    handed_over
-        Time and reason of a hand-over to computed torque, a `HandOver`; None without one.
+    Attributes:
+        handed_over: Time and reason of a hand-over to computed torque, a `HandOver`; None without one.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value, or a carrier has no cable or more than three cables of fixed length.
+    Raises:
+        InputError: If an argument has a wrong value, or a carrier has no cable or more than three cables of fixed
+            length.
     """
 
     batches = False

@@ -30,23 +30,16 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     several cables of fixed length that begin at one point of it, and all cables together give every wrench, that point
     stays on its path.
 
-    Parameters
-    ----------
-    plan
-        A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
-    time
-        Time in the plan at which the stop begins [s], at most its end. A plan that ends while the robot moves is
-        continued with its last acceleration.
+    Args:
+        plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
+        time: Time in the plan at which the stop begins [s], at most its end. A plan that ends while the robot moves is
+            continued with its last acceleration.
 
-    Returns
-    -------
-    Stop
-        `simulate` and `references` take it as they take a plan.
+    Returns:
+        Stop: `simulate` and `references` take it as they take a plan.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or value, or the robot has flying carriers with other cables.
+    Raises:
+        InputError: If an argument has a wrong type or value, or the robot has flying carriers with other cables.
     """
     robot, trajectory = planned(plan)
     return stop_along(robot, trajectory, number("time", time, 0.0, 1e9))
@@ -58,17 +51,12 @@ def longest_stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], peri
     If it is feasible, the robot can stop within its duration from each of these instants. Computing a stop takes a
     few milliseconds.
 
-    Parameters
-    ----------
-    plan
-        A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
-    period
-        Time between two instants [s].
+    Args:
+        plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
+        period: Time between two instants [s].
 
-    Raises
-    ------
-    InputError
-        As `stop` does, or if there are more than 10 000 instants.
+    Raises:
+        InputError: As `stop` does, or if there are more than 10 000 instants.
     """
     robot, trajectory = planned(plan)
     period = number("period", period, 1e-6, 1e9)

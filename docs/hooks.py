@@ -23,8 +23,9 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parent.parent
-# Parameters that share a description, in a docstring.
-SHARED = re.compile(r"^( +)(\w+(?:, \w+)+)( :[^\n]*)?\n((?:\1    [^\n]*\n)+)", re.MULTILINE)
+DOCSTRING = re.compile(r'"""[\s\S]*?"""')
+# Parameters that share a description.
+SHARED = re.compile(r"^( +)(\w+(?:, \w+)+)(: [^\n]*\n(?:\1    [^\n]*\n)*)", re.MULTILINE)
 SOURCES = ROOT / "build" / "docs"
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 
@@ -37,14 +38,14 @@ def on_startup(**_: object) -> None:
         folder = SOURCES.joinpath(*package.split("."))
         folder.mkdir(parents=True)
         for source in ROOT.joinpath(*package.split(".")[1:]).glob("*.py"):
-            text = _with_fields(SHARED.sub(_each, source.read_text(encoding="utf-8")))
-            (folder / source.name).write_text(text, encoding="utf-8")
+            text = DOCSTRING.sub(lambda found: SHARED.sub(_each, found[0]), source.read_text(encoding="utf-8"))
+            (folder / source.name).write_text(_with_fields(text), encoding="utf-8")
 
 
 def _each(shared: re.Match[str]) -> str:
     """Describe each parameter apart: mkdocstrings gives those of one line the type of the first, and no defaults."""
-    indent, names, kind, description = shared.groups(default="")
-    return "".join(f"{indent}{name}{kind}\n{description}" for name in names.split(", "))
+    indent, names, description = shared.groups()
+    return "".join(f"{indent}{name}{description}" for name in names.split(", "))
 
 
 def _with_fields(text: str) -> str:

@@ -27,10 +27,8 @@ class Drawn:
 
         A figure without content is left out.
 
-        Parameters
-        ----------
-        format
-            png, pdf or svg.
+        Args:
+            format: png, pdf or svg.
 
         Raises `InputError` if the format is another, or a file cannot be written.
         """
@@ -60,15 +58,11 @@ class Filmed(Drawn):
 
         Cables are coloured by tension, and grey where no tensions exist.
 
-        Parameters
-        ----------
-        file
-            Ends in .gif or .mp4.
-        speed
-            Seconds of the motion in one second of the film; 1 is real time.
-        fps
-            Frames per second. GIF counts in hundredths of a second: the nearest rate is taken, at most 50, and the
-            motion keeps its speed.
+        Args:
+            file: Ends in .gif or .mp4.
+            speed: Seconds of the motion in one second of the film; 1 is real time.
+            fps: Frames per second. GIF counts in hundredths of a second: the nearest rate is taken, at most 50, and the
+                motion keeps its speed.
 
         Raises `InputError` if the suffix, the speed or the rate is not valid, or the file cannot be written.
         """

@@ -233,10 +233,8 @@ class Dynamics(Displayed):
         - `elastic`: True: elastic cables, each with its `stiffness`; False: constant tensions, only the geometry
           changes.
 
-        Raises
-        ------
-        InputError
-            If `elastic` and a cable has no stiffness.
+        Raises:
+            InputError: If `elastic` and a cable has no stiffness.
         """
         if flag("elastic", elastic):
             for index, cable in enumerate(self.robot.cables):
@@ -262,10 +260,8 @@ class Dynamics(Displayed):
           slack and are ignored.
         - `elastic`: False: inextensible cables, which permit 6 - rank motions, or none.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong shape or value, or `elastic` and a cable has no stiffness.
+        Raises:
+            InputError: If an argument has a wrong shape or value, or `elastic` and a cable has no stiffness.
         """
         home = self.robot.carrier_home
         places = home if carrier_pose is None else carrier_pose

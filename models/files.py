@@ -15,10 +15,9 @@ from .robot import Robot
 def load(name: str | os.PathLike[str]) -> Robot:
     """Load a robot of the library by its `name`, one of `available()`, or any YAML file by its path.
 
-    Raises
-    ------
-    InputError
-        If there is no such robot or file, or the file is not a valid robot: one line with file, field and value.
+    Raises:
+        InputError: If there is no such robot or file, or the file is not a valid robot: one line with file, field and
+            value.
     """
     path = file_path("robot", name, "a name of the library or the path of a YAML file")
     text = os.fspath(name)

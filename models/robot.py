@@ -104,10 +104,8 @@ class Robot(Part):
     def parameter_values(self, names: Iterable[str]) -> np.ndarray:
         """Return cable parameters by name, such as `cables[2].anchor.x` or `cables[2].pulley.radius`, (p,) [m].
 
-        Raises
-        ------
-        InputError
-            If `names` is not a list of names, or the robot has no such parameter.
+        Raises:
+            InputError: If `names` is not a list of names, or the robot has no such parameter.
         """
         try:
             listed = None if isinstance(names, str) else list(names)
@@ -142,10 +140,8 @@ class Robot(Part):
 
         The first robots of a `seed` do not depend on the count.
 
-        Raises
-        ------
-        InputError
-            If the robot has no uncertainty, an argument is wrong, or a sample is geometrically invalid.
+        Raises:
+            InputError: If the robot has no uncertainty, an argument is wrong, or a sample is geometrically invalid.
         """
         whole_number("count", count, 1, 1_000_000)
         whole_number("seed", seed, 0, 2**63 - 1)

@@ -53,38 +53,27 @@ def plan(
     If the duration alone is free, so is the time law along the path: the path's own time law, stretched, competes with
     the fastest one (`time_along`, if the extra `timing` is installed), and the task's objective decides.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    task
-        A `Task`, a mapping with its keys, or the path of a YAML file.
-    progress
-        Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
-    start
-        Initial guess: a plan of the same robot for a similar task, or a path for the platform (or a mapping with its
-        keys) in the frame of the task's path. Default: the planner's guess.
-    initial
-        The measured state from which the motion starts, instead of the task's `initial`: an `Initial`, a mapping with
-        its keys, or a `control.State`.
-    robust
-        Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, instead of the task's: to first
-        order, this fraction has tensions inside their limits at all times of the plan. The planner iterates, with
-        limits tightened by the tension spread of the previous plan.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        task: A `Task`, a mapping with its keys, or the path of a YAML file.
+        progress: Called with (iteration, objective, infeasibility) while the nonlinear program is solved.
+        start: Initial guess: a plan of the same robot for a similar task, or a path for the platform (or a mapping with
+            its keys) in the frame of the task's path. Default: the planner's guess.
+        initial: The measured state from which the motion starts, instead of the task's `initial`: an `Initial`, a
+            mapping with its keys, or a `control.State`.
+        robust: Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, instead of the task's:
+            to first order, this fraction has tensions inside their limits at all times of the plan. The planner
+            iterates, with limits tightened by the tension spread of the previous plan.
 
-    Returns
-    -------
-    Plan
-        With status `feasible`; or `infeasible` if no motion that the task allows is feasible, proven by the certificate
-        or by a limit that every such motion exceeds; or `not-found`, with the certificate at the worst time of the
-        closest motion known, or with the limits that it exceeds. `Plan.stages` records the stages,
-        `Plan.infeasible_spans` the times without tensions, and `Plan.relaxations` suggests feasible variations: a
-        duration, or looser limits.
+    Returns:
+        Plan: With status `feasible`; or `infeasible` if no motion that the task allows is feasible, proven by the
+            certificate or by a limit that every such motion exceeds; or `not-found`, with the certificate at the worst
+            time of the closest motion known, or with the limits that it exceeds. `Plan.stages` records the stages,
+            `Plan.infeasible_spans` the times without tensions, and `Plan.relaxations` suggests feasible variations: a
+            duration, or looser limits.
 
-    Raises
-    ------
-    InputError
-        If the task or the start is invalid or does not fit the robot.
+    Raises:
+        InputError: If the task or the start is invalid or does not fit the robot.
     """
     with heeding():
         return Planner(robot, task, initial, robust).plan(progress, start)
@@ -93,17 +82,12 @@ def plan(
 class Planner(Displayed):
     """Plan similar tasks repeatedly, reusing programs and the last solution.
 
-    Parameters
-    ----------
-    robot
-        As for `plan`.
-    task, initial, robust
-        As for `plan`.
+    Args:
+        robot: As for `plan`.
+        task, initial, robust: As for `plan`.
 
-    Raises
-    ------
-    InputError
-        As `plan` does.
+    Raises:
+        InputError: As `plan` does.
     """
 
     def __init__(
@@ -187,28 +171,19 @@ class Planner(Displayed):
         `settle`. If the state contains tensions, the plan starts with them and the acceleration that they cause;
         otherwise with the acceleration of the last plan. Time 0 of the new plan is `time` of the whole motion.
 
-        Parameters
-        ----------
-        state
-            A `control.State`, or an `Initial` or a mapping with its keys.
-        time
-            Time since the start of the motion of `plan` [s], not earlier than in the last successful call.
-        settle
-            Time within which the tracking error decays [s], limited to the remaining time.
-        progress
-            As for `plan`.
+        Args:
+            state: A `control.State`, or an `Initial` or a mapping with its keys.
+            time: Time since the start of the motion of `plan` [s], not earlier than in the last successful call.
+            settle: Time within which the tracking error decays [s], limited to the remaining time.
+            progress: As for `plan`.
 
-        Returns
-        -------
-        Plan
-            The plan, with the status that `plan` would return. If it is not feasible, the next call continues from the
-            previous feasible plan.
+        Returns:
+            Plan: The plan, with the status that `plan` would return. If it is not feasible, the next call continues
+                from the previous feasible plan.
 
-        Raises
-        ------
-        InputError
-            If there is no feasible plan yet, if the task has phases, exact waypoints or a path in the frame of a
-            carrier, or if an argument does not fit.
+        Raises:
+            InputError: If there is no feasible plan yet, if the task has phases, exact waypoints or a path in the frame
+                of a carrier, or if an argument does not fit.
         """
         check_progress(progress)
         if self._flown is None:

@@ -47,37 +47,24 @@ class PlannerStep(NamedTuple):
 class PlanData(Displayed):
     """A planned motion and its audit, without figures, files and reports.
 
-    Attributes
-    ----------
-    scenario
-        The robot and the task.
-    status
-        See `MotionStatus`.
-    deviation
-        Planned free coordinates and tensions at the nodes; None if the task fixes the motion.
-    audit
-        The dense evaluation that decides whether the plan is feasible.
-    build_s, solve_s
-        Wall time to build and to solve the nonlinear programs [s], over all attempts; 0 if none was solved.
-    reason
-        If the status is `not-found`: the reason why the search ended.
-    iterations, message
-        Iterations and message of the last run of the solver.
-    iterates
-        Rows of (iteration, objective, infeasibility) of all runs of the solver, in order; each run starts at 0.
-    stages
-        The stages of the planner, in order, with their messages and times.
-    objective
-        Final value of the solver's objective; None if no program was solved.
-    robust
-        Tension spread due to geometric uncertainty; None unless the task requires it.
-    stop
-        The longest stop on the path from an instant of the plan; None unless the task has `stop_within`.
-    offers
-        Computes `relaxations`.
-    law
-        Result of `time_along`: the fastest time law along the path with its active limits, or the point where none
-        exists; None for other plans.
+    Attributes:
+        scenario: The robot and the task.
+        status: See `MotionStatus`.
+        deviation: Planned free coordinates and tensions at the nodes; None if the task fixes the motion.
+        audit: The dense evaluation that decides whether the plan is feasible.
+        build_s, solve_s: Wall time to build and to solve the nonlinear programs [s], over all attempts; 0 if none was
+            solved.
+        reason: If the status is `not-found`: the reason why the search ended.
+        iterations, message: Iterations and message of the last run of the solver.
+        iterates: Rows of (iteration, objective, infeasibility) of all runs of the solver, in order; each run starts at
+            0.
+        stages: The stages of the planner, in order, with their messages and times.
+        objective: Final value of the solver's objective; None if no program was solved.
+        robust: Tension spread due to geometric uncertainty; None unless the task requires it.
+        stop: The longest stop on the path from an instant of the plan; None unless the task has `stop_within`.
+        offers: Computes `relaxations`.
+        law: Result of `time_along`: the fastest time law along the path with its active limits, or the point where none
+            exists; None for other plans.
     """
 
     scenario: Scenario
@@ -214,12 +201,9 @@ class PlanData(Displayed):
         Poses and required wrenches are those of the plan, at some 200 times. Nothing is linearised: each robot has its
         own wrench matrices, and the exact solver decides.
 
-        Parameters
-        ----------
-        count
-            Number of robots.
-        seed
-            Seed of the random numbers.
+        Args:
+            count: Number of robots.
+            seed: Seed of the random numbers.
 
         Raises `InputError` if an argument is wrong, or the robot has no uncertainty.
         """
@@ -263,16 +247,11 @@ class PlanData(Displayed):
 class Relaxed(Displayed):
     """A feasible variation of the requested task, and its plan.
 
-    Attributes
-    ----------
-    name, unit
-        Field of the task that differs, or a description, and its unit.
-    requested, possible
-        Value in the task, and the closest value with a known feasible plan.
-    plan
-        The plan of the varied task.
-    detail
-        What is said of it behind the value, such as the end of a shorter line; may be empty.
+    Attributes:
+        name, unit: Field of the task that differs, or a description, and its unit.
+        requested, possible: Value in the task, and the closest value with a known feasible plan.
+        plan: The plan of the varied task.
+        detail: What is said of it behind the value, such as the end of a shorter line; may be empty.
     """
 
     name: str

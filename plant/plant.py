@@ -29,15 +29,11 @@ STEPS_WORTH_A_THREAD = 20_000  # some 20 milliseconds
 class History(NamedTuple):
     """States over time, with leading dimensions of a batch.
 
-    Attributes
-    ----------
-    times
-        (K,) [s], from 0.
-    states
-        (..., K, n).
-    tensions
-        (..., K, m) [N], at each state, for the command that begins there; at the last state, for the one that ends
-        there.
+    Attributes:
+        times: (K,) [s], from 0.
+        states: (..., K, n).
+        tensions: (..., K, m) [N], at each state, for the command that begins there; at the last state, for the one that
+            ends there.
     """
 
     times: np.ndarray
@@ -52,42 +48,31 @@ class Plant:
     and `run` return later ones. Arguments may have leading batch dimensions, which broadcast. The same arguments give
     the same bits.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    drive
-        Type of the cable commands: unstrained "lengths" [m], "rates" of these [m/s], "forces" [N] of the winch motors,
-        or "tensions" [N]. Without a winch in the robot's file, lengths and rates are followed exactly: a length is
-        reached, at constant rate, at the end of its step. A winch follows them as a servo loop inside its limits.
-    contacts
-        "located": steps end where a cable becomes taut or slack, or a winch begins or stops slipping, which keeps the
-        fourth order. "sampled": Runge-Kutta over the kinks, in a third of the time if there are many; for elastic
-        cables only.
-    stiffness, damping
-        E A [N] and C [N s/m], a number or one for each cable, instead of the file's values. A cable without stiffness
-        does not stretch: it keeps the distance of its ends below its length, and becomes taut in an impact.
-    carrier_bandwidth, winch_bandwidth
-        Bandwidths of the servo loops of mobile carriers and of winches [rad/s]. Robot files have no keys for them.
-    tension_lag
-        Time constant [s] with which tensions follow their commands; 0: exactly.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        drive: Type of the cable commands: unstrained "lengths" [m], "rates" of these [m/s], "forces" [N] of the winch
+            motors, or "tensions" [N]. Without a winch in the robot's file, lengths and rates are followed exactly: a
+            length is reached, at constant rate, at the end of its step. A winch follows them as a servo loop inside its
+            limits.
+        contacts: "located": steps end where a cable becomes taut or slack, or a winch begins or stops slipping, which
+            keeps the fourth order. "sampled": Runge-Kutta over the kinks, in a third of the time if there are many; for
+            elastic cables only.
+        stiffness, damping: E A [N] and C [N s/m], a number or one for each cable, instead of the file's values. A cable
+            without stiffness does not stretch: it keeps the distance of its ends below its length, and becomes taut in
+            an impact.
+        carrier_bandwidth, winch_bandwidth: Bandwidths of the servo loops of mobile carriers and of winches [rad/s].
+            Robot files have no keys for them.
+        tension_lag: Time constant [s] with which tensions follow their commands; 0: exactly.
 
-    Attributes
-    ----------
-    robot
-        The `Robot`.
-    size
-        Length of a state, n.
-    record
-        The robot in the format of the numeric core, with the plant's stiffness and damping; read-only.
-    settings
-        Drive, contacts and bandwidths in the format of the numeric core, `packing.SETTINGS`.
+    Attributes:
+        robot: The `Robot`.
+        size: Length of a state, n.
+        record: The robot in the format of the numeric core, with the plant's stiffness and damping; read-only.
+        settings: Drive, contacts and bandwidths in the format of the numeric core, `packing.SETTINGS`.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value, forces are commanded to cables without winches, or the robot has more cables
-        or carriers than the numeric core supports. Every method raises it for a wrong shape or value.
+    Raises:
+        InputError: If an argument has a wrong value, forces are commanded to cables without winches, or the robot has
+            more cables or carriers than the numeric core supports. Every method raises it for a wrong shape or value.
     """
 
     def __init__(
@@ -149,21 +134,17 @@ class Plant:
     ) -> np.ndarray:
         """Return a state, (..., n).
 
-        Parameters
-        ----------
-        pose, velocity
-            Pose of the platform frame in {G} [m, rad], (..., 6), and its time derivative; default: at home, at rest.
-        carrier_pose, carrier_velocity
-            The same for the carriers, (..., c, 6); velocities of fixed coordinates are ignored.
-        tensions
-            Tensions at rest, (..., m) [N], which determine the unstrained lengths of elastic cables.
-        lengths
-            Unstrained lengths, (..., m) [m], instead of `tensions`; default: cables without tension at the pose.
+        Args:
+            pose, velocity: Pose of the platform frame in {G} [m, rad], (..., 6), and its time derivative; default: at
+                home, at rest.
+            carrier_pose, carrier_velocity: The same for the carriers, (..., c, 6); velocities of fixed coordinates are
+                ignored.
+            tensions: Tensions at rest, (..., m) [N], which determine the unstrained lengths of elastic cables.
+            lengths: Unstrained lengths, (..., m) [m], instead of `tensions`; default: cables without tension at the
+                pose.
 
-        Raises
-        ------
-        InputError
-            If both tensions and lengths are given, or an argument has a wrong shape or value.
+        Raises:
+            InputError: If both tensions and lengths are given, or an argument has a wrong shape or value.
         """
         robot, count = self.robot, len(self.robot.carriers)
         if tensions is not None and lengths is not None:
@@ -210,29 +191,23 @@ class Plant:
     ) -> np.ndarray:
         """Pack the commands for a step into rows, (..., k).
 
-        Parameters
-        ----------
-        cables
-            (..., m): lengths [m], rates [m/s], forces [N] or tensions [N], depending on the drive.
-        actuation
-            Commands to the actuators of each carrier, (..., c, a): for a quadrotor thrust [N] and torques
-            about its axes [N m]. The plant clips them to their limits. Default: zeros.
-        carrier_pose, carrier_velocity, carrier_acceleration
-            Reference of the carriers at the beginning of the step, (..., c, 6). It continues to the reference of the
-            next command of a `run`, or with this acceleration if there is none. Prescribed carriers follow it exactly;
-            mobile ones with a second-order lag, inside their limits of speed and acceleration. Default: at home, at
-            rest. Missing velocities and accelerations are derived from the poses of a `run`, see `samples`.
-        wind
-            Velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag.
-        wrench
-            Disturbance on the platform: force [N] and moment about the CoM [N m] in {G}, (..., 6).
-        carrier_wrench
-            The same on the carriers, (..., c, 6), such as wind on quadrotors. It moves those that have mass.
+        Args:
+            cables: (..., m): lengths [m], rates [m/s], forces [N] or tensions [N], depending on the drive.
+            actuation: Commands to the actuators of each carrier, (..., c, a): for a quadrotor thrust [N] and torques
+                about its axes [N m]. The plant clips them to their limits. Default: zeros.
+            carrier_pose, carrier_velocity, carrier_acceleration: Reference of the carriers at the beginning of the
+                step, (..., c, 6). It continues to the reference of the next command of a `run`, or with this
+                acceleration if there is none. Prescribed carriers follow it exactly; mobile ones with a second-order
+                lag, inside their limits of speed and acceleration. Default: at home, at rest. Missing velocities and
+                accelerations are derived from the poses of a `run`, see `samples`.
+            wind: Velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag.
+            wrench: Disturbance on the platform: force [N] and moment about the CoM [N m] in {G}, (..., 6).
+            carrier_wrench: The same on the carriers, (..., c, 6), such as wind on quadrotors. It moves those that have
+                mass.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong shape or value, or wind is given and the robot's file has no `platform.aero`.
+        Raises:
+            InputError: If an argument has a wrong shape or value, or wind is given and the robot's file has no
+                `platform.aero`.
         """
         robot, count = self.robot, len(self.robot.carriers)
         if wind is not None and robot.platform.aero is None:
@@ -260,18 +235,13 @@ class Plant:
     def step(self, state: np.ndarray, command: np.ndarray, dt: float, after: np.ndarray | None = None) -> np.ndarray:
         """Return the state [m, rad, s] after `dt` [s] under one command, (..., n).
 
-        Parameters
-        ----------
-        state, command, dt
-            As in `run`.
-        after
-            The next command, (..., k). Carriers then continue to its reference as in a `run`; without it their
-            acceleration is constant.
+        Args:
+            state, command, dt: As in `run`.
+            after: The next command, (..., k). Carriers then continue to its reference as in a `run`; without it their
+                acceleration is constant.
 
-        Raises
-        ------
-        InputError, SolverError
-            As in `run`.
+        Raises:
+            InputError, SolverError: As in `run`.
         """
         try:
             rows = np.stack([command] if after is None else np.broadcast_arrays(command, after), axis=-2)
@@ -306,28 +276,18 @@ class Plant:
     ) -> History:
         """Simulate a sequence of commands.
 
-        Parameters
-        ----------
-        state
-            (..., n), from `start`, `step` or `run`.
-        commands
-            (..., K, k), from `command`: each is held for `dt`.
-        dt
-            Period of the commands [s].
-        substeps
-            Runge-Kutta steps in each period.
-        keep
-            Return the first state and every `keep`-th one after it.
-        threads
-            Number of threads that share the rows of a batch; default: one per processor, at most one per 20 000 steps.
-            The result does not depend on it.
+        Args:
+            state: (..., n), from `start`, `step` or `run`.
+            commands: (..., K, k), from `command`: each is held for `dt`.
+            dt: Period of the commands [s].
+            substeps: Runge-Kutta steps in each period.
+            keep: Return the first state and every `keep`-th one after it.
+            threads: Number of threads that share the rows of a batch; default: one per processor, at most one per 20
+                000 steps. The result does not depend on it.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong shape or value.
-        SolverError
-            If the simulation diverges, for example because steps are too long for stiff cables.
+        Raises:
+            InputError: If an argument has a wrong shape or value.
+            SolverError: If the simulation diverges, for example because steps are too long for stiff cables.
         """
         rows = np.asarray(commands)
         if rows.ndim < 2 or not rows.shape[-2]:
@@ -375,12 +335,9 @@ class Plant:
     def cut(self, state: np.ndarray, cable: int) -> np.ndarray:
         """Return the state, (..., n) [m, rad, s], with a cable cut: it never pulls again.
 
-        Parameters
-        ----------
-        state
-            (..., n).
-        cable
-            Index of the cable, from 0.
+        Args:
+            state: (..., n).
+            cable: Index of the cable, from 0.
         """
         return self._with_condition(state, cable, layout.CUT)
 

@@ -69,12 +69,9 @@ class _Bodies:
 class Reading:
     """Read states, (..., n). Each quantity is computed on first use, with the same leading dimensions.
 
-    Parameters
-    ----------
-    robot
-        The robot of the plant.
-    states
-        (..., n).
+    Args:
+        robot: The robot of the plant.
+        states: (..., n).
     """
 
     def __init__(self, robot: Robot, states: np.ndarray):

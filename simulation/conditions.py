@@ -18,43 +18,32 @@ from .mismatch import Mismatch
 class Conditions(Displayed):
     """Conditions of a simulation. `simulate` also accepts each field by its name.
 
-    Attributes
-    ----------
-    wind
-        Velocity of the air in {G} [m/s], (3,), or a function of times (K,) [s] and a seed that returns (K, 3); default:
-        no air, and so no drag.
-    gusts
-        Intensity of Dryden turbulence, which is added to a constant wind [m/s].
-    noise
-        Sensor noise, a `Noise` or a mapping (default: none).
-    events
-        Events, each a line, a mapping, the YAML file of a list, or an `Event` (times in [s], cables count from 1): "cut
-        3 at 2.5", a cable breaks; "stick 2 at 1", a winch stops; "lose quad1 at 2", the actuators of a carrier stop;
-        "miss 0.05 at 1.2", the controller does not respond; "carry 2.5 at 1", the platform carries a load [kg];
-        "stop at 3", the reference stops on its path as `control.stop` does; "follow next.nc at 3", another plan becomes
-        the reference; "push 20 0 0 at 1 for 0.5", a force on the platform in {G} [N]; a `Wall` that the platform meets.
-    disturbance
-        Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
-    duration
-        Simulated time [s] (default: until every reference has ended). After that the robot holds its final pose.
-    period
-        Period of the controller [s].
-    substeps
-        Runge-Kutta steps of the plant per period (default: chosen by the stiffness and damping of the cables, see
-        `plant.steps.steps_in`).
-    drive
-        Type of command of the plant, see `Plant`; default: "forces" if all cables have winches, "lengths" if all are
-        elastic or of fixed length, otherwise "tensions".
-    tolerance
-        Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at home if that
-        is less.
-    mismatch
-        How the simulated robot and its drives differ from the file, a `Mismatch` or a mapping (default: not at all).
+    Attributes:
+        wind: Velocity of the air in {G} [m/s], (3,), or a function of times (K,) [s] and a seed that returns (K, 3);
+            default: no air, and so no drag.
+        gusts: Intensity of Dryden turbulence, which is added to a constant wind [m/s].
+        noise: Sensor noise, a `Noise` or a mapping (default: none).
+        events: Events, each a line, a mapping, the YAML file of a list, or an `Event` (times in [s], cables count from
+            1): "cut 3 at 2.5", a cable breaks; "stick 2 at 1", a winch stops; "lose quad1 at 2", the actuators of a
+            carrier stop; "miss 0.05 at 1.2", the controller does not respond; "carry 2.5 at 1", the platform carries a
+            load [kg]; "stop at 3", the reference stops on its path as `control.stop` does; "follow next.nc at 3",
+            another plan becomes the reference; "push 20 0 0 at 1 for 0.5", a force on the platform in {G} [N]; a `Wall`
+            that the platform meets.
+        disturbance: Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
+        duration: Simulated time [s] (default: until every reference has ended). After that the robot holds its final
+            pose.
+        period: Period of the controller [s].
+        substeps: Runge-Kutta steps of the plant per period (default: chosen by the stiffness and damping of the cables,
+            see `plant.steps.steps_in`).
+        drive: Type of command of the plant, see `Plant`; default: "forces" if all cables have winches, "lengths" if all
+            are elastic or of fixed length, otherwise "tensions".
+        tolerance: Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at
+            home if that is less.
+        mismatch: How the simulated robot and its drives differ from the file, a `Mismatch` or a mapping (default: not
+            at all).
 
-    Raises
-    ------
-    InputError
-        If a field has a wrong value.
+    Raises:
+        InputError: If a field has a wrong value.
     """
 
     wind: Any = None

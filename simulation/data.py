@@ -22,26 +22,16 @@ TENSION_TOLERANCE = 1e-3  # of a cable's range: what its tension may be above t_
 class SimulationData(Displayed):
     """Numbers of a simulation, without figures, files and reports.
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    conditions
-        References, events and noise, see `Experiment`.
-    seed
-        Seed of wind and noise.
-    record
-        Motion, tensions and commands, a row for each period.
-    lasted
-        Number of simulated periods; smaller than the number of references if the simulation diverged.
-    tolerance
-        Largest position error allowed for a pass [m].
-    wind
-        Velocity of the air in {G} [m/s], (K, 3); None if there is no air.
-    seconds
-        Computing time of each step of the controller [s], (K,).
-    wall
-        Wall time of the simulation [s].
+    Attributes:
+        robot: The robot.
+        conditions: References, events and noise, see `Experiment`.
+        seed: Seed of wind and noise.
+        record: Motion, tensions and commands, a row for each period.
+        lasted: Number of simulated periods; smaller than the number of references if the simulation diverged.
+        tolerance: Largest position error allowed for a pass [m].
+        wind: Velocity of the air in {G} [m/s], (K, 3); None if there is no air.
+        seconds: Computing time of each step of the controller [s], (K,).
+        wall: Wall time of the simulation [s].
     """
 
     robot: Robot

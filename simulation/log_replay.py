@@ -44,20 +44,14 @@ LATEST = 0.2  # [s]
 class Replay(Drawn, Reported, Displayed):
     """The result of `replay`.
 
-    Attributes
-    ----------
-    matching
-        The recording, compared with its plant.
-    found
-        Share of the residuals that each parameter alone explains, largest first.
-    explained
-        Residuals with the first one fitted; None if it does not reduce them.
-    fitted
-        Parameters after a fit, or None.
-    validation
-        Root mean square of the residuals of validation windows over their noise, before and after a fit, or None.
-    tolerance
-        Largest position residual for a pass [m].
+    Attributes:
+        matching: The recording, compared with its plant.
+        found (tuple[Explanation, ...]): Share of the residuals that each parameter alone explains, largest first.
+        explained: Residuals with the first one fitted; None if it does not reduce them.
+        fitted: Parameters after a fit, or None.
+        validation: Root mean square of the residuals of validation windows over their noise, before and after a fit, or
+            None.
+        tolerance: Largest position residual for a pass [m].
     """
 
     matching: Matching
@@ -133,10 +127,8 @@ class Replay(Drawn, Reported, Displayed):
     def save_robot(self, file: str | os.PathLike[str]) -> Path:
         """Write the fitted robot as a robot file atomically.
 
-        Raises
-        ------
-        InputError
-            If the fit does not improve validation windows, see `refused`, or the file cannot be written.
+        Raises:
+            InputError: If the fit does not improve validation windows, see `refused`, or the file cannot be written.
         """
         if self.refused:
             raise InputError(f"the robot is not written: {self.refused}")
@@ -278,29 +270,19 @@ def replay(
 ) -> Replay:
     """Replay a recording: simulate its commands, in windows that each start from the recorded state.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    log, poses, fields
-        As `path`, `poses` and `fields` of `read_measurements`.
-    drive
-        Type of the commands: "lengths", "tensions", or "forces" of winches (default: recorded commands,
-        otherwise measured lengths of elastic cables, otherwise measured tensions).
-    delay
-        Known delay of the robot behind its recorded commands [s].
-    window
-        Duration of a window [s].
-    tolerance
-        Largest position residual for a pass, of 95 % of the samples [m]; default: 0.05 m, or 5 % of the mean cable
-        length at home if that is less.
-    fit
-        True to fit parameters to half of the windows, and to validate them on the other half.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        log, poses, fields: As `path`, `poses` and `fields` of `read_measurements`.
+        drive: Type of the commands: "lengths", "tensions", or "forces" of winches (default: recorded commands,
+            otherwise measured lengths of elastic cables, otherwise measured tensions).
+        delay: Known delay of the robot behind its recorded commands [s].
+        window: Duration of a window [s].
+        tolerance: Largest position residual for a pass, of 95 % of the samples [m]; default: 0.05 m, or 5 % of the mean
+            cable length at home if that is less.
+        fit: True to fit parameters to half of the windows, and to validate them on the other half.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value, the log cannot be read, or lacks what a replay needs.
+    Raises:
+        InputError: If an argument has a wrong value, the log cannot be read, or lacks what a replay needs.
     """
     if drive is not None:
         one_of("drive", drive, DRIVES)

@@ -53,10 +53,8 @@ class Mismatch(Part):
     def check(self, robot: Robot) -> None:
         """Check that the robot has what should differ.
 
-        Raises
-        ------
-        InputError
-            If it has not.
+        Raises:
+            InputError: If it has not.
         """
         if self.geometry and robot.uncertainty is None:
             raise InputError("mismatch.geometry must be false for a robot file without an uncertainty, got true")

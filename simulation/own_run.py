@@ -26,23 +26,16 @@ SAME = 1e-6  # of the time between two states
 def simulation_of(plant: Plant, history: History, reference: Any = None, tolerance: float | None = None) -> Simulation:
     """Return a run of a plant as a `Simulation`.
 
-    Parameters
-    ----------
-    plant
-        The plant.
-    history
-        Result of its `run` for one state, at equal times.
-    reference
-        Reference of the position errors: a plan, the NetCDF file of one, a path or a pose (6,); default:
-        the motion itself.
-    tolerance
-        Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at home if that
-        is less.
+    Args:
+        plant: The plant.
+        history: Result of its `run` for one state, at equal times.
+        reference: Reference of the position errors: a plan, the NetCDF file of one, a path or a pose (6,); default: the
+            motion itself.
+        tolerance: Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at
+            home if that is less.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or value, or the reference belongs to another robot.
+    Raises:
+        InputError: If an argument has a wrong type or value, or the reference belongs to another robot.
     """
     robot, states = required("plant", plant, Plant).robot, required("history", history, History).states
     if states.ndim != 2 or states.shape[-1] != plant.size or len(states) < 2:

@@ -114,42 +114,27 @@ def simulate(
 ) -> Simulation | xr.Dataset:
     """Simulate a reference motion in closed loop, with wind, sensor noise and events.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    reference
-        A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to hold; or the path of
-        a recording (CSV, MCAP, a bag, NetCDF without a plan), which `replay` repeats: then all other arguments are left
-        out, and the result is a `Replay`.
-    controller
-        Controller (default: `ComputedTorque(robot)`). A single run calls its `reset` and uses the object itself. Many
-        runs use copies, unless it accepts batches.
-    wind, noise, events, duration
-        As in `Conditions`.
-    seed
-        Seed of wind and noise. The same seed gives the same run.
-    runs
-        Number of runs, with the seeds from `seed` on (default: one).
-    conditions
-        `Conditions`; arguments given by name replace its fields.
-    execution
-        Workers and checkpoint of many runs, see `Execution`.
-    options
-        Other fields of `Conditions` and `Execution`, by their names. `faults` is the former name of `events`.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        reference: A plan, the NetCDF file of one, a path (also as a mapping, as in a task), or a pose (6,) to hold; or
+            the path of a recording (CSV, MCAP, a bag, NetCDF without a plan), which `replay` repeats: then all other
+            arguments are left out, and the result is a `Replay`.
+        controller: Controller (default: `ComputedTorque(robot)`). A single run calls its `reset` and uses the object
+            itself. Many runs use copies, unless it accepts batches.
+        wind, noise, events, duration: As in `Conditions`.
+        seed: Seed of wind and noise. The same seed gives the same run.
+        runs: Number of runs, with the seeds from `seed` on (default: one).
+        conditions: `Conditions`; arguments given by name replace its fields.
+        execution: Workers and checkpoint of many runs, see `Execution`.
+        options: Other fields of `Conditions` and `Execution`, by their names. `faults` is the former name of `events`.
 
-    Returns
-    -------
-    Simulation or xarray.Dataset
-        With `runs`, a dataset with the statistics of each run.
+    Returns:
+        Simulation or xarray.Dataset: With `runs`, a dataset with the statistics of each run.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value, the reference belongs to another robot, the checkpoint cannot be written, is
-        damaged or belongs to other runs, or the scheduler does not exist.
-    SolverError
-        If workers end before their work is done, or the extra `cluster` is not installed.
+    Raises:
+        InputError: If an argument has a wrong value, the reference belongs to another robot, the checkpoint cannot be
+            written, is damaged or belongs to other runs, or the scheduler does not exist.
+        SolverError: If workers end before their work is done, or the extra `cluster` is not installed.
     """
     given: dict[str, Any] = dict(options)
     if isinstance(reference, str | os.PathLike) and is_recording(reference):

@@ -30,29 +30,19 @@ BEYOND_THE_CORE = "python"  # the back end that is reported for sizes that it do
 class BatchSolution(Displayed):
     """The solutions of a batch of problems with leading dimensions `...`.
 
-    Attributes
-    ----------
-    tensions :
-        Tensions [N], shape (..., m), inside the limits to the last bit; nan where none exist.
-    code :
-        Status of each row as a small integer, shape (...); `statuses[code]` is the `Status`.
-    residual :
-        Wrench error |S (A t - w)| [N], shape (...); nan without tensions.
-    direction :
-        Verified wrench direction that proves infeasibility, shape (..., n), scaled as in `Certificate`; nan for
-        feasible rows. Along it the shortfall exceeds the tolerance, but it is not always the largest possible one,
-        which `solution(index).certificate` has.
-    shortfall, support :
-        d . w - h(d) [N] and h(d) [N] along that direction, shape (...); nan elsewhere.
-    time :
-        Wall time of the call [s].
-    problem :
-        A, w, t_min, t_max, t_ref, weights and length, broadcast. Float64 arrays are views of the arguments: do not
-        change them as long as `solution` may be called.
-    rho :
-        As given.
-    backend :
-        "lanes" or "c", see `solve_batch`; "python" for sizes that the C core does not take.
+    Attributes:
+        tensions: Tensions [N], shape (..., m), inside the limits to the last bit; nan where none exist.
+        code: Status of each row as a small integer, shape (...); `statuses[code]` is the `Status`.
+        residual: Wrench error |S (A t - w)| [N], shape (...); nan without tensions.
+        direction: Verified wrench direction that proves infeasibility, shape (..., n), scaled as in `Certificate`; nan
+            for feasible rows. Along it the shortfall exceeds the tolerance, but it is not always the largest possible
+            one, which `solution(index).certificate` has.
+        shortfall, support: d . w - h(d) [N] and h(d) [N] along that direction, shape (...); nan elsewhere.
+        time: Wall time of the call [s].
+        problem: A, w, t_min, t_max, t_ref, weights and length, broadcast. Float64 arrays are views of the arguments: do
+            not change them as long as `solution` may be called.
+        rho: As given.
+        backend: "lanes" or "c", see `solve_batch`; "python" for sizes that the C core does not take.
     """
 
     tensions: Array  # (..., m)
@@ -100,10 +90,8 @@ class BatchSolution(Displayed):
 
         The method is "active-set", or "soft-wrench" if `rho` was given; `index` is a number or a tuple.
 
-        Raises
-        ------
-        InputError
-            If the row is invalid; the message gives the reason.
+        Raises:
+            InputError: If the row is invalid; the message gives the reason.
         """
         accepted = f"index must pick one row of a batch of shape {self.code.shape}"
         try:
@@ -141,34 +129,22 @@ def solve_batch(
     The core supports up to 6 wrench rows and 32 cables. `solve` solves all rows of larger problems, at about 0.2 ms
     each.
 
-    Parameters
-    ----------
-    A :
-        Wrench matrices, shape (..., n, m).
-    w :
-        Required wrenches, shape (..., n), [N] and [N m].
-    t_min, t_max :
-        Tension limits [N], shape (..., m) or one number.
-    t_ref :
-        Preferred tensions [N], shape (..., m) or one number; None = 0.
-    weights :
-        Weights of the cables, shape (..., m) or one number; None = 1.
-    length :
-        Characteristic length [m], shape (...); None = 1 m.
-    rho :
-        Weight of the squared wrench error relative to the squared tensions, as in the method "soft-wrench", 1e-12 to
-        1e12: every valid row gets tensions, and rows with a wrench error are "inaccurate". None = exact wrench.
-    threads :
-        Number of threads that share the rows; None = one for each 2000 rows, at most the number of processors. The
-        result does not depend on it.
-    backend :
-        "lanes" as described above, or "c" for rows one by one with the method of `solve`: for tests, and for results
-        equal to `solve` in every bit. None = "lanes".
+    Args:
+        A: Wrench matrices, shape (..., n, m).
+        w: Required wrenches, shape (..., n), [N] and [N m].
+        t_min, t_max: Tension limits [N], shape (..., m) or one number.
+        t_ref: Preferred tensions [N], shape (..., m) or one number; None = 0.
+        weights: Weights of the cables, shape (..., m) or one number; None = 1.
+        length: Characteristic length [m], shape (...); None = 1 m.
+        rho: Weight of the squared wrench error relative to the squared tensions, as in the method "soft-wrench", 1e-12
+            to 1e12: every valid row gets tensions, and rows with a wrench error are "inaccurate". None = exact wrench.
+        threads: Number of threads that share the rows; None = one for each 2000 rows, at most the number of processors.
+            The result does not depend on it.
+        backend: "lanes" as described above, or "c" for rows one by one with the method of `solve`: for tests, and for
+            results equal to `solve` in every bit. None = "lanes".
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or shape.
+    Raises:
+        InputError: If an argument has a wrong type or shape.
     """
     start = time.perf_counter()
     if threads is not None:

@@ -46,25 +46,17 @@ def casadi_function(
     It is a Python callback: each evaluation costs a `solve`, and it cannot be exported as C code. Keep it in a variable
     as long as anything calls it.
 
-    Parameters
-    ----------
-    m, n :
-        Numbers of cables and of wrench rows.
-    t_ref, weights, length :
-        As in `TensionProblem`.
-    name :
-        Name of the Function.
+    Args:
+        m, n: Numbers of cables and of wrench rows.
+        t_ref, weights, length: As in `TensionProblem`.
+        name: Name of the Function.
 
-    Returns
-    -------
-    :
+    Returns:
         Function with inputs A (n, m), w (n), t_min (m), t_max (m) and output t (m) [N]. Crossed limits or entries that
-        are not finite numbers give nan.
+            are not finite numbers give nan.
 
-    Raises
-    ------
-    InputError
-        If an argument is not what `TensionProblem` accepts.
+    Raises:
+        InputError: If an argument is not what `TensionProblem` accepts.
     """
     m, n = whole_number("m", m, 1, _MOST), whole_number("n", n, 1, _MOST)
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z]([A-Za-z0-9]|_(?!_))*", name):

@@ -45,33 +45,23 @@ class CertificateText(NamedTuple):
 class Certificate(Displayed):
     """A wrench direction along which the required wrench exceeds everything that the cables can give.
 
-    Attributes
-    ----------
-    direction :
-        d, shape (n,), for unscaled wrench rows: d . w and d . A t are in newtons. With six rows its force entries are
-        dimensionless, its moment entries are in 1/m, and |(d_force, length * d_moment)| = 1. With any other number of
-        rows |d| = 1.
-    support :
-        h(d) [N]: the maximum that tensions inside the limits can give along d.
-    demand :
-        d . w [N]: the required wrench along d.
-    shortfall :
-        demand - support [N], positive. If `binding` is not empty it is the distance from w to the available wrench set
-        in the norm |(force, moment / length)|; if it is empty (singular), the distance from w to the range of A.
-    at_max, at_min :
-        Indices of the cables that could give more along d only by exceeding t_max, or by falling below t_min.
-    closest :
-        Tensions inside the limits with the wrench closest to w [N], shape (m,).
-    length :
-        The characteristic length [m] of the problem.
-    time :
-        For a motion: the instant [s] at which w is required. None for a single problem.
-    span :
-        For a motion: start and end [s] of the time around `time` without tensions for the required wrench.
-    wind :
-        For a motion in a box of winds: the velocity of the air [m/s] in {G} at which w is required.
-    load :
-        For a motion with a load of uncertain mass or CoM: mass [kg] and CoM [m] with which w is required.
+    Attributes:
+        direction: d, shape (n,), for unscaled wrench rows: d . w and d . A t are in newtons. With six rows its force
+            entries are dimensionless, its moment entries are in 1/m, and |(d_force, length * d_moment)| = 1. With any
+            other number of rows |d| = 1.
+        support: h(d) [N]: the maximum that tensions inside the limits can give along d.
+        demand: d . w [N]: the required wrench along d.
+        shortfall: demand - support [N], positive. If `binding` is not empty it is the distance from w to the available
+            wrench set in the norm |(force, moment / length)|; if it is empty (singular), the distance from w to the
+            range of A.
+        at_max, at_min: Indices of the cables that could give more along d only by exceeding t_max, or by falling below
+            t_min.
+        closest: Tensions inside the limits with the wrench closest to w [N], shape (m,).
+        length: The characteristic length [m] of the problem.
+        time: For a motion: the instant [s] at which w is required. None for a single problem.
+        span: For a motion: start and end [s] of the time around `time` without tensions for the required wrench.
+        wind: For a motion in a box of winds: the velocity of the air [m/s] in {G} at which w is required.
+        load: For a motion with a load of uncertain mass or CoM: mass [kg] and CoM [m] with which w is required.
     """
 
     direction: Array  # (n,)
@@ -135,16 +125,12 @@ class Certificate(Displayed):
         0.23)". A force or a moment below 0.05 is omitted. Moments are divided by `length`, which the text gives if the
         direction has a moment.
 
-        Parameters
-        ----------
-        up :
-            The direction opposite to gravity in the frame of the wrench, shape (3,): a vertical force is then marked
-            "up" or "down". Default: none is marked.
+        Args:
+            up: The direction opposite to gravity in the frame of the wrench, shape (3,): a vertical force is then
+                marked "up" or "down". Default: none is marked.
 
-        Raises
-        ------
-        InputError
-            If `up` is not three finite numbers.
+        Raises:
+            InputError: If `up` is not three finite numbers.
         """
         pull_only = " (the cables can pull only the other way)" if self.support < 0.0 else ""
         limits = [
@@ -223,14 +209,10 @@ def certify(problem: TensionProblem) -> Certificate | None:
     Support and shortfall are computed from the direction, and only a certificate that `Certificate.verify` accepts is
     returned: its shortfall exceeds `TensionProblem.tolerance`.
 
-    Parameters
-    ----------
-    problem :
-        The problem; its t_ref and weights play no part.
+    Args:
+        problem: The problem; its t_ref and weights play no part.
 
-    Returns
-    -------
-    :
+    Returns:
         A verified certificate. None means that w is available within the tolerance.
     """
     projection = project(required("problem", problem, TensionProblem))

@@ -41,26 +41,20 @@ class Derivatives(NamedTuple):
 def sensitivity(problem: TensionProblem, solution: TensionSolution) -> Array:
     """Return dt/dw of the bounded least squares at its active set.
 
-    Parameters
-    ----------
-    problem :
-        The problem.
-    solution :
-        Its solution by a method that solves the quadratic program ("active-set", "min-norm" without `lambda_`, "qp",
-        "2-norm", "dykstra").
+    Args:
+        problem: The problem.
+        solution: Its solution by a method that solves the quadratic program ("active-set", "min-norm" without
+            `lambda_`, "qp", "2-norm", "dykstra").
 
-    Returns
-    -------
-    :
+    Returns:
         dt_i / dw_j, shape (m, n) [N per N, N per N m]. The tensions are piecewise linear in w. Where pieces meet (a
-        cable is at its limit but nothing holds it there) the result is one-sided: that of the piece on which such
-        cables are free. It is 0 in directions of w that the free cables cannot give: there the active set
-        changes at once (where pieces meet), or no tensions exist (on the boundary of the available wrench set).
+            cable is at its limit but nothing holds it there) the result is one-sided: that of the piece on which such
+            cables are free. It is 0 in directions of w that the free cables cannot give: there the active set changes
+            at once (where pieces meet), or no tensions exist (on the boundary of the available wrench set).
 
-    Raises
-    ------
-    InputError
-        If an argument is something else, or the solution has no tensions or those of another number of cables.
+    Raises:
+        InputError: If an argument is something else, or the solution has no tensions or those of another number of
+            cables.
     """
     tensions = required("solution", solution, TensionSolution).tensions
     if tensions is None:
@@ -78,12 +72,9 @@ def derivatives(problem: TensionProblem, tensions: Array) -> Derivatives:
     The notes of `sensitivity` on kinks hold for all. The tensions may also be those of "soft-wrench" for a w out of
     reach.
 
-    Parameters
-    ----------
-    problem :
-        The problem.
-    tensions :
-        Its optimal tensions [N], shape (m,).
+    Args:
+        problem: The problem.
+        tensions: Its optimal tensions [N], shape (m,).
     """
     m, n = problem.m, problem.n
     low, high, free = _active_set(problem, tensions)

@@ -19,14 +19,10 @@ COLD, WARM, SHIFTED = 0, 1, 2  # of `towline_beginning`
 class Multipliers(NamedTuple):
     """Multipliers of a solution, per unit of what they limit.
 
-    Attributes
-    ----------
-    dynamics :
-        Multipliers of A x + B u + c = x of the next stage, shape (N, n).
-    lower, upper :
-        Multipliers of the bounds of controls, shape (N, m), not negative.
-    rows :
-        Multipliers of the soft rows, shape (N, p), from 0 to the slope of their penalty.
+    Attributes:
+        dynamics: Multipliers of A x + B u + c = x of the next stage, shape (N, n).
+        lower, upper: Multipliers of the bounds of controls, shape (N, m), not negative.
+        rows: Multipliers of the soft rows, shape (N, p), from 0 to the slope of their penalty.
     """
 
     dynamics: Array  # (N, n)
@@ -40,16 +36,11 @@ class Multipliers(NamedTuple):
 class Residuals(NamedTuple):
     """Errors of the optimality conditions, each relative to its largest term (`docs/horizon.md`).
 
-    Attributes
-    ----------
-    stationarity :
-        Gradient of the Lagrangian.
-    dynamics :
-        Error of the dynamics.
-    complementarity :
-        Products of multipliers and distances to bounds.
-    soft :
-        Deviation of the multipliers of soft rows from slopes of the penalty.
+    Attributes:
+        stationarity: Gradient of the Lagrangian.
+        dynamics: Error of the dynamics.
+        complementarity: Products of multipliers and distances to bounds.
+        soft: Deviation of the multipliers of soft rows from slopes of the penalty.
     """
 
     stationarity: float
@@ -77,40 +68,26 @@ class Horizon(Displayed):
     (`core/horizon`): nothing is copied, allocated or checked. If a number is not finite or the cost is not convex, the
     controls are still finite and inside their bounds, and the solution has not converged.
 
-    Parameters
-    ----------
-    N, n, m, rows :
-        Numbers of stages, states, controls, and soft rows of a stage (p).
+    Args:
+        N, n, m, rows: Numbers of stages, states, controls, and soft rows of a stage (p).
 
-    Attributes
-    ----------
-    A, B, c :
-        Dynamics, shapes (N, n, n), (N, n, m) and (N, n). All arrays except the bounds are zero at first.
-    start :
-        The state x of stage 0, shape (n,).
-    Q, R, S :
-        Cost, shapes (N + 1, n, n), (N, m, m) and (N, m, n); together convex, Q and R symmetric. R may be zero.
-    q, r :
-        Linear cost, shapes (N + 1, n) and (N, m).
-    u_min, u_max :
-        Bounds of controls, shape (N, m), infinite at first. They may be equal.
-    C, D, d :
-        Soft rows, shapes (N, p, n), (N, p, m) and (N, p).
-    penalty, square :
-        Linear and quadratic cost of violating each soft row, not negative, shape (N, p). A linear cost above the
-        multiplier of the row as a hard constraint enforces it exactly.
-    states, controls :
-        The solution, shapes (N + 1, n) and (N, m). Controls are always inside their bounds, and states follow from
-        them.
-    multipliers :
-        See `Multipliers`. `solve(warm=True)` starts from these, and from states and controls.
-    tolerance, iterations_max :
-        Largest residual of a converged solution, and largest number of iterations. Default: 1e-8 and 50.
+    Attributes:
+        A, B, c: Dynamics, shapes (N, n, n), (N, n, m) and (N, n). All arrays except the bounds are zero at first.
+        start: The state x of stage 0, shape (n,).
+        Q, R, S: Cost, shapes (N + 1, n, n), (N, m, m) and (N, m, n); together convex, Q and R symmetric. R may be zero.
+        q, r: Linear cost, shapes (N + 1, n) and (N, m).
+        u_min, u_max: Bounds of controls, shape (N, m), infinite at first. They may be equal.
+        C, D, d: Soft rows, shapes (N, p, n), (N, p, m) and (N, p).
+        penalty, square: Linear and quadratic cost of violating each soft row, not negative, shape (N, p). A linear cost
+            above the multiplier of the row as a hard constraint enforces it exactly.
+        states, controls: The solution, shapes (N + 1, n) and (N, m). Controls are always inside their bounds, and
+            states follow from them.
+        multipliers: See `Multipliers`. `solve(warm=True)` starts from these, and from states and controls.
+        tolerance, iterations_max: Largest residual of a converged solution, and largest number of iterations. Default:
+            1e-8 and 50.
 
-    Raises
-    ------
-    InputError
-        If a size is not a whole number in its range.
+    Raises:
+        InputError: If a size is not a whole number in its range.
     """
 
     def __init__(self, N: int, n: int, m: int, rows: int = 0):
@@ -161,15 +138,11 @@ class Horizon(Displayed):
         The costs do not change, so write them for differences. Small differences are then not lost in the rounding of
         large numbers.
 
-        Parameters
-        ----------
-        states, controls :
-            Of the reference, shapes (N + 1, n) and (N, m).
+        Args:
+            states, controls: Of the reference, shapes (N + 1, n) and (N, m).
 
-        Raises
-        ------
-        InputError
-            If an array has another shape.
+        Raises:
+            InputError: If an array has another shape.
         """
         N, n, m, _ = self._sizes
         given = []
@@ -183,17 +156,12 @@ class Horizon(Displayed):
     def solve(self, shifted: bool = False, warm: bool = False) -> bool:
         """Solve the problem in the arrays, and return whether the solution converged.
 
-        Parameters
-        ----------
-        shifted :
-            Begin with the last solution moved by one stage, for a controller that solves once per stage.
-        warm :
-            Begin with the last solution, or what is written into `states`, `controls` and `multipliers`.
+        Args:
+            shifted: Begin with the last solution moved by one stage, for a controller that solves once per stage.
+            warm: Begin with the last solution, or what is written into `states`, `controls` and `multipliers`.
 
-        Raises
-        ------
-        InputError
-            If an argument is not a bool.
+        Raises:
+            InputError: If an argument is not a bool.
         """
         shifted, warm = flag("shifted", shifted), flag("warm", warm)
         beginning = SHIFTED if shifted else WARM if warm else COLD

@@ -25,16 +25,12 @@ from .problem import Array, TensionProblem
 class Margin(NamedTuple):
     """Signed distance of w to the boundary of the available wrench set.
 
-    Attributes
-    ----------
-    value :
-        The distance [N], moments divided by the problem's length: positive inside, negative outside.
-    gradient :
-        d value / d w, shape (n,): force entries are numbers, moment entries in 1/m. Where two facets are equally near
-        it is that of one of them; the value has a kink there.
-    direction :
-        Outward direction d to the nearest boundary point (inside) or from it to w (outside), shape (n,), in the form of
-        `Certificate.direction`. Then gradient = -direction. Zeros if there is no boundary.
+    Attributes:
+        value: The distance [N], moments divided by the problem's length: positive inside, negative outside.
+        gradient: d value / d w, shape (n,): force entries are numbers, moment entries in 1/m. Where two facets are
+            equally near it is that of one of them; the value has a kink there.
+        direction: Outward direction d to the nearest boundary point (inside) or from it to w (outside), shape (n,), in
+            the form of `Certificate.direction`. Then gradient = -direction. Zeros if there is no boundary.
     """
 
     value: float
@@ -56,15 +52,11 @@ def capacity_margin(problem: TensionProblem) -> Margin:
     the set, within `TensionProblem.tolerance`, has the margin measured inside the flat, among the wrenches that the
     robot can give at all; a wrench that is not in it is outside, with a negative value.
 
-    Parameters
-    ----------
-    problem :
-        The problem; its t_ref and weights play no part. Without a boundary (limits infinite in every direction) the
-        value is infinite, and 0 if the set is a single wrench.
+    Args:
+        problem: The problem; its t_ref and weights play no part. Without a boundary (limits infinite in every
+            direction) the value is infinite, and 0 if the set is a single wrench.
 
-    Returns
-    -------
-    :
+    Returns:
         The margin.
     """
     closest, residual = project(required("problem", problem, TensionProblem))

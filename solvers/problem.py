@@ -32,31 +32,22 @@ class TensionProblem(Displayed):
     The arrays are copied, converted to float64 and set read-only. Entries smaller than 1e-50 are set to 0, and limits
     beyond 1e50 are infinite.
 
-    Parameters
-    ----------
-    A :
-        Wrench matrix, shape (n, m), any n and m from 1 up. Usually n = 6: rows 0 to 2 are forces [N per N of tension],
-        rows 3 to 5 moments [N m per N].
-    w :
-        Required wrench, shape (n,), [N] and [N m]. The entries of w and of A must be below 1e50.
-    t_min, t_max :
-        Tension limits [N], shape (m,) or one number for all cables. Equal limits fix a tension; t_min may be -inf and
-        t_max +inf.
-    t_ref :
-        Preferred tensions [N], shape (m,) or one number, inside or outside the limits. Default: 0, for the least
-        norm.
-    weights :
-        Weights omega of the cables in the cost, from 1e-20 to 1e20 and at most 1e14 apart, shape (m,) or one number.
-        None = 1.
-    length :
-        Characteristic length [m], from 1e-20 to 1e20, by which moment rows (3 to 5, when n = 6) are divided wherever
-        newtons and newton metres are compared: in residuals, tolerances and certificates. It never changes which
-        tensions are optimal. Default: 1 m.
+    Args:
+        A: Wrench matrix, shape (n, m), any n and m from 1 up. Usually n = 6: rows 0 to 2 are forces [N per N of
+            tension], rows 3 to 5 moments [N m per N].
+        w: Required wrench, shape (n,), [N] and [N m]. The entries of w and of A must be below 1e50.
+        t_min, t_max: Tension limits [N], shape (m,) or one number for all cables. Equal limits fix a tension; t_min may
+            be -inf and t_max +inf.
+        t_ref: Preferred tensions [N], shape (m,) or one number, inside or outside the limits. Default: 0, for the least
+            norm.
+        weights: Weights omega of the cables in the cost, from 1e-20 to 1e20 and at most 1e14 apart, shape (m,) or one
+            number. None = 1.
+        length: Characteristic length [m], from 1e-20 to 1e20, by which moment rows (3 to 5, when n = 6) are divided
+            wherever newtons and newton metres are compared: in residuals, tolerances and certificates. It never changes
+            which tensions are optimal. Default: 1 m.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, shape or value. The message is one line.
+    Raises:
+        InputError: If an argument has a wrong type, shape or value. The message is one line.
     """
 
     A: Array  # (n, m)
@@ -182,10 +173,8 @@ class TensionProblem(Displayed):
         of t are limited to 1e10 times the sum in brackets plus the terms of t_ref: if larger terms cancelled, rounding
         alone could give any wrench.
 
-        Parameters
-        ----------
-        tensions :
-            The tensions to check [N], shape (m,).
+        Args:
+            tensions: The tensions to check [N], shape (m,).
         """
         if not isinstance(tensions, np.ndarray) or tensions.shape != self.t_min.shape or tensions.dtype != np.float64:
             tensions = _per_cable("tensions", tensions, self.m)

@@ -15,25 +15,17 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
     infeasible, its certificate refers to the reduced limits. A cable whose last tension is so far outside its limits
     that they cannot be reached moves towards them as far as the rate allows.
 
-    Parameters
-    ----------
-    problem :
-        The problem with its original limits.
-    previous :
-        The last tensions [N], shape (m,).
-    rate_max :
-        Largest change of a tension from one call to the next [N], >= 0, shape (m,) or one number; a rate in N/s times
-        the time step.
+    Args:
+        problem: The problem with its original limits.
+        previous: The last tensions [N], shape (m,).
+        rate_max: Largest change of a tension from one call to the next [N], >= 0, shape (m,) or one number; a rate in
+            N/s times the time step.
 
-    Returns
-    -------
-    :
+    Returns:
         The same problem with both limits moved into previous - rate_max to previous + rate_max.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, shape or value.
+    Raises:
+        InputError: If an argument has a wrong type, shape or value.
     """
     required("problem", problem, TensionProblem)
     at, step = repeated("previous", previous, problem.m), repeated("rate_max", rate_max, problem.m)

@@ -20,26 +20,17 @@ _OPTIMAL = STATUSES[OPTIMAL]  # to read it from the enumeration takes longer tha
 class TensionSolution(Displayed):
     """Tensions, or the proof that none exist.
 
-    Attributes
-    ----------
-    problem :
-        The problem.
-    tensions :
-        Tensions [N], shape (m,), always inside the limits to the last bit; None unless `status` is optimal or
-        inaccurate.
-    status :
-        See `Status`.
-    method, backend :
-        The method and the code that computed the result. For "active-set" `backend` is "c" for the C core, or "daqp" if
-        its result was uncertain; for "qp" it is the package. Other methods have None.
-    time :
-        Wall time of the call [s].
-    iterations :
-        Iterations of the method, or None.
-    detail :
-        Further message of the method; may be empty.
-    proof :
-        The certificate, or a function of the problem that computes it on first access of `certificate`.
+    Attributes:
+        problem: The problem.
+        tensions: Tensions [N], shape (m,), always inside the limits to the last bit; None unless `status` is optimal or
+            inaccurate.
+        status: See `Status`.
+        method, backend: The method and the code that computed the result. For "active-set" `backend` is "c" for the C
+            core, or "daqp" if its result was uncertain; for "qp" it is the package. Other methods have None.
+        time: Wall time of the call [s].
+        iterations: Iterations of the method, or None.
+        detail: Further message of the method; may be empty.
+        proof: The certificate, or a function of the problem that computes it on first access of `certificate`.
     """
 
     problem: TensionProblem

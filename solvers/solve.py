@@ -39,21 +39,14 @@ def solve(
     of least squares the status "optimal" is based on verified multipliers; "infeasible" and "singular" are based on a
     verified certificate. The status of a solver is never trusted.
 
-    Parameters
-    ----------
-    problem :
-        The problem.
-    method :
-        One of `methods()`, or a method of your own (docs/adding-a-method.md).
-    backend :
-        For "qp", the name of an installed QP solver; default: "clarabel".
-    **options :
-        Options of the method, see `methods()[name].options`.
+    Args:
+        problem: The problem.
+        method: One of `methods()`, or a method of your own (docs/adding-a-method.md).
+        backend: For "qp", the name of an installed QP solver; default: "clarabel".
+        **options: Options of the method, see `methods()[name].options`.
 
-    Raises
-    ------
-    InputError
-        If the method, back end or option does not exist; the message lists the existing ones.
+    Raises:
+        InputError: If the method, back end or option does not exist; the message lists the existing ones.
     """
     start = perf_counter()
     # These few lines decide the time of a step: a constructor would add a tenth.

@@ -23,24 +23,15 @@ from .problem import Array, TensionProblem
 class StandardForm(NamedTuple):
     """A problem in orthonormal rows, for the k cables whose limits differ; its rank is r.
 
-    Attributes
-    ----------
-    Q :
-        Orthonormal basis of the row space, (r, k).
-    N :
-        Orthonormal basis of the null space, one row per dimension, (k - r, k): Q N^T = 0.
-    b :
-        Right-hand side, (r,).
-    lower, upper :
-        Limits of s, (k,).
-    origin :
-        Tensions at s = 0 [N], (m,): t_ref, or the common limit where the limits are equal.
-    unit :
-        Newtons per unit of s, (k,): smaller for larger weights.
-    moving :
-        Indices of the cables whose limits differ, (k,).
-    sigma :
-        Wrench error in newtons per unit of each row of Q s - b, up to one common factor, (r,).
+    Attributes:
+        Q: Orthonormal basis of the row space, (r, k).
+        N: Orthonormal basis of the null space, one row per dimension, (k - r, k): Q N^T = 0.
+        b: Right-hand side, (r,).
+        lower, upper: Limits of s, (k,).
+        origin: Tensions at s = 0 [N], (m,): t_ref, or the common limit where the limits are equal.
+        unit: Newtons per unit of s, (k,): smaller for larger weights.
+        moving: Indices of the cables whose limits differ, (k,).
+        sigma: Wrench error in newtons per unit of each row of Q s - b, up to one common factor, (r,).
     """
 
     Q: Array

@@ -40,25 +40,18 @@ def tensions(
 
     The robot defines the degrees of freedom, the characteristic length that scales moments, and the tension limits.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    pose, velocity, acceleration
-        (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivatives, (6,); default: at rest.
-    carrier_pose, carrier_velocity, carrier_acceleration
-        Pose of each carrier's frame in {G} and its time derivatives, (c, 6); default: at home, at rest.
-    wind
-        Velocity of the air in {G} [m/s], (3,); default: no aerodynamic drag.
-    t_ref
-        Preferred tensions [N], a number or (m,) (default: 0).
-    method, backend, **options
-        As for `towline.solve`.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        pose, velocity, acceleration: (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time derivatives,
+            (6,); default: at rest.
+        carrier_pose, carrier_velocity, carrier_acceleration: Pose of each carrier's frame in {G} and its time
+            derivatives, (c, 6); default: at home, at rest.
+        wind: Velocity of the air in {G} [m/s], (3,); default: no aerodynamic drag.
+        t_ref: Preferred tensions [N], a number or (m,) (default: 0).
+        method, backend, **options: As for `towline.solve`.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, shape or value.
+    Raises:
+        InputError: If an argument has a wrong type, shape or value.
     """
     from ..models.dynamics import dynamics_of
     from ..models.files import as_robot
@@ -116,18 +109,12 @@ def wrench_problem(
 
     Wrench rows of locked coordinates become zero.
 
-    Parameters
-    ----------
-    robot
-        Defines degrees of freedom, characteristic length and limits.
-    A
-        (6, m), about the platform's CoM.
-    w
-        (6,) [N, N m].
-    t_min, t_max
-        (m,) [N]; default: the robot's.
-    t_ref
-        [N]; default: 0.
+    Args:
+        robot: Defines degrees of freedom, characteristic length and limits.
+        A: (6, m), about the platform's CoM.
+        w: (6,) [N, N m].
+        t_min, t_max: (m,) [N]; default: the robot's.
+        t_ref: [N]; default: 0.
     """
     mask = robot.dof_mask
     low = robot.t_min if t_min is None else t_min

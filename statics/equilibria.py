@@ -42,20 +42,13 @@ SAME = 1e-5  # poses nearer than this, in metres and radians times `Robot.length
 class Equilibrium(Displayed):
     """A stable equilibrium pose.
 
-    Attributes
-    ----------
-    pose
-        (6,) in {G} [m, rad].
-    tensions
-        (m,) [N], zero for slack cables.
-    lengths
-        Distances between anchors and attachments, (m,) [m].
-    energy
-        Potential energy relative to the origin of {G} [J].
-    residual
-        |A t + m g| with moments over `Robot.length` [N].
-    neutral
-        True if the equilibrium is neutral along some motion, that is, one of a family of poses.
+    Attributes:
+        pose: (6,) in {G} [m, rad].
+        tensions: (m,) [N], zero for slack cables.
+        lengths: Distances between anchors and attachments, (m,) [m].
+        energy: Potential energy relative to the origin of {G} [J].
+        residual: |A t + m g| with moments over `Robot.length` [N].
+        neutral: True if the equilibrium is neutral along some motion, that is, one of a family of poses.
     """
 
     pose: np.ndarray
@@ -76,19 +69,13 @@ def equilibria(
 ) -> list[Equilibrium]:
     """Return stable equilibrium poses for cables of `lengths` (m,) [m], lowest potential energy first.
 
-    Parameters
-    ----------
-    lengths
-        Length > 0 of each cable [m].
-    carrier_pose
-        (c, 6) in {G}; default: at home.
-    starts
-        Number of initial poses to try: home, and random ones below and around it.
+    Args:
+        lengths: Length > 0 of each cable [m].
+        carrier_pose: (c, 6) in {G}; default: at home.
+        starts: Number of initial poses to try: home, and random ones below and around it.
 
-    Returns
-    -------
-    list
-        Solutions with a residual below 1e-6 of the weight; empty if no pose has these lengths.
+    Returns:
+        list: Solutions with a residual below 1e-6 of the weight; empty if no pose has these lengths.
 
     Raises `InputError` if `lengths` or `carrier_pose` has a wrong shape or value, or the robot has no gravity.
     """

@@ -126,16 +126,11 @@ def _inverse(A: np.ndarray) -> np.ndarray:
 def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None) -> np.ndarray:
     """Return the first-order standard deviations of tensions due to geometric uncertainty, (n, m) [N].
 
-    Parameters
-    ----------
-    robot
-        Robot with an uncertainty.
-    pose
-        Poses of the platform in {G} [m, rad], (n, 6).
-    tensions
-        Tensions of the nominal robot at these poses [N], (n, m).
-    carrier_pose
-        Poses of the carriers, (n, c, 6); default: at home.
+    Args:
+        robot: Robot with an uncertainty.
+        pose: Poses of the platform in {G} [m, rad], (n, 6).
+        tensions: Tensions of the nominal robot at these poses [N], (n, m).
+        carrier_pose: Poses of the carriers, (n, c, 6); default: at home.
 
     Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty.
     """
@@ -147,12 +142,9 @@ def spread(robot: Robot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: Arr
 def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
     """Return the factor k of standard deviations within which a fraction of robots stays at all poses simultaneously.
 
-    Parameters
-    ----------
-    uncertainty
-        Uncertainty of a robot.
-    share
-        Fraction of the robots, above 0 and below 1.
+    Args:
+        uncertainty: Uncertainty of a robot.
+        share: Fraction of the robots, above 0 and below 1.
 
     Raises `InputError` if an argument is wrong.
     """
@@ -164,12 +156,10 @@ def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
 def motion_factor(changes: ArrayLike, share: float) -> float:
     """Return the factor k within which a fraction of the robots stays along a motion, at all times and for all cables.
 
-    Parameters
-    ----------
-    changes
-        Changes of the tensions along each direction of the uncertainty, at dense times in order, (n, m, r) [N].
-    share
-        Fraction of the robots, above 0 and below 1.
+    Args:
+        changes: Changes of the tensions along each direction of the uncertainty, at dense times in order, (n, m, r)
+            [N].
+        share: Fraction of the robots, above 0 and below 1.
 
     Raises `InputError` if an argument has a wrong type, shape or value.
     """
@@ -211,10 +201,8 @@ def _chi(rank: int, share: float) -> float:
 class RobotShare(NamedTuple):
     """Sampled robots, and which of them have tensions inside their limits at all poses.
 
-    Attributes
-    ----------
-    holds
-        True for each robot that does, (count,).
+    Attributes:
+        holds: True for each robot that does, (count,).
     """
 
     holds: np.ndarray
@@ -239,20 +227,13 @@ def share_of_robots(
 
     This is exact: each robot has its own wrench matrices, and the exact solver decides.
 
-    Parameters
-    ----------
-    robot
-        Robot with an uncertainty.
-    pose
-        Poses of the platform in {G} [m, rad], (n, 6).
-    wrench
-        Required wrenches about the CoM in {G} [N, N m], (n, 6).
-    carrier_pose
-        Poses of the carriers, (n, c, 6); default: at home.
-    count
-        Number of robots.
-    seed
-        Seed of the random numbers.
+    Args:
+        robot: Robot with an uncertainty.
+        pose: Poses of the platform in {G} [m, rad], (n, 6).
+        wrench: Required wrenches about the CoM in {G} [N, N m], (n, 6).
+        carrier_pose: Poses of the carriers, (n, c, 6); default: at home.
+        count: Number of robots.
+        seed: Seed of the random numbers.
 
     Raises `InputError` if an argument has a wrong type or shape, or the robot has no uncertainty.
     """

@@ -30,21 +30,14 @@ def natural_frequencies(
     move; they are negative where the motion is unstable, and nan where a cable has no direction.
     `Dynamics.natural_frequencies` has the modes of one equilibrium, also of inextensible cables.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file. Every cable has a `stiffness`.
-    pose
-        (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6).
-    tensions
-        (..., m) [N]; cables with zero tension are slack and have no stiffness.
-    carrier_pose
-        Pose of each carrier's frame, (..., c, 6); default: at home.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file. Every cable has a `stiffness`.
+        pose: (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (..., 6).
+        tensions: (..., m) [N]; cables with zero tension are slack and have no stiffness.
+        carrier_pose: Pose of each carrier's frame, (..., c, 6); default: at home.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value, or a cable has no stiffness.
+    Raises:
+        InputError: If an argument has a wrong shape or value, or a cable has no stiffness.
     """
     robot = as_robot(robot)
     K = dynamics_of(robot).stiffness(pose, tensions, carrier_pose)
@@ -68,14 +61,10 @@ def frequencies_of(robot: Robot, K: np.ndarray, pose: np.ndarray) -> np.ndarray:
 class StiffestTensions(Displayed):
     """The result of `stiffest`.
 
-    Attributes
-    ----------
-    solution
-        The tensions, or a certificate that none exist.
-    frequency
-        Lowest natural frequency with them [Hz]: negative if the pose is unstable, nan without tensions.
-    bound
-        Frequency that no tensions inside the limits exceed [Hz].
+    Attributes:
+        solution: The tensions, or a certificate that none exist.
+        frequency: Lowest natural frequency with them [Hz]: negative if the pose is unstable, nan without tensions.
+        bound: Frequency that no tensions inside the limits exceed [Hz].
     """
 
     solution: TensionSolution
@@ -93,22 +82,15 @@ def stiffest(
 
     The frequency is that of small motions with fixed unstrained lengths, see `natural_frequencies`.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file. Every cable has a `stiffness` and a
-        `t_min` above zero: without tension a cable has no stiffness, so that the frequency would jump.
-    pose
-        (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (6,).
-    carrier_pose
-        The same of each carrier, (c, 6); default: at home.
-    w
-        Required wrench about the CoM in {G} [N, N m], (6,); default: that of the platform at rest.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file. Every cable has a `stiffness` and
+            a `t_min` above zero: without tension a cable has no stiffness, so that the frequency would jump.
+        pose: (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (6,).
+        carrier_pose: The same of each carrier, (c, 6); default: at home.
+        w: Required wrench about the CoM in {G} [N, N m], (6,); default: that of the platform at rest.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value, or a cable has no stiffness or no t_min above zero.
+    Raises:
+        InputError: If an argument has a wrong shape or value, or a cable has no stiffness or no t_min above zero.
     """
     robot = as_robot(robot)
     slack = np.flatnonzero(robot.t_min <= 0)

@@ -56,26 +56,18 @@ MISSING = 1e-7  # of the robot's forces: a wrench that is missed by less is give
 class Stop(Displayed):
     """A motion from an instant of a plan to rest, on the plan's path.
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    begins, ends
-        Times in the plan [s]: where the stop begins, and where on the path it ends.
-    times
-        From 0 to its duration, (n,) [s].
-    platform, carriers
-        Pose, velocity and acceleration in {G} at these times: (n, 6) each, and (n, c, 6) each.
-    tensions
-        (n, m) [N]; where none exist inside the limits, those with the closest wrench.
-    distance
-        Length of the path of the platform until it rests [m].
-    certificate
-        Certificate of the instant with the largest shortfall; None if tensions inside their limits always exist.
-    limit
-        Of a team of flying carriers: the limit that the stop breaks most, its value and time; empty if it breaks none.
-    load
-        Load of the platform from the beginning of the stop until the robot rests; default: no load.
+    Attributes:
+        robot: The robot.
+        begins, ends: Times in the plan [s]: where the stop begins, and where on the path it ends.
+        times: From 0 to its duration, (n,) [s].
+        platform, carriers: Pose, velocity and acceleration in {G} at these times: (n, 6) each, and (n, c, 6) each.
+        tensions: (n, m) [N]; where none exist inside the limits, those with the closest wrench.
+        distance: Length of the path of the platform until it rests [m].
+        certificate: Certificate of the instant with the largest shortfall; None if tensions inside their limits always
+            exist.
+        limit: Of a team of flying carriers: the limit that the stop breaks most, its value and time; empty if it breaks
+            none.
+        load: Load of the platform from the beginning of the stop until the robot rests; default: no load.
     """
 
     robot: Robot

@@ -39,15 +39,11 @@ FRAME_RATE = 25.0  # [1/s] of a page
 def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[str]:
     """Serve a subject until the block ends; yield the address to open in a browser.
 
-    Parameters
-    ----------
-    subject
-        From `read`.
-    host
-        The address to listen on: 127.0.0.1 for this machine only. There is no password: on any other address, everyone
-        who reaches it can look. Pages of other sites in a browser cannot, whatever the address.
-    port
-        The port; if it is in use, one of the next. 0 selects any free port.
+    Args:
+        subject: From `read`.
+        host: The address to listen on: 127.0.0.1 for this machine only. There is no password: on any other address,
+            everyone who reaches it can look. Pages of other sites in a browser cannot, whatever the address.
+        port: The port; if it is in use, one of the next. 0 selects any free port.
 
     Raises `InputError` if `subject` is not a `Subject`, viser is not installed, or the host or port is invalid.
     """
@@ -83,12 +79,9 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     A plan plays. A robot, with the points of its workspace if there are any, opens at home, or at the feasible pose
     nearest to it, and its platform and carriers can be dragged: the page computes tensions, margin and certificate.
 
-    Parameters
-    ----------
-    subject
-        From `read`.
-    file
-        The file to write.
+    Args:
+        subject: From `read`.
+        file: The file to write.
 
     Raises `InputError` if `subject` is not a `Subject`, viser is not installed and the subject is a plan or a
     simulation, the robot is too large for the core, or the file cannot be written.

@@ -26,18 +26,12 @@ ACCEPTED = "a robot, or a file that `towline plan`, `towline simulate` or `towli
 class Subject(Displayed):
     """A robot, a plan, a simulation or a workspace to show.
 
-    Attributes
-    ----------
-    title
-        Its title, one line.
-    robot
-        The robot, or that of the plan, simulation or workspace.
-    replay
-        The instants of a plan or a simulation, or None.
-    cloud
-        The points of a workspace, or None.
-    other
-        A plan or a simulation of the same robot to compare the replay with, or None.
+    Attributes:
+        title: Its title, one line.
+        robot: The robot, or that of the plan, simulation or workspace.
+        replay: The instants of a plan or a simulation, or None.
+        cloud: The points of a workspace, or None.
+        other: A plan or a simulation of the same robot to compare the replay with, or None.
     """
 
     title: str
@@ -76,20 +70,14 @@ def read(
 ) -> Subject:
     """Read a robot, a plan, a simulation or a workspace.
 
-    Parameters
-    ----------
-    target
-        A robot of the library or a robot file; a plan, a simulation or a workspace as NetCDF, or a workspace as a Zarr
-        folder.
-    robot
-        The robot of a workspace, if it is not in the library: a workspace file has only the name.
-    other
-        A plan or a simulation to compare a plan or a simulation with.
+    Args:
+        target: A robot of the library or a robot file; a plan, a simulation or a workspace as NetCDF, or a workspace as
+            a Zarr folder.
+        robot: The robot of a workspace, if it is not in the library: a workspace file has only the name.
+        other: A plan or a simulation to compare a plan or a simulation with.
 
-    Raises
-    ------
-    InputError
-        If it is none of these, or belongs to another robot.
+    Raises:
+        InputError: If it is none of these, or belongs to another robot.
     """
     path = file_path("target", target, ACCEPTED)
     if other is not None:

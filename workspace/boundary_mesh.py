@@ -54,21 +54,14 @@ def boundary(
 ) -> Mesh:
     """Compute the boundary of the positions where a condition holds, at one attitude, with the carriers at home.
 
-    Parameters
-    ----------
-    robot, condition
-        The robot, and the condition that holds inside the boundary.
-    low, high
-        Corners of the box of positions, (3,) in {G} [m].
-    cells
-        Cells along the longest edge of the box. The mesh is accurate to about half the size of a cell.
-    attitude
-        (roll, pitch, yaw) [rad]; default: the attitude at home.
+    Args:
+        robot, condition: The robot, and the condition that holds inside the boundary.
+        low, high: Corners of the box of positions, (3,) in {G} [m].
+        cells: Cells along the longest edge of the box. The mesh is accurate to about half the size of a cell.
+        attitude: (roll, pitch, yaw) [rad]; default: the attitude at home.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type or value, or the box is flat.
+    Raises:
+        InputError: If an argument has a wrong type or value, or the box is flat.
     """
     required("robot", robot, Robot)
     required("condition", condition, Condition)

@@ -25,12 +25,9 @@ LEAST_SHARE = 1e-9  # of robots that must fulfil a condition, or that need not
 class Condition(Part, ABC):
     """A condition on configurations. A condition of your own defines `kind` and `evaluate`.
 
-    Attributes
-    ----------
-    kinds
-        The registry: every defined condition by its kind.
-    takes_every_row
-        True if it needs a cable for each degree of freedom: with fewer it holds nowhere.
+    Attributes:
+        kinds: The registry: every defined condition by its kind.
+        takes_every_row: True if it needs a cable for each degree of freedom: with fewer it holds nowhere.
     """
 
     kinds: ClassVar[dict[str, type[Condition]]] = {}
@@ -59,10 +56,8 @@ class Condition(Part, ABC):
     def evaluate(self, robot: Robot, places: Places) -> np.ndarray:
         """Return whether the condition holds at each configuration (finite numbers), (n,) of bool.
 
-        Raises
-        ------
-        InputError
-            If the condition does not apply to the robot.
+        Raises:
+            InputError: If the condition does not apply to the robot.
         """
 
     def shortfall(self, robot: Robot, places: Places) -> np.ndarray:
@@ -97,10 +92,8 @@ class Condition(Part, ABC):
 def condition_from(data: Any) -> Condition:
     """Create a condition from its data: a mapping as returned by `model_dump` or read from a file.
 
-    Raises
-    ------
-    InputError
-        If `kind` is missing or unknown, or another key does not fit.
+    Raises:
+        InputError: If `kind` is missing or unknown, or another key does not fit.
     """
     if isinstance(data, Condition):
         return data

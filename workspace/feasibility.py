@@ -54,14 +54,10 @@ def feasible(
 ) -> np.ndarray:
     """Return whether tensions inside their limits give all of some wrenches, (n,) of bool.
 
-    Parameters
-    ----------
-    wrenches
-        (k, 6) for all configurations or (k, n, 6), about the CoM in {G} [N, N m].
-    rows
-        Wrench rows to balance; default: those of the coordinates that can move.
-    robust
-        Fraction of the uncertain robots for which tensions must exist; default: the nominal robot only.
+    Args:
+        wrenches: (k, 6) for all configurations or (k, n, 6), about the CoM in {G} [N, N m].
+        rows: Wrench rows to balance; default: those of the coordinates that can move.
+        robust: Fraction of the uncertain robots for which tensions must exist; default: the nominal robot only.
     """
     rows = wrench_rows(robot) if rows is None else rows
     tightened = None if robust is None else Tightened(robot, robust, rows)

@@ -17,17 +17,12 @@ if TYPE_CHECKING:
 def draw(result: xr.Dataset, robot: Robot | None = None) -> Figure:
     """Draw the metrics of a workspace as contours, or, if it has none, where samples were accepted.
 
-    Parameters
-    ----------
-    result
-        A result of `sample`.
-    robot
-        The robot whose anchors are drawn as triangles (default: none).
+    Args:
+        result: A result of `sample`.
+        robot: The robot whose anchors are drawn as triangles (default: none).
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong type, or the result is not one of `sample`.
+    Raises:
+        InputError: If an argument has a wrong type, or the result is not one of `sample`.
     """
     import xarray as xr
 

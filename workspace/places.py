@@ -17,12 +17,9 @@ from ..models import Robot
 class Places(Displayed):
     """n configurations: poses of platform and carriers.
 
-    Attributes
-    ----------
-    pose
-        (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (n, 6).
-    carriers
-        Pose of each carrier in {G}, (n, c, 6).
+    Attributes:
+        pose: (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (n, 6).
+        carriers: Pose of each carrier in {G}, (n, c, 6).
     """
 
     pose: np.ndarray  # (n, 6)
@@ -34,10 +31,8 @@ class Places(Displayed):
 
         At a pose with a number that is not finite no condition holds.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong type or shape.
+        Raises:
+            InputError: If an argument has a wrong type or shape.
         """
         home = required("robot", robot, Robot).carrier_home
         poses = np.atleast_2d(real_array("pose", pose).astype(float, copy=False))
@@ -51,10 +46,8 @@ class Places(Displayed):
     def only(self, rows: np.ndarray | slice) -> Places:
         """Return the configurations of some rows: indices, flags (n,) or a slice.
 
-        Raises
-        ------
-        InputError
-            If `rows` are none of these.
+        Raises:
+            InputError: If `rows` are none of these.
         """
         try:
             return Places(self.pose[rows], self.carriers[rows])

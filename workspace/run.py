@@ -58,67 +58,47 @@ def sample(
     The result does not depend on the number of workers, to the last bit. Memory does not grow with the number of
     samples, because beyond `points_max` samples only counts are kept.
 
-    Parameters
-    ----------
-    robot
-        From `load` or `Robot.model_validate`.
-    condition
-        A `Condition`, or a mapping with its `kind` and keys.
-    region
-        A `Region`, or a mapping of its keys; default: a box about home and anchors, everything else at home.
-    samples
-        Number of samples. A grid and adaptive refinement have at most this many.
-    method
-        random; sobol (low discrepancy); grid; adaptive: cells whose corners differ are halved.
-    seed
-        Seed of the random streams, and of the scrambling of sobol.
-    size
-        Smallest cell edge of the adaptive method [m]; default: as small as the number of samples permits.
-    keep
-        Samples in the dataset: accepted, all or none.
-    points_max
-        Maximum number of samples in the dataset; the first ones are kept.
-    metrics
-        Names of metrics to compute at the samples in the dataset, any of `METRICS` (default: none).
-    robust
-        Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the conditions about
-        tension limits hold at all accepted configurations, to first order. It sets the key `robust` of these
-        conditions; others are not affected.
-    execution
-        Workers and checkpoint, see `Execution`. Its `progress` is called with (samples done, samples in total, samples
-        accepted); the total is an upper bound for adaptive.
-    options
-        Fields of `Execution` by their names, which replace its own.
+    Args:
+        robot: From `load` or `Robot.model_validate`.
+        condition: A `Condition`, or a mapping with its `kind` and keys.
+        region: A `Region`, or a mapping of its keys; default: a box about home and anchors, everything else at home.
+        samples: Number of samples. A grid and adaptive refinement have at most this many.
+        method: random; sobol (low discrepancy); grid; adaptive: cells whose corners differ are halved.
+        seed: Seed of the random streams, and of the scrambling of sobol.
+        size: Smallest cell edge of the adaptive method [m]; default: as small as the number of samples permits.
+        keep: Samples in the dataset: accepted, all or none.
+        points_max: Maximum number of samples in the dataset; the first ones are kept.
+        metrics: Names of metrics to compute at the samples in the dataset, any of `METRICS` (default: none).
+        robust: Fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, for which the conditions
+            about tension limits hold at all accepted configurations, to first order. It sets the key `robust` of these
+            conditions; others are not affected.
+        execution: Workers and checkpoint, see `Execution`. Its `progress` is called with (samples done, samples in
+            total, samples accepted); the total is an upper bound for adaptive.
+        options: Fields of `Execution` by their names, which replace its own.
 
-    Returns
-    -------
-    Dataset with the variables
-        position (point, axis) [m]
-            Positions of the samples kept; attitude (point, angle) [rad] and carrier_position (point, carrier, axis) [m]
-            if they vary; accepted (point) if all samples are kept.
-        margin, natural_frequency, payload, ... (point)
-            The `metrics`, in their units; nan where they need tensions and there are none.
-        tried, reached (x, y, z)
-            Samples in each of 32 x 32 x 32 cells of the box of positions, and those of them that were accepted.
-        bounds (end, axis) [m]
-            Bounds of the accepted positions; nan if there are none.
-        volume, volume_interval (end) [m^3]
-            Accepted fraction of the samples times the volume of the box, with the 95 % interval of Clopper and Pearson.
-            It is the mean over all other varying quantities, and an area or a length if the box has no
-            thickness along some axes. With `lengths` it is the volume of the cells reached, without an interval; a grid
-            has no interval either. Adaptive: the interval from the cells inside to the cells inside or on the boundary.
-        boundary (cell, axis) [m], cell_edges (axis) [m]
-            Adaptive method only: centres of the smallest cells with differing corners, and their edges.
+    Returns:
+        Dataset: Its attributes are the arguments, `samples` and `accepted`, and of this run `seconds` and
+            `poses_per_s`. Its variables are
 
-    Its attributes are the arguments, `samples` and `accepted`, and of this run `seconds` and `poses_per_s`.
+            - `position` (point, axis) [m]: positions of the samples kept; `attitude` (point, angle) [rad] and
+              `carrier_position` (point, carrier, axis) [m] if they vary; `accepted` (point) if all samples are kept.
+            - `margin`, `natural_frequency`, `payload`, ... (point): the `metrics`, in their units; nan where they need
+              tensions and there are none.
+            - `tried`, `reached` (x, y, z): samples in each of 32 x 32 x 32 cells of the box of positions, and those of
+              them that were accepted.
+            - `bounds` (end, axis) [m]: bounds of the accepted positions; nan if there are none.
+            - `volume`, `volume_interval` (end) [m^3]: accepted fraction of the samples times the volume of the box,
+              with the 95 % interval of Clopper and Pearson. It is the mean over all other varying quantities, and an
+              area or a length if the box has no thickness along some axes. With `lengths` it is the volume of the cells
+              reached, without an interval; a grid has no interval either. Adaptive: the interval from the cells inside
+              to the cells inside or on the boundary.
+            - `boundary` (cell, axis) [m], `cell_edges` (axis) [m]: adaptive method only, centres of the smallest cells
+              with differing corners, and their edges.
 
-    Raises
-    ------
-    InputError
-        If an argument is wrong, the region is empty, the checkpoint cannot be written, is damaged or belongs to another
-        run, or the scheduler does not exist. No file is changed then.
-    SolverError
-        If workers end before their work is done, or the extra `cluster` is not installed.
+    Raises:
+        InputError: If an argument is wrong, the region is empty, the checkpoint cannot be written, is damaged or
+            belongs to another run, or the scheduler does not exist. No file is changed then.
+        SolverError: If workers end before their work is done, or the extra `cluster` is not installed.
     """
     start = time.perf_counter()
     required("robot", robot, Robot)

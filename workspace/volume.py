@@ -20,16 +20,11 @@ MOST_SAMPLES = 10**15
 class Volume(Displayed):
     """A volume and its confidence interval, in the unit of the box: [m^3], or [m^2] for a plane.
 
-    Attributes
-    ----------
-    value
-        Estimate: accepted fraction of the samples times the volume of the box.
-    low, high
-        Ends of the interval.
-    level
-        Lower bound of the probability that such an interval covers the true volume.
-    accepted, samples
-        Numbers of samples it was computed from.
+    Attributes:
+        value: Estimate: accepted fraction of the samples times the volume of the box.
+        low, high: Ends of the interval.
+        level: Lower bound of the probability that such an interval covers the true volume.
+        accepted, samples: Numbers of samples it was computed from.
     """
 
     value: float
@@ -49,14 +44,10 @@ def volume(accepted: int, samples: int, box: float, level: float = LEVEL) -> Vol
     Samples of a low-discrepancy sequence or a grid are more even than random ones: for them the interval is usually
     wider than necessary.
 
-    Parameters
-    ----------
-    accepted, samples
-        Number of samples in the workspace, and number of all samples.
-    box
-        Volume of the box.
-    level
-        Confidence level, between 0 and 1.
+    Args:
+        accepted, samples: Number of samples in the workspace, and number of all samples.
+        box: Volume of the box.
+        level: Confidence level, between 0 and 1.
 
     Raises `InputError` if a number is out of its range.
     """

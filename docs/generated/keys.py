@@ -56,7 +56,7 @@ class _Keys:
             schema = self.parts[part]
             title, used = self._title(part), [f"`{path}`" for path in dict.fromkeys(paths)]
             where = "" if [title] == used else f"Used in: {', '.join(used)}.\n\n"
-            text = escaped(re.split(r"\n\s*(?:Attributes|Parameters)\n", schema.get("description", ""))[0])
+            text = escaped(re.split(r"\n\s*(?:Attributes|Args):\n", schema.get("description", ""))[0])
             sections.append(f"## {title} {{ #{part.lower()} }}\n\n{text}\n\n{where}{self._table(schema)}")
         return "\n".join(sections)
 

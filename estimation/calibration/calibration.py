@@ -34,15 +34,11 @@ class Calibration(CalibrationData, Drawn, Reported):
 
         A result that should not be used (`refused`) is not saved. `robot.save` saves it nevertheless.
 
-        Parameters
-        ----------
-        path
-            Path of the file; an existing file is overwritten.
+        Args:
+            path: Path of the file; an existing file is overwritten.
 
-        Raises
-        ------
-        InputError
-            If the result is refused, or the file cannot be written.
+        Raises:
+            InputError: If the result is refused, or the file cannot be written.
         """
         if self.refused is not None:
             raise InputError(f"calibration must be usable to be saved, got one that is refused: {self.refused}")

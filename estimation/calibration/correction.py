@@ -19,16 +19,12 @@ MOST_MISTAKES = 3
 class Correction(NamedTuple):
     """A log and its robot without the probable input errors of the log.
 
-    Attributes
-    ----------
-    robot
-        The robot. Its encoders convert readings in another unit or with another sign, so it fits the log as it is.
-    measurements
-        Measurements without the other errors.
-    texts
-        The errors, in one line each.
-    counted
-        True if readings count something whose size is known only roughly, so their scales should be estimated.
+    Attributes:
+        robot: The robot. Its encoders convert readings in another unit or with another sign, so it fits the log as it
+            is.
+        measurements: Measurements without the other errors.
+        texts: The errors, in one line each.
+        counted: True if readings count something whose size is known only roughly, so their scales should be estimated.
     """
 
     robot: Robot
@@ -40,10 +36,8 @@ class Correction(NamedTuple):
 def corrected(robot: Robot, measurements: Measurements) -> tuple[Measurements, list[str]]:
     """Return measurements without their probable input errors, and a line about each error.
 
-    Raises
-    ------
-    InputError
-        If the measurements have another number of cables, or several errors are equally probable.
+    Raises:
+        InputError: If the measurements have another number of cables, or several errors are equally probable.
     """
     found = correction_of(robot, measurements)
     first, last = (Parameters(one, ()).table(Parameters(one, ()).first)[:, 7] for one in (as_robot(robot), found.robot))

@@ -77,16 +77,11 @@ class Compared(NamedTuple):
 class HeldOut(Displayed):
     """Errors of cross-validation.
 
-    Attributes
-    ----------
-    before
-        Root mean square of the residuals with the file's parameters [m].
-    after
-        Root mean square with the parameters estimated from the other half [m].
-    sets
-        The parameter sets, from the empty set (the file) to the full set.
-    best
-        The smallest set with an error at most 2 % above the smallest error of all.
+    Attributes:
+        before: Root mean square of the residuals with the file's parameters [m].
+        after: Root mean square with the parameters estimated from the other half [m].
+        sets: The parameter sets, from the empty set (the file) to the full set.
+        best: The smallest set with an error at most 2 % above the smallest error of all.
     """
 
     before: float

@@ -36,25 +36,17 @@ def next_poses(
 
     It greedily adds the pose that shrinks the parameters' error ellipsoid most.
 
-    Parameters
-    ----------
-    robot
-        A robot, its name or its file if nothing was measured so far, or a `Calibration`, whose measurements are
-        included.
-    candidates
-        Poses to choose from, (k, 6) [m, rad]. Default: random ones with angles up to 0.3 rad at which tensions inside
-        their limits hold the platform at rest.
-    count
-        Number of poses.
-    free
-        Parameters to estimate, as in `calibrate`; default: those of a `Calibration`. A clock offset is ignored.
-    measured
-        True if poses will be measured, False if only lengths.
+    Args:
+        robot: A robot, its name or its file if nothing was measured so far, or a `Calibration`, whose measurements are
+            included.
+        candidates: Poses to choose from, (k, 6) [m, rad]. Default: random ones with angles up to 0.3 rad at which
+            tensions inside their limits hold the platform at rest.
+        count: Number of poses.
+        free: Parameters to estimate, as in `calibrate`; default: those of a `Calibration`. A clock offset is ignored.
+        measured: True if poses will be measured, False if only lengths.
 
-    Raises
-    ------
-    InputError
-        If an argument is wrong, or no candidate exists.
+    Raises:
+        InputError: If an argument is wrong, or no candidate exists.
     """
     if isinstance(robot, Calibration):
         calibration, chosen, groups = robot, robot.robot, robot.free

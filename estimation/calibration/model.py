@@ -45,14 +45,10 @@ PART = 4000  # samples whose derivatives are computed together
 class State(NamedTuple):
     """Parameters and poses.
 
-    Attributes
-    ----------
-    x
-        Parameters, (P,).
-    shift, turn
-        Increments of the poses from their initial values, in {G}: (N, 3) [m], (N, 3, 3).
-    errors
-        Errors of the tensions that stretch cables, in standard deviations, (N, d).
+    Attributes:
+        x: Parameters, (P,).
+        shift, turn: Increments of the poses from their initial values, in {G}: (N, 3) [m], (N, 3, 3).
+        errors: Errors of the tensions that stretch cables, in standard deviations, (N, d).
     """
 
     x: np.ndarray

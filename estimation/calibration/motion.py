@@ -16,20 +16,13 @@ from .parameters import Parameters
 class Motion(NamedTuple):
     """Motion at N samples; zeros of a log without times, whose samples are at rest.
 
-    Attributes
-    ----------
-    signs
-        Expected signs of the cable speeds, 1: paid out, 0 where either is as likely, (N, m).
-    gravity
-        Gravity less the acceleration of the platform frame, (N, 3) [m/s^2].
-    rate, spin
-        Angular velocity [rad/s] and acceleration [rad/s^2] in {G}, (N, 3).
-    turning
-        Rate of the angular momentum about the CoM in {G}, (N, 3) [N m].
-    sigma
-        Standard deviation of the acceleration, 0 where the platform rests, (N,) [m/s^2].
-    smooth
-        Smoothing of values (N, d) by the same parabolas, None without times.
+    Attributes:
+        signs: Expected signs of the cable speeds, 1: paid out, 0 where either is as likely, (N, m).
+        gravity: Gravity less the acceleration of the platform frame, (N, 3) [m/s^2].
+        rate, spin: Angular velocity [rad/s] and acceleration [rad/s^2] in {G}, (N, 3).
+        turning: Rate of the angular momentum about the CoM in {G}, (N, 3) [N m].
+        sigma: Standard deviation of the acceleration, 0 where the platform rests, (N,) [m/s^2].
+        smooth: Smoothing of values (N, d) by the same parabolas, None without times.
     """
 
     signs: np.ndarray

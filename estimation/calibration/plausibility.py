@@ -48,16 +48,11 @@ OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # from 1, and from those of units
 class Mistake(NamedTuple):
     """A probable input error of a log.
 
-    Attributes
-    ----------
-    text
-        The error, in one line.
-    corrected
-        Measurements without it, or None if several errors are equally probable.
-    severe
-        True if a calibration would be wrong, False if it would only mean another frame than the file's.
-    factors
-        Factors of the readings in `corrected`, (m,) or one for all cables.
+    Attributes:
+        text: The error, in one line.
+        corrected: Measurements without it, or None if several errors are equally probable.
+        severe: True if a calibration would be wrong, False if it would only mean another frame than the file's.
+        factors: Factors of the readings in `corrected`, (m,) or one for all cables.
     """
 
     text: str

@@ -45,14 +45,10 @@ class Parameter(NamedTuple):
 class CalibrationData(Displayed):
     """The result of `calibrate`, without figures, files and reports.
 
-    Attributes
-    ----------
-    free
-        Groups of estimated parameters.
-    prior
-        Standard deviations about the file's values, if given.
-    mistake
-        A probable input error of the log, such as cables in another order or degrees read as radians, or None.
+    Attributes:
+        free: Groups of estimated parameters.
+        prior: Standard deviations about the file's values, if given.
+        mistake: A probable input error of the log, such as cables in another order or degrees read as radians, or None.
     """
 
     _solved: Solved

@@ -27,30 +27,24 @@ def calibrate(
     estimated along with the parameters, by lengths and, with tensions or fewer cables than coordinates, by the balance
     of forces on the platform. Carriers are at home, unless their poses were measured.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file, with the initial values.
-    measurements
-        `Measurements` of the robot, or from `read_measurements`.
-    free
-        Parameters to estimate, some of anchors, attachments, offsets (of the lengths), scales (of the lengths), radii
-        (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is ahead of the
-        clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan (friction as the
-        logarithm of a ratio of tensions), friction (as a force) and gains (newtons per unit of
-        the tensions, if these are motor currents).
-        Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the
-        smallest set whose cross-validation error is close to the best (`select`), which may be empty.
-    prior
-        Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
-        {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
-    outliers
-        True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after the slip.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file, with the initial values.
+        measurements: `Measurements` of the robot, or from `read_measurements`.
+        free: Parameters to estimate, some of anchors, attachments, offsets (of the lengths), scales (of the lengths),
+            radii (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is
+            ahead of the clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan
+            (friction as the logarithm of a ratio of tensions), friction (as a force) and gains (newtons per unit of the
+            tensions, if these are motor currents). Default: anchors and offsets, and the clock if times and poses of a
+            motion were measured. Or "auto": the smallest set whose cross-validation error is close to the best
+            (`select`), which may be empty.
+        prior: Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
+            {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
+        outliers: True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after
+            the slip.
 
-    Raises
-    ------
-    InputError
-        If an argument is wrong, the number of cables differs, or there are fewer measurements than unknowns.
+    Raises:
+        InputError: If an argument is wrong, the number of cables differs, or there are fewer measurements than
+            unknowns.
     """
     chosen = as_robot(robot)
     given = check_measurements(chosen, measurements)

@@ -100,24 +100,16 @@ def fields_of(
 ) -> Fields:
     """Return the fields of logs: those that a map names, and for all other roles those with usual names.
 
-    Parameters
-    ----------
-    recordings
-        The logs.
-    given
-        Names of the fields; default: the usual ones.
-    m
-        Number of cables, which decides among several candidates.
-    carriers
-        Names of carriers, whose poses are not the platform's.
-    free
-        `free_axes` of the robot.
+    Args:
+        recordings: The logs.
+        given: Names of the fields; default: the usual ones.
+        m: Number of cables, which decides among several candidates.
+        carriers: Names of carriers, whose poses are not the platform's.
+        free: `free_axes` of the robot.
 
-    Raises
-    ------
-    InputError
-        If a name of the map is not there, part of a position or an orientation is missing, or there are several
-        candidates.
+    Raises:
+        InputError: If a name of the map is not there, part of a position or an orientation is missing, or there are
+            several candidates.
     """
     roles = ("lengths", "tensions", "position", "orientation", "directions")
     found = {name: _named(recordings, name, given, free) for name in roles} if given else {}

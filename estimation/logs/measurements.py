@@ -32,18 +32,12 @@ ARRAYS = ("lengths", "poses", "tensions", "times", "carrier_poses", "directions"
 class Sigma(NamedTuple):
     """Standard deviations of measurements.
 
-    Attributes
-    ----------
-    lengths
-        Standard deviation of each reading, after scaling [m].
-    position
-        Standard deviation of measured positions, along each axis [m]; 0: exact.
-    rotation
-        Standard deviation of measured orientations, about each axis [rad]; 0: exact.
-    tensions
-        Standard deviation of each tension, relative to it [-].
-    directions
-        Standard deviation of cable directions, about each axis across the cable [rad].
+    Attributes:
+        lengths: Standard deviation of each reading, after scaling [m].
+        position: Standard deviation of measured positions, along each axis [m]; 0: exact.
+        rotation: Standard deviation of measured orientations, about each axis [rad]; 0: exact.
+        tensions: Standard deviation of each tension, relative to it [-].
+        directions: Standard deviation of cable directions, about each axis across the cable [rad].
     """
 
     lengths: float = SIGMA
@@ -56,45 +50,32 @@ class Sigma(NamedTuple):
 class Measurements(Displayed):
     """Store N samples of a robot's cable lengths, with poses, tensions and times if they were measured.
 
-    Parameters
-    ----------
-    lengths
-        Readings of the lengths [m], (N, m): the lengths from anchor to attachment up to offset and scale.
-    poses
-        (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (N, 6), or positions alone, (N, 3). Rows of
-        nan were not measured. Default: no pose was measured.
-    orientations
-        Orientations of the platform, unless `poses` includes them: (roll, pitch, yaw) [rad], (N, 3), or quaternions
-        (x, y, z, w), (N, 4). Rows of nan were not measured.
-    tensions
-        Cable tensions at the winches [N], (N, m), for elastic elongation and the balance of forces on the platform.
-        Default: not measured, no elongation.
-    times
-        Times of the samples [s], (N,), increasing; a clock offset requires them.
-    carrier_poses
-        Measured poses of the carriers in {G}, (N, c, 6) [m, rad], exact. Default: at home.
-    sigma
-        Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m], `rotation` [rad],
-        `tensions` (relative) and `directions` [rad]. Default: 1 mm, poses that are exact, 2 % of tensions, 0.02 rad.
-    directions
-        Unit vectors in {G} along the cables, from the anchor to the platform, (N, m, 3). Cables with nan were not
-        measured; if only z is nan, x and y are the direction seen from above (a swivel angle). Default: not measured.
+    Args:
+        lengths: Readings of the lengths [m], (N, m): the lengths from anchor to attachment up to offset and scale.
+        poses: (x, y, z, roll, pitch, yaw) of the platform frame in {G} [m, rad], (N, 6), or positions alone, (N, 3).
+            Rows of nan were not measured. Default: no pose was measured.
+        orientations: Orientations of the platform, unless `poses` includes them: (roll, pitch, yaw) [rad], (N, 3), or
+            quaternions (x, y, z, w), (N, 4). Rows of nan were not measured.
+        tensions: Cable tensions at the winches [N], (N, m), for elastic elongation and the balance of forces on the
+            platform. Default: not measured, no elongation.
+        times: Times of the samples [s], (N,), increasing; a clock offset requires them.
+        carrier_poses: Measured poses of the carriers in {G}, (N, c, 6) [m, rad], exact. Default: at home.
+        sigma: Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m], `rotation` [rad],
+            `tensions` (relative) and `directions` [rad]. Default: 1 mm, poses that are exact, 2 % of tensions, 0.02
+            rad.
+        directions: Unit vectors in {G} along the cables, from the anchor to the platform, (N, m, 3). Cables with nan
+            were not measured; if only z is nan, x and y are the direction seen from above (a swivel angle). Default:
+            not measured.
 
-    Attributes
-    ----------
-    lengths
-        (N, m) [m].
-    poses
-        (N, 6) [m, rad], nan where not measured, or None.
-    tensions, times, carrier_poses, directions
-        The given arrays, or None; directions have unit length, horizontal if azimuths were measured.
-    sigma
-        `Sigma`: of lengths, positions, rotations, tensions and directions.
+    Attributes:
+        lengths: (N, m) [m].
+        poses: (N, 6) [m, rad], nan where not measured, or None.
+        tensions, times, carrier_poses, directions: The given arrays, or None; directions have unit length, horizontal
+            if azimuths were measured.
+        sigma: `Sigma`: of lengths, positions, rotations, tensions and directions.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value; nan in lengths, tensions or times is refused.
+    Raises:
+        InputError: If an argument has a wrong shape or value; nan in lengths, tensions or times is refused.
     """
 
     def __init__(
@@ -132,10 +113,8 @@ class Measurements(Displayed):
     def only(self, rows: np.ndarray | slice) -> Measurements:
         """Return the measurements of some samples: indices, flags (N,) of bool or a slice.
 
-        Raises
-        ------
-        InputError
-            If `rows` are none of these.
+        Raises:
+            InputError: If `rows` are none of these.
         """
         arrays = {name: getattr(self, name) for name in ARRAYS}
         try:
@@ -184,15 +163,11 @@ class Measurements(Displayed):
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Save as NetCDF atomically, and return the path; `read_measurements` reads the file.
 
-        Parameters
-        ----------
-        path
-            Path of the file; an existing file is overwritten.
+        Args:
+            path: Path of the file; an existing file is overwritten.
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises:
+            InputError: If the file cannot be written.
         """
         first = "sample" if self.times is None else "time"
         cable = (first, "cable")

@@ -34,22 +34,14 @@ AHRS = np.radians(0.5)  # sigma of orientations that no motion capture measured
 class Log(NamedTuple):
     """Measurements with their origin.
 
-    Attributes
-    ----------
-    measurements
-        The measurements.
-    fields
-        The fields that they are from.
-    notes
-        Remarks on files and clocks, one line each.
-    begin
-        Reading of the lengths' clock at time 0 of the measurements [s].
-    recordings
-        The files.
-    clock
-        Clock of the poses, if it is another one than that of the lengths.
-    ned
-        Axis of x of {G}, if poses in a frame of north, east, down were converted.
+    Attributes:
+        measurements: The measurements.
+        fields: The fields that they are from.
+        notes: Remarks on files and clocks, one line each.
+        begin: Reading of the lengths' clock at time 0 of the measurements [s].
+        recordings: The files.
+        clock: Clock of the poses, if it is another one than that of the lengths.
+        ned: Axis of x of {G}, if poses in a frame of north, east, down were converted.
     """
 
     measurements: Measurements
@@ -70,27 +62,20 @@ def read_measurements(
 ) -> Measurements:
     """Read measurements from a log: CSV, NetCDF, MCAP, or a bag of ROS 1 or ROS 2.
 
-    Parameters
-    ----------
-    path
-        File, or several. CSV has a header such as `t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], ...,
-        tension0 [N]`; NetCDF is from `Measurements.save` or a simulation, or has variables named like these columns.
-        Empty fields or nan mark poses that were not measured. Messages of usual types are recognised.
-    sigma
-        Standard deviations as for `Measurements`; default: those of the file if `Measurements.save` wrote it, otherwise
-        the defaults of `Measurements`.
-    poses
-        Log of the poses, if they are in another file; its clock is aligned by cable speeds.
-    robot
-        Robot of the log, to align clocks and to find the poses of its moving carriers by their names.
-    fields
-        YAML file with the names of the fields, such as `lengths: /winches/position[*] [m]`; default: usual names.
+    Args:
+        path: File, or several. CSV has a header such as `t [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg],
+            ..., tension0 [N]`; NetCDF is from `Measurements.save` or a simulation, or has variables named like these
+            columns. Empty fields or nan mark poses that were not measured. Messages of usual types are recognised.
+        sigma: Standard deviations as for `Measurements`; default: those of the file if `Measurements.save` wrote it,
+            otherwise the defaults of `Measurements`.
+        poses: Log of the poses, if they are in another file; its clock is aligned by cable speeds.
+        robot: Robot of the log, to align clocks and to find the poses of its moving carriers by their names.
+        fields: YAML file with the names of the fields, such as `lengths: /winches/position[*] [m]`; default: usual
+            names.
 
-    Raises
-    ------
-    InputError
-        If a file cannot be read, a field has an unknown unit, a length, tension or time is missing, times do not
-        increase, or clocks cannot be aligned.
+    Raises:
+        InputError: If a file cannot be read, a field has an unknown unit, a length, tension or time is missing, times
+            do not increase, or clocks cannot be aligned.
     """
     return read_log(path, sigma, poses, robot, fields).measurements
 

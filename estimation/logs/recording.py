@@ -24,18 +24,12 @@ class Samples(NamedTuple):
 class Topic:
     """Fields of numbers that are recorded together: the messages of a topic, or the columns of a table.
 
-    Attributes
-    ----------
-    name, kind
-        Name, "" of a table, and type of the messages.
-    count
-        Number of messages or lines.
-    times
-        When they were recorded [s], (N,), or None if no clock is known; a table has one among its fields.
-    fields
-        Names of the fields and their units as they are stated, "" if they are not.
-    read
-        Function that returns the values of some fields as they are recorded.
+    Attributes:
+        name, kind: Name, "" of a table, and type of the messages.
+        count: Number of messages or lines.
+        times: When they were recorded [s], (N,), or None if no clock is known; a table has one among its fields.
+        fields: Names of the fields and their units as they are stated, "" if they are not.
+        read: Function that returns the values of some fields as they are recorded.
     """
 
     name: str
@@ -54,18 +48,13 @@ class Topic:
 class Recording:
     """A log and its topics.
 
-    Attributes
-    ----------
-    where, kind
-        Path and kind of the file, such as "MCAP".
-    topics
-        Its topics by their names.
-    sigma
-        Standard deviations that the file states, by the names of `Sigma`.
-    notes
-        Remarks about the file, such as that its end is missing.
-    ahead
-        Time by which its clock is ahead of that of the poses [s], which is found when several files are read together.
+    Attributes:
+        where, kind: Path and kind of the file, such as "MCAP".
+        topics: Its topics by their names.
+        sigma: Standard deviations that the file states, by the names of `Sigma`.
+        notes: Remarks about the file, such as that its end is missing.
+        ahead: Time by which its clock is ahead of that of the poses [s], which is found when several files are read
+            together.
     """
 
     where: str

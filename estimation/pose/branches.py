@@ -35,20 +35,14 @@ def branches(
     Poses in which the cables can hold the weight at rest come first, since measured cables are taut. Within both groups
     the poses are sorted by their rotation from home.
 
-    Parameters
-    ----------
-    lengths, carrier_pose, sigma
-        As in `pose_from_lengths`, for one pose.
-    starts
-        Number of initial poses. Some poses may be missed; more starts miss fewer. If gravity determines the pose, the
-        results are equilibria, which have separate starts.
-    seed
-        Seed of the starts.
+    Args:
+        lengths, carrier_pose, sigma: As in `pose_from_lengths`, for one pose.
+        starts: Number of initial poses. Some poses may be missed; more starts miss fewer. If gravity determines the
+            pose, the results are equilibria, which have separate starts.
+        seed: Seed of the starts.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value.
+    Raises:
+        InputError: If an argument has a wrong shape or value.
     """
     robot = as_robot(robot)
     starts = whole_number("starts", starts, 1, 1_000_000)

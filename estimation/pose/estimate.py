@@ -25,28 +25,18 @@ MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standar
 class PoseEstimate(Displayed):
     """The pose of the platform that fits measured cable lengths best; arrays have the leading dimensions of these.
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    pose
-        (x, y, z, roll, pitch, yaw) of the platform frame in {G}, (..., 6) [m, rad].
-    residuals
-        Length of each cable at that pose minus its measured length, (..., m) [m].
-    converged
-        True if the search ended at a minimum of the residuals, (...).
-    sigma
-        Standard deviations of the measured lengths, (m,) [m].
-    carrier_pose
-        Poses of the carriers, (c, 6) or (..., c, 6), or None if they are at home.
-    ambiguous
-        True if the search found another pose that may be the true one, (...): it passes the fit test at the 0.01 %
-        level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
-    by_gravity
-        True if the lengths alone do not determine the pose, and gravity fixes it, (...).
-    known_covariance
-        Covariance that was computed with the pose, (..., 6, 6): of one pose near a start, and of an equilibrium, where
-        it does not follow from the lengths alone.
+    Attributes:
+        robot: The robot.
+        pose: (x, y, z, roll, pitch, yaw) of the platform frame in {G}, (..., 6) [m, rad].
+        residuals: Length of each cable at that pose minus its measured length, (..., m) [m].
+        converged: True if the search ended at a minimum of the residuals, (...).
+        sigma: Standard deviations of the measured lengths, (m,) [m].
+        carrier_pose: Poses of the carriers, (c, 6) or (..., c, 6), or None if they are at home.
+        ambiguous: True if the search found another pose that may be the true one, (...): it passes the fit test at the
+            0.01 % level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
+        by_gravity: True if the lengths alone do not determine the pose, and gravity fixes it, (...).
+        known_covariance: Covariance that was computed with the pose, (..., 6, 6): of one pose near a start, and of an
+            equilibrium, where it does not follow from the lengths alone.
     """
 
     robot: Robot

@@ -39,20 +39,13 @@ BIASES = slice(18, 24)
 class MotionEstimate(NamedTuple):
     """Pose and velocity of the platform at a time.
 
-    Attributes
-    ----------
-    time
-        [s].
-    pose
-        (x, y, z, roll, pitch, yaw) of the platform frame in {G}, (6,) [m, rad].
-    velocity
-        Its time derivative, (6,); rates of roll and yaw are nan at a pitch of 90 degrees.
-    twist
-        Velocity of the platform frame and angular velocity, in {G}, (6,) [m/s, rad/s].
-    covariance
-        Covariance of x, y, z, a small rotation in {G}, and the twist, (12, 12).
-    left_out
-        Indices of the cables whose lengths were excluded as wrong readings.
+    Attributes:
+        time: [s].
+        pose: (x, y, z, roll, pitch, yaw) of the platform frame in {G}, (6,) [m, rad].
+        velocity: Its time derivative, (6,); rates of roll and yaw are nan at a pitch of 90 degrees.
+        twist: Velocity of the platform frame and angular velocity, in {G}, (6,) [m/s, rad/s].
+        covariance: Covariance of x, y, z, a small rotation in {G}, and the twist, (12, 12).
+        left_out: Indices of the cables whose lengths were excluded as wrong readings.
     """
 
     time: float
@@ -70,27 +63,20 @@ class PoseFilter(Displayed):
 
     The first update must have lengths or a pose. A search starts again if most lengths are wrong.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    sigma
-        Standard deviations of errors: `lengths` [m], `position` [m], `rotation` [rad], `rate` [rad/s], `acceleration`
-        [m/s^2], `tensions` (relative), unmodelled `forces` (of the weight), and of the constant biases
-        `rate_bias` [rad/s] and `acceleration_bias` [m/s^2]. Default: 1 mm, 1 mrad, 0.01 rad/s, 0.1 m/s^2, 2 %, 2 %,
-        0.02 rad/s, 0.2 m/s^2.
-    jerk
-        Densities of the white jerk [m/s^2.5] and [rad/s^2.5]: standard deviations of the change of acceleration in a
-        second, relative to a reference if there is one. Default: 10 m/s^2.5, and that over the robot's `length`. With
-        less jerk the filter is slower, and its estimates less noisy. It must be several times faster than a controller
-        that uses it.
-    sensor
-        Position of the inertial sensor in the platform frame, (3,) [m]; its axes are those of the platform.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        sigma: Standard deviations of errors: `lengths` [m], `position` [m], `rotation` [rad], `rate` [rad/s],
+            `acceleration` [m/s^2], `tensions` (relative), unmodelled `forces` (of the weight), and of the constant
+            biases `rate_bias` [rad/s] and `acceleration_bias` [m/s^2]. Default: 1 mm, 1 mrad, 0.01 rad/s, 0.1 m/s^2, 2
+            %, 2 %, 0.02 rad/s, 0.2 m/s^2.
+        jerk: Densities of the white jerk [m/s^2.5] and [rad/s^2.5]: standard deviations of the change of acceleration
+            in a second, relative to a reference if there is one. Default: 10 m/s^2.5, and that over the robot's
+            `length`. With less jerk the filter is slower, and its estimates less noisy. It must be several times faster
+            than a controller that uses it.
+        sensor: Position of the inertial sensor in the platform frame, (3,) [m]; its axes are those of the platform.
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value.
+    Raises:
+        InputError: If an argument has a wrong value.
     """
 
     def __init__(
@@ -135,28 +121,19 @@ class PoseFilter(Displayed):
     ) -> MotionEstimate:
         """Return the estimate at `time`, with the measurements of that time; without any it is a prediction.
 
-        Parameters
-        ----------
-        time
-            Not before that of the last update [s].
-        lengths
-            Cable lengths from anchor to attachment (m,) [m]; nan: not measured.
-        pose
-            Measured pose (6,) [m, rad], for example by motion capture; nan: not measured.
-        rate, acceleration
-            Angular velocity [rad/s] and specific force [m/s^2] of an inertial sensor in platform axes, (3,).
-        tensions
-            Tensions at the attachments (m,) [N], which accelerate the platform; its mass must be right.
-        reference
-            Reference pose and its first and second time derivative, each (6,), such as a `Reference`.
-        carrier_pose
-            Poses of the carriers in {G}, (c, 6); default: at home.
+        Args:
+            time: Not before that of the last update [s].
+            lengths: Cable lengths from anchor to attachment (m,) [m]; nan: not measured.
+            pose: Measured pose (6,) [m, rad], for example by motion capture; nan: not measured.
+            rate, acceleration: Angular velocity [rad/s] and specific force [m/s^2] of an inertial sensor in platform
+                axes, (3,).
+            tensions: Tensions at the attachments (m,) [N], which accelerate the platform; its mass must be right.
+            reference: Reference pose and its first and second time derivative, each (6,), such as a `Reference`.
+            carrier_pose: Poses of the carriers in {G}, (c, 6); default: at home.
 
-        Raises
-        ------
-        InputError
-            If an argument has a wrong shape or value, the time is earlier than the last one, or the first update has
-            neither lengths nor a pose.
+        Raises:
+            InputError: If an argument has a wrong shape or value, the time is earlier than the last one, or the first
+                update has neither lengths nor a pose.
         """
         robot = self.robot
         time = number("time", time, -LARGEST, LARGEST)

@@ -35,24 +35,17 @@ def pose_from_lengths(
     If the lengths do not determine the pose, as with parallel cables or few of them, the result is the equilibrium
     pose, see `statics.equilibria`.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    lengths
-        Measured lengths of taut cables, from anchor to attachment, over the pulley if there is one, (..., m) [m].
-    start
-        Initial pose, (..., 6) [m, rad], such as the last one of a stream: the estimate is the minimum near it.
-        Default: a search without a start. If several poses fit, `branches` lists them.
-    carrier_pose
-        Poses of the carriers in {G}, (..., c, 6); default: at home.
-    sigma
-        Standard deviations of the lengths [m], one number or (m,).
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        lengths: Measured lengths of taut cables, from anchor to attachment, over the pulley if there is one, (..., m)
+            [m].
+        start: Initial pose, (..., 6) [m, rad], such as the last one of a stream: the estimate is the minimum near it.
+            Default: a search without a start. If several poses fit, `branches` lists them.
+        carrier_pose: Poses of the carriers in {G}, (..., c, 6); default: at home.
+        sigma: Standard deviations of the lengths [m], one number or (m,).
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong shape or value, or the robot has more than 32 cables or 8 carriers.
+    Raises:
+        InputError: If an argument has a wrong shape or value, or the robot has more than 32 cables or 8 carriers.
     """
     robot = as_robot(robot)
     lengths, deviations = checked_lengths(lengths, robot), checked_sigma(sigma, robot.m)

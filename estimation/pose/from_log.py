@@ -48,22 +48,15 @@ class Wrong(NamedTuple):
 class LogPoses(Displayed):
     """The poses of a platform over a log.
 
-    Attributes
-    ----------
-    estimate
-        The poses with their covariances, of N samples.
-    times
-        Times of the poses on the clock of the lengths [s], (N,), or None.
-    squares
-        Sum of all squared residuals of each sample, in standard deviations, (N,); None if lengths alone were measured.
-    more
-        Number of the residuals in a sample besides those of the lengths.
-    excess
-        Factor by which these other residuals exceed their standard deviations.
-    misread
-        Description of an error of the measured orientations, which is corrected; or None.
-    mistake
-        Probable input error of the log, or None.
+    Attributes:
+        estimate: The poses with their covariances, of N samples.
+        times: Times of the poses on the clock of the lengths [s], (N,), or None.
+        squares: Sum of all squared residuals of each sample, in standard deviations, (N,); None if lengths alone were
+            measured.
+        more: Number of the residuals in a sample besides those of the lengths.
+        excess: Factor by which these other residuals exceed their standard deviations.
+        misread: Description of an error of the measured orientations, which is corrected; or None.
+        mistake: Probable input error of the log, or None.
     """
 
     estimate: PoseEstimate
@@ -195,23 +188,16 @@ class LogPoses(Displayed):
 def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = SIGMA, begin: float = 0.0) -> LogPoses:
     """Estimate the pose of the platform at each sample of a log; the file's encoders convert readings to lengths.
 
-    Parameters
-    ----------
-    robot
-        The robot.
-    measurements
-        Readings; measured tensions stretch cables with a stiffness, and measured poses of carriers move their anchors.
-        Directions of cables and orientations of the platform are used, and tensions with these. Positions only serve
-        to detect input errors of the log (`mistake`).
-    sigma
-        Standard deviations of the lengths [m], one number or (m,).
-    begin
-        Time of the clock at time 0 of the measurements [s].
+    Args:
+        robot: The robot.
+        measurements: Readings; measured tensions stretch cables with a stiffness, and measured poses of carriers move
+            their anchors. Directions of cables and orientations of the platform are used, and tensions with these.
+            Positions only serve to detect input errors of the log (`mistake`).
+        sigma: Standard deviations of the lengths [m], one number or (m,).
+        begin: Time of the clock at time 0 of the measurements [s].
 
-    Raises
-    ------
-    InputError
-        If an argument has a wrong value, or a length is not above zero.
+    Raises:
+        InputError: If an argument has a wrong value, or a length is not above zero.
     """
     given, deviations = check_measurements(robot, measurements), checked_sigma(sigma, robot.m)
     few = robot.m < robot.dof_mask.sum()  # more cables need no orientations

@@ -56,31 +56,21 @@ def export_fmu(
 ) -> str | None:
     """Write a robot as a unit for co-simulation with FMI 3.0: its C sources, and the binary for this platform.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    file
-        File to write, with the ending .fmu.
-    part
-        "plant" (`Plant`), "controller" (`ComputedTorque`), or "both" in a closed loop.
-    drive
-        Type of the cable commands of the plant, see `Plant` (default: tensions, which the plant realises as in
-        `simulate`, or constant lengths for robots that have these).
-    reference
-        A plan, the NetCDF file of one, a path or a pose (6,), at the beginning of which a simulation starts
-        (default: the robot's home).
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        file: File to write, with the ending .fmu.
+        part: "plant" (`Plant`), "controller" (`ComputedTorque`), or "both" in a closed loop.
+        drive: Type of the cable commands of the plant, see `Plant` (default: tensions, which the plant realises as in
+            `simulate`, or constant lengths for robots that have these).
+        reference: A plan, the NetCDF file of one, a path or a pose (6,), at the beginning of which a simulation starts
+            (default: the robot's home).
 
-    Returns
-    -------
-    str or None
-        Platform of the binary, such as "x86_64-linux"; None if there is no C compiler: `cc`, or what the environment
-        variable CC names.
+    Returns:
+        Platform of the binary, such as "x86_64-linux"; None without a C compiler, which is `cc` or what the environment
+            variable CC names.
 
-    Raises
-    ------
-    InputError
-        If an argument is wrong, the file cannot be written, or the compiler fails.
+    Raises:
+        InputError: If an argument is wrong, the file cannot be written, or the compiler fails.
     """
     loaded, path = as_robot(robot), check_ending("file", file_path("file", file), ".fmu")
     check_writable(path)

@@ -25,12 +25,9 @@ class Costs(NamedTuple):
 def costs(m: int, rank: int, mechanics: int, sines: int) -> Costs:
     """Return the bounds for m cables that balance `rank` wrench rows.
 
-    Parameters
-    ----------
-    m, rank
-        Cables, and degrees of freedom of the platform.
-    mechanics, sines
-        Operations of the mechanics without sines and cosines, and how many of these.
+    Args:
+        m, rank: Cables, and degrees of freedom of the platform.
+        mechanics, sines: Operations of the mechanics without sines and cosines, and how many of these.
     """
     exact, soft = _Solve(m, m - min(m, rank)), _Solve(m + ROWS, m)
     singular = _Solve(m, m)  # whatever the rank

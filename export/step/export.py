@@ -42,24 +42,16 @@ def export_step(
     an example `main.c` that computes steps from its standard input, a `Makefile` and a `README.md`. The folder is
     written atomically.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    folder
-        A new folder.
-    precision
-        "double" or "float", the type of all numbers in the C code.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        folder: A new folder.
+        precision: "double" or "float", the type of all numbers in the C code.
 
-    Returns
-    -------
-    Path
-        The folder.
+    Returns:
+        Path: The folder.
 
-    Raises
-    ------
-    InputError
-        If an argument is wrong, `folder` exists, or it cannot be written.
+    Raises:
+        InputError: If an argument is wrong, `folder` exists, or it cannot be written.
     """
     loaded = as_robot(robot)
     path = file_path("folder", folder)
@@ -167,12 +159,10 @@ def moving_carriers(robot: Robot) -> list[int]:
 def mechanics(robot: Robot) -> ca.Function:
     """Return the Function of a step, with zero rows for the coordinates that the platform does not have.
 
-    Returns
-    -------
-    casadi.Function
-        From `pose`, `velocity` and `acceleration` (6,), `carrier_pose` (c, 6) of the carriers that move and `wind` (3,)
-        if the robot has such, and `disturbance` (6,) to `A` (6, m) and `w` (6,): `A` and `w` of `Dynamics`, less the
-        disturbance.
+    Returns:
+        casadi.Function: From `pose`, `velocity` and `acceleration` (6,), `carrier_pose` (c, 6) of the carriers that
+            move and `wind` (3,) if the robot has such, and `disturbance` (6,) to `A` (6, m) and `w` (6,): `A` and `w`
+            of `Dynamics`, less the disturbance.
     """
     dynamics, moving, mask = Dynamics(robot), moving_carriers(robot), ca.DM(robot.dof_mask)
     motion = {name: ca.SX.sym(name, 6) for name in ("pose", "velocity", "acceleration")}

@@ -17,16 +17,12 @@ from ..limits.state import Body, State
 class CostState(State):
     """The state at one instant, in {G}, and the quantities that the planner chooses for the whole motion.
 
-    Attributes
-    ----------
-    offsets
-        Motions of the platform and of each carrier relative to those that the task gives: the platform's path, in
-        the path's axes; the carrier's path, `around`, or home. They are zero in coordinates that are not free.
-    duration
-        Duration of the motion, (1, 1) [s].
-    margin
-        Smallest distance of all planned tensions from their limits, beyond the task's `margin`, (1, 1) [N]; zero
-        unless the objective rewards it.
+    Attributes:
+        offsets: Motions of the platform and of each carrier relative to those that the task gives: the platform's path,
+            in the path's axes; the carrier's path, `around`, or home. They are zero in coordinates that are not free.
+        duration: Duration of the motion, (1, 1) [s].
+        margin: Smallest distance of all planned tensions from their limits, beyond the task's `margin`, (1, 1) [N];
+            zero unless the objective rewards it.
     """
 
     offsets: tuple[Body, ...]
@@ -37,21 +33,14 @@ class CostState(State):
 class Cost(ABC):
     """A cost: the mean over time of sum (values / amount)^2. Subclass it for a cost of your own.
 
-    Parameters
-    ----------
-    amount
-        Amount (default: that of the class).
+    Args:
+        amount: Amount (default: that of the class).
 
-    Attributes
-    ----------
-    name
-        Name in messages.
-    unit
-        Unit of values and amount.
-    amount
-        Value that adds 1 to the objective.
-    squared
-        False to sum the values themselves instead of their squares, so negative values are a reward.
+    Attributes:
+        name: Name in messages.
+        unit: Unit of values and amount.
+        amount: Value that adds 1 to the objective.
+        squared: False to sum the values themselves instead of their squares, so negative values are a reward.
     """
 
     name: str = "cost"

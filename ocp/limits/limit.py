@@ -31,16 +31,12 @@ class Hull(NamedTuple):
     degrees), so that the convex hull of the Bernstein points bounds them over a whole interval. While such a limit is
     hard, the program imposes it only if the planner is free to choose one of the coordinates.
 
-    Attributes
-    ----------
-    carrier
-        Index of the carrier; None for the platform's offset from its path.
-    order
-        0: the pose, 1: the velocity, 2: the acceleration.
-    coordinates
-        Coordinates on which the values depend: 0 to 5 for x, y, z, roll, pitch, yaw.
-    at_ends
-        True if the program limits the points at the ends of an interval; False if bounds of its unknowns already do.
+    Attributes:
+        carrier: Index of the carrier; None for the platform's offset from its path.
+        order: 0: the pose, 1: the velocity, 2: the acceleration.
+        coordinates: Coordinates on which the values depend: 0 to 5 for x, y, z, roll, pitch, yaw.
+        at_ends: True if the program limits the points at the ends of an interval; False if bounds of its unknowns
+            already do.
     """
 
     carrier: int | None
@@ -60,32 +56,20 @@ class Rows(NamedTuple):
 class Limit(ABC):
     """A limit: `values` stay from `low` to `high` along the whole motion. Subclass it for a limit of your own.
 
-    Attributes
-    ----------
-    name
-        Name in tasks, audits, reports and figures.
-    unit
-        Unit of values and bounds.
-    labels
-        Subject of each value, (k,): "cable 3", "quad1".
-    low, high
-        Bounds of each value; infinite: no bound.
-    scale
-        Typical size in this unit: programs divide by it, and the audit's tolerance is proportional to it.
-    soft
-        Excess that adds 1 to the objective, or None if the limit is hard. A task's `limits.soft` sets it by name.
-    hull
-        The part of the motion on which it depends, if it is convex: it then holds between the nodes too.
-    shown
-        True if figures and reports show it.
-    per_metre
-        Largest change of a value while each point of the platform moves by at most one metre and all else is fixed;
-        infinite if unknown, 1 for a distance. With it the planner proves that an obstacle blocks the way.
-    thickness
-        For a distance from a keep-out region, its thickness [m]. A motion may jump over a thin region between two
-        nodes, so the program also constrains the distance between them. Infinite for other limits.
-    phases
-        Indices of the phases of the task in which it holds; None for all times.
+    Attributes:
+        name: Name in tasks, audits, reports and figures.
+        unit: Unit of values and bounds.
+        labels: Subject of each value, (k,): "cable 3", "quad1".
+        low, high: Bounds of each value; infinite: no bound.
+        scale: Typical size in this unit: programs divide by it, and the audit's tolerance is proportional to it.
+        soft: Excess that adds 1 to the objective, or None if the limit is hard. A task's `limits.soft` sets it by name.
+        hull: The part of the motion on which it depends, if it is convex: it then holds between the nodes too.
+        shown: True if figures and reports show it.
+        per_metre: Largest change of a value while each point of the platform moves by at most one metre and all else is
+            fixed; infinite if unknown, 1 for a distance. With it the planner proves that an obstacle blocks the way.
+        thickness: For a distance from a keep-out region, its thickness [m]. A motion may jump over a thin region
+            between two nodes, so the program also constrains the distance between them. Infinite for other limits.
+        phases: Indices of the phases of the task in which it holds; None for all times.
     """
 
     name: str = "limit"

@@ -42,16 +42,11 @@ class Body(NamedTuple):
 class State(Displayed):
     """The state at one instant, in {G}.
 
-    Attributes
-    ----------
-    platform
-        Motion of the platform.
-    carriers
-        Motion of each carrier.
-    tensions
-        (m, 1) [N].
-    off_path
-        Offset of the platform from its path, in the path's axes, (6, 1) [m, rad].
+    Attributes:
+        platform: Motion of the platform.
+        carriers: Motion of each carrier.
+        tensions: (m, 1) [N].
+        off_path: Offset of the platform from its path, in the path's axes, (6, 1) [m, rad].
     """
 
     robot: Robot

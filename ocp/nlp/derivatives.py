@@ -137,14 +137,10 @@ def derivatives(
 ) -> dict[str, ca.Function]:
     """Return the derivatives of a program as the options of `casadi.nlpsol` that take them.
 
-    Parameters
-    ----------
-    x, p
-        Unknowns and parameters.
-    costs
-        What the objective sums, with the weight of each set.
-    blocks
-        The rows, in their order.
+    Args:
+        x, p: Unknowns and parameters.
+        costs: What the objective sums, with the weight of each set.
+        blocks: The rows, in their order.
     """
     multipliers, of_objective = ca.MX.sym("lam_g", sum(block.values.numel() for block in blocks)), ca.MX.sym("lam_f")
     curved = [cost.curvature(of_objective * ca.DM(weights).T) for cost, weights in costs]

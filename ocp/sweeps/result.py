@@ -59,12 +59,9 @@ _NUMBERS = ("cost", "duration", "margin", "tension_max")  # what a report shows 
 class Sweep(Displayed, Reported):
     """The plans of one task for all combinations of some values of its fields.
 
-    Attributes
-    ----------
-    cases
-        The combinations: robot, task and varied fields.
-    rows
-        Results of each plan, in the order of the combinations, the last field fastest.
+    Attributes:
+        cases: The combinations: robot, task and varied fields.
+        rows: Results of each plan, in the order of the combinations, the last field fastest.
     """
 
     cases: Cases
@@ -135,10 +132,8 @@ class Sweep(Displayed, Reported):
     def save(self, file: str | os.PathLike[str]) -> tuple[Path, Path]:
         """Save the table as NetCDF, and as CSV with the suffix .csv; return both paths.
 
-        Raises
-        ------
-        InputError
-            If a file cannot be written, or `path` ends in .csv (reserved for the second file).
+        Raises:
+            InputError: If a file cannot be written, or `path` ends in .csv (reserved for the second file).
         """
         path = file_path("file", file)
         beside = path.with_suffix(".csv")

@@ -52,43 +52,29 @@ def sweep(
     `time_limit`. Processes use one thread each. With `workers=1` set `OMP_NUM_THREADS` to 1 before towline is imported
     for the same result, because with more threads the last digits of some plans differ.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    task
-        A `Task`, a mapping with its keys, or the path of a YAML file.
-    vary
-        Lists of values by dotted keys of a task file: `{"margin": [0, 5, 10], "scheme": ["linear", "spline"]}`. Keys
-        that begin with `robot.` are keys of the robot file: `robot.platform.mass`. Items of lists are numbered from 0,
-        `limits.keep_out[0].radius`; a key without a number means all items, `robot.cables.t_max`. The keys `robot` and
-        `task` vary the whole robot or task: names or files. Where one does not fit the other, the row is `failed`.
-    workers
-        Number of processes on this machine, with one thread each; 1: this process.
-    scheduler
-        Address of a Dask scheduler whose workers are used instead (extra `cluster`).
-    checkpoint
-        File to which each plan's row is appended as soon as it is computed.
-    resume
-        True to continue the checkpoint if the file exists. It must belong to the same sweep.
-    keep
-        Folder in which to save every plan as NetCDF, named by its number; default: plans are not saved.
-    progress
-        Function that is called with (plans done, plans in total, plans feasible).
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        task: A `Task`, a mapping with its keys, or the path of a YAML file.
+        vary: Lists of values by dotted keys of a task file: `{"margin": [0, 5, 10], "scheme": ["linear", "spline"]}`.
+            Keys that begin with `robot.` are keys of the robot file: `robot.platform.mass`. Items of lists are numbered
+            from 0, `limits.keep_out[0].radius`; a key without a number means all items, `robot.cables.t_max`. The keys
+            `robot` and `task` vary the whole robot or task: names or files. Where one does not fit the other, the row
+            is `failed`.
+        workers: Number of processes on this machine, with one thread each; 1: this process.
+        scheduler: Address of a Dask scheduler whose workers are used instead (extra `cluster`).
+        checkpoint: File to which each plan's row is appended as soon as it is computed.
+        resume: True to continue the checkpoint if the file exists. It must belong to the same sweep.
+        keep: Folder in which to save every plan as NetCDF, named by its number; default: plans are not saved.
+        progress: Function that is called with (plans done, plans in total, plans feasible).
 
-    Returns
-    -------
-    Sweep
-        The table of all plans; it can be saved and drawn.
+    Returns:
+        Sweep: The table of all plans; it can be saved and drawn.
 
-    Raises
-    ------
-    InputError
-        Before anything is planned, if an argument or a combination of values is wrong, the checkpoint cannot be
-        written, is damaged or belongs to another sweep, or the scheduler does not exist. Later, if the checkpoint or a
-        plan of `keep` can no longer be written; the checkpoint can be resumed.
-    SolverError
-        If workers end before their work is done, or the extra `cluster` is not installed.
+    Raises:
+        InputError: Before anything is planned, if an argument or a combination of values is wrong, the checkpoint
+            cannot be written, is damaged or belongs to another sweep, or the scheduler does not exist. Later, if the
+            checkpoint or a plan of `keep` can no longer be written; the checkpoint can be resumed.
+        SolverError: If workers end before their work is done, or the extra `cluster` is not installed.
     """
     from ...base.execution import check_workers, start_workers  # imports as long as a short plan takes
 

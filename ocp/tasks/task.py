@@ -235,10 +235,8 @@ class Task(Part):
     def model_dump(self, **options: Any) -> dict[str, Any]:
         """Return the fields, by `options` of pydantic; without `path` if that follows from `phases`.
 
-        Raises
-        ------
-        InputError
-            In mode "json", as for a file, if the task has limits or costs defined in Python.
+        Raises:
+            InputError: In mode "json", as for a file, if the task has limits or costs defined in Python.
         """
         for key, own in (("limits", self.limits.own), ("objective", self.objective.own)):
             if own and options.get("mode") == "json":
@@ -270,10 +268,8 @@ class Task(Part):
 
         If the path has dwell times, durations below their sum are left out.
 
-        Raises
-        ------
-        InputError
-            If neither the task nor its path gives it.
+        Raises:
+            InputError: If neither the task nor its path gives it.
         """
         if isinstance(self.duration, PositiveRange):
             return float(np.sqrt(max(self.duration.min, self.path.resting) * self.duration.max))

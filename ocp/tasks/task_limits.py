@@ -100,12 +100,10 @@ class SpeedZone(Part):
 class TaskLimits(Part):
     """The limits of a task; default: no limit. Each is hard unless `soft` names it.
 
-    Attributes
-    ----------
-    soft :
-        By name of a limit, the excess that adds 1 to the objective, in the limit's unit; twice the excess adds 4.
-        The task's `margin` and carriers' own limits can be soft too: carrier_speed, carrier_acceleration, carrier_tilt,
-        carrier_turn_acceleration, carrier_reach, thrust, torque.
+    Attributes:
+        soft: By name of a limit, the excess that adds 1 to the objective, in the limit's unit; twice the excess adds 4.
+            The task's `margin` and carriers' own limits can be soft too: carrier_speed, carrier_acceleration,
+            carrier_tilt, carrier_turn_acceleration, carrier_reach, thrust, torque.
     """
 
     model_config = ConfigDict(arbitrary_types_allowed=True)

@@ -89,27 +89,19 @@ def _tensions(problem: TensionProblem) -> str:
 class FastestLaw(Displayed):
     """Result of `time_along`: the fastest time law, or the point where none exists.
 
-    Attributes
-    ----------
-    parametrised
-        The robot and the geometry that was timed.
-    limits
-        The limits besides those of the tensions.
-    margin
-        Distance of every tension from its limits [N].
-    s
-        Grid, (n,), the fraction of the path's own time, from 0 to 1.
-    sd
-        ds/dt on the grid, (n,) [1/s]; nan without a law.
-    at
-        Without a law: s of the certificate, or where the search ended.
-    certificate
-        If infeasible: proof that at `at` no tensions inside their limits give the required wrench at any speed and
-        acceleration (at the ends: at rest). It belongs to `problem` and has the largest shortfall along the grid.
-    problem
-        The tension problem at `at` for the speed and acceleration that are closest to feasible; at the ends, for rest.
-    blocked
-        All grid points s with such a proof.
+    Attributes:
+        parametrised: The robot and the geometry that was timed.
+        limits: The limits besides those of the tensions.
+        margin: Distance of every tension from its limits [N].
+        s: Grid, (n,), the fraction of the path's own time, from 0 to 1.
+        sd: ds/dt on the grid, (n,) [1/s]; nan without a law.
+        at: Without a law: s of the certificate, or where the search ended.
+        certificate: If infeasible: proof that at `at` no tensions inside their limits give the required wrench at any
+            speed and acceleration (at the ends: at rest). It belongs to `problem` and has the largest shortfall along
+            the grid.
+        problem: The tension problem at `at` for the speed and acceleration that are closest to feasible; at the ends,
+            for rest.
+        blocked: All grid points s with such a proof.
     """
 
     parametrised: ParametrisedPath

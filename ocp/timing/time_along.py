@@ -63,31 +63,22 @@ def time_along(
     on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there.
     The extra `timing` installs it.
 
-    Parameters
-    ----------
-    robot
-        A `Robot`, the name of one in the library, or the path of a robot file.
-    task
-        A `Task`, a mapping with its keys, or the path of a YAML file, as for `plan`.
-    grid
-        Initial number of intervals, from 10 to 6400; the audit may double it.
+    Args:
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
+        task: A `Task`, a mapping with its keys, or the path of a YAML file, as for `plan`.
+        grid: Initial number of intervals, from 10 to 6400; the audit may double it.
 
-    Returns
-    -------
-    Plan
-        Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law` contains
-        the active limit on each part of the path (`bottlenecks`). If infeasible, no tensions inside their limits give
-        the required wrench at `law.at` at any speed and acceleration (at the ends: at rest). The motion then only
-        shows the path, in 10 s. If not-found, every grid point allows some speed, but no time law connects them, or
-        none passes the audit.
+    Returns:
+        Plan: Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law`
+            contains the active limit on each part of the path (`bottlenecks`). If infeasible, no tensions inside their
+            limits give the required wrench at `law.at` at any speed and acceleration (at the ends: at rest). The motion
+            then only shows the path, in 10 s. If not-found, every grid point allows some speed, but no time law
+            connects them, or none passes the audit.
 
-    Raises
-    ------
-    InputError
-        If an argument is invalid, the task does not fit the robot or has keys that a time law along a path does not
-        support, or nothing limits the speed.
-    SolverError
-        If toppra is not installed; the message contains the command that installs it.
+    Raises:
+        InputError: If an argument is invalid, the task does not fit the robot or has keys that a time law along a path
+            does not support, or nothing limits the speed.
+        SolverError: If toppra is not installed; the message contains the command that installs it.
     """
     robot, task = as_robot(robot), read_task(task)
     grid = whole_number("grid", grid, 10, MOST_INTERVALS)

@@ -34,14 +34,10 @@ Seconds = Annotated[float, BeforeValidator(number_in), Field(ge=0, le=LONGEST, a
 class Running(Displayed):
     """A running simulation, which events may change.
 
-    Attributes
-    ----------
-    plant, periods
-        The plant, and how it is stepped.
-    states
-        States of all runs, (N, n), see `Plant`.
-    silent_until
-        Time until which the controller does not respond [s].
+    Attributes:
+        plant, periods: The plant, and how it is stepped.
+        states: States of all runs, (N, n), see `Plant`.
+        silent_until: Time until which the controller does not respond [s].
     """
 
     plant: Plant
@@ -57,16 +53,11 @@ class Running(Displayed):
 class Event(Part, ABC):
     """An event. One of your own defines `kind`, `describe`, and one or more of `begin`, `wrench` and `follow`.
 
-    Attributes
-    ----------
-    at
-        Time at which it begins [s]. It acts from the next period of the controller on.
-    kinds
-        The registry: every defined event by its kind.
-    short
-        Its form in one line, without "at SECONDS" and "for SECONDS"; empty if it has none.
-    said
-        The field whose value is the words between its kind and "at".
+    Attributes:
+        at: Time at which it begins [s]. It acts from the next period of the controller on.
+        kinds: The registry: every defined event by its kind.
+        short: Its form in one line, without "at SECONDS" and "for SECONDS"; empty if it has none.
+        said: The field whose value is the words between its kind and "at".
     """
 
     kinds: ClassVar[dict[str, type[Event]]] = {}
@@ -94,10 +85,8 @@ class Event(Part, ABC):
     def check(self, robot: Robot) -> None:
         """Check that it can happen to the robot.
 
-        Raises
-        ------
-        InputError
-            If it cannot: "must ..., got ...".
+        Raises:
+            InputError: If it cannot: "must ..., got ...".
         """
 
     @abstractmethod
@@ -113,25 +102,18 @@ class Event(Part, ABC):
         With three dimensions, (N, 1 + c, 6), they act on the platform and on the carriers, whose motion they change
         if these have mass.
 
-        Parameters
-        ----------
-        time
-            Time at which the period begins [s].
-        motions
-            Poses of platform and carriers then, and their derivatives, in N runs: (N, 1 + c, 12).
+        Args:
+            time: Time at which the period begins [s].
+            motions: Poses of platform and carriers then, and their derivatives, in N runs: (N, 1 + c, 12).
         """
         return None
 
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory | None:
         """Return the reference from the event on, with time 0 at the event; None if the reference does not change.
 
-        Parameters
-        ----------
-        robot
-            The robot.
-        trajectory
-            The reference until then.
-        time
-            The time in it [s].
+        Args:
+            robot: The robot.
+            trajectory: The reference until then.
+            time: The time in it [s].
         """
         return None

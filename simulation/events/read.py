@@ -26,15 +26,11 @@ class EventFile(Part):
 def read_events(robot: Robot, events: Sequence[Any], name: str = "events") -> list[tuple[str, Event]]:
     """Return events, the earliest first, each with its place in the argument.
 
-    Parameters
-    ----------
-    robot
-        The robot. In lines and files its cables count from 1, and its carriers are named.
-    events
-        Each a line such as "cut 3 at 2.5" (times in [s]), a mapping with a `kind` or such a mapping in JSON, the YAML
-        file of a list `events` of these, or an `Event`.
-    name
-        Name of the argument, for errors.
+    Args:
+        robot: The robot. In lines and files its cables count from 1, and its carriers are named.
+        events: Each a line such as "cut 3 at 2.5" (times in [s]), a mapping with a `kind` or such a mapping in JSON,
+            the YAML file of a list `events` of these, or an `Event`.
+        name: Name of the argument, for errors.
 
     Raises `InputError` if one has another form, or cannot happen to the robot.
     """

@@ -15,17 +15,12 @@ __all__ = ["Array", "Method", "Proposal", "StandardForm"]
 class Proposal(NamedTuple):
     """The proposal of a method; `towline.solvers.solve` checks it.
 
-    Attributes
-    ----------
-    s :
-        The point in standard form, shape (k,), or None if the method has none.
-    iterations :
-        How many it took, None if not counted.
-    detail :
-        The reason when `s` is None.
-    final :
-        True if `solve` reports this failure even if the problem is feasible, for example because the feasible
-        tensions are unbounded; it then does not try exact arithmetic.
+    Attributes:
+        s: The point in standard form, shape (k,), or None if the method has none.
+        iterations: How many it took, None if not counted.
+        detail: The reason when `s` is None.
+        final: True if `solve` reports this failure even if the problem is feasible, for example because the feasible
+            tensions are unbounded; it then does not try exact arithmetic.
     """
 
     s: Array | None
@@ -82,12 +77,8 @@ class Method(ABC):
     def propose(self, form: StandardForm, backend: str | None, **options: Any) -> Proposal:
         """Choose s with Q s = b and lower <= s <= upper.
 
-        Parameters
-        ----------
-        form :
-            The problem in standard form.
-        backend :
-            One of `backends`; None = the first.
-        options :
-            As `options` lists them.
+        Args:
+            form: The problem in standard form.
+            backend: One of `backends`; None = the first.
+            options: As `options` lists them.
         """

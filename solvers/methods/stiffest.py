@@ -22,18 +22,13 @@ class Stiffest(Method):
     unique, and may jump as w changes. Cost: about four linear programs in m - rank variables, 0.5 ms. Outside the
     feasible set: a certificate. It is not in `methods()`, as it takes matrices.
 
-    Parameters
-    ----------
-    stiffness
-        (p, p).
-    by_tension
-        (m, p, p).
+    Args:
+        stiffness: (p, p).
+        by_tension: (m, p, p).
 
-    Attributes
-    ----------
-    value, bound
-        The smallest eigenvalue at the last proposal, and its upper bound for all tensions inside the limits, by the
-        last linear program; both are nan without a proposal.
+    Attributes:
+        value, bound: The smallest eigenvalue at the last proposal, and its upper bound for all tensions inside the
+            limits, by the last linear program; both are nan without a proposal.
     """
 
     name = "stiffest"

@@ -42,13 +42,10 @@ _STEPS = ((1e-5, 12), (1e-7, 18))
 class Motion:
     """Attachments, cable directions and a wrench that move smoothly over time 0 to 2; feasible throughout.
 
-    Parameters
-    ----------
-    seed :
-        Each seed is another motion; the robot's size goes through `SIZES`.
-    kind :
-        "inside": at least 1 N to all limits. "touching": w comes to the boundary of the available wrench set at time 1
-        and goes back in. "following": w comes to the boundary at time 0.7 and follows it until 1.3.
+    Args:
+        seed: Each seed is another motion; the robot's size goes through `SIZES`.
+        kind: "inside": at least 1 N to all limits. "touching": w comes to the boundary of the available wrench set at
+            time 1 and goes back in. "following": w comes to the boundary at time 0.7 and follows it until 1.3.
     """
 
     def __init__(self, seed: int, kind: str = "inside") -> None:
@@ -113,19 +110,13 @@ class Leaving(Motion):
 class Result(NamedTuple):
     """The result of one method.
 
-    Attributes
-    ----------
-    motions :
-        How many.
-    worst :
-        Largest change left by halving, relative to the largest step of the motion.
-    worst_seed :
-        The motion that it belongs to.
-    inaccurate, unanswered :
-        At how many instants the tensions missed w (as they must beyond the available wrench set), and at how many there
-        were none.
-    seconds :
-        How long it took.
+    Attributes:
+        motions: How many.
+        worst: Largest change left by halving, relative to the largest step of the motion.
+        worst_seed: The motion that it belongs to.
+        inaccurate, unanswered: At how many instants the tensions missed w (as they must beyond the available wrench
+            set), and at how many there were none.
+        seconds: How long it took.
     """
 
     motions: int

@@ -34,18 +34,12 @@ CONTROLLERS = {"computed torque": ComputedTorque, "predictive": Predictive}
 class Task:
     """A motion in gusts.
 
-    Attributes
-    ----------
-    robot
-        The robot as its controllers know it.
-    references
-        One for each period of 1 ms.
-    reach
-        Of carriers that help the tensions [m]; default: that of the controllers.
-    hardware
-        The robot where a case names nothing else.
-    wind, gusts, area
-        Mean wind and intensity [m/s] on the platform, and its area times the drag coefficient [m^2].
+    Attributes:
+        robot: The robot as its controllers know it.
+        references: One for each period of 1 ms.
+        reach: Of carriers that help the tensions [m]; default: that of the controllers.
+        hardware: The robot where a case names nothing else.
+        wind, gusts, area: Mean wind and intensity [m/s] on the platform, and its area times the drag coefficient [m^2].
     """
 
     robot: Robot

@@ -35,16 +35,11 @@ Array = NDArray[np.float64]
 class Steps(NamedTuple):
     """Counts over a robot's steps.
 
-    Attributes
-    ----------
-    answered
-        How many steps were answered in each way of `ANSWERS`, (4,).
-    proofs
-        How many directions were checked.
-    faults
-        How many steps broke a promise, by the promise; empty if none did.
-    seconds
-        Of the controller, a step.
+    Attributes:
+        answered: How many steps were answered in each way of `ANSWERS`, (4,).
+        proofs: How many directions were checked.
+        faults: How many steps broke a promise, by the promise; empty if none did.
+        seconds: Of the controller, a step.
     """
 
     answered: NDArray[np.int64]

@@ -26,19 +26,13 @@ STEPS = 200  # of the search for the least cost
 class Tolerances(NamedTuple):
     """The documented numbers.
 
-    Attributes
-    ----------
-    required, terms :
-        Wrench error that is accepted, relative to what is required and to the terms of A t.
-    cancelled :
-        Terms of A t count up to this many times what is required.
-    gap :
-        What the tensions may cost beyond the least, relative.
-    negligible :
-        Pulls below this part of a column's norm are called zero by the status "singular".
-    distance :
-        Distance from the optimum, relative to the largest tension; float alone states one. The cost of float is the
-        square of a norm that may be off by as much, so that its gap may be twice that.
+    Attributes:
+        required, terms: Wrench error that is accepted, relative to what is required and to the terms of A t.
+        cancelled: Terms of A t count up to this many times what is required.
+        gap: What the tensions may cost beyond the least, relative.
+        negligible: Pulls below this part of a column's norm are called zero by the status "singular".
+        distance: Distance from the optimum, relative to the largest tension; float alone states one. The cost of float
+            is the square of a norm that may be off by as much, so that its gap may be twice that.
     """
 
     required: float

@@ -29,18 +29,14 @@ TRIES = 60
 class ExactProblem(NamedTuple):
     """A problem, and what is known of it.
 
-    Attributes
-    ----------
-    A, w, t_min, t_max, t_ref, weights, length :
-        As in `TensionProblem`, without any rounding.
-    multipliers :
-        Of the wrench, one for each row of S A t = S w, if they were drawn; then the optimum is known.
-    outside :
-        The distance from w to the available wrench set [N], moments divided by the length; 0 if the cables can give w.
-    place :
-        Where w is: "inside", "face", "corner", "outside", or "off range", where no tensions of either sign give it.
-    rough :
-        Whether scales differ, or cables are nearly parallel, such that rounding may decide.
+    Attributes:
+        A, w, t_min, t_max, t_ref, weights, length: As in `TensionProblem`, without any rounding.
+        multipliers: Of the wrench, one for each row of S A t = S w, if they were drawn; then the optimum is known.
+        outside: The distance from w to the available wrench set [N], moments divided by the length; 0 if the cables can
+            give w.
+        place: Where w is: "inside", "face", "corner", "outside", or "off range", where no tensions of either sign give
+            it.
+        rough: Whether scales differ, or cables are nearly parallel, such that rounding may decide.
     """
 
     A: Array  # (n, m)

@@ -37,34 +37,21 @@ CREEP = 0.01  # [m/s] at which friction is nearly all there
 class Hardware:
     """Differences from the robot's file, and errors of sensors.
 
-    Attributes
-    ----------
-    winch
-        "source", "loop" or "lengths".
-    mass
-        Of the platform with its inertia, over that of the file.
-    stiffness, damping
-        E A [N] and C [N s/m] of the cables.
-    stretch
-        Their stiffness over that which winches take for it.
-    gain, lag
-        Of tensions: over their commands, and how late they follow [s].
-    friction
-        Of each cable [N].
-    sensor
-        What a tension sensor reports over what pulls; None without sensors.
-    delay, held
-        How late all sensors are [s], and how long each report is held [s].
-    stamped
-        Whether reports come with the time at which they were made.
-    resolution
-        Of the measured position [m] and attitude [rad]: steps, with the rates as differences over 10 ms; zeros: exact.
-    noise
-        Standard deviation of the measured position [m] and attitude [rad], with rates by differences over 10 ms.
-    rotor_lag
-        Of thrusts and torques [s].
-    lost
-        A carrier without thrust from a time on: its number and the time [s].
+    Attributes:
+        winch: "source", "loop" or "lengths".
+        mass: Of the platform with its inertia, over that of the file.
+        stiffness, damping: E A [N] and C [N s/m] of the cables.
+        stretch: Their stiffness over that which winches take for it.
+        gain, lag: Of tensions: over their commands, and how late they follow [s].
+        friction: Of each cable [N].
+        sensor: What a tension sensor reports over what pulls; None without sensors.
+        delay, held: How late all sensors are [s], and how long each report is held [s].
+        stamped: Whether reports come with the time at which they were made.
+        resolution: Of the measured position [m] and attitude [rad]: steps, with the rates as differences over 10 ms;
+            zeros: exact.
+        noise: Standard deviation of the measured position [m] and attitude [rad], with rates by differences over 10 ms.
+        rotor_lag: Of thrusts and torques [s].
+        lost: A carrier without thrust from a time on: its number and the time [s].
     """
 
     winch: str = "source"
@@ -88,18 +75,12 @@ class Hardware:
 class World:
     """A robot in MuJoCo, from a motion on, with sensors.
 
-    Parameters
-    ----------
-    robot, hardware
-        The robot as its file has it, and what differs.
-    motion
-        (1 + c, 12), poses and velocities at the beginning, the platform's first.
-    tensions
-        At the beginning, (m,) [N].
-    period
-        Of the controller [s].
-    seed
-        Of the noise.
+    Args:
+        robot, hardware: The robot as its file has it, and what differs.
+        motion: (1 + c, 12), poses and velocities at the beginning, the platform's first.
+        tensions: At the beginning, (m,) [N].
+        period: Of the controller [s].
+        seed: Of the noise.
     """
 
     def __init__(

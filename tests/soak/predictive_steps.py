@@ -33,12 +33,9 @@ NONSENSE = 0.005  # of the steps
 class Checked(Controller):
     """Predictive control whose commands are checked, and whose sensors report nonsense now and then.
 
-    Attributes
-    ----------
-    answered
-        How many steps were answered in each way of `ANSWERS`.
-    broken
-        The step in which each promise was broken first.
+    Attributes:
+        answered: How many steps were answered in each way of `ANSWERS`.
+        broken: The step in which each promise was broken first.
     """
 
     batches = True  # so that a flight uses this one and no copy
@@ -82,10 +79,8 @@ class Checked(Controller):
 def fly_random(robot: Robot, seed: int) -> tuple[np.ndarray, dict[str, int]]:
     """Fly once, and return the counts of answers, (4,), and the first step in which each promise was broken.
 
-    Raises
-    ------
-    InputError
-        If predictive control does not accept the robot.
+    Raises:
+        InputError: If predictive control does not accept the robot.
     """
     rng, span = np.random.default_rng(seed), robot.t_max - robot.t_min
     rate = span / 10 ** rng.uniform(-2.5, 0) if rng.random() < 0.5 else np.full(robot.m, np.inf)

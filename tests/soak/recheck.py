@@ -40,12 +40,9 @@ Points = Callable[[np.ndarray], np.ndarray]  # times (n,) -> values (n, k)
 def rechecked(dataset: Any, tolerance: float) -> list[str]:
     """Return what is wrong with a feasible plan; nothing if all is right.
 
-    Parameters
-    ----------
-    dataset
-        The plan's trajectory, with at least 1000 instants a second.
-    tolerance
-        Of the wrench [N].
+    Args:
+        dataset: The plan's trajectory, with at least 1000 instants a second.
+        tolerance: Of the wrench [N].
     """
     yaml = YAML(typ="safe")
     robot = Robot.model_validate(yaml.load(dataset.attrs["robot"]))

@@ -48,16 +48,13 @@ TENSION = 2e-3  # [N], of what it starts with
 class Replanned(NamedTuple):
     """One call of `replan`: what it took, how far the robot was off its path, and what jumps.
 
-    Attributes
-    ----------
-    seconds, processor
-        Wall time, and time of the processor, which does not depend on what else the machine does [s].
-    off
-        Distance of the platform from the circle [m].
-    gap
-        Largest difference of pose and velocity between the start of the plan and the state [m, rad, and per second].
-    jump
-        Largest difference of the tensions between the last plan and the start of this one [N].
+    Attributes:
+        seconds, processor: Wall time, and time of the processor, which does not depend on what else the machine does
+            [s].
+        off: Distance of the platform from the circle [m].
+        gap: Largest difference of pose and velocity between the start of the plan and the state [m, rad, and per
+            second].
+        jump: Largest difference of the tensions between the last plan and the start of this one [N].
     """
 
     seconds: float
@@ -71,12 +68,9 @@ class Replanned(NamedTuple):
 class Replanning(Controller):
     """Predictive control that plans the rest of the motion again at given times.
 
-    Parameters
-    ----------
-    planner, first
-        Whose `plan` led to the first plan.
-    times
-        When to plan again [s].
+    Args:
+        planner, first: Whose `plan` led to the first plan.
+        times: When to plan again [s].
     """
 
     batches = True  # so that it is not copied, as its planner cannot be; it flies alone

@@ -88,21 +88,14 @@ class States(NamedTuple):
 class StepCode:
     """The step of a robot as a library of this process.
 
-    Parameters
-    ----------
-    robot
-        Whose step.
-    precision
-        "double" or "float".
-    folder
-        Gets the files and the library.
-    compiler, flags
-        The command, and what it gets beside `FLAGS`.
+    Args:
+        robot: Whose step.
+        precision: "double" or "float".
+        folder: Gets the files and the library.
+        compiler, flags: The command, and what it gets beside `FLAGS`.
 
-    Raises
-    ------
-    InputError
-        If there is no such compiler.
+    Raises:
+        InputError: If there is no such compiler.
     """
 
     def __init__(

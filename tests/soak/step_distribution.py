@@ -32,17 +32,12 @@ class Distributed(NamedTuple):
 class StepDistribution:
     """The step of a robot of twelve cables, in double or float.
 
-    Parameters
-    ----------
-    precision
-        "double" or "float".
-    folder
-        Gets the files and the library.
+    Args:
+        precision: "double" or "float".
+        folder: Gets the files and the library.
 
-    Raises
-    ------
-    InputError
-        If there is no C compiler, command cc.
+    Raises:
+        InputError: If there is no C compiler, command cc.
     """
 
     def __init__(self, precision: str, folder: Path):

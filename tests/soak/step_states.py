@@ -18,14 +18,10 @@ KINDS = ("near", "inside", "at limits", "forceful", "far", "symmetric", "gimbal"
 def random_states(robot: Robot, count: int, seed: int, single: bool = False) -> States:
     """Return states of all `KINDS`, one after the other.
 
-    Parameters
-    ----------
-    robot
-        Whose states.
-    count, seed
-        How many, and which.
-    single
-        Whether each number is one of single precision.
+    Args:
+        robot: Whose states.
+        count, seed: How many, and which.
+        single: Whether each number is one of single precision.
     """
     rng = np.random.default_rng(seed)
     dynamics, c = Dynamics(robot), len(robot.carriers)

@@ -48,10 +48,8 @@ class EquilibriumPosture(Condition):
     def postures(self, robot: Robot, places: Places) -> tuple[np.ndarray, np.ndarray]:
         """Return poses (n, 6) at rest and their tensions (n, m) [N], of any sign; nan where Newton did not converge.
 
-        Raises
-        ------
-        InputError
-            If the platform cannot turn about all three axes, or has fewer than three cables or no weight.
+        Raises:
+            InputError: If the platform cannot turn about all three axes, or has fewer than three cables or no weight.
         """
         check_places(robot, places)
         if robot.drive == "fixed-length" and robot.m > 3:

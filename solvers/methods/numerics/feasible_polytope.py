@@ -82,18 +82,12 @@ def simplex_centroid(points: Array) -> Array:
 def meet(N: Array, low: Array, high: Array, zero: Array | None = None) -> Array:
     """Meet the lines N^T lambda = low and = high with each other and keep what is inside them.
 
-    Parameters
-    ----------
-    N :
-        Null space, shape (m - rank, k), with m - rank = 0, 1 or 2.
-    low, high :
-        Limits of N^T lambda, shape (k,), finite.
-    zero :
-        One more value of each row to meet at, shape (k,), or None.
+    Args:
+        N: Null space, shape (m - rank, k), with m - rank = 0, 1 or 2.
+        low, high: Limits of N^T lambda, shape (k,), finite.
+        zero: One more value of each row to meet at, shape (k,), or None.
 
-    Returns
-    -------
-    :
+    Returns:
         The points, shape (points, m - rank).
     """
     freedom = N.shape[0]
