@@ -14,9 +14,9 @@ from .outputs import check_outputs
 
 @parameters("""
     LOG: Log of lengths and, if known, poses, tensions and times: NetCDF, MCAP, a ROS bag, or CSV with a header such as
-        't [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'. Or several logs of one
-        motion, such as one for each computer; that of a carrier has its name, as in quad1.csv.
-    --poses LOG: Log of the poses, if they are in another file; its clock is aligned by cable speeds.
+        't [s], l0 [m], l1 [m], x [mm], y [mm], z [mm], roll [deg], pitch [deg], yaw [deg]'. Several logs
+        of one motion are accepted, such as one for each computer; the log of a carrier is named after it, as quad1.csv.
+    --poses LOG: Log of the poses, if they are in another file; its clock is aligned by comparing cable speeds.
     --free NAMES: Parameters to estimate, separated by commas: anchors, attachments, offsets, scales, radii, build-up,
         clock, com; with tensions also mass, stiffness, capstan, friction, gains; or auto. Default: anchors, offsets,
         and clock if the log records times and poses of a motion.
@@ -48,10 +48,10 @@ def calibrate(
 ) -> None:
     """Estimate anchors, offsets and more from measured cable lengths, and write a calibrated robot file.
 
-    The file includes the covariance of its new parameters. Moving carriers have their recorded poses, others are
-    at home. Nothing is written, and the exit code
-    is 1, if the log probably has an input error (order of cables, units, conventions of angles, frames), the fit did
-    not converge, or validation samples fit worse than with the robot's file. --fix corrects input errors of the log.
+    The file includes the covariance of its new parameters. Carriers are taken to be at their recorded poses, or at
+    home if the log has none. Nothing is written, and the exit code is 1, if the log probably has an input error (order
+    of cables, units, conventions of angles, frames), if the fit did not converge, or if validation samples fit worse
+    than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
     from ..estimation.calibration.correction import correction_of

@@ -31,7 +31,7 @@ def new(
 ) -> None:
     """Write a commented robot file and a feasible task for it, to edit.
 
-    The files are NAME.yaml and NAME-task.yaml in this folder. Files that exist are never overwritten.
+    The files are NAME.yaml and NAME-task.yaml in this folder. Existing files are never overwritten.
     """
     from ..base.writing import whole_file
 

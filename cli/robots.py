@@ -38,8 +38,9 @@ def robots(
 ) -> None:
     """List the robots of the library, or diagnose one.
 
-    The diagnosis reports the rank of the wrench matrix (and why, if deficient), the tensions at rest at home or the
-    proof that none exist, a box of positions at which the platform can rest, and warnings about implausible numbers.
+    The diagnosis gives the rank of the wrench matrix (with the cause of a deficient one), the tensions at rest at home
+    or the proof that none exist, a box of positions at which the platform can rest, and warnings about implausible
+    numbers.
     """
     if schema:
         from ..models import Robot

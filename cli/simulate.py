@@ -55,7 +55,7 @@ CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "ope
     --gusts SIGMA: With --wind: intensity of Dryden turbulence, added to the wind [m/s].
     --noise FILE: Errors and delay of the sensors (YAML), such as {{position: 0.001, delay: 0.002}}.
     --mismatch FILE: How the simulated robot and its drives differ from the file (YAML), such as {{mass: [0.9, 1.1],
-        winch_lag: 0.02}}; from a range each run draws a number.
+        winch_lag: 0.02}}; each run draws a random number from a range.
     --event, --fault EVENT: Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2
         stops), 'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'carry 2.5
         at 1' (the platform carries a load of 2.5 kg; 0: none), 'stop at 3' (the reference stops on its path), 'follow

@@ -39,9 +39,10 @@ def tension(
     backend: str | None = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute the cable tensions at one pose and motion, by every method.
+    """Compute the cable tensions for one pose and motion by every method.
 
-    The exit code is 1 if the method returns no tensions inside the limits. If none exist, the proof is printed.
+    The exit code is 1 if the method chosen with --method returns no tensions inside the limits. If none exist, the
+    proof is printed.
     """
     from ..models import Dynamics, load
     from ..solvers import methods

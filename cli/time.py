@@ -23,15 +23,15 @@ def time(
     report: ReportOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Find the fastest motion along a task's path with every tension inside its limits; exit code 1 if none exists.
+    """Find the fastest motion along a task's path with every tension inside its limits.
 
     It uses these keys of the task: `path`, `base` (hold or given), `margin`, and in `limits` the speeds of platform,
     cables and carriers, their accelerations, and platform_lateral_acceleration. `duration` is ignored, except for
     circles. `wind: [0, 0, 0]` includes the drag of still air; without `wind` there are no aerodynamic forces. Any other
-    wind or limit, a tube and a free base are refused.
+    wind or limit, a tube or a free base is an error.
 
     The motion is audited like every plan. The result is a task file that contains the time law, and `towline plan`
-    reads it like any other task.
+    reads it like any other task. The exit code is 1 if no motion is found.
     """
     from ..models import load
     from ..ocp import read_task, time_along

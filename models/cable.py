@@ -26,7 +26,7 @@ class Pulley(Part):
 
 
 class Winch(Part):
-    """A winch reduced to its cable: an inertia that the motor's force and the tension accelerate, inside limits."""
+    """A winch, modelled as a mass on the cable that the motor's force and the tension accelerate, within limits."""
 
     inertia: Positive = Field(description="inertia of rotor, gear and drum, as an equivalent mass on the cable [kg]")
     friction: NonNegative = optional("dry friction, as a force on the cable [N]", 0.0)
@@ -39,7 +39,9 @@ class Encoder(Part):
 
     offset: Finite = optional("length of the cable at reading 0 [m]", 0.0)
     scale: Finite = optional("metres of cable per unit of the reading, not 0", 1.0)
-    build_up: Finite = optional("growth by layers of cable on the drum, per square of the reading [1/m]", 0.0)
+    build_up: Finite = optional(
+        "effect of the layers of cable on the drum, as length per square of the reading [1/m]", 0.0
+    )
 
     @field_validator("scale")
     @classmethod

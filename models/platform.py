@@ -52,8 +52,8 @@ class Platform(Part):
         min_length=1,
     )
     body: AnyBody | None = optional(
-        "convex body in the platform frame, which plans keep above the floor, in the room and out of "
-        "regions; default: the CoM and the attachments"
+        "convex body in the platform frame, which plans keep above the floor, inside the workspace box and out "
+        "of keep-out regions; default: the CoM and the attachments"
     )
     aero: Aero | None = optional("aerodynamic data of the platform; required for wind")
 

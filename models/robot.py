@@ -57,7 +57,9 @@ class Robot(Part):
     platform: Platform
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1, description="bodies from which the cables hang")
     cables: tuple[Cable, ...] = Field(min_length=1, description="cables; results number them in this order")
-    uncertainty: Uncertainty | None = optional("uncertainty of anchors, attachments and pulley radii; default: exact")
+    uncertainty: Uncertainty | None = optional(
+        "uncertainty of anchors, attachments and pulley radii; default: no uncertainty"
+    )
 
     floor: Finite | None = optional(
         "height z in {G} below which no part of platform and load may be [m]; default: none"

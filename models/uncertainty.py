@@ -20,7 +20,7 @@ class Uncertainty(Part):
     parameters: tuple[ParameterName, ...] = Field(
         min_length=1,
         description="names such as cables[2].anchor.x, cables[2].attachment.z, cables[2].pulley.radius; "
-        "cables count from 0",
+        "cables are numbered from 0",
     )
     covariance: tuple[tuple[Finite, ...], ...] = Field(
         description="covariance of these parameters [m^2]; symmetric, no negative eigenvalues"

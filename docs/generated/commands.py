@@ -12,8 +12,8 @@ HEAD = """# Commands
 
 {intro}
 
-`towline COMMAND --help` prints the same in a terminal. Every command has the same [exit codes](status.md#exit-codes):
-0 if the result is positive, 1 if it is negative, 2 for wrong input.
+`towline COMMAND --help` prints the same text in a terminal. All commands have the same
+[exit codes](status.md#exit-codes): 0 if the result is positive, 1 if it is negative, 2 for wrong input.
 
 """
 

@@ -14,17 +14,17 @@ Schema = dict[str, Any]
 UNIT = re.compile(r" ?\[((?:-|1|rad|m|kg|s|N|Hz|W|J|deg|%)(?:[ /^,]|\d|m|kg|s|N|rad)*)\]")
 ROBOT = """# Keys of robot files
 
-A robot is a YAML file with these keys. [Describe your robot](../howto/robot-file.md) is the guide, and `towline new`
-writes a file to edit. Units are SI, and [conventions](conventions.md) explains the frames and angles. An unknown key is
-an error. `towline robots --schema` prints the same as a JSON Schema, for editors.
+A robot is a YAML file with these keys. [Describe your robot](../howto/robot-file.md) is a guide, and `towline new`
+writes a file to edit. Units are SI; [Units, frames and numbering](conventions.md) explains the frames and angles. An
+unknown key is an error. `towline robots --schema` prints these keys as a JSON Schema, which editors can use.
 
 """
 TASK = """# Keys of task files
 
-A task is a YAML file with these keys. [Write task files](../howto/task-files.md) is the guide, and `towline new` writes
-a file to edit. In Python, `plan(robot, task)` takes the same keys as a mapping. Either `path` or `phases` is required.
-Units are SI, and [conventions](conventions.md) explains the frames and angles. An unknown key is an error.
-`towline plan --schema` prints the same as a JSON Schema, for editors.
+A task is a YAML file with these keys. [Write task files](../howto/task-files.md) is a guide, and `towline new` writes
+a file to edit. In Python, `plan(robot, task)` accepts a dictionary with the same keys. Either `path` or `phases` is
+required. Units are SI; [Units, frames and numbering](conventions.md) explains the frames and angles. An unknown key is
+an error. `towline plan --schema` prints these keys as a JSON Schema, which editors can use.
 
 """
 
@@ -87,7 +87,7 @@ class _Keys:
         for key, field in schema.get("properties", {}).items():
             description = field.get("description") or self._description_of_part(field)
             if "const" in field and not description:
-                description = "chooses these keys"
+                description = "selects this kind"
             unit = UNIT.search(description)
             text = escaped(UNIT.sub("", description, count=1).strip(" ;,"))
             default = "required" if key in required else _default(field)

@@ -9,11 +9,11 @@ from .markup import escaped, table
 
 HEAD = """# The robots of the library
 
-These robots ship with towline. `cogiro` in a command, or `load("cogiro")` in Python, is the robot of that name.
-`towline robots cogiro` diagnoses it, and `towline robots cogiro --figure cogiro.png` draws the picture that you see
-here: cables are coloured by their tensions at rest at home, or grey if the robot cannot rest there. The green area is
-the outline of sampled positions at which it can rest, seen from above. *Drag it* opens a page that computes tensions
-while you move the platform.
+These robots ship with towline. Commands accept their names, as in `towline robots cogiro`, which diagnoses a robot, and
+so does Python, as in `load("cogiro")`. `towline robots cogiro --figure cogiro.png` draws the picture shown here. Cables
+are coloured by their tensions at rest at home, or grey if the robot cannot rest there. The green area outlines the
+sampled positions at which the robot can rest, seen from above. *Drag it* opens a page that computes the tensions while
+you move the platform.
 
 """
 

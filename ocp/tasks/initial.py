@@ -59,13 +59,15 @@ class Final(_State):
     """The state at the end of a motion, in {G}; given fields override `tube.ends` and `base.ends`."""
 
     pose: PoseOrPosition | None = optional(
-        "pose of the platform [m, rad]; default: anywhere in the tube if velocity is given, else as tube.ends requires"
+        "pose of the platform [m, rad]; default: anywhere in the tube if velocity is given, otherwise as "
+        "tube.ends requires"
     )
     velocity: OrZero | None = optional(
         "time derivative of the pose [m/s, rad/s], or 0: at rest; default: at rest, if pose is given"
     )
     acceleration: OrZero | None = optional(
-        "second time derivative [m/s^2, rad/s^2], or 0; default: 0 at rest without a pose, else chosen by the planner"
+        "second time derivative [m/s^2, rad/s^2], or 0; default: 0 if velocity is 0 and pose is not given, otherwise "
+        "chosen by the planner"
     )
     carrier_pose: tuple[Pose, ...] | None = optional("pose of each carrier [m, rad]; default: as base.ends requires")
     carrier_velocity: tuple[Pose, ...] | None = optional(

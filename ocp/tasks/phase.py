@@ -26,8 +26,8 @@ class Load(RigidLoad):
         (0.0, 0.0, 0.0),
     )
     body: AnyBody | None = optional(
-        "convex body in the platform frame, which the plan keeps above the floor, in the room and out of "
-        "regions while the load is carried; default: none"
+        "convex body in the platform frame, which the plan keeps above the floor, inside the workspace box and "
+        "out of keep-out regions while the load is carried; default: none"
     )
 
     @property
@@ -74,7 +74,7 @@ class Phase(Part):
         "feasible duration; default: the path's own"
     )
     load: Load | None = optional("load fixed to the platform; default: none")
-    ground: Ground | None = optional("contact of the platform or its load with the ground; default: none, it hangs")
+    ground: Ground | None = optional("contact of the platform or its load with the ground; default: no contact")
 
 
 def path_of(phases: Sequence[Phase]) -> SequencePath:

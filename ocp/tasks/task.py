@@ -49,11 +49,11 @@ class Tube(Part):
         "range of each of roll, pitch, yaw about the path [rad]; 0: followed exactly; free: 1.2 rad", 0.0
     )
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
-        "free: anywhere in the tube; periodic: the end equals the start, without a stop, for a path that "
-        "ends where it starts; rest: position on the path at start and end, without speed and "
-        "acceleration (with few cables or fixed lengths angular acceleration is free); exact: no deviation of "
-        "position and velocity there, with free acceleration; default: rest if the path (other than kind rest) starts "
-        "and ends at rest and no carrier moves as given, otherwise free"
+        "state at the start and the end. free: anywhere in the tube; periodic: the end state equals the start state, "
+        "without a stop, for a path that ends where it starts; rest: position on the path, zero velocity and "
+        "acceleration (angular acceleration is free with few cables or fixed lengths); exact: position and velocity of "
+        "the path, free acceleration; default: rest if the path (of another kind than rest) starts and ends at rest "
+        "and the base is not of kind given, otherwise free"
     )
     waypoints: Literal["free", "exact"] = optional(
         "exact: the platform passes through the points of a path of kind waypoints, even if the path rounds them",
@@ -75,15 +75,15 @@ class HoldBase(Part):
     """Carriers that hold their positions."""
 
     kind: Literal["hold"]
-    poses: dict[Name, Pose] = optional("pose of each carrier by its name, in {G} [m, rad]; others at home", {})
+    poses: dict[Name, Pose] = optional("pose of each carrier by its name, in {G} [m, rad]; all others stay at home", {})
 
 
 class GivenBase(Part):
-    """Carriers that move as given: their motion is a disturbance."""
+    """Carriers that follow given paths: their motion is a disturbance."""
 
     kind: Literal["given"]
     paths: dict[Name, AnyPath] = Field(
-        min_length=1, description="path of each carrier by its name, in {G}; others stay at home"
+        min_length=1, description="path of each carrier by its name, in {G}; all others stay at home"
     )
 
 
@@ -97,17 +97,17 @@ class FreeBase(Part):
     acceleration_max: Positive | None = optional("largest acceleration [m/s^2]")
     speed_max: Positive | None = optional("largest speed [m/s]")
     tilt_max: float = optional(
-        "largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, quadrotors have "
-        "the limit of the robot's file",
+        "largest angle to the vertical [rad]; 0: prescribed carriers keep their attitude, and quadrotors have "
+        "the limit of the robot file",
         0.0,
         ge=0,
         lt=1.5,
     )
     turn_acceleration_max: Positive | None = optional("largest second derivative of each Euler angle [rad/s^2]")
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
-        "free: any start and end; rest: zero speed at both, and zero acceleration of positions (with few "
-        "cables or fixed lengths it is free); periodic: the end equals the start; exact: start and end as in "
-        "`around`; default: as `tube.ends` if that is rest or periodic, else free"
+        "state at the start and the end. free: any state; rest: zero velocity, and zero linear acceleration (free with "
+        "few cables or fixed lengths); periodic: the end state equals the start state; exact: the states of `around`; "
+        "default: as `tube.ends` if that is rest or periodic, otherwise free"
     )
 
 
@@ -172,32 +172,31 @@ class Task(Part):
     final: Final | None = optional("state in which the motion ends; default: as `ends` require")
     margin: NonNegative = optional("smallest distance of every tension from its limits [N]", 0.0)
     robust: Share | None = optional(
-        "fraction of the robots consistent with the robot's `uncertainty`, such as 0.95, whose tensions "
-        "must stay inside their limits, reduced by the margin, to first order; default: the nominal robot "
-        "only"
+        "fraction, such as 0.95, of the robots consistent with the robot file's `uncertainty` for which all tensions "
+        "must keep the margin from their limits, to first order; default: only the nominal robot"
     )
     stop_within: Positive | None = optional(
-        "time in which the robot must be able to stop on its path, inside the tension limits, from every "
-        "instant of the plan [s]; checked every 0.02 s, or at 200 instants of plans of more than 4 s; default: not "
+        "time within which the robot must be able to stop on its path from every instant of the plan, inside the "
+        "tension limits [s]; checked every 0.02 s, or at 200 instants if the plan takes more than 4 s; default: not "
         "checked"
     )
     wind: Vector3 | WindBox | WindDisc | None = optional(
-        "wind on the platform in {G} [m/s]: one velocity; or a range {min, max}, or {speed} for every "
-        "horizontal wind up to a speed. Tensions then exist in each of these winds, and the planned tensions are those "
-        "in the middle of the range, for {speed} in still air; default: no aerodynamic forces; [0, 0, 0] is still air, "
-        "with drag on a moving platform"
+        "wind on the platform in {G} [m/s]: one velocity; a range {min, max}; or {speed}, every horizontal wind up to "
+        "a speed. In a range, tensions exist for every wind, and the planned tensions are those for the middle of the "
+        "range (for {speed}: still air). [0, 0, 0] is still air, with drag on a moving platform; default: no "
+        "aerodynamic forces"
     )
     limits: TaskLimits = TaskLimits()
     steps: Whole = optional("number of intervals of the transcription", 100, ge=4, le=20_000)
     scheme: SchemeName | None = optional(
         "acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
-        "spline: a smooth cubic B-spline; default: linear, or hermite if with linear the audit reports that carriers "
-        "cannot follow the motion between the nodes"
+        "spline: a smooth cubic B-spline; default: linear, or hermite if the audit of a linear plan reports that "
+        "carriers cannot follow the motion between the nodes"
     )
     objective: Objective = Objective()
     time_limit: Positive = optional(
-        "time for the whole search [s]; the best motion so far is then audited and returned. An operation "
-        "in progress is finished first",
+        "time for the whole search [s]. When it is over, the operation in progress is finished, and the best motion so "
+        "far is audited and returned",
         600.0,
     )
     output_rate: Positive = optional("samples per second of the saved trajectory, all of them audited [1/s]", 100.0)

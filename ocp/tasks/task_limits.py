@@ -49,8 +49,8 @@ class KeepOut(Part):
     )
     platform: Distance = 0.0
     carriers: NonNegative | Literal["radius"] | None = optional(
-        "least distance of the origins of moving carriers [m]; radius: the radius of each body, such as a "
-        "quadrotor with its rotors; null: no limit",
+        "least distance of the origins of moving carriers [m]; radius: the radius of each carrier's body, such "
+        "as a quadrotor with its rotors; null: no limit",
         "radius",
     )
     cables: Distance = 0.0
@@ -137,18 +137,22 @@ class TaskLimits(Part):
     carrier_acceleration: Positive | None = optional(
         "acceleration of every moving carrier, in addition to the robot file's limit [m/s^2]"
     )
-    cable_clearance: Positive | None = optional("least distance of cables that share neither anchor nor attachment [m]")
-    carrier_separation: Positive | Literal["radius"] | None = optional(
-        "least distance of the origins of carriers [m]; radius: the sum of the radii of both bodies, such as quadrotors"
+    cable_clearance: Positive | None = optional(
+        "least distance between cables that share neither anchor nor attachment [m]"
     )
-    cable_platform_clearance: Distance = optional("least distance of cables from the bodies of platform and load [m]")
+    carrier_separation: Positive | Literal["radius"] | None = optional(
+        "least distance between the origins of carriers [m]; radius: the sum of the radii of the two carriers' bodies"
+    )
+    cable_platform_clearance: Distance = optional(
+        "least distance between cables and the bodies of platform and load [m]"
+    )
     carrier_platform_clearance: NonNegative | Literal["radius"] | None = optional(
-        "least distance of the origins of moving carriers from the bodies of platform and load [m]; "
+        "least distance between the origins of moving carriers and the bodies of platform and load [m]; "
         "radius: the radius of each carrier's body"
     )
     keep_out: tuple[AnyKeepOut, ...] = optional("keep-out regions", ())
     soft: dict[str, Positive] = optional(
-        "by the name of a limit, the excess that adds 1 to the objective; twice the excess adds 4", {}
+        "limits that may be exceeded, by name: the excess that adds 1 to the objective; twice the excess adds 4", {}
     )
     own: SkipJsonSchema[tuple[Limit, ...]] = Field(
         default=(), exclude=True, description="limits of your own, in Python alone (docs/adding-a-limit.md)"

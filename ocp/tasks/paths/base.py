@@ -54,7 +54,7 @@ PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude, json_sche
 class PathBase(Part):
     """The base of all paths."""
 
-    frame: str = optional("frame of the path: world, or the name of the only carrier", "world")
+    frame: str = optional("frame of the path: world, or the name of the carrier if the robot has only one", "world")
 
     @property
     def natural_duration(self) -> float | None:

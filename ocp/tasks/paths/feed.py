@@ -32,8 +32,8 @@ class FeedPath(PathBase):
     points: tuple[PoseOrPosition, ...] = Field(
         min_length=2,
         json_schema_extra=or_file,
-        description="two positions or more [m], or poses with one attitude [m, rad]; in a task also the name of a file "
-        "of them, .csv with units in its header or .gcode, relative to the task file",
+        description="at least two positions [m], or poses with the same attitude [m, rad]; a task may give the name of "
+        "a file of points instead, .csv with units in its header or .gcode, relative to the task file",
     )
     feed: Positive | None = optional("speed [m/s]; default: that of each line of a .gcode file")
     acceleration: Positive = Field(description="largest acceleration, along the path and across it in corners [m/s^2]")

@@ -33,8 +33,12 @@ class TimedPath(PathBase):
     """
 
     kind: Literal["timed"]
-    along: Curve = Field(description="the path; s is the fraction of its own time, or for straight legs of its length")
-    until: Positive | None = optional("end of the path by its own time [s]; default: its natural duration")
+    along: Curve = Field(
+        description="the path; s is the fraction of the path's own time, or of its length for straight legs"
+    )
+    until: Positive | None = optional(
+        "time on the path's own clock at which it ends [s]; default: its natural duration"
+    )
     s: tuple[Finite, ...] = Field(min_length=2, description="grid of s, increasing from 0 to 1")
     speeds: tuple[NonNegative, ...] = Field(min_length=2, description="ds/dt at each s [1/s]")
     dwell: tuple[NonNegative, ...] | None = optional(

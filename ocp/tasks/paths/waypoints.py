@@ -35,16 +35,16 @@ class WaypointPath(PathBase):
     where it reverses or dwells, and at all points if `blend` is 0. Attitudes turn the shortest way: from 3.1 to -3.1
     rad is a turn of 0.08 rad. Where path length is measured, 1 rad is taken as 1 m.
 
-    As a `spline` it is a curve of degree 5 from rest to rest that passes exactly through the points but may leave their
-    box.
+    With the shape `spline` the path is a curve of degree 5 from rest to rest that passes exactly through the points but
+    may leave their box.
     """
 
     kind: Literal["waypoints"]
     points: tuple[PoseOrPosition, ...] = Field(
         min_length=2,
         json_schema_extra=or_file,
-        description="two poses or positions or more [m, rad]; in a task also the name of a file of them, .csv with "
-        "units in its header or .gcode, relative to the task file",
+        description="at least two poses or positions [m, rad]; a task may give the name of a file of points instead, "
+        ".csv with units in its header or .gcode, relative to the task file",
     )
     shape: Literal["legs", "spline"] = optional(
         "legs: straight, rounded at the points; spline: a smooth curve of degree 5", "legs"
@@ -53,12 +53,14 @@ class WaypointPath(PathBase):
         "for legs: largest distance from the points [m]; 0: stop at each; default: 1 % of the span of the points"
     )
     order: Literal["given", "free"] = optional(
-        "free: the points between the first and the last, at most 12, in the order of the shortest path", "given"
+        "order of the points; free: the order that makes the path shortest, with the first and the last point fixed "
+        "and at most 12 between them",
+        "given",
     )
     times: tuple[Finite, ...] | None = optional(
         "time at which the path passes each point, from 0 on, increasing [s]; default: spread over the "
-        "duration so that all legs have the same peak acceleration; for a spline by the square roots of "
-        "the distances"
+        "duration so that all legs have the same peak acceleration; for a spline, in proportion to the square "
+        "roots of the distances"
     )
     shares: tuple[Finite, ...] | None = optional(
         "instead of times: share of the duration after which the path passes each point, from 0 to 1, increasing"
