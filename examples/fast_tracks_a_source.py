@@ -2,10 +2,10 @@
 
 The dish is a sphere with a radius of 300 m. Its focus is 160 m from the centre, opposite to the source; the cables hold
 the receiver there. To save computing time, four hours pass in one minute, 240 times too fast. The inertial forces are
-then half a percent of the weight, so the tensions are almost those of the real motion, which is at most 12 mm/s fast.
+then half a percent of the weight, so the tensions are almost those of the real motion, which reaches 12 mm/s.
 
-With CASPR's lower tension limit of 120 kN the receiver could reach only a narrow column above 138 m, and track no
-source away from the zenith. Here the limit is 100 kN, and the planner chooses the attitude.
+With CASPR's lower tension limit of 120 kN the receiver could reach only a narrow column above 138 m, and could not
+track a source away from the zenith. Here the limit is 100 kN, and the planner chooses the attitude.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ HOURS, FASTER = 4.0, 240.0
 SIDEREAL = 2 * np.pi / 86164.0905  # angular velocity of the Earth [rad/s]
 
 times = np.linspace(0, HOURS * 3600, 81)  # [s]
-hour_angle = SIDEREAL * (times - times[-1] / 2)  # the source is highest half way
+hour_angle = SIDEREAL * (times - times[-1] / 2)  # the source is highest halfway
 east = -np.cos(DECLINATION) * np.sin(hour_angle)
 north = np.sin(DECLINATION) * np.cos(LATITUDE) - np.cos(DECLINATION) * np.sin(LATITUDE) * np.cos(hour_angle)
 up = np.sin(DECLINATION) * np.sin(LATITUDE) + np.cos(DECLINATION) * np.cos(LATITUDE) * np.cos(hour_angle)

@@ -1,8 +1,8 @@
-"""Fly a load on four quadrotors through a slot of 1.8 m; run `python examples/four_quadrotors_slot.py`.
+"""Fly a load on four quadrotors through a slot 1.8 m wide; run `python examples/four_quadrotors_slot.py`.
 
-The quadrotors start and end 1.7 m apart, as at home, and with their rotors they are 2.4 m wide. To pass between the
-walls they must fly closer together, and spread again behind them; no rotor touches a wall or another rotor. The user
-gives no initial guess: the planner starts with a formation that avoids the walls.
+The quadrotors start and end 1.7 m apart, as at home, and their formation is 2.4 m wide, rotors included. To pass
+between the walls they must fly closer together, and they spread again behind them; no rotor touches a wall or another
+rotor. The user gives no initial guess, because the planner finds a formation that avoids the walls.
 """
 
 from towline import load, plan

@@ -2,7 +2,7 @@
 
 These are the robots of Wang, Zhao, Li and Ji: their ends move inside reach boxes, and winches change the cable lengths.
 They lift the load off a table, carry it across, and set it down on another table. The load stays level. Three cables
-hold it level only for certain positions of the robot-ends; the planner computes them.
+hold it level only for certain positions of the ends; the planner computes them.
 """
 
 from towline import load, plan
