@@ -22,7 +22,7 @@ result = plan(
         "duration": {"min": 2, "max": 20},  # [s]
         "steps": 40,
         "limits": {"cable_speed": 1.5, "platform_acceleration": 1.5, "keep_out": [COLUMN]},  # [m/s], [m/s^2]
-        "objective": {"time": 1, "jerk": 10, "tension": 10_000},  # amounts that cost as much as a second [s, m/s^3, N]
+        "objective": {"time": 1, "jerk": 10, "tension": 10_000},  # amounts that add 1 each [s, m/s^3, N]
         "margin": 20,  # [N]
     },
 )

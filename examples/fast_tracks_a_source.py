@@ -33,7 +33,7 @@ result = plan(
         "name": "fast-tracks-a-source",
         "path": {"kind": "samples", "times": list(times / FASTER), "poses": focus.tolist()},
         "tube": {"attitude": 0.5},  # the position is exact, the attitude is free within 0.5 rad
-        "objective": {"margin": 10_000, "deviation": 100, "jerk": 0.001},  # amounts that cost one [N, m, m/s^3]
+        "objective": {"margin": 10_000, "deviation": 100, "jerk": 0.001},  # amounts that add 1 each [N, m, m/s^3]
         "steps": 60,
         "output_rate": 5,  # [1/s]
     },

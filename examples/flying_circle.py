@@ -26,7 +26,7 @@ moving = plan(
             "kind": "free",
             "around": {"quad": {"kind": "rest", "pose": HOVER}},  # the objective is zero while it stays here
             "acceleration_max": 3.0,  # [m/s^2]
-            "ends": "periodic",  # the end state is the start state
+            "ends": "periodic",  # the final state equals the initial state
         },
     },
 )
