@@ -218,13 +218,13 @@ def write(report: Report, folder: Path) -> list[Path]:
 def markdown(report: Report) -> str:
     """Return the report as a page: one table for each task, the fastest first."""
     lines = [
-        "# Tension distribution in a hot loop",
+        "# All tables of tension distribution",
         "",
         f"Measured on {report.machine}.",
         f"Random problems per task: {report.count}. Rounds after a warm-up round: {report.repeats}.",
-        "Required is the tolerance that a solver was given. A solver is out if a task takes it longer than the limit.",
-        f"The ratio is that to `{REFERENCE}` in the same round. The error is the largest one of a tension, divided by "
-        "the largest tension; it is - if there is nothing to compare.",
+        "The column required has the tolerance that a solver was given. A solver is out if it exceeds the time limit.",
+        f"The ratio is that of the times to `{REFERENCE}` in the same round. The error is the largest error of a "
+        "tension, divided by the largest tension; it is - if there is nothing to compare.",
         f"A failure is a missing result, an error above {FAILED:g}, or a result for an infeasible problem.",
     ]
     for task in dict.fromkeys(row.task for row in report.rows):
