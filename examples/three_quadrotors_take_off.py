@@ -1,7 +1,7 @@
 """Three quadrotors lift a load whose cables are slack; run `python examples/three_quadrotors_take_off.py`.
 
-The load lies on the ground. The tensions rise from zero until they bear its weight. The quadrotors then carry it a metre
-away and set it down until the ground bears its weight again.
+The load lies on the ground. The tensions rise from zero until they bear its weight. The quadrotors then carry it a
+metre away and set it down until the ground bears its weight again.
 """
 
 from towline import load, plan
