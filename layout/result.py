@@ -158,7 +158,8 @@ class Design(Drawn, Reported, Displayed):
             boxes = [each.box for each in self.requirements.require if each.box is not None]
             facts += [("box", f"from {quantity_row(box.min)} to {quantity_row(box.max)} [m]") for box in boxes]
         if self.stopped:
-            facts.append(("", "INTERRUPTED: this is the best layout so far"))
+            unplanned = "; its tasks were not planned" * (len(self.plans) < len(self.requirements.tasks))
+            facts.append(("", f"INTERRUPTED: this is the best layout so far{unplanned}"))
         facts += [("task", each.report().splitlines()[0]) for each in self.plans]
         if self.status == "not-found":
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]

@@ -99,14 +99,23 @@ def design(
         wanted, found = largest.requirements, largest.found
     else:
         found = search(variables, wanted, on_progress)
-    how = found.rows, len(grid.pose_of), found.starts, found.stopped
-    result = _designed(chosen, variables, wanted, found.y, *how)
-    if not result.feasible:  # the robot itself may meet the requirements, as nearly as its numbers may be chosen
-        kept = _designed(chosen, variables, wanted, variables.of_robot(), *how)
-        result = kept if kept.feasible else result
+    how = found.rows, len(grid.pose_of), found.starts
+    try:
+        result = _best_of(chosen, variables, wanted, found.y, *how, found.stopped)
+    except KeyboardInterrupt:  # judged again, without the plans of tasks, which take long
+        result = _best_of(chosen, variables, wanted, found.y, *how, True)
     if largest is not None:
         result = replace(result, size=largest.size, size_before=largest.size_before)
     return result
+
+
+def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, y: np.ndarray, *how: Any) -> Design:
+    """Return the layout as designed, or the robot itself, as nearly as its numbers may be chosen, if only it will do."""
+    result = _designed(chosen, variables, wanted, y, *how)
+    if result.feasible:
+        return result
+    kept = _designed(chosen, variables, wanted, variables.of_robot(), *how)
+    return kept if kept.feasible else result
 
 
 def _designed(

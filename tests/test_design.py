@@ -313,6 +313,25 @@ def test_an_interrupt_keeps_the_best_so_far():
     assert calls[1][1] < 0.5
 
 
+def test_an_interrupt_while_the_layout_is_judged_keeps_it(monkeypatch):
+    """The search is over by then: its layout is judged again, and only the plans of tasks are left out."""
+    calls = []
+
+    def judged(*given):
+        calls.append(given)
+        if len(calls) == 1:
+            raise KeyboardInterrupt
+        return its(*given)
+
+    its = run.judge
+    monkeypatch.setattr(run, "judge", judged)
+    robot = load("ipanema-2")
+    result = design(robot, requirements=wanted(robot, time_limit=0.5))
+    assert result.stopped
+    assert result.feasible
+    assert result.margin > result.margin_before
+
+
 def test_from_random_layouts_and_for_equal_and_mirrored_points():
     """A start that knows nothing of the published layout; a symmetric robot stays symmetric."""
     robot = load("ipanema-2")
