@@ -110,7 +110,7 @@ def design(
 
 
 def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, y: np.ndarray, *how: Any) -> Design:
-    """Return the layout as designed, or the robot itself, as nearly as its numbers may be chosen, if only it will do."""
+    """Return the layout that was found; if only the robot itself meets the requirements, that."""
     result = _designed(chosen, variables, wanted, y, *how)
     if result.feasible:
         return result
