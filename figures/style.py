@@ -228,6 +228,7 @@ def save(canvas: Figure, path: Path) -> Path:
             metadata = {"CreationDate": None} if form == "pdf" else None
             with rc_context({"pdf.fonttype": 42}):
                 canvas.savefig(temporary, dpi=DPI, format=form, metadata=metadata)
+    canvas.set_layout_engine("none")
     return path
 
 
@@ -252,4 +253,7 @@ def svg(canvas: Figure) -> str:
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with rc_context({"svg.fonttype": "path", "svg.hashsalt": "towline"}):
         canvas.savefig(stream, format="svg", metadata=nothing)
+    canvas.set_layout_engine(
+        "none"
+    )  # its places are kept: laid out again, the figure would differ, and take twice as long
     return stream.getvalue()
