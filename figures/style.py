@@ -253,7 +253,5 @@ def svg(canvas: Figure) -> str:
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with rc_context({"svg.fonttype": "path", "svg.hashsalt": "towline"}):
         canvas.savefig(stream, format="svg", metadata=nothing)
-    canvas.set_layout_engine(
-        "none"
-    )  # its places are kept: laid out again, the figure would differ, and take twice as long
+    canvas.set_layout_engine("none")  # laid out again, the figure would differ
     return stream.getvalue()
