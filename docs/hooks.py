@@ -25,7 +25,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parent.parent
 DOCSTRING = re.compile(r'"""[\s\S]*?"""')
 # Parameters that share a description.
-SHARED = re.compile(r"^( +)(\w+(?:, \w+)+)(: [^\n]*\n(?:\1    [^\n]*\n)*)", re.MULTILINE)
+SHARED = re.compile(r"^( +)(\w+(?:, \*{0,2}\w+)+)(: [^\n]*\n(?:\1    [^\n]*\n)*)", re.MULTILINE)
 SOURCES = ROOT / "build" / "docs"
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 
