@@ -58,8 +58,9 @@ class ComputedTorque(Controller):
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         bandwidth: Bandwidth w of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = w^2.
             Default: 10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers;
-            see `sensors`. If the first two steps, or three in a row, are more than 0.75 / w apart, it is lowered until
-            two are not: the loop would be unstable from 1 / w on. Of given bandwidths a warning says so.
+            see `sensors`. If the first two steps, or three in a row, are more than 0.75 / w apart, the default is
+            lowered, because the loop is unstable from 1 / w on, and restored after two steps that are closer together.
+            A given bandwidth is kept, with a warning.
         damping: Damping ratio z: Kd = 2 z w.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
@@ -70,12 +71,12 @@ class ComputedTorque(Controller):
             than degrees of freedom.
         carrier_bandwidth, carrier_acceleration: Bandwidth of the carriers' deviation [rad/s], and its largest
             acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but a quarter of `place` if flying carriers
-            only take over what is steady. With a faster one, carriers that turn and the damping of their cables make
-            the observer's loop unstable.
+            only take over steady disturbances. With a larger bandwidth, carriers that turn and the damping of their
+            cables make the observer's loop unstable.
         place, attitude: Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`.
-            Default of `attitude`: 40, or less by the known lags of rotors and sensors (control/bandwidths.py); of
-            `place`: 5, at most a sixth of it. If carriers turn so late that the attitude loop would be unstable
-            (core/control/turning.c), it is lowered to the inverse of this lag.
+            Default of `attitude`: 40, or less if the known lags of rotors and sensors require it
+            (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn so late that the
+            attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the inverse of the lag.
         patience: Time for which the sensor of a cable may report no tension, although one is commanded, until the cable
             is treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again
             once its sensor reports a tension. Cables of fixed length are never treated as cut. If no sensor reports a
@@ -83,17 +84,17 @@ class ComputedTorque(Controller):
             wrench".
         tension_loop: Bandwidth of a loop on measured tensions [rad/s], for winches that do not deliver the commanded
             tensions: the command is corrected until the sensors report the desired tensions, inside the limits of
-            tensions and rates. With 0 only the observer compensates, in a third of a second; with 20 it takes a tenth
-            of a second.
+            tensions and rates. With 0 only the observer compensates the error, in a third of a second; with 20 this
+            takes a tenth of a second.
         tension_lag, rotor_lag: Known time constants with which winches and actuators of flying carriers follow commands
             [s]. Commands are sent ahead of time, within limits and rates, so that only 5 ms of the first and 15 ms of
             the second remain.
-        sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The bandwidths
-            that are not given are then the largest that they permit (control/bandwidths.py), at most twice the defaults
+        sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default
+            bandwidths are then the largest that these sensors permit (control/bandwidths.py), at most twice those
             above.
 
     Raises:
-        InputError: If an argument has a wrong value, or the robot would be lost with these sensors.
+        InputError: If an argument has a wrong value, or these sensors are too slow to control the robot.
     """
 
     batches = True

@@ -31,8 +31,8 @@ class LengthControl(Controller):
 
     with the planned pose x and tensions t at the time when the winches will have followed, the Jacobian J of the
     lengths, and the error e of the measured pose. The tensions of a robot with more cables than degrees of freedom
-    follow from the lengths; they are not controlled. With a lag, e and its integral are those at that time, to first
-    order.
+    follow from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to that time, to
+    first order.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
@@ -41,12 +41,12 @@ class LengthControl(Controller):
             degrees of freedom).
         lag: Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time,
             and their corrections with as much lead.
-        proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. Default: by the age of the
-            measured pose, 4 and 10 if it is current, 0.3 and 2 up to 20 ms, less beyond. For a late pose without its
-            `time` of measurement, give the gains for its age: with larger ones, oscillations of the platform on its
-            cables grow.
-        most: Largest correction of a length [m]; default: 5 % of the robot's length. There the integral stops, and the
-            status is "hold".
+        proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default depends on the age
+            of the measured pose: 4 and 10 if it is current, 0.3 and 2 if it is at most 20 ms old, less beyond. For a
+            late pose without its `time` of measurement, give the gains for its age: with larger ones, oscillations of
+            the platform on its cables grow.
+        most: Largest correction of a length [m]; default: 5 % of the robot's length. At this value the integral stops,
+            and the status is "hold".
 
     Raises:
         InputError: If an argument has a wrong value, the robot has flying carriers, or its cables have fixed lengths.

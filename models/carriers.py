@@ -202,7 +202,7 @@ class PrescribedCarrier(Carrier):
 
 
 class MobileCarrier(Carrier):
-    """A robot end that moves inside a reach box (paper C): a point with the constant orientation of its home."""
+    """The end of a robot (paper C): a point that moves inside a reach box and keeps the orientation of its home."""
 
     tows: ClassVar[bool] = True
 

@@ -48,9 +48,9 @@ def capacity_margin(problem: TensionProblem) -> Margin:
     subsets of rank - 1 cables, 56 for m = 8 and 792 for m = 12 with six equations. Cables with t_min = t_max are left
     out.
 
-    If the set is flat (the rank of the other cables is below n) it has no inside among all wrenches. Then a wrench in
-    the set, within `TensionProblem.tolerance`, has the margin measured inside the flat, among the wrenches that the
-    robot can give at all; a wrench that is not in it is outside, with a negative value.
+    If the set is flat (the rank of the other cables is below n), it has no interior in the space of all wrenches. The
+    margin of a wrench in the set, within `TensionProblem.tolerance`, is then measured in the subspace of the wrenches
+    that the robot can give at all; a wrench that is not in this subspace is outside, with a negative value.
 
     Args:
         problem: The problem; its t_ref and weights play no part. Without a boundary (limits infinite in every

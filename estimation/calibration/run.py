@@ -23,14 +23,14 @@ def calibrate(
 ) -> Calibration:
     """Estimate the robot parameters that best explain measured cable lengths.
 
-    Exactly measured poses are fixed, poses measured with an error may move within it, and unmeasured poses are
-    estimated along with the parameters, by lengths and, with tensions or fewer cables than coordinates, by the balance
-    of forces on the platform. Carriers are at home, unless their poses were measured.
+    Exactly measured poses are fixed, and poses measured with an error may move within it. Unmeasured poses are
+    estimated along with the parameters, from the lengths and, if tensions were measured or the robot has fewer cables
+    than coordinates, from the balance of forces on the platform. Carriers are at home unless their poses were measured.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file, with the initial values.
         measurements: `Measurements` of the robot, or from `read_measurements`.
-        free: Parameters to estimate, some of anchors, attachments, offsets (of the lengths), scales (of the lengths),
+        free: Parameters to estimate, any of anchors, attachments, offsets (of the lengths), scales (of the lengths),
             radii (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is
             ahead of the clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan
             (friction as the logarithm of a ratio of tensions), friction (as a force) and gains (newtons per unit of the
