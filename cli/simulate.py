@@ -48,10 +48,10 @@ CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "ope
 
 
 @parameters(f"""
-    PLAN|LOG: A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF); or a recording to
+    PLAN|LOG: A plan of this robot: a file that `towline plan` or `towline simulate` wrote (NetCDF). Or a recording to
         replay: CSV, NetCDF, MCAP or a ROS bag.
     --controller: The controller: {", ".join(CONTROLLERS)}; Python accepts controllers of your own.
-    --wind 'X Y Z': Velocity of the air [m/s], for robots with platform.aero; default: no air, and so no drag.
+    --wind 'X Y Z': Velocity of the air [m/s], for robots with platform.aero; default: no aerodynamic forces.
     --gusts SIGMA: With --wind: intensity of Dryden turbulence, added to the wind [m/s].
     --noise FILE: Errors and delay of the sensors (YAML), such as {{position: 0.001, delay: 0.002}}.
     --mismatch FILE: How the simulated robot and its drives differ from the file (YAML), such as {{mass: [0.9, 1.1],
@@ -61,7 +61,7 @@ CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "ope
         at 1' (the platform carries a load of 2.5 kg; 0: none), 'stop at 3' (the reference stops on its path), 'follow
         next.nc at 3' (another plan becomes the reference), 'push 20 0 0 at 1 for 0.5' (a force on the platform [N]), or
         the YAML file of a list of events. Repeat the option for more.
-    --duration: Simulated time [s]; default: the plan's. After its end the robot holds the final pose.
+    --duration: Simulated time [s]; default: the plan's. After the end of the plan the robot holds the final pose.
     --tolerance: Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at home
         if that is less.
     --seed: Seed of gusts and noise; the same seed gives the same run.
@@ -113,12 +113,13 @@ def simulate(
     fit: Path | None = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate a plan in closed loop, with wind, sensor noise and events; or replay a recording.
+    """Simulate a plan in closed loop, with wind, sensor noise and events, or replay a recording.
 
     A run passes if it does not diverge, its position error stays within --tolerance, no tension exceeds t_max by more
-    than 0.1 % of the cable's range, and no cable with t_min above zero goes slack. The exit code is 0 if all runs pass,
-    otherwise 1. A recording is replayed with its commands, in windows that each start from the recorded state; it
-    passes if 95 % of the position residuals are within --tolerance.
+    than 0.1 % of the cable's range, no cable with t_min above zero goes slack, and the platform stays above the floor
+    and inside the workspace_box of the robot file. A recording is replayed with its commands, in windows that each
+    start from the recorded state; it passes if 95 % of the position residuals are within --tolerance. The exit code is
+    1 if a run or a recording does not pass.
     """
     one_of("--controller", controller, CONTROLLERS)
     check_animation(animate, speed, fps)

@@ -140,7 +140,7 @@ class Dynamics(Displayed):
           derivatives, (..., 6).
         - `carrier_pose`, `carrier_velocity`, `carrier_acceleration`: the same of each carrier, (..., c, 6); default: at
           home and at rest.
-        - `wind`: velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag. Raises `InputError` if
+        - `wind`: velocity of the air in {G} [m/s], (..., 3); default: no aerodynamic forces. Raises `InputError` if
           the robot's file has no `platform.aero`.
         """
         motion = Motion(pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration)

@@ -200,7 +200,7 @@ class Plant:
                 acceleration if there is none. Prescribed carriers follow it exactly; mobile ones with a second-order
                 lag, inside their limits of speed and acceleration. Default: at home, at rest. Missing velocities and
                 accelerations are derived from the poses of a `run`, see `samples`.
-            wind: Velocity of the air in {G} [m/s], (..., 3); default: no air, and so no drag.
+            wind: Velocity of the air in {G} [m/s], (..., 3); default: no aerodynamic forces.
             wrench: Disturbance on the platform: force [N] and moment about the CoM [N m] in {G}, (..., 6).
             carrier_wrench: The same on the carriers, (..., c, 6), such as wind on quadrotors. It moves those that have
                 mass.

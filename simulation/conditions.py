@@ -20,7 +20,7 @@ class Conditions(Displayed):
 
     Attributes:
         wind: Velocity of the air in {G} [m/s], (3,), or a function of times (K,) [s] and a seed that returns (K, 3);
-            default: no air, and so no drag.
+            default: no aerodynamic forces.
         gusts: Intensity of Dryden turbulence, which is added to a constant wind [m/s].
         noise: Sensor noise, a `Noise` or a mapping (default: none).
         events: Events, each a line, a mapping, the YAML file of a list, or an `Event` (times in [s], cables count from
