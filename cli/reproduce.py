@@ -28,7 +28,7 @@ def reproduce(paper: str, out: Path | None = None, form: FormatOption = "png", a
     if paper not in PAPERS:
         raise InputError(f"PAPER must be one of {', '.join(PAPERS)}, got {paper!r}")
     folder = out if out is not None else Path(f"towline-{paper}")
-    check_writable(folder / f"{paper}.md")
+    check_writable(folder / f"{paper}.html")
     with progress_bar("", quiet=as_json) as progress:
         account = PAPERS[paper](progress)
     files = write(account, folder, form)

@@ -6,7 +6,7 @@ from ...figures import page as html
 from ...figures import style
 from .account import Account, Chapter
 from .claim import Claim, Verdict, value_text
-from .text import BY_THE_PAPER, MEANING, READ
+from .errata import BY_THE_PAPER, MEANING, READ
 
 NOT_REPRODUCED = "What was not reproduced"
 
@@ -50,7 +50,7 @@ def _chapter(chapter: Chapter) -> list[str]:
 
 def _claim(claim: Claim) -> str:
     rows = [
-        (BY_THE_PAPER.capitalize(), value_text(claim.printed, claim.unit)),
+        (BY_THE_PAPER, value_text(claim.printed, claim.unit)),
         ("Computed", value_text(claim.computed, claim.unit)),
         (claim.verdict.value.capitalize(), claim.why),
         ("Name", claim.id),
