@@ -29,7 +29,7 @@ from .search.reference import about_better_reference
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion
 from .search.search import Search
-from .search.stronger_or_nearer import near_chosen_motion, stronger_or_nearer
+from .search.stronger_or_nearer import near_chosen_motion, slower_path, stronger_or_nearer
 from .search.time_law import BOUND, fastest
 from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
@@ -91,7 +91,8 @@ def _fixed_motion(search: Search) -> Plan:
 
 def _offers(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of a task that fixes the motion, or else of where it ends and of the robot."""
-    return near_fixed_motion(search, scenario, left, audit) or stronger_or_nearer(search, scenario, audit)
+    near = near_fixed_motion(search, scenario, left, audit)
+    return slower_path(search, scenario, audit) + near if near else stronger_or_nearer(search, scenario, audit)
 
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:

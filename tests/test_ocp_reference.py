@@ -89,3 +89,16 @@ def test_exact_points_are_passed_and_not_later_than_at_fixed_shares():
         assert np.linalg.norm(free.audit.motion.pose[:, :3] - point, axis=1).min() < 5e-3  # between its instants
     assert free.waypoint_distance is not None
     assert free.waypoint_distance.position.distance < 1e-5
+
+
+def test_a_limit_on_the_jerk_of_cables_is_kept_in_a_tube():
+    """The jerk of a smoothed law would jump between the nodes; third differences of the lengths are the judge."""
+    robot, most = load("point-mass-3"), 30.0
+    line = {"kind": "line", "start": [-0.4, 0, 0.8], "end": [0.5, 0.2, 1.2]}
+    limited = {"limits": {"cable_jerk": most}, "objective": {"time": 0.1}, "duration": {"min": 0.2, "max": 9}}
+    found = plan(robot, {"path": line, "tube": {"position": 0.1}} | limited)
+    assert found.feasible
+    assert found.duration < 2.5  # not the longest duration, at which the smooth law keeps the limit
+    position = found.trajectory["pose"].values[:, :3]
+    lengths = np.linalg.norm(np.array([cable.anchor for cable in robot.cables]) - position[:, None], axis=2)
+    assert np.abs(np.diff(lengths, 3, axis=0) / found.trajectory["time"].values[1] ** 3).max() < 1.05 * most

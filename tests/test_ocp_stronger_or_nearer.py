@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from towline import Robot, load, plan, tensions
+from towline import Robot, Task, load, plan, tensions
 from towline.ocp.reports.report import sections
+from towline.ocp.tasks.paths.shifted import shifted
 
 WAYS = {
     "beyond the frame": ("cogiro", [0, 0, 2], [9, 0, 2], {}),
@@ -40,6 +41,9 @@ def test_there_is_advice_and_all_of_it_is_feasible_when_planned_anew(refused):
             "platform.mass": lambda robot=robot: robot.platform.mass,
             "cables.t_max": lambda robot=robot: robot.t_max.max(),
             "cables.t_min": lambda robot=robot: robot.t_min.max(),
+            "shift of the path": lambda task=varied.task: np.subtract(task.path.end, refused.scenario.task.path.end)[
+                "xyz".index(offer.detail[-1])
+            ],
         }[offer.name]()
         assert value == pytest.approx(offer.possible, rel=2e-3)
 
@@ -159,6 +163,78 @@ def test_without_a_feasible_change_the_report_says_what_may_help():
     assert not above.relaxations
     assert "no cable pulls along force (0.00, 0.00, 1.00)" in above.report()  # above all anchors
     assert "a nearer path" in above.report()
+
+
+FLOOR = {"mass": 20, "dof": ["x", "y", "z"]}
+ANCHORS = [[x, y, 4.0] for x in (-3, 3) for y in (-2, 2)]
+
+
+@pytest.mark.parametrize("path", ["line", "feed"])
+def test_a_path_below_the_floor_is_offered_as_far_above_it_as_it_was_below(path):
+    held = {"carrier": "f", "attachment": [0, 0, 0], "t_min": 1, "t_max": 900}
+    cables = [held | {"anchor": anchor} for anchor in ANCHORS]
+    frame = {"name": "r", "source": "made up", "carriers": [{"name": "f", "kind": "ground"}]}
+    robot = frame | {"platform": FLOOR, "floor": 0.5, "cables": cables}
+    start, end = [0, 0, 1], [0.5, 0.2, 0.25]
+    paths = {
+        "line": {"path": {"kind": "line", "start": start, "end": end}, "duration": 3},
+        "feed": {"path": {"kind": "feed", "points": [start, end], "feed": 0.3, "acceleration": 2}},
+    }
+    found = plan(Robot.model_validate(robot), paths[path])
+    (offer,) = found.relaxations
+    assert (offer.name, offer.detail) == ("shift of the path", "along z")
+    assert offer.possible == pytest.approx(0.25, rel=1e-2)  # the end is as far below the floor
+    moved = offer.plan.trajectory["pose"].values - found.trajectory["pose"].values
+    np.testing.assert_allclose(moved, np.tile([0, 0, offer.possible, 0, 0, 0], (len(moved), 1)), atol=1e-9)
+
+
+def test_a_path_that_starts_where_nothing_holds_the_platform_is_offered_beside_that():
+    line = {"kind": "line", "start": [7.8, 0, 2], "end": [6, 0.5, 2]}
+    found = plan("cogiro", {"path": line, "duration": 4})
+    offer = next(each for each in found.relaxations if each.name == "shift of the path")
+    at_start = offer.plan.trajectory["pose"].values[0]
+    assert tensions("cogiro", at_start).feasible
+    back = 0.2 * np.sign(offer.possible) * np.eye(6)["xyz".index(offer.detail[-1])]
+    assert not tensions("cogiro", at_start - back).feasible
+
+
+@pytest.mark.parametrize(
+    ("path", "bound"),
+    [
+        ({"kind": "circle", "centre": [0, 0, 1.5], "radius": 2, "rate": -1}, 1.0),  # a speed of 2 m/s
+        ({"kind": "feed", "points": [[-1, 0, 1], [1, 0, 1]], "feed": 2, "acceleration": 4}, 1.0),
+    ],
+)
+def test_a_path_with_its_own_speed_is_offered_at_the_speed_that_the_limit_permits(path, bound):
+    found = plan("cogiro", {"path": path, "limits": {"platform_speed": bound}})
+    offer = found.relaxations[0]
+    assert offer.name in ("path.rate", "path.feed")
+    assert offer.possible == pytest.approx(offer.requested * bound / 2, rel=3e-3)  # half of its 2 m/s
+    speed = np.linalg.norm(np.gradient(offer.plan.trajectory["pose"].values[:, :3], 0.01, axis=0), axis=1)
+    assert bound * 0.99 < speed.max() < bound * 1.0001
+
+
+PATHS = (
+    {"kind": "rest", "pose": [1, 2, 3, 0.1, 0.2, 0.3]},
+    {"kind": "line", "start": [0, 0, 1], "end": [1, 2, 3]},
+    {"kind": "circle", "centre": [1, 2, 3], "radius": 1, "rate": 1, "drift": [0.1, 0, 0]},
+    {"kind": "waypoints", "points": [[0, 0, 1], [1, 0, 1], [1, 1, 2]]},
+    {"kind": "feed", "points": [[0, 0, 1], [1, 0, 1], [1, 1, 2]], "feed": 1, "acceleration": 2},
+    {"kind": "samples", "times": range(6), "poses": [[k, k**2, 1] for k in range(6)]},
+)
+RETURN = {"kind": "return", "path": PATHS[3], "duration": 2, "start": 0.5, "settle": 1, "offset": [0.1, 0, 0, 0, 0, 0]}
+PARTS = [{"path": PATHS[1], "duration": 1}, {"path": {"kind": "rest", "pose": [1, 2, 3]}, "duration": 1}]
+
+
+@pytest.mark.parametrize(
+    "fields", [*PATHS, RETURN, {"kind": "sequence", "parts": PARTS}], ids=lambda each: each["kind"]
+)
+def test_a_shifted_path_is_the_path_elsewhere(fields):
+    path = Task.model_validate({"path": fields, "duration": 2}).path
+    times, by = np.linspace(0, 2, 21), np.array([0.3, -0.2, 0.1])
+    before, after = path.at(times, 2.0), shifted(path, by).at(times, 2.0)
+    np.testing.assert_allclose(after.pose - before.pose, np.tile([*by, 0, 0, 0], (21, 1)), atol=1e-12)
+    np.testing.assert_allclose(after.acceleration, before.acceleration, atol=1e-9)
 
 
 def advice(found, name):

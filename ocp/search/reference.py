@@ -122,7 +122,8 @@ def _leaves_times(scenario: Scenario) -> bool:
 def _fastest(search: Search, scenario: Scenario, mesh: Mesh) -> _Candidate | None:
     """Return the path with the fastest law, smoothed."""
     path, task = scenario.path, scenario.task
-    if task.objective.time is None:
+    # The jerk of a smoothed law jumps between nodes, where the program's jerk cannot make up for it.
+    if task.objective.time is None or task.limits.cable_jerk is not None:
         return None
     if isinstance(path, WaypointPath):
         if path.shape == "spline" and task.tube.waypoints == "exact":

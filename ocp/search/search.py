@@ -11,6 +11,7 @@ import numpy as np
 
 from ...base.text import quantity
 from ..audits.audit import Audit, audit
+from ..audits.excess import TENSIONS
 from ..audits.violation import relative_violation
 from ..nlp.grid import Grid
 from ..nlp.guess import initial_guess, usual_guess
@@ -328,7 +329,6 @@ def describe(audited: Audit) -> str:
     if audited.violation.max() > audited.tolerance:
         short = quantity(audited.violation.max(), "N")
         lines.append(f"short by up to {short} at t = {audited.times[audited.worst]:.3f} s")
-    if audited.excess:
-        count = len(audited.excess)
+    if count := sum(not lines or each.limit != TENSIONS for each in audited.excess):
         lines.append(f"{count} other limit{'s' * (count > 1)} exceeded")
     return ", ".join(lines)

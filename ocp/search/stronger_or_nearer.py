@@ -1,4 +1,4 @@
-"""What else would make a motion feasible: a nearer end, another yaw, less wind, less mass, other cables."""
+"""What else would make a motion feasible: a nearer end, another place, feed or yaw, less wind or mass, other cables."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -13,13 +13,15 @@ from ...solvers.margins import margins
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
 from ..audits.tensions import scaled
+from ..global_path.at_rest import AtRest
 from ..plan import Plan
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
-from ..tasks.paths import LinePath, WaypointPath
+from ..tasks.paths import AnyPath, CirclePath, FeedPath, LinePath, WaypointPath
+from ..tasks.paths.shifted import shifted
 from ..tasks.phase import Load
-from ..tasks.scenario import AUDIT_RATE, MOST_SAMPLES, Scenario
+from ..tasks.scenario import AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.wind_set import WindBox, WindDisc
 from .relaxations import LONGER, near_motion, rounded, slower
@@ -28,6 +30,9 @@ from .search import Search
 INSTANTS = 120  # at which tensions are asked for before a motion is audited
 HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of what has tensions at these instants, one after the other until the audit passes
+PLACES = 31  # of a path, at which a shifted one is compared
+SHIFT_STEP = 1.3  # of a shift to the next one that is tried
+SHIFTS = SHIFT_STEP ** np.arange(-36, 0)  # that are tried, in parts of the distance between the farthest anchors
 YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 
@@ -49,7 +54,7 @@ def near_chosen_motion(
 
 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
-    """Return feasible variations of what a task does not name: where its line ends, the platform's mass, t_max, t_min.
+    """Return feasible variations of what a task does not name: where its path is, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change; if speeds or accelerations are
     exceeded too, it may also need a longer duration, which is not tried in phases. The list is empty if the motion
@@ -62,9 +67,9 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     if others and task.phases is not None:
         return []
     factors = [slower(excess) for excess in others]
+    found = slower_path(search, scenario, audit)
     if min(factors, default=2.0) <= 1.0 or (others and not scenario.stretches):
-        return []
-    found = list[Relaxed]()
+        return found + _shifted_path(search, scenario, audit)
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
     for make in (
         _nearer_end,
@@ -81,7 +86,7 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
             with_it = f", with a duration of {quantity(seconds, 's')}"
             its = [replace(each, detail=each.detail + with_it) for each in make(search, longer)]
         found += its
-    return found
+    return found + _shifted_path(search, scenario, audit)
 
 
 def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -104,6 +109,80 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
     return (
         _largest(search, to, "part of the rotation", "%") if turns else _largest(search, to, "length of the line", "m")
     )
+
+
+def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the largest feed or angular velocity of a path that has its own, at which it is feasible.
+
+    `audit` is that of the motion exactly on the path.
+    """
+    path, factors = scenario.task.path, [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
+    if not isinstance(path, FeedPath | CirclePath) or min(factors, default=2.0) <= 1.0:
+        return []
+    fed = isinstance(path, FeedPath)
+    fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
+    others = ", the others by the same factor" if fed and path.feed is None else ""
+
+    least = scenario.duration * AUDIT_RATE / MOST_SAMPLES  # else it would last too long to be audited
+
+    def at(share: float) -> Variation:
+        share = max(share, least)
+        data = path.model_dump()  # a copy of the path would keep its law
+        for name, power in (("rate", 1), ("drift", 1), ("feed", 1), ("feeds", 1), ("acceleration", 2)):
+            if data.get(name) is not None:
+                data[name] = (share**power * np.array(data[name])).tolist()
+        push = f"{others}, with an acceleration of {quantity(data['acceleration'], 'm/s^2')}" if fed else ""
+        return _along(scenario, type(path).model_validate(data)), share * fastest, push.removeprefix(", ")
+
+    name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
+    return _largest(search, at, name, unit, up=fastest < 0, most=1.0 / max(factors, default=1.0))
+
+
+def _shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the smallest shift of the whole path along an axis of {G} with which it is feasible.
+
+    Shifts are compared at rest, at some positions of the path; the audit decides. The list is empty where a way round
+    an obstacle, or other positions of the carriers, are better advice.
+    """
+    task, path, robot = scenario.task, scenario.task.path, scenario.robot
+    blocked = any(excess.limit == "keep_out" for excess in audit.excess)
+    movable = any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers)
+    if blocked or movable or scenario.relative or task.phases is not None or task.initial is not None:
+        return []
+    times = np.linspace(0.0, scenario.duration, PLACES)
+    platform, carriers = scenario.motion(times, None)
+    size = float(np.linalg.norm(np.ptp(robot.home_anchors, axis=0)))
+    kept = AtRest(scenario, size)
+
+    def holds(by: np.ndarray) -> bool:
+        poses = platform.pose.copy()
+        poses[:, :3] += by
+        return bool((kept(poses, carriers.pose).slack >= 0).all())
+
+    if holds(np.zeros(3)):
+        return []
+    shortest = np.full(3, np.inf)
+    for way in (sign * np.eye(3)[axis] for axis in POSITION if robot.dof_mask[axis] for sign in (1, -1)):
+        far = next((far for far in SHIFTS * size if far < np.abs(shortest).max() and holds(far * way)), None)
+        if far is None:
+            continue
+        low, high = far / SHIFT_STEP, far
+        for _ in range(HALVINGS // 2):
+            middle = (low + high) / 2
+            low, high = (low, middle) if holds(middle * way) else (middle, high)
+        if high < np.abs(shortest).max():
+            shortest = high * way
+    if np.isinf(shortest).any():
+        return []
+    axis = int(np.abs(shortest).argmax())
+    for reserve in RESERVES:
+        by = rounded(float(np.abs(shortest[axis])) / reserve, up=True) * np.sign(shortest)
+        moved = _along(scenario, shifted(path, by))
+        audit = search.audit_motion(moved, None, "audit, shifted path")
+        if audit.passed:
+            plan = Plan(moved, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0)
+            return [Relaxed("shift of the path", "m", 0.0, float(by[axis]), plan, f"along {'xyz'[axis]}")]
+    return []
 
 
 def _other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -151,7 +230,7 @@ def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -
     return margins(A, w, *scenario.bounds()).reshape(yaws.shape)
 
 
-def _along(scenario: Scenario, path: LinePath | WaypointPath) -> Scenario:
+def _along(scenario: Scenario, path: AnyPath) -> Scenario:
     """Return the scenario along another path. Where a given state is that of an end of the path, it moves with it."""
     times, changes = np.array([0.0, scenario.duration]), dict[str, object](path=path)
     motion = scenario.along(path, scenario.duration).motion(times, None)[0]
@@ -249,10 +328,10 @@ def _slacker_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
 
 
 def _largest(
-    search: Search, make: Callable[[float], Variation], name: str, unit: str, up: bool = False
+    search: Search, make: Callable[[float], Variation], name: str, unit: str, up: bool = False, most: float = 1.0
 ) -> list[Relaxed]:
-    """Return the variation with the largest share, from 0 to 1, that passes its audit; nothing if none is found."""
-    low, high = 0.0, 1.0
+    """Return the variation with the largest share, from 0 to `most`, that passes its audit; [] if none is found."""
+    low, high = 0.0, most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if _has_tensions(make(middle)[0]) else (low, middle)
