@@ -189,6 +189,11 @@ def test_docstrings_and_messages():
     assert not hits, "\n".join(hits)
 
 
+def test_sections_of_docstrings_are_those_that_the_site_reads():
+    hits = [place for place, text in literals() if re.search(r"^ *[A-Z][a-z]+\n *-{4,}$", text, re.MULTILINE)]
+    assert not hits, f"use Args:, Returns:, Raises: and Attributes: in {', '.join(hits)}"
+
+
 def test_docstrings_of_functions_begin_with_a_verb():
     hits = [f"{place}: {word} ..." for place, word in openings(ast.FunctionDef) if NO_VERB.fullmatch(word)]
     assert not hits, "\n".join(hits)
