@@ -93,7 +93,9 @@ class _Search:
         starts = self._starts()
         while self.found.starts == 0 or self._share() < _SEARCHING:
             if self.found.starts == 0 and self._requirements.start == "robot":
+                own = self._y.copy()
                 self._improve("the robot's own layout", _FIRST_STEP)
+                self._take(own)  # the audit may find that the linear programs have made it worse
             elif self._share() < _STARTING or (not self._met() and self.found.starts % 2):
                 next(starts)
             else:

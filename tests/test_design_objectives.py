@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from towline import Dynamics, InputError, TensionProblem, design, load, read_requirements
-from towline.layout import growth
+from towline.layout import growth, search
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import goal_of
 from towline.layout.linear_programs import maximise
@@ -21,6 +21,10 @@ POINTS = [
 ]
 CHEAP = {"minimise": "cost", "prices": {"cable": 10.0, "t_max": 0.5}, "margin": 10.0, "time_limit": 1.5}
 REQUIRE = [{"box": BOX, "grid": [3, 3, 3]}]
+
+
+# For anchors and attachments: in the frame, and as far as the platform extends.
+LOW, HIGH = ([-4, -3, 1], [-0.75, -0.125, 0.25]), ([4, 3, 5], [0.75, 0.125, 0.75])
 
 
 def corners(size=1.0):
@@ -74,6 +78,17 @@ def test_no_layout_nearby_is_cheaper():
             z = np.clip(y + size * rng.standard_normal(y.size), variables.low, variables.high)
             near = evaluation.outcome(z, goal)
             assert near.margin < last.margin or near.cable > 0.999 * last.cable
+
+
+def test_a_layout_is_never_worse_than_the_robots_own(monkeypatch):
+    """A grid of one pose says nothing of the corners of the box: linear programs spoil the margin there."""
+    monkeypatch.setattr(search, "AUDITED", 5_000)
+    wide = {"min": [-2.5, -1.5, 1.5], "max": [2.5, 1.5, 4.0]}
+    free = [{**each, "box": {"min": low, "max": high}} for each, low, high in zip(POINTS, LOW, HIGH, strict=True)]
+    found = design(ROBOT, free, [{"box": wide, "grid": [1, 1, 1]}], time_limit=0.3)
+    poses = np.zeros((8, 6))
+    poses[:, :3] = list(product(*zip(wide["min"], wide["max"], strict=True)))
+    assert least_margin(found.robot, poses) >= least_margin(ROBOT, poses) - 1e-6
 
 
 def test_slopes_of_the_longest_cables_are_those_of_differences():
