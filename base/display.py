@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .inputs import printable
-from .text import quantity, quantity_row
+from .text import quantity, quantity_row, unbroken
 
 Fact = tuple[str, str]  # its name, and the fact with its unit
 Curve = tuple[ArrayLike, ArrayLike, str]  # (n,) and (n,), broken at nan, and its colour
@@ -54,8 +54,8 @@ class Displayed:
     def _repr_html_(self) -> str:
         headline, facts = _shown(self)
         rows = "".join(
-            f'<tr><th style="text-align: left">{escape(name)}</th><td style="text-align: left">{escape(fact)}</td></tr>'
-            for name, fact in facts[:ROWS]
+            f'<tr><th style="text-align: left">{escape(name)}</th><td style="text-align: left">{cell}</td></tr>'
+            for name, cell in ((name, unbroken(escape(fact))) for name, fact in facts[:ROWS])
         )
         return f"<p><strong>{escape(headline)}</strong></p><table>{rows}</table>{_or_without(self._picture, '')}"
 

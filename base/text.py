@@ -16,6 +16,8 @@ SMALL_DIGITS = 2  # of a number below PLAIN_FROM in its unit: "0.52 uN"
 PREFIXES = ("n", "u", "m", "", "k", "M", "G")  # in steps of a thousand
 PREFIXED = ("N", "m", "s", "rad", "g", "W", "Hz", "Pa")  # symbols that take a prefix
 OTHERS = {"m^2": ("mm^2", 1e6), "m^3": ("cm^3", 1e6)}  # what a small value is written in, and how many make one
+UNITS = rf"[{''.join(PREFIXES)}c]?(?:{'|'.join(PREFIXED)})|degrees?"
+INSIDE = re.compile(rf"(?<=\d) (?=(?:{UNITS}|\d{{3}})\b|%)|(?:(?<=\bN)|(?<=\bkg)) (?=m\b)")  # of "10 340 N m", "95 %"
 
 
 def quantity(value: Number, unit: str = "", digits: int = DIGITS) -> str:
@@ -61,6 +63,11 @@ def quantity_range(values: Iterable[Number], unit: str = "", digits: int = DIGIT
     low, high = (_cell(end, scale, unit, digits) for end in (min(known, key=float), max(known, key=float)))
     text = low if low == high else f"{low} to {high}"
     return f"{text} {unit}" if unit else text
+
+
+def unbroken(text: str) -> str:
+    """Return text in which no line breaks between a number and its unit, by no-break spaces, as pages need it."""
+    return INSIDE.sub("\u00a0", text)
 
 
 def column(values: Iterable[Number], digits: int = DIGITS) -> list[str]:

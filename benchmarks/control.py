@@ -352,7 +352,7 @@ def markdown(report: Report) -> str:
     return f"""# Control
 
 Measured on {report.machine}.
-Flights of {report.count} steps of 1 ms in gusts, with elastic cables.
+Runs of {report.count} steps of 1 ms in gusts, with elastic cables.
 
 ## Whole steps, from state to command
 

@@ -11,11 +11,11 @@ from .outputs import check_outputs
     --mjcf: Write a MuJoCo model.
     --c: Write the functions of the dynamics as C code without dependencies.
     --step DIR: Write a control step as C, from state to tensions, into this new folder.
-    --float: With --step: compute in float instead of double.
-    --fmu FILE.fmu: Write a unit for co-simulation (FMI 3.0), for example Simulink.
+    --float: With --step: compute in single precision instead of double.
+    --fmu FILE.fmu: Write an FMU for co-simulation (FMI 3.0), for example in Simulink.
     --fmu-of PART: With --fmu: plant, controller, or both in a loop.
     --drive DRIVE: With --fmu: type of the plant's cable commands (lengths, rates, forces or tensions); default:
-        tensions, or constant lengths for robots that have these.
+        tensions, or lengths for robots whose cables have constant lengths.
     --reference PLAN.nc|'x y z roll pitch yaw': With --fmu: pose in {G} [m, rad], or plan, at which a simulation starts;
         default: home.
     --out FILE: File to write; default: ROBOT.xml or ROBOT.c in this folder, from the robot's `name`.

@@ -36,7 +36,7 @@ from .watching import watching
         file is overwritten.
     --figures: Folder for figures: path.png, views.png, tensions.png and, if applicable, base.png (carriers), limits.png
         and convergence.png.
-    --animate: Film of the robot to write: .gif, or .mp4 with ffmpeg.
+    --animate: File for a film of the motion: .gif, or .mp4 with ffmpeg.
     --robust SHARE: Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension
         limits must hold; default: the task's value.
     --vary KEY=VALUES: Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8',

@@ -39,7 +39,7 @@ FEWEST_FIT = 0.95  # of the samples of a log
         robot file convert them to lengths. May be repeated, for several logs of one motion.
     --out FILE.csv: With --log: file of poses and covariances; default: LOG-poses.csv in this folder.
     --figures FOLDER: With --log: folder for a figure of the residuals over time.
-    --start '{SIX}': Pose to start from [m, rad]; default: search without a start.
+    --start '{SIX}': Pose at which the search starts [m, rad]; default: none is needed.
     --sigma S: Standard deviation of the lengths [m]: one number, or one per cable; with --log also
         'lengths=0.001,directions=0.01,rotation=0.01'.
 """)
@@ -128,10 +128,10 @@ def _of_log(
     else:
         sigmas = np.sqrt(np.diagonal(found.estimate.covariance, axis1=-2, axis2=-1))
         size = quantity(1e3 * data["residual"], "mm", 3)
-        typer.echo(f"{robot.name}: {quantity(data['samples'])} poses, residuals of {size} (rms)")
+        typer.echo(f"{robot.name}: {quantity(data['samples'])} poses, residuals {size} rms")
         for i, name in enumerate(SIX.split()):
-            middle = float(np.median(sigmas[:, i])) * (1e3 if i < 3 else 180 / np.pi)
-            size = quantity(middle, "mm" if i < 3 else "deg", 3) if np.isfinite(middle) else "undetermined"
+            middle = 1e3 * float(np.median(sigmas[:, i]))
+            size = quantity(middle, "mm" if i < 3 else "mrad", 3) if np.isfinite(middle) else "undetermined"
             typer.echo(f"  median sigma of {name}: {size}")
         for line in (*read.notes, *found.lines()):
             typer.echo(f"  {line}")
@@ -152,19 +152,18 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
 
     from ..base.text import quantity, quantity_row
 
-    verdict = "a pose fits the lengths," if estimate.consistent else "NO POSE FITS THE LENGTHS, the closest one has"
+    verdict = "a pose fits the lengths" if estimate.consistent else "NO POSE FITS THE LENGTHS; the closest one is shown"
     if estimate.by_gravity and not estimate.converged:
-        verdict = "NO EQUILIBRIUM WITH THESE LENGTHS, the closest pose has"
-    typer.echo(f"{robot.name}: {verdict} residuals of {quantity(1e3 * estimate.residual, 'mm', 3)}")
-    scale = np.repeat([1e3, 180.0 / np.pi], 3)
+        verdict = "NO EQUILIBRIUM WITH THESE LENGTHS; the closest pose is shown"
+    typer.echo(f"{robot.name}: {verdict} (residuals {quantity(1e3 * estimate.residual, 'mm', 3)} rms)")
     rows = []
     for i, name in enumerate(SIX.split()):
-        unit, small = ("m", "mm") if i < 3 else ("rad", "deg")
-        deviation = scale[i] * estimate.sigmas[i]
-        spread = quantity(deviation, small, 3) if np.isfinite(deviation) else "undetermined"
+        unit, deviation = "m" if i < 3 else "rad", 1e3 * estimate.sigmas[i]
+        spread = quantity(deviation, f"m{unit}", 3) if np.isfinite(deviation) else "undetermined"
         rows.append((name, quantity(round(estimate.pose[i], 9), unit, 7), spread if robot.dof_mask[i] else "fixed"))
     print_table(["", "estimate", "sigma"], rows, "lrr")
-    typer.echo("The sigmas of the angles are those of small rotations about the axes of {G}.")
+    if robot.dof_mask[3:].any():
+        typer.echo("The sigmas of the angles are those of small rotations about the axes of {G}.")
     if estimate.by_gravity and estimate.converged:
         typer.echo("The lengths do not determine the pose. This is the equilibrium pose.")
     if estimate.consistent and not estimate.determined:

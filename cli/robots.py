@@ -17,14 +17,15 @@ if TYPE_CHECKING:
     from ..workspace.resting_box import RestingBox
 
 MOVES = {
-    "both": "winches change the lengths of cables, and carriers that can move may move too",
-    "fixed-length": "carriers move, and cables keep their lengths",
-    "variable-length": "winches change the lengths of cables, and mobile carriers stay",
+    "both": "winches change the cable lengths, and carriers may move too",
+    "fixed-length": "carriers move, and the cable lengths are constant",
+    "variable-length": "winches change the cable lengths, and mobile carriers stay where they are",
+    "winches": "winches change the cable lengths",  # "both", where no carrier can move
 }
 
 
 @parameters("""
-    --figure FILE: Picture of the robot to write: .png, .pdf or .svg.
+    --figure FILE: File for a picture of the robot: .png, .pdf or .svg.
     --schema: Print the JSON Schema of robot files.
 """)
 def robots(
@@ -128,13 +129,14 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution, box: R
     if result["rank"] < len(robot.platform.dof):
         rank += f"; highest rank near home: {highest}"
     cables = f"{result['cables']} cable{'s' * (result['cables'] != 1)}"
+    drive = "winches" if robot.drive == "both" and not any(carrier.moves for carrier in robot.carriers) else robot.drive
     lines = [
-        f"{result['name']}: {cables}; carriers: {_count(result['carriers'])}",
+        f"{result['name']}: {cables}, {_count(result['carriers'])} carrier{'s' * (len(robot.carriers) != 1)}",
         f"  mass {quantity(result['mass'], 'kg')}, weight {quantity(result['weight'], 'N')}, "
         f"characteristic length {quantity(result['length'], 'm')}",
         f"  home ({quantity_row(result['home'])}) [m, rad], cable lengths there "
         f"{quantity_range(result['cable_lengths'], 'm')}",
-        f"  drive {robot.drive}: {MOVES[robot.drive]}",
+        f"  drive {robot.drive}: {MOVES[drive]}",
         f"  tension limits: t_min {quantity_range(result['t_min'], 'N')}, t_max {quantity_range(result['t_max'], 'N')}",
         f"  wrench matrix: {rank}",
         f"  its singular values, moments divided by the characteristic length: "
@@ -171,7 +173,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
     attitude = "in its home attitude"
     if box is None:
         movable = any(carrier.moves for carrier in robot.carriers)
-        hint = ["    (in a plan with `base: {kind: free}` the carriers move, too)"] if movable else []
+        hint = ["    (in a plan with `base: {kind: free}` the carriers can move too)"] if movable else []
         where = "at none of the positions that were sampled"
         return [f"  can rest, {attitude} and with its carriers at home, {where}", *hint]
     sides = [
@@ -183,7 +185,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
         where = f"in the box {', '.join(sides)}" if sides else "at any position"
         return [
             f"  can rest, {attitude}, {where}",
-            "    (the carriers move along, since the cables keep their lengths)",
+            "    (the carriers move with it, because the cable lengths are constant)",
         ]
     lines = [f"  can rest, {attitude} and with its carriers at home, in the box", f"    {', '.join(sides)}"]
     if (box.centre != robot.home[:3]).any():

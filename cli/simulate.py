@@ -55,7 +55,7 @@ CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "ope
     --gusts SIGMA: With --wind: intensity of Dryden turbulence, added to the wind [m/s].
     --noise FILE: Errors and delay of the sensors (YAML), such as {{position: 0.001, delay: 0.002}}.
     --mismatch FILE: How the simulated robot and its drives differ from the file (YAML), such as {{mass: [0.9, 1.1],
-        winch_lag: 0.02}}; each run draws a random number from a range.
+        winch_lag: 0.02}}; each run draws a random number from each range.
     --event, --fault EVENT: Event: 'cut 3 at 2.5' (cable 3 breaks at 2.5 s), 'stick 2 at 1' (the winch of cable 2
         stops), 'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'carry 2.5
         at 1' (the platform carries a load of 2.5 kg; 0: none), 'stop at 3' (the reference stops on its path), 'follow
@@ -71,11 +71,11 @@ CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "ope
         PLAN-runs.nc with --runs, or LOG-replay.nc for a recording. An existing file is overwritten.
     --figures: Folder for figures of error, tensions and controller status; with --runs: errors of all runs and their
         envelopes over time.
-    --animate: Film of the simulation to write: .gif, or .mp4 with ffmpeg.
+    --animate: File for a film of the simulation: .gif, or .mp4 with ffmpeg.
     --replay: Replay PLAN as a recording, even if it is the file of a simulation.
     --poses LOG: With a recording: log of the poses, if they are in another file.
     --drive: With a recording: commands of the plant: lengths, tensions or forces (default: depends on the log).
-    --delay: With a recording: known delay of the robot behind its recorded commands [s].
+    --delay: With a recording: known delay from a recorded command to the response of the robot [s].
     --window: With a recording: duration of a window, a part replayed from its recorded state [s].
     --fit FILE.yaml: With a recording: robot file to write, with parameters fitted to half of the windows; written only
         if they reduce the residuals of the other half.

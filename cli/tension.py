@@ -25,7 +25,7 @@ METHODS = (
     --acceleration 'six numbers': Second time derivative of the pose; default: zero.
     --wind 'x y z': Velocity of the air in {{G}} [m/s]; default: no aerodynamic forces. '0 0 0' is still air, with drag
         on a moving platform.
-    --method NAME: Method whose result decides the exit code: {METHODS}.
+    --method NAME: Method that determines the exit code: {METHODS}.
     --backend NAME: QP solver that the method qp uses.
 """)
 def tension(

@@ -20,16 +20,16 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
     --html: HTML file to write instead of serving a page. The file works without a server, and for a robot also
         without the extra viewer.
     --robot: Robot file of a workspace whose robot is not in the library.
-    --host: Address to listen on; 127.0.0.1: this machine only.
-    --port: Port to listen on; if taken, the next free port is used; 0 picks any.
+    --host: Address to listen on; 127.0.0.1 accepts only this machine.
+    --port: Port to listen on; if it is taken, the next free port is used; 0: any free port.
 """)
 def view(
     target: Annotated[
         str | None,
         typer.Argument(
             metavar="TARGET",
-            help="A robot (name or YAML file), or a plan, simulation or workspace file (NetCDF); default: the first "
-            "robot of the library, in a view that has a list of all.",
+            help="A robot (name or YAML file), or a plan, simulation or workspace file (NetCDF); default: the "
+            "library, from its first robot on.",
             autocompletion=robot_names,
         ),
     ] = None,

@@ -54,8 +54,8 @@ METRICS = (
     --keep: Samples to keep in the file, at most a million: accepted, all or none.
     --out: NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: ROBOT-workspace.nc in
         this folder, from the robot's `name`.
-    --figure: Picture of the reached positions to write: .png, .pdf or .svg.
-    --mesh: STL file for the boundary, at one attitude and with carriers at home (extra mesh).
+    --figure: File for a picture of the accepted positions: .png, .pdf or .svg.
+    --mesh: STL file for the boundary of the workspace at one attitude, with carriers at home (extra mesh).
 """)
 def workspace(
     robot: RobotArgument,
@@ -251,7 +251,8 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reaso
     unit = summary["volume_unit"].replace("1", "")
     between = f", from {quantity_range((low, high), unit, digits=6)}"
     about = "" if math.isnan(low) else f"{between} ({result['volume_interval'].long_name})"
-    typer.echo(f"  volume {quantity(summary['volume'], unit, digits=6)}{about}")
+    size_of = {"m^2": "area", "m": "length"}.get(unit, "volume")
+    typer.echo(f"  {size_of} {quantity(summary['volume'], unit, digits=6)}{about}")
     if "cell_edges" in result:
         longest = float(result["cell_edges"].max())
         larger = size is not None and longest > size * (1 + 1e-9)

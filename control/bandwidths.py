@@ -83,7 +83,7 @@ def bandwidths_for(
 
     Without `sensors` they are the usual ones.
 
-    Raises `InputError` if an argument has a wrong value, or the robot would be lost with given bandwidths, or with a
+    Raises `InputError` if an argument has a wrong value, or no loop is stable with the given bandwidths, or with a
     tenth of the usual ones.
     """
     w = None if bandwidth is None else positive("bandwidth", bandwidth, 6)
@@ -97,16 +97,16 @@ def bandwidths_for(
     part, reason = errors.permit(usual.bandwidth, usual.observer)
     if w is None and K is None and part < LEAST:
         raise InputError(
-            f"sensors must permit {LEAST:g} of the bandwidths {usual.bandwidth:g} and {usual.observer:g} rad/s, got "
-            f"{reason}, which permits {part:.2g}"
+            f"sensors must permit {quantity(100 * LEAST, '%')} of the default bandwidths, {usual.bandwidth:g} and "
+            f"{usual.observer:g} rad/s, got {reason}, which permits {quantity(100 * part, '%', 2)}"
         )
     part = min(part, usual.most)
     given = np.full(6, part * usual.bandwidth) if w is None else w, part * usual.observer if K is None else K
     part, reason = errors.permit(float(given[0].max()), given[1])
     if LOST * part < 1.0:
         raise InputError(
-            f"bandwidth and observer must be at most {LOST * part:.2g} of the given ones for {reason}, got "
-            f"{given[0].max():g} and {given[1]:g} rad/s"
+            f"bandwidth and observer must be at most {LOST * part * given[0].max():.2g} and "
+            f"{LOST * part * given[1]:.2g} rad/s with {reason}, got {given[0].max():g} and {given[1]:g} rad/s"
         )
     return Bandwidths(*given, _attitude_for(robot, errors, lag, h))
 

@@ -26,7 +26,7 @@ class Command(NamedTuple):
             reference").
         direction, shortfall: If no tensions inside the limits and rates give the required wrench: the direction of the
             missing wrench, (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying
-            carrier has too little thrust for them, or does not turn as ordered because its actuators were at their
+            carrier has too little thrust for them, or does not turn as commanded because its actuators were at their
             limits for most of the last 0.1 s, only the size.
         actuation: Commands to the actuators of each carrier, (..., c, a); None if no carrier has any.
         unexplained: Mean acceleration of the platform that was not predicted, (...) [m/s^2], angles times the robot's

@@ -72,8 +72,8 @@ class LengthControl(Controller):
         given = [cable.stiffness or np.inf for cable in self.robot.cables] if stiffness is None else stiffness
         if stiffness is None and np.isinf(given).any() and self.robot.m > self.robot.dof_mask.sum():
             raise InputError(
-                "stiffness must be given, or be in the robot's file, for a robot with more cables than degrees of "
-                f"freedom, whose lengths alone set its tensions, got none for {self.robot.name!r}"
+                "stiffness must be given, here or in the robot's file, for a robot with more cables than degrees of "
+                f"freedom, because its tensions depend on it, got none for {self.robot.name!r}"
             )
         self._EA = repeated("stiffness", given, self.robot.m)
         if not (self._EA > 0).all():

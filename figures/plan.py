@@ -107,7 +107,7 @@ def _draw_tensions(ax: style.Axes, trajectory: xr.Dataset) -> None:
     _draw_phases(ax, trajectory)
     if missing.any():
         shortfall = quantity(float(np.nanmax(trajectory["violation"].values)), "N", digits=3)
-        label = f"no tensions inside the limits:\nshortfall up to {shortfall}; thin\nlines: needed without limits"
+        label = f"no tensions inside the limits:\nshortfall up to {shortfall}; thin\nlines: tensions without limits"
         ax.fill_between(time, 0, 1, missing, transform=ax.get_xaxis_transform(), label=label, **MISSING)
     _draw_limits(ax, trajectory, np.where(np.isfinite(values), values, unlimited))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.inputs import file_path, one_of, printable
+from ..base.text import unbroken
 from ..base.writing import whole_file
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ def marker(index: int) -> str:
 
 
 def typeset(unit: str) -> str:
-    """Return a unit, or text with units, as it is printed: m/s^2 becomes m/s², and [um] becomes [µm]."""
-    return unit.replace("^2", "²").replace("^3", "³").replace("[um]", "[µm]")
+    """Return a unit, or text with units, as it is printed: m/s^2 becomes m/s², [um] becomes [µm]; 5 N is not broken."""
+    return unbroken(unit).replace("^2", "²").replace("^3", "³").replace("[um]", "[µm]")
 
 
 def figure(width: float = COLUMN, height: float = 2.5) -> Figure:

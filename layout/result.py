@@ -93,12 +93,12 @@ class Design(Drawn, Reported, Displayed):
 
     @property
     def cost(self) -> float | None:
-        """Return what cables and winches cost, or None without prices."""
+        """Return the cost of cables and winches, or None without prices."""
         return self._cost_of(self.robot, self.judgement)
 
     @property
     def cost_before(self) -> float | None:
-        """Return what those of the initial robot cost, or None without prices."""
+        """Return the cost of the initial robot's cables and winches, or None without prices."""
         return self._cost_of(self.before, self.judgement_before)
 
     def _cost_of(self, robot: Robot, judgement: Judgement | None) -> float | None:
@@ -165,12 +165,16 @@ class Design(Drawn, Reported, Displayed):
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
             wanted += room_of(self.before, self.requirements).describe()
             wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
-            facts.append(("wanted", f"{' and a '.join(wanted)}; the search does not prove that no layout has them"))
+            listed = ", ".join(f"a {each}" for each in wanted)
+            facts.append(("wanted", f"{listed}; the search does not prove that no layout has all of these"))
         why = [] if self.reasons is None else self._why(self.reasons)
         files = [("The robot's file", to_yaml(self.robot))]
         if (found := self.reasons) is not None:  # whether the layout can be improved
             state = "a local optimum: no small change improves it" if found.local_optimum else "not yet a local optimum"
-            bounds = f"{found.at_bounds} free numbers are at a bound of their box"
+            count, several = found.at_bounds or "no", found.at_bounds > 1
+            bounds = (
+                f"{count} free number{'s are at bounds of their ranges' if several else ' is at a bound of its range'}"
+            )
             if pairing:
                 state, bounds = "the best of all pairings at the poses of the grid", "all points are given"
             facts.append(("layout", f"{state}; {bounds}"))
@@ -192,10 +196,7 @@ class Design(Drawn, Reported, Displayed):
             cables = ", ".join(str(cable + 1) for cable in certificate.at_max)
             idea = ("stronger cables", f"a higher t_max of cables {cables}, a smaller wrench, or larger boxes")
         else:
-            idea = (
-                "another pose",
-                "or anchors whose boxes lie farther along the direction; stronger cables do not help",
-            )
+            idea = ("another pose", "or boxes of anchors farther along the direction; stronger cables do not help")
         return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
 
     def figures(self) -> dict[str, Figure]:

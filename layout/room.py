@@ -98,7 +98,7 @@ class Room(NamedTuple):
         """Return each bound as a text."""
         found = [f"clearance of {quantity(self.clearance, 'm')}"] * (self.clearance > 0.0)
         found += [f"cable length of {quantity_range((self.shortest, self.longest), 'm')}"] * self.limits_lengths
-        found += [f"distance of cables from {each.name} of {quantity(each.least, 'm')}" for each in self.regions]
+        found += [f"distance of {quantity(each.least, 'm')} between cables and {each.name}" for each in self.regions]
         found += [f"height of cables of {quantity(self.lowest, 'm')}"] * (self.lowest > -np.inf)
         return found + [f"natural frequency of {quantity(self.frequency, 'Hz')}"] * (self.frequency > 0.0)
 

@@ -36,11 +36,11 @@ def design(
     progress: Progress | None = None,
     **options: Any,
 ) -> Design:
-    """Find anchors, attachments and tension limits whose smallest capacity margin is largest, or the lowest t_max.
+    """Find anchors, attachments and tension limits with the largest capacity margin at the worst pose.
 
-    Layouts from simulated annealing on few poses are improved by sequential linear programs on all of them, and audits
-    at 100 000 random poses add the worst. The result is judged by `capacity_margin`. It is a local optimum. Carriers
-    are at home.
+    Simulated annealing on a few poses proposes layouts, sequential linear programs on all poses improve them, and
+    audits at 100 000 random poses add the worst of these. The result is judged by `capacity_margin`. It is a local
+    optimum. Carriers are at home.
 
     - `robot`: a `Robot`, the name of one in the library, or the path of a robot file.
     - `free`: numbers to choose: `Free`, or mappings with its keys.

@@ -108,8 +108,8 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
     if not (t_min < lowest).all():
         cable = int(np.argmin(lowest - t_min))
         raise InputError(
-            f"free must keep t_min of cable {cable + 1} below its t_max, got up to {t_min[cable]:g} and from "
-            f"{lowest[cable]:g} [N]"
+            f"free must keep t_min of cable {cable + 1} below its t_max, got t_min up to {t_min[cable]:g} N "
+            f"and t_max from {lowest[cable]:g} N"
         )
     return found
 

@@ -178,7 +178,7 @@ class Dynamics(Displayed):
     ) -> Array:
         """Return the second time derivative of `pose` under the tensions, (..., 6) [m/s^2, rad/s^2].
 
-        Arguments as in `required_wrench`; `tensions`, (..., m) [N], are taken as they are, also beyond their limits.
+        Arguments as in `required_wrench`; `tensions`, (..., m) [N], may be beyond their limits.
         """
         state = {"pose": pose, "velocity": velocity, "tensions": tensions, "carrier_pose": carrier_pose}
         return self._in_wind("acceleration", wind, **state)["acceleration"]

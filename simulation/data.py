@@ -105,7 +105,7 @@ class SimulationData(Displayed):
             lines.append(f"the simulation diverged at t = {self.lasted * self.period:.3f} s")
         at = int(self.error.argmax())  # the first nan, if there is one
         if np.isnan(self.error[at]):
-            lines.append(f"no position at t = {self.times[at]:.3f} s")
+            lines.append(f"the position is undefined at t = {self.times[at]:.3f} s")
         elif self.error[at] > self.tolerance:
             lines.append(
                 f"error of {quantity(1e3 * self.error[at], 'mm')} at t = {self.times[at]:.3f} s "
@@ -126,7 +126,8 @@ class SimulationData(Displayed):
         if self.slack.any():
             row, cable = np.argwhere(self.slack)[0]
             lines.append(
-                f"slack for {quantity(self.slack_s, 's')}, first cable {cable + 1} at t = {self.times[row]:.3f} s"
+                f"slack for {quantity(self.slack_s, 's')}, beginning with cable {cable + 1} at "
+                f"t = {self.times[row]:.3f} s"
             )
         return tuple(lines)
 

@@ -174,7 +174,7 @@ def report(dataset: xr.Dataset) -> Report:
         "tolerance": quantity(1e3 * float(dataset.attrs["tolerance_m"]), "mm"),
         "tensions": f"{quantity(float(dataset['tension_min'].values.min()), 'N')} to "
         f"{quantity(float(dataset['tension_max'].values.max()), 'N')}",
-        "slack": f"in {int((slack > 0).sum())} runs, up to {quantity(float(slack.max()), 's')}"
+        "slack": f"in {_runs(int((slack > 0).sum()))}, up to {quantity(float(slack.max()), 's')}"
         if slack.any()
         else "none",
         "controller status": ", ".join(
@@ -182,11 +182,15 @@ def report(dataset: xr.Dataset) -> Report:
         ),
     }
     return Report(
-        about=f"{name}, {short['runs']} runs of {longest}",
+        about=f"{name}, {_runs(short['runs'])} of {longest}",
         status="passed" if short["passed"] == short["runs"] else "failed",
         summary=f"{short['passed']} passed",
         parts=[Section("", list(rows.items()))],
     )
+
+
+def _runs(count: int) -> str:
+    return f"{count} run{'s' * (count != 1)}"
 
 
 def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:

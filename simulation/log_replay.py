@@ -210,7 +210,7 @@ class Replay(Drawn, Reported, Displayed):
             more = any(after[name] > 2 * noise[name] for name in after)
             return f"{text}; the remainder has other causes" if more else text
         if max(ratios.values()) <= 2:
-            return f"{text}; the model does what the robot did"
+            return f"{text}; the model reproduces the recording"
         return f"{text}; none of {', '.join(one.name for one in self.found)} explains it"
 
     def _facts(self) -> list[Fact]:
@@ -220,7 +220,8 @@ class Replay(Drawn, Reported, Displayed):
             kind = "thrusts" if windows.commanded else "motion of the carriers"
         facts = {
             "commands": kind,
-            "windows": f"{len(windows.starts)} of {quantity(windows.window, 's')}, {outliers} outliers",
+            "windows": f"{len(windows.starts)} of {quantity(windows.window, 's')}, "
+            f"{outliers} outlier{'s' * (outliers != 1)}",
             "error": f"95 % within {_of('position', self.error)} (tolerance {_of('position', self.tolerance)})",
         }
         if self.fitted is not None and self.validation is not None:
@@ -247,9 +248,9 @@ class Replay(Drawn, Reported, Displayed):
     def _explanation_table(self) -> Table:
         rows = []
         for one in self.found:
-            remark = "" if one.named else "no reduction" if one.shown else "not shown by this recording"
+            remark = "" if one.named else "no reduction" if one.shown else "not determined by this recording"
             if one.name in self.named[1:]:
-                remark = "not distinguished from the first"
+                remark = "not distinguishable from the first"
             sigma = quantity(one.sigma * (1e3 if one.name == "delay" else 1.0), digits=2)
             value = f"{_value(one.name, one.value)} +- {sigma}" if one.shown else "-"
             rows.append((one.name, _value(one.name, one.before), value, _share(one) if one.named else "-", remark))
@@ -275,7 +276,7 @@ def replay(
         log, poses, fields: As `path`, `poses` and `fields` of `read_measurements`.
         drive: Type of the commands: "lengths", "tensions", or "forces" of winches (default: recorded commands,
             otherwise measured lengths of elastic cables, otherwise measured tensions).
-        delay: Known delay of the robot behind its recorded commands [s].
+        delay: Known delay from a recorded command to the response of the robot [s].
         window: Duration of a window [s].
         tolerance: Largest position residual for a pass, of 95 % of the samples [m]; default: 0.05 m, or 5 % of the mean
             cable length at home if that is less.

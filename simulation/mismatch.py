@@ -36,7 +36,7 @@ Lag: TypeAlias = Annotated[Amount, _within(0.0, 10.0)]
 class Mismatch(Part):
     """Differences between the simulated robot and its file, which the controller keeps using; by default none.
 
-    A number holds in every run. From a range [low, high] each run draws a number, another one for each cable or
+    A number holds in every run. From a range [low, high] each run draws a number, a different one for each cable or
     carrier; the numbers of a run depend on its seed.
     """
 

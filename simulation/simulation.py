@@ -98,7 +98,7 @@ class Simulation(SimulationData, Filmed, Reported):
         variables["cable_lengths"] = over(cable, record.lengths[rows], "m", "from anchor to attachment")
         variables["tensions_unlimited"] = over(cable, record.commanded[rows], "N", "the same as tensions_commanded")
         missing = np.nan_to_num(record.shortfall[rows])
-        variables["violation"] = over(("time",), missing, "N", "shortfall of the wrench, moments over length")
+        variables["violation"] = over(("time",), missing, "N", "shortfall of the wrench, moments divided by the length")
         variables["tracking_error"] = over(("time",), self.error, "m", "distance from the reference")
         if np.isfinite(record.unexplained[rows]).any():
             about = "mean acceleration of the platform that was not predicted, angles times the robot's length"

@@ -42,7 +42,7 @@ class BatchSolution(Displayed):
         problem: A, w, t_min, t_max, t_ref, weights and length, broadcast. Float64 arrays are views of the arguments: do
             not change them as long as `solution` may be called.
         rho: As given.
-        backend: "lanes" or "c", see `solve_batch`; "python" for sizes that the C core does not take.
+        backend: "lanes" or "c", see `solve_batch`; "python" for sizes that the C core does not support.
     """
 
     tensions: Array  # (..., m)

@@ -60,7 +60,7 @@ class Certificate(Displayed):
         length: The characteristic length [m] of the problem.
         time: For a motion: the instant [s] at which w is required. None for a single problem.
         span: For a motion: start and end [s] of the time around `time` without tensions for the required wrench.
-        wind: For a motion in a box of winds: the velocity of the air [m/s] in {G} at which w is required.
+        wind: For a motion in a range of winds: the velocity of the air [m/s] in {G} at which w is required.
         load: For a motion with a load of uncertain mass or CoM: mass [kg] and CoM [m] with which w is required.
     """
 

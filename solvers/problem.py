@@ -143,7 +143,7 @@ class TensionProblem(Displayed):
 
     @cached_property
     def wrench_scale(self) -> float:
-        """Return a size of wrenches, by which errors are measured: |S w| plus sum |S a_i| times the least |t_i| [N]."""
+        """Return the wrench size to which errors are relative: |S w| plus sum |S a_i| times the least |t_i| [N]."""
         nearest_to_zero = np.minimum(np.maximum(self.t_min, 0.0), self.t_max)
         return float(np.sqrt(self.scaled_w @ self.scaled_w) + self.column_norms @ np.abs(nearest_to_zero))
 

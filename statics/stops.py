@@ -65,8 +65,7 @@ class Stop(Displayed):
         distance: Length of the path of the platform until it rests [m].
         certificate: Certificate of the instant with the largest shortfall; None if tensions inside their limits always
             exist.
-        limit: Of a team of flying carriers: the limit that the stop breaks most, its value and time; empty if it breaks
-            none.
+        limit: For a team of flying carriers: the limit that is exceeded most, with value and time; empty if none is.
         load: Load of the platform from the beginning of the stop until the robot rests; default: no load.
     """
 

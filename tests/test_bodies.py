@@ -358,7 +358,7 @@ def test_wrong_bodies_are_one_line():
     for name in ("cable", "carrier"):
         with pytest.raises(InputError, match=rf"limits.{name}_platform_clearance must be left out without a body"):
             plan("cogiro", still | {"limits": {f"{name}_platform_clearance": 0.1}})
-    with pytest.raises(InputError, match="platform's body must leave all attachments outside by as much as"):
+    with pytest.raises(InputError, match="platform's body must leave all attachments outside by at least"):
         plan(with_body(BOX), still | {"limits": {"cable_platform_clearance": 0.0}})
     for wrong, text in (
         ({"kind": "box", "min": [0, 0, 0], "max": [1, 1, 0]}, "body.min must be smaller than max"),

@@ -199,7 +199,7 @@ def test_locked_cables_leave_scale_and_offset_open():
     result = calibrate(robot, Measurements(readings, poses, sigma=0.2), ("offsets", "scales"))
     assert [text.split(" with ") for text in result.not_identifiable]
     assert all(
-        {f"cables[{i}].offset", f"cables[{i}].scale"} == set(text.split(" with "))
+        {f"cables[{i}].offset", f"cables[{i}].scale"} == set(text.removesuffix(" together").split(", "))
         for i, text in enumerate(sorted(result.not_identifiable))
     )
     np.testing.assert_allclose(result.lengths(readings[0]), truth.mean(axis=0), atol=1e-6)

@@ -118,7 +118,7 @@ def test_a_stated_distance_is_kept_as_it_was_and_warned_of():
     least = nearest(found, y)
     assert 0.05 - 1e-5 <= least < USUAL
     (sentence,) = found.warnings
-    assert sentence.startswith(f"the centre of left comes to {least:.3g} m from 'post' at t = ")
+    assert sentence.startswith(f"the centre of left comes within {least:.3g} m of 'post' at t = ")
     assert f"inside the radius of its body, {USUAL:.3g} m" in sentence
     assert sentence in found.report()
     wide = plan(robot, past(0.3, carriers=USUAL + 0.1, platform=None, cables=None))
@@ -143,7 +143,7 @@ def test_quadrotors_that_meet_are_warned_of():
     robot = pair(radius=2 * BEAM_HALF - USUAL + 0.01)
     (sentence,) = plan(robot, task).warnings
     assert (
-        "the centres of left and right come to 2 m at t = 0.000 s, less than the radii of their bodies together"
+        "the centres of left and right are 2 m apart at t = 0.000 s, less than the sum of the radii of their bodies"
         in sentence
     )
     assert not plan(pair(radius=2 * BEAM_HALF - USUAL - 0.01), task).warnings

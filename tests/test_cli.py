@@ -78,7 +78,7 @@ def test_robots_draws_and_tells_whether_it_can_rest(tmp_path):
     box = json.loads(run("robots", "multi-quadrotor-3", "--json").stdout)["resting_box"]
     assert (box["min"], box["about"], box["samples"]) == ([None] * 3, [0, 0, 0], 0)
     assert (
-        "can rest, in its home attitude, at any position\n    (the carriers move along"
+        "can rest, in its home attitude, at any position\n    (the carriers move with it"
         in run("robots", "multi-quadrotor-3").stdout
     )
 
@@ -196,7 +196,7 @@ def test_plan_writes_a_report_and_a_film(tmp_path):
     assert (answer["report"], answer["animation"]) == ("out/plan.html", "out/plan.gif")
     page = (tmp_path / "out" / "plan.html").read_text()
     assert page.startswith("<!DOCTYPE html>")
-    assert f"{answer['tension_min']:.4g} N in cable" in page
+    assert f"{answer['tension_min']:.4g}\u00a0N in cable" in page  # on one line
     assert "Convergence of the solver" in page
     assert "convergence.png" in [Path(picture).name for picture in answer["figures"]]
     with Image.open(tmp_path / "out" / "plan.gif") as film:

@@ -41,7 +41,9 @@ def test_a_loop_with_the_permitted_bandwidths_is_stable_and_one_that_is_refused_
     assert w[0] / K == pytest.approx(TEAM.bandwidth / TEAM.observer)
     assert not grows(w[0], K, delay)
     assert grows(3 * w[0], 3 * K, delay)
-    with pytest.raises(InputError, match=r"bandwidth and observer must be at most .* of the given ones"):
+    with pytest.raises(
+        InputError, match=r"bandwidth and observer must be at most .* rad/s with a state that is .* late, got"
+    ):
         bandwidths_for(robot, TEAM, {"delay": delay}, 0.0, 3 / (28 * delay) * 8, 3 / (28 * delay) * 20)
 
 
@@ -121,8 +123,8 @@ def test_a_team_is_not_started_with_sensors_that_leave_its_attitude_loops_too_sl
 @pytest.mark.parametrize(
     ("sensors", "message"),
     [
-        ({"delay": 1.0}, "sensors must permit 0.1 of the bandwidths .* rad/s, got a state that is 1 s late"),
-        ({"velocity": 100.0}, "sensors must permit 0.1 of .* got noise of 0 m and 100 m/s"),
+        ({"delay": 1.0}, "sensors must permit 10 % of the default bandwidths, .* rad/s, got a state that is 1 s late"),
+        ({"velocity": 100.0}, "sensors must permit 10 % of .* got noise of 0 m and 100 m/s"),
         ({"delay": -1}, "sensors: delay must be"),
         ({"dealy": 1}, "dealy"),
         (7, "sensors"),
@@ -158,4 +160,4 @@ def test_the_command_line_gives_its_controllers_the_sensors(tmp_path):
     assert printed["error_rms"] == own.to_dict()["error_rms"]
     (tmp_path / "late.yaml").write_text("{delay: 2}")
     refused = run("simulate", "cogiro", "line.nc", "--noise", "late.yaml", cwd=tmp_path, code=2)
-    assert "sensors must permit 0.1 of the bandwidths" in refused.stderr
+    assert "sensors must permit 10 % of the default bandwidths" in refused.stderr

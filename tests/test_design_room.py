@@ -104,7 +104,7 @@ def test_cables_keep_away_from_bodies_and_the_floor(tmp_path):
     assert found.to_dict()["cable_height"] == pytest.approx(robot.anchors[:, 2].min(), abs=1e-9)
     steep = design(before, **wanted(before) | asked | {"keep_out": [{**SHELF, "cables": 3.0}]}, time_limit=0.1)
     assert steep.status == "not-found"
-    assert "distance of cables from shelf of 3 m" in steep.report()
+    assert "distance of 3 m between cables and shelf" in steep.report()
 
 
 def test_cables_of_different_carriers_are_apart_whatever_their_anchors_are():

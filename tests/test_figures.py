@@ -96,7 +96,7 @@ def test_views_of_one_object_have_one_scale(name, figures):
 def test_an_infeasible_stretch_states_what_its_thin_curves_are(figures):
     figure, _ = figures["tensions-infeasible"]
     labels = " ".join(text.get_text().replace("\n", " ") for text in figure.legends[0].get_texts())
-    assert "no tensions inside the limits: shortfall up to 2.13 N; thin lines: needed without limits" in labels
+    assert "no tensions inside the limits: shortfall up to 2.13 N; thin lines: tensions without limits" in labels
     assert "t_max = 60 N, above the plot" in labels
     assert not any(panel.get_title(loc=loc) for panel in figure.axes for loc in ("left", "center", "right"))
 

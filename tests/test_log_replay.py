@@ -113,7 +113,7 @@ def test_the_right_model_leaves_the_noise(kind, logs):
     rms, noise = result.rms(), result.matching.noise
     assert all(rms[name] < 1.5 * noise[name] for name in rms)
     assert rms["position"] < 2 * NOISE["pose"]
-    assert "the model does what the robot did" in result.report()
+    assert "the model reproduces the recording" in result.report()
     assert "input error" not in result.report()
     # Of a robot in a plane, x and z are drawn, and its pitch.
     position, rotation = result.figures()["replay"].axes[:2]

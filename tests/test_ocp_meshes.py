@@ -397,7 +397,7 @@ def test_a_corner_that_is_cut_between_nodes_is_kept_clear_by_the_next_program():
     found = plan(load("ipanema-1"), task, start=around)
     assert found.feasible, found.report()
     audits = [stage.message for stage in found.stages if stage.name == "audit"]
-    assert audits == ["1 other limit exceeded", "passed"]
+    assert audits == ["1 limit exceeded", "passed"]
 
 
 @pytest.mark.parametrize(

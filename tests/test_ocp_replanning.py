@@ -179,7 +179,7 @@ def test_a_state_of_a_controller_is_an_initial_state():
     np.testing.assert_allclose(poses, [pose, *carriers], atol=1e-9)
     np.testing.assert_allclose(velocities[0], 0.05, atol=1e-5)
     far = State(pose, np.zeros(6), carriers + 0.02, 0 * carriers)
-    with pytest.raises(InputError, match=r"initial must have the x of the .* that the task fixes, .*within 0.01"):
+    with pytest.raises(InputError, match=r"initial must have the x of the .* that the task prescribes, .*within 0.01"):
         plan(GROUND, task, initial=far)
 
 

@@ -297,9 +297,12 @@ def test_wrong_boxes_are_one_line(wind, message):
 
 def test_who_has_no_box_of_winds():
     box = {"min": [-1, 0, 0], "max": [1, 0, 0]}
-    with pytest.raises(InputError, match=r"wind must be one wind, .*got a box: carrier 'quad' of kind quadrotor"):
+    with pytest.raises(
+        InputError,
+        match=r"wind must be one velocity .*got a range: the cables pull on carrier 'quad' of kind quadrotor",
+    ):
         lay_out(load("wang-flying-quadrotor"), read_task({"path": CIRCLE, "wind": box}))
-    with pytest.raises(InputError, match=r"without platform\.aero"):
+    with pytest.raises(InputError, match=r"has no platform\.aero"):
         lay_out(load("ipanema-1"), read_task({"path": CIRCLE, "wind": box}))
 
 

@@ -220,7 +220,7 @@ def test_the_command_plans_for_robots(tmp_path):
     assert printed["robust"]["share"] == 0.9
     assert len(printed["robust"]["reach"]) == 8
     done = towline("plan", "cogiro", "rest.yaml", "--robust", "0.9", cwd=tmp_path, code=2)
-    assert "robust must be left out for a robot without an uncertainty in its file" in done.stderr
+    assert "robust must be left out, because the file of robot 'cogiro' has no uncertainty" in done.stderr
 
 
 def test_what_robust_does_not_go_with():
@@ -228,7 +228,7 @@ def test_what_robust_does_not_go_with():
     robot = known("wang-flying", 0.01)
     box = {"min": [-1, 0, 0], "max": [1, 0, 0]}
     for name, task, message in (
-        ("wang-flying", rest | {"wind": box}, "wind must be one wind"),
+        ("wang-flying", rest | {"wind": box}, "wind must be one velocity"),
         ("point-mass-3", rest | {"robust": 1.0}, r"robust must be less than 1, got 1\.0"),
         ("wang-ctmrts", rest, "robust must be left out for a robot with fewer cables than degrees of freedom"),
     ):

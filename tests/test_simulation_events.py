@@ -99,7 +99,7 @@ def test_the_viewer_reads_cuts_and_events(failed, tmp_path):
     assert not before.cut.any()
     assert np.flatnonzero(after.cut).tolist() == [2]
     assert after.nearest != 2
-    assert before.events == ("0.3 s: the controller missed 0.02 s",)
+    assert before.events == ("0.3 s: the controller paused for 0.02 s",)
     assert "0.8 s: cable 3 was cut" in readout(after, replay.robot)
     assert ">cut</td>" in readout(after, replay.robot)
     with xr.open_dataset(tmp_path / "flight.nc", engine="h5netcdf") as file:

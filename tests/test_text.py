@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from towline.base.text import at_most, column, quantity, quantity_range, quantity_row
+from towline.base.text import at_most, column, quantity, quantity_range, quantity_row, unbroken
 
 WRITTEN = [
     (10337.2, "10 340"),
@@ -108,3 +108,16 @@ def test_errors_below_their_resolution_have_no_digits():
     assert at_most(0.00237, "mm", 0.01) == "under 0.01 mm"
     assert at_most(12.3456, "mm", 0.01) == "at most 12.3 mm"
     assert at_most(math.nan, "mm", 0.01) == "at most -"
+
+
+@pytest.mark.parametrize(
+    ("text", "joined"),
+    [
+        ("10 340 N in cable 3 at t = 1.000 s", "10~340~N in cable 3 at t = 1.000~s"),
+        ("5 N m, 2 kg m^2, 3.5 m/s^2, 1 uN", "5~N~m, 2~kg~m^2, 3.5~m/s^2, 1~uN"),
+        ("95 % of 20 robots, tilted by 12 degrees", "95~% of 20 robots, tilted by 12~degrees"),
+        ("cable 3 must have 4 stages", "cable 3 must have 4 stages"),
+    ],
+)
+def test_a_number_and_its_unit_stay_on_one_line(text, joined):
+    assert unbroken(text) == joined.replace("~", "\u00a0")

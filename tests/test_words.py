@@ -162,8 +162,9 @@ def descriptions(schema):
 
 def commands(group, name=()):
     """Return the words of each command, groups included."""
-    nested = getattr(group, "commands", {})
-    return [name, *(words for own, command in nested.items() for words in commands(command, (*name, own)))]
+    context = typer.Context(group)
+    names = group.list_commands(context) if hasattr(group, "list_commands") else []
+    return [name, *(words for own in names for words in commands(group.get_command(context, own), (*name, own)))]
 
 
 @pytest.mark.parametrize("text", ["it is left open", "None: home.", "pose: is -1; accepted: six", "counts as none"])

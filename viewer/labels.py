@@ -73,7 +73,7 @@ def readout(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> s
 def _tension_margin(instant: Snapshot) -> list[str]:
     """Return the tension margin in words; nothing if there is none."""
     known = np.isfinite(instant.margin)
-    return [f"tension margin {quantity(instant.margin, 'N')}, of cable {instant.nearest + 1}"] if known else []
+    return [f"tension margin {quantity(instant.margin, 'N')} (cable {instant.nearest + 1})"] if known else []
 
 
 def decimals(robot: Robot) -> int:
@@ -166,7 +166,7 @@ def note(message: str) -> str:
 def margin_scale(largest: float) -> str:
     """Return the colours of capacity margins from zero to the largest [N] of a workspace, as HTML."""
     return (
-        f'<div style="{BODY}"><div>surface by capacity margin, attitude and carriers at home</div>'
+        f'<div style="{BODY}"><div>surface coloured by capacity margin; attitude and carriers at home</div>'
         f"{_gradient('0', quantity(largest, 'N', 3))}</div>"
     )
 

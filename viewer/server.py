@@ -42,7 +42,7 @@ def serve(subject: Subject, host: str = LOOPBACK, port: int = PORT) -> Iterator[
     Args:
         subject: From `read`.
         host: The address to listen on: 127.0.0.1 for this machine only. There is no password: on any other address,
-            everyone who reaches it can look. Pages of other sites in a browser cannot, whatever the address.
+            anyone who can reach it can watch. Pages of other web sites never can.
         port: The port; if it is in use, one of the next. 0 selects any free port.
 
     Raises `InputError` if `subject` is not a `Subject`, viser is not installed, or the host or port is invalid.

@@ -57,7 +57,7 @@ class Subject(Displayed):
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
 
     def other_at(self, instant: Snapshot) -> Snapshot | None:
-        """Return the instant of the other motion at the same time, or its last one; None without another."""
+        """Return the instant of the other motion at the same time, or its last instant; None without another motion."""
         if self.other is None or instant.time is None:
             return None
         return self.other.at(self.other.index_at(instant.time), prove=False)

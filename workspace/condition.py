@@ -73,7 +73,7 @@ class Condition(Part, ABC):
         return too_few_cables(robot) if self.takes_every_row else None
 
     def for_robots(self, robust: float) -> Condition:
-        """Return the condition for a fraction `robust` of the uncertain robots; unchanged without such a key.
+        """Return the condition for a fraction `robust` of the uncertain robots; unchanged if it has no such key.
 
         Raises `InputError` if `robust` is not a number between 0 and 1.
         """

@@ -25,9 +25,10 @@ def robots() -> str:
         name = entry["name"]
         robot = load(name)
         carriers = ", ".join(f"{count} {kind}" for kind, count in entry["carriers"].items())
+        held = f"{carriers} carrier{'s' * (len(robot.carriers) > 1)}"
         dof = ", ".join(robot.platform.dof)
         rows.append([f"[{name}](#{name})", str(robot.m), str(len(robot.platform.dof)), carriers, f"{entry['mass']:g}"])
-        facts = f"{robot.m} cables, {len(robot.platform.dof)} degrees of freedom ({dof}), carriers: {carriers}."
+        facts = f"{robot.m} cables, {held}, {len(robot.platform.dof)} degrees of freedom ({dof})."
         sections.append(
             f"## {name} {{ #{name} }}\n\n![{name}: carriers, cables and platform](pictures/robots/{name}.png)"
             f"{{ width=400 }}\n\n[Drag it](../live/{name}.html)\n\n{facts}\n\n{escaped(robot.source)}\n"

@@ -180,7 +180,7 @@ def _one(column: np.ndarray, where: np.ndarray, parameters: Parameters, toward: 
     parts += [(abs(value), name) for value, name in zip(changes[rest], parameters.names[rest], strict=True)]
     parts.sort(key=lambda part: -part[0])
     named = [text for size, text in parts if size >= NOTABLE * parts[0][0]][:MOST_NAMED]
-    return " with ".join(named)
+    return ", ".join(named) + " together" * (len(named) > 1)
 
 
 def _direction(unit: np.ndarray, cable: np.ndarray | None) -> str:

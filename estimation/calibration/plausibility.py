@@ -158,7 +158,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
 
 def _better(text: str, before: float, after: float) -> str:
     times = quantity(before / max(after, 1e-12), digits=2)
-    return f"{text}: with this corrected, lengths and poses agree {times} times better"
+    return f"{text}: correcting this makes the differences between lengths and poses {times} times smaller"
 
 
 def _corrected(

@@ -77,7 +77,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
     held_out = result.held_out
     if not np.isfinite(held_out.after):
         return ["no cross-validation: half of the samples are too few, or their fit did not converge"]
-    lines = [f"on validation samples {_mm(held_out.before)} before, {_mm(held_out.after)} after"]
+    lines = [f"residual on validation samples {_mm(held_out.before)} before, {_mm(held_out.after)} after (rms)"]
     fitted = held_out.sets[-1].fitted
     if not held_out.best:
         return (
@@ -85,8 +85,8 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         )
     if set(held_out.best) < set(result.free):
         lines.append(
-            f"{', '.join(held_out.best)} alone predict validation samples equally well: the other parameters do not "
-            f"help"
+            f"with {', '.join(held_out.best)} alone, validation samples are predicted equally well: the other "
+            "parameters do not help"
         )
     elif held_out.after > 1.5 * fitted:
         lines.append(
@@ -104,7 +104,7 @@ def _of_noise(result: CalibrationData) -> list[str]:
             f"below are multiplied by {quantity(result.noise / stated, digits=3)}"
         )
     if result.noise > LACKS * stated and "scales" not in result.free:
-        lines.append("the model lacks something: --free auto tries scales, attachments and others")
+        lines.append("the model is incomplete: --free auto also tries scales, attachments and more")
     turns = turning(result.file, result.measurements) if "attachments" in result.free else None
     if turns is not None and not turns.enough:
         by = quantity(np.degrees(turns.angle), "deg", 2)
@@ -162,7 +162,8 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         f"left out: cables[{one.cable}] at sample {one.sample}, off by {_mm(one.error)}" for one in wrong[:MOST_LISTED]
     ]
     if len(wrong) > MOST_LISTED:
-        lines.append(f"and {len(wrong) - MOST_LISTED} more readings left out")
+        more = len(wrong) - MOST_LISTED
+        lines.append(f"and {more} more reading{'s' * (more > 1)} left out")
     return lines
 
 
@@ -176,5 +177,6 @@ def _of_open(result: CalibrationData) -> list[Part]:
         lines.append(f"hardly determined: {names}; measure other poses, or give a prior")
     if not texts:
         return [*lines, "all directions of the parameters are observable"]
-    title = f"{len(texts)} unobservable directions, along which the file's values are kept:"
+    count = f"{len(texts)} unobservable direction{'s' * (len(texts) > 1)}"
+    title = f"{count}, along which the file's values are kept:"
     return [*lines, Section(title, [("", text) for text in texts])]

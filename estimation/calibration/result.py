@@ -92,7 +92,10 @@ class CalibrationData(Displayed):
         held_out = self.held_out
         if np.isfinite(held_out.after) and held_out.after > max(held_out.before, EXACT * self.stated_sigma):
             before, after = (quantity(1e3 * error, "mm", digits=3) for error in (held_out.before, held_out.after))
-            return f"validation samples fit worse than with the file's robot: {after}, {before} with the file"
+            return (
+                f"validation samples fit worse than with the file's robot: {after} instead of {before}; keep the file, "
+                "or try --free auto, which estimates only what the log shows"
+            )
         return None
 
     @cached_property

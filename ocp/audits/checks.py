@@ -70,7 +70,7 @@ def _still(audited: Instants) -> list[Excess]:
         pose, velocity, acceleration = (part[:, index] for part in audited.carriers)
         if not carrier.free_coordinates(robot.drive):
             moves = np.maximum(np.abs(velocity).max(axis=1), np.abs(acceleration).max(axis=1))
-            why = f"with the drive {robot.drive} only winches move"
+            why = f"the drive {robot.drive} moves only winches"
             exceeded += _above(audited, "drive", carrier.name, moves, STILL_TOLERANCE, "m/s", why)
         free, why = carrier.free_coordinates("both"), f"a carrier of kind {carrier.kind} cannot change it"
         for limit, coordinates, unit in (("carrier_position", POSITION, "m"), ("carrier_attitude", ATTITUDE, "rad")):
@@ -105,7 +105,7 @@ def _lengths(audited: Instants) -> list[Excess]:
     off = np.abs(lengths - kept)
     exceeded = []
     for i in np.flatnonzero(off.max(axis=0) > LENGTH_TOLERANCE):
-        row, why = int(off[:, i].argmax()), "with the drive fixed-length it stays"
+        row, why = int(off[:, i].argmax()), "the drive fixed-length keeps it constant"
         facts = (float(audited.times[row]), float(lengths[row, i]), float(kept[i]), "m", "exactly", why)
         exceeded.append(Excess("cable_length", f"cable {i + 1}", *facts))
     return exceeded
@@ -124,7 +124,7 @@ def _initial(audited: Instants) -> list[Excess]:
                 if order == 0:
                     off[3:] = np.arctan2(np.sin(off[3:]), np.cos(off[3:]))
                 unit = ("m, rad", "m/s, rad/s", "m/s^2, rad/s^2")[order]
-                why = f"away from the {'given end' if end else 'measured start'}"
+                why = f"distance from the {'given end' if end else 'measured start'}"
                 exceeded += _missed(name, about, audited.times[end], np.abs(off).max(), END_TOLERANCE, unit, why)
     if task.final is not None and task.final.rests_anywhere:
         kept = [at_rest_without_acceleration(audited.scenario.robot, None, i) for i in range(6)]
@@ -156,7 +156,7 @@ def _tube_ends(audited: Instants) -> list[Excess]:
         off = [part[-1] - part[0] for part in audited.motion]
         off[0][3:] -= 2 * np.pi * np.round(off[0][3:] / (2 * np.pi))
         worst = np.max(np.abs(off))
-        facts = (worst, END_TOLERANCE, "m, m/s, m/s^2", "away from where it started")
+        facts = (worst, END_TOLERANCE, "m, m/s, m/s^2", "difference from the start")
         return _missed("tube.ends", "platform", scenario.duration, *facts)
     if word not in ("rest", "exact"):
         return []
@@ -179,7 +179,7 @@ def _tube_ends(audited: Instants) -> list[Excess]:
                 counts = word == "exact" or unit == "m" or per == "/s"
                 counts |= per == "/s^2" and at_rest_without_acceleration(scenario.robot, None, place[0])
                 if counts:
-                    why = "off its path at an end" if word == "exact" or not per else "an end at which it should rest"
+                    why = "distance from its path" if word == "exact" or not per else "it must rest there"
                     exceeded += _missed("tube.ends", "platform", end, off, tolerance, unit + per, why)
     return exceeded
 
@@ -227,14 +227,14 @@ def _base_ends(audited: Instants) -> list[Excess]:
         off = [audited.carriers.velocity[:, moving]]
         if at_rest_without_acceleration(scenario.robot, moving[0], 0):
             off.append(audited.carriers.acceleration[:, moving, :3])
-        unit, why = "m/s, m/s^2", "an end at which they should be at rest"
+        unit, why = "m/s, m/s^2", "they must be at rest there"
     elif word == "periodic":
         off, ends = [part[:, moving] - part[0, moving] for part in audited.carriers], [-1]
-        unit, why = "m, m/s, m/s^2", "away from where they started"
+        unit, why = "m, m/s, m/s^2", "difference from the start"
     else:
         references = scenario.references(audited.times)[1]
         off = [audited.carriers[k][:, i] - references[i][k] for i in moving for k in range(2)]
-        unit, why = "m, m/s", "away from `around`"
+        unit, why = "m, m/s", "distance from `around`"
     exceeded = []
     for end in ends:
         worst = np.max([np.abs(part[end]).max() for part in off])  # nan if one is
@@ -249,7 +249,7 @@ def _grounded(audited: Instants) -> list[Excess]:
         return []
     values = np.hstack([audited.off_path, audited.motion.velocity, audited.motion.acceleration])
     off = np.where(resting, np.abs(values).max(axis=1), 0.0)
-    why = "on the ground it rests on its path"
+    why = "on the ground it must rest on its path"
     return _above(audited, "phases.ground", "platform", off, END_TOLERANCE, "m, m/s, m/s^2", why)
 
 

@@ -23,7 +23,7 @@ class Nearest(NamedTuple):
 
     def describe(self, unit: str) -> str:
         """Return the distance in a thousandth of [m] or [rad], with the waypoint and the time."""
-        return f"{quantity(1e3 * self.distance, unit)} ({self.point}, at t = {self.time:.3f} s)"
+        return f"{quantity(1e3 * self.distance, unit)} (most at {self.point}, t = {self.time:.3f} s)"
 
 
 class WaypointDistance(NamedTuple):
@@ -36,7 +36,7 @@ class WaypointDistance(NamedTuple):
         """Return both in one line, except those that are passed exactly."""
         parts = ((self.position, "mm"), (self.attitude, "mrad"))
         said = [nearest.describe(unit) for nearest, unit in parts if nearest.distance > EXACT]
-        return f"passed at up to {' and '.join(said)}" if said else "passed exactly"
+        return f"passed within {' and '.join(said)}" if said else "passed exactly"
 
     def to_dict(self) -> dict[str, Any]:
         """Return {"position": {"point", "distance", "at_s"}, "attitude": {"point", "angle", "at_s"}} for JSON."""

@@ -180,7 +180,7 @@ def _stretched(
     if off[row, cable] <= LENGTH_TOLERANCE:
         return []
     length = float(scenario.dynamics.cable_lengths(platform.pose[row], carriers.pose[row])[cable])
-    kept, why = float(robot.fixed_lengths[cable]), "with the drive fixed-length it stays"
+    kept, why = float(robot.fixed_lengths[cable]), "the drive fixed-length keeps it constant"
     return [Excess("cable_length", f"cable {cable + 1}", float(times[row]), length, kept, "m", "exactly", why)]
 
 

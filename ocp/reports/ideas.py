@@ -31,7 +31,7 @@ def ideas(plan: PlanData) -> list[Fact]:
         return []
     found = [*_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
-    nothing = [("no single change", f"is known that makes it feasible: no duration, limit, {tried}")]
+    nothing = [("no single change", f"makes it feasible, as far as was tried: no duration, limit, {tried}")]
     return found or (nothing if plan.certificate is not None and not units(plan) else [])
 
 
@@ -87,9 +87,9 @@ def _clear_ends(scenario: Scenario) -> list[Fact]:
         elif limit.name == "keep_out":
             blocked.append(ENDS[end])
     if blocked:
-        where = " and at the ".join(blocked)
-        why = f"the robot is inside one at the {where}, and along x, y and z no position was found that helps"
-        facts.append(("other regions", f"or other anchors: {why}"))
+        where = f"at the {' and at the '.join(blocked)} the robot is inside a region"
+        why = "no position along x, y or z was found at which it is not"
+        facts.append(("other regions", f"or other anchors: {where}, and {why}"))
     return facts
 
 

@@ -33,7 +33,11 @@ def motion_facts(plan: PlanData) -> list[Fact]:
         facts.append(("feed", task.path.steadiness()))
         facts += [("ignored words", ", ".join(task.path.ignored))] if task.path.ignored else []
     facts += _accuracy(plan)
-    facts.append(("platform", f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"))
+    if speed > 0:
+        moves = f"up to {quantity(speed, 'm/s')} and {quantity(acceleration, 'm/s^2')}"
+    else:
+        moves = "turns about the origin of its frame" if audit.motion.velocity.any() else "at rest"
+    facts.append(("platform", moves))
     if plan.scenario.phases.extremes:
         facts.append(("loads", LOADS))
     if (stop := plan.stop) is not None:
@@ -48,11 +52,10 @@ def _accuracy(plan: PlanData) -> list[Fact]:
     """Return the distance from the path, and that from its waypoints, which the path itself may round."""
     audit, from_waypoints = plan.audit, plan.waypoint_distance
     error = millimetres(plan.tracking_error_max)
-    if not error.startswith("0 "):
-        error += f" at most, at t = {audit.times[int(audit.tracking_error.argmax())]:.3f} s"
+    worst = f" at most, at t = {audit.times[int(audit.tracking_error.argmax())]:.3f} s" * (not error.startswith("0 "))
     if from_waypoints is None:
-        return [("tracking error", error)]
-    return [("tracking error", f"{error}, from the path"), ("waypoints", from_waypoints.describe())]
+        return [("tracking error", f"{error}{worst}")]
+    return [("tracking error", f"{error} from the path{worst}"), ("waypoints", from_waypoints.describe())]
 
 
 def millimetres(metres: float) -> str:

@@ -88,7 +88,7 @@ def _bounds(plan: PlanData, certificate: Certificate) -> str:
         if cables.size
     ]
     margin = plan.scenario.hard_margin
-    return "; ".join(limits) + (f", with the margin of {quantity(margin, 'N')}" if limits and margin else "")
+    return "; ".join(limits) + (f", with a margin of {quantity(margin, 'N')}" if limits and margin else "")
 
 
 def in_phase(plan: PlanData, time: float | None) -> str:

@@ -226,11 +226,14 @@ def _robots(plan: PlanData) -> list[Fact]:
     row, cable = np.unravel_index(int(margin.reach.argmax()), margin.reach.shape)
     share = f"{quantity(100 * margin.share, '%')} of the robots"
     at = f"in cable {cable + 1} at t = {plan.audit.times[row]:.3f} s"
-    kept = "to first order, tensions inside their limits at all times" if margin.holds else "not all tensions inside"
+    kept = f"to first order, tensions {'' if margin.holds else 'do not always '}stay inside their limits"
     drawn = plan.share_of_robots().holds
     return [
         (share, kept),
-        ("tension spread", f"up to {quantity(margin.reach.max(), 'N')} {at}, {margin.factor:.3g} standard deviations"),
+        (
+            "tension spread",
+            f"up to {quantity(margin.reach.max(), 'N')} {at}, which is {margin.factor:.3g} standard deviations",
+        ),
         ("random samples", f"{int(drawn.sum())} of {len(drawn)} robots have tensions inside their limits throughout"),
     ]
 
@@ -241,8 +244,9 @@ def _jumps(plan: PlanData) -> list[Fact]:
     for time in plan.scenario.phases.jumps:
         after = int(np.searchsorted(plan.audit.times, time * (1 - SAME_TIME)))
         rise = np.abs(plan.audit.tensions[after] - plan.audit.tensions[after - 1]).max()
-        why = "the load changes between two phases off the ground"
-        facts.append(("jump", f"by up to {quantity(rise, 'N')} at t = {time:.3f} s, where {why}"))
+        if np.isfinite(rise):  # tensions exist before and after
+            why = "the load changes between two phases off the ground"
+            facts.append(("jump", f"by up to {quantity(rise, 'N')} at t = {time:.3f} s, where {why}"))
     return facts
 
 

@@ -31,7 +31,9 @@ def trajectory(plan: PlanData) -> Contents:
     variables["cable_lengths"] = over(("time", "cable"), lengths, "m", "from anchor to attachment")
     about = "tensions of least norm without limits; negative: the cable would push"
     variables["tensions_unlimited"] = over(("time", "cable"), audit.tensions_unlimited[rows], "N", about)
-    variables["violation"] = over(("time",), audit.violation[rows], "N", "shortfall of the wrench, moments over length")
+    variables["violation"] = over(
+        ("time",), audit.violation[rows], "N", "shortfall of the wrench, moments divided by the length"
+    )
     variables["tracking_error"] = over(("time",), audit.tracking_error[rows], "m", "distance from the path")
     variables["t_min"] = over(("cable",), robot.t_min, "N", "smallest tension allowed")
     variables["t_max"] = over(("cable",), robot.t_max, "N", "largest tension allowed")

@@ -330,5 +330,5 @@ def describe(audited: Audit) -> str:
         short = quantity(audited.violation.max(), "N")
         lines.append(f"short by up to {short} at t = {audited.times[audited.worst]:.3f} s")
     if count := sum(not lines or each.limit != TENSIONS for each in audited.excess):
-        lines.append(f"{count} other limit{'s' * (count > 1)} exceeded")
+        lines.append(f"{count} {'other ' if lines else ''}limit{'s' * (count > 1)} exceeded")
     return ", ".join(lines)

@@ -268,7 +268,8 @@ def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
     mass = max(masses, default=0.0)
     if mass == 0.0:
         return []
-    every = "in each phase" if len({*masses, 0.0}) == 2 else "the others by the same factor"
+    others = "in each phase" if len({*masses, 0.0}) == 2 else "the others by the same factor"
+    every = f", {others}" if sum(each > 0 for each in masses) > 1 else ""
 
     def lighter(load: Load | None, share: float) -> Load | None:
         if load is None:
@@ -279,7 +280,7 @@ def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
     def with_loads(share: float) -> Variation:
         carried = tuple(phase.model_copy(update={"load": lighter(phase.load, share)}) for phase in phases)
         task = scenario.task.model_copy(update={"phases": carried})
-        return lay_out(scenario.robot, task), share * mass, f"instead of {quantity(mass, 'kg')}, {every}"
+        return lay_out(scenario.robot, task), share * mass, f"instead of {quantity(mass, 'kg')}{every}"
 
     return _largest(search, with_loads, f"phases[{masses.index(mass)}].load.mass", "kg")
 

@@ -71,7 +71,7 @@ def _check_ground(robot: Robot, task: Task, where: str) -> None:
     if task.path.frame != "world":
         raise InputError(f"{where}: phases.path.frame must be 'world' on the ground, got {task.path.frame!r}")
     if isinstance(task.wind, WindBox | WindDisc):
-        raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with a phase on the ground, got a box")
+        raise InputError(f"{where}: wind must be one velocity (x, y, z) [m/s] with a phase on the ground, got a range")
 
 
 def _check_tolerances(task: Task, where: str) -> None:
@@ -126,8 +126,9 @@ def _supported(scenario: Scenario, columns: np.ndarray, needed: np.ndarray, name
             f"difference, got {-up @ needed[:3]:.6g} N less"
         )
     raise InputError(
-        f"{named[0]}.ground.support must have points about the centre of mass of the load that it bears where "
-        f"{named[1]} begins or ends, got points whose forces miss {missed[0]:.3g} N of {size:.3g} N, with moments"
+        f"{named[0]}.ground.support must have points all round the centre of mass of what the ground bears where "
+        f"{named[1]} begins or ends, got points at which {missed[0]:.3g} N of {size:.3g} N, moments included, are "
+        "without support"
     )
 
 

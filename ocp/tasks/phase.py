@@ -90,7 +90,7 @@ def path_of(phases: Sequence[Phase]) -> SequencePath:
             raise ValueError(f"{key}.name must be unique, got {phase.name!r} twice")
         if path is None:
             if not joined:
-                raise ValueError(f"{key}.path must be a path, since no phase comes before, got nothing")
+                raise ValueError(f"{key}.path must be a path, since no phase comes before it, got nothing")
             before, seconds = joined[-1]
             x, y, z, roll, pitch, yaw = before.at(np.array([seconds]), seconds).pose[0].tolist()
             pose: Pose = (x, y, z, roll, pitch, yaw)

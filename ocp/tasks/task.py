@@ -218,7 +218,7 @@ class Task(Part):
             return self
         for key in ("path", "duration"):
             if key in self.model_fields_set and getattr(self, key) is not None:
-                raise ValueError(f"{key} must be left out with phases, which have theirs")
+                raise ValueError(f"{key} must be left out with phases, which have their own")
         object.__setattr__(self, "path", path_of(self.phases))
         return self
 
@@ -265,7 +265,7 @@ class Task(Part):
     def seconds(self) -> float:
         """Return the duration of the motion [s]; for a range its geometric mean, from which the planner starts.
 
-        If the path has dwell times, durations below their sum are left out.
+        If the path has dwell times, durations below their sum are excluded.
 
         Raises:
             InputError: If neither the task nor its path gives it.

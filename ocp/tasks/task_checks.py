@@ -83,14 +83,14 @@ def check_margin(robot: Robot, task: Task) -> None:
 def _check_wind(robot: Robot, task: Task, where: str) -> None:
     """Refuse wind for a robot without `aero`, and a box of winds if the motion depends on the tensions."""
     if task.wind is not None and robot.platform.aero is None:
-        raise InputError(f"{where}: wind must be left out for a robot without platform.aero, such as {robot.name!r}")
+        raise InputError(f"{where}: wind must be left out, because robot {robot.name!r} has no platform.aero")
     if not isinstance(task.wind, WindBox | WindDisc):
         return
     for carrier in robot.carriers:
         if carrier.efforts:
             raise InputError(
-                f"{where}: wind must be one wind, (x, y, z) [m/s], got a box: carrier {carrier.name!r} of kind "
-                f"{carrier.kind} moves with the pull of its cables, so that no motion is the same in every wind"
+                f"{where}: wind must be one velocity (x, y, z) [m/s], got a range: the cables pull on carrier "
+                f"{carrier.name!r} of kind {carrier.kind}, so its motion depends on the wind"
             )
 
 
@@ -98,16 +98,16 @@ def _check_robust(robot: Robot, task: Task, where: str) -> None:
     """Refuse what the differences between robots are not known for."""
     if task.robust is None:
         return
-    missing = "must be left out for a robot without an uncertainty in its file"
     if robot.uncertainty is None:
-        raise InputError(f"{where}: robust {missing}, such as {robot.name!r}, got {task.robust:g}")
+        missing = f"because the file of robot {robot.name!r} has no uncertainty"
+        raise InputError(f"{where}: robust must be left out, {missing}, got {task.robust:g}")
     if robot.m < len(robot.platform.dof):
         raise InputError(
             f"{where}: robust must be left out for a robot with fewer cables than degrees of freedom, because its "
             f"motion depends on its geometry, got {task.robust:g} for {robot.name!r}"
         )
     if isinstance(task.wind, WindBox | WindDisc):
-        raise InputError(f"{where}: wind must be one wind, (x, y, z) [m/s], with robust, got a box")
+        raise InputError(f"{where}: wind must be one velocity (x, y, z) [m/s] with robust, got a range")
     for phase in task.phases or ():
         if phase.ground is not None:
             raise InputError(f"{where}: robust must be left out with phases on the ground, got phase {phase.name!r}")
@@ -151,13 +151,13 @@ def _check_times(task: Task, where: str) -> None:
         for name, path in paths.items():
             if path.natural_duration is not None or (path.resting and path is not task.path):
                 raise InputError(
-                    f"{where}: duration must be a number [s], got a range, while {name} of kind {path.kind} has "
-                    "times of its own; paths of kind rest, line, and waypoints without times take a range"
+                    f"{where}: duration must be a number [s], because {name} of kind {path.kind} has its own "
+                    "times, got a range; paths of kind rest, line, and waypoints without times take a range"
                 )
             if path.resting and (task.tube.radius or task.tube.turn or isinstance(task.base, FreeBase)):
                 raise InputError(
-                    f"{where}: duration must be a number [s] where path has a dwell and tube or base leave the motion "
-                    "free, got a range"
+                    f"{where}: duration must be a number [s], because path has a dwell and tube or base leave the "
+                    "motion free, got a range"
                 )
     for name, path in paths.items():
         end = path.natural_duration if path.kind in ENDING else None
@@ -202,8 +202,9 @@ def _check_waypoints(task: Task, where: str) -> None:
         for name, value, most, unit in (("position", off, tube.radius, "m"), ("attitude", turned, tube.turn, "rad")):
             if value > most + TOLERANCE:
                 raise InputError(
-                    f"{where}: tube.{name} must be at least {value:.3g} {unit}, by which legs pass points[{index}], "
-                    f"since tube.waypoints is exact, got {most:g} {unit}; legs with path.blend 0 rest at their points"
+                    f"{where}: tube.{name} must be at least {value:.3g} {unit}, the distance at which the legs pass "
+                    f"points[{index}], because tube.waypoints is exact, got {most:g} {unit}; with path.blend 0 the "
+                    "motion stops at the points"
                 )
 
 
@@ -238,7 +239,7 @@ def _check_limits(robot: Robot, task: Task, limits: Limits, where: str) -> None:
     its = list(bodies(robot, task))
     if not its and not (carrier is None and cable is None):
         key = ("cable" if carrier is None else "carrier") + "_platform_clearance"
-        missing = f"a body: robot {robot.name!r} has no platform.body, and no load one"
+        missing = f"a body: robot {robot.name!r} has no platform.body, and no load has a body"
         raise InputError(f"{where}: limits.{key} must be left out without {missing}")
     if cable is not None:
         for body, whose, _ in its:
@@ -251,7 +252,7 @@ def _check_attachments(robot: Robot, body: Shape, least: float, which: str, key:
         outside = float(point_outside(body, ca.DM(attachment)))
         if outside < least:
             raise InputError(
-                f"{which} must leave all attachments outside by as much as {key}, {least:g} m, got {outside:.3g} m "
+                f"{which} must leave all attachments outside by at least {key}, {least:g} m, got {outside:.3g} m "
                 f"for cable {index + 1}"
             )
 
@@ -267,8 +268,8 @@ def _check_ends_of_range(scenario: Scenario, where: str) -> None:
         given = rests if state is None else any(order for order, _ in state.of(None))
         if given and np.abs(velocity[end]).max() > TOLERANCE:
             raise InputError(
-                f"{where}: duration must be a number where a velocity is given at the {name} and the path moves there, "
-                "got a range; a line rests there with path.timing smooth, a circle moves"
+                f"{where}: duration must be a number, because a velocity is given at the {name} and the path does not "
+                "rest there, got a range; a line with path.timing smooth rests there, a circle never does"
             )
 
 
@@ -283,10 +284,10 @@ def _check_state(scenario: Scenario, where: str, end: int, key: str, state: Init
                     off = remainder(off, 2 * np.pi)
                 if (owner, i) not in scenario.owners() and abs(off) > TOLERANCE:
                     what = ("", "speed of ", "acceleration of ")[order]
-                    hint = "a tube or a free base may leave it"
+                    hint = "only a tube or a free base permits another value"
                     if owner is None and not scenario.robot.dof_mask[i]:
                         hint = f"{coordinate} is not one of the platform's degrees of freedom"
                     raise InputError(
-                        f"{where}: {key} must have the {what}{coordinate} of the {name} that the task fixes at its "
-                        f"{'end' if end else 'start'}, {value[i] - off:g}, got {value[i]:g}; {hint}"
+                        f"{where}: {key} must have the {what}{coordinate} of the {name} that the task prescribes at "
+                        f"its {'end' if end else 'start'}, {value[i] - off:g}, got {value[i]:g}; {hint}"
                     )

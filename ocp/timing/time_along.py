@@ -57,11 +57,11 @@ def time_along(
     and dwells; the dwell times are part of the duration. Circles end after the task's duration at their own rate, or
     after one turn; any other duration is ignored. Carriers rest or follow given paths with the same parameter s.
 
-    The task's limits on speeds and accelerations of platform, cables and carriers apply, and the robot file's limits of
-    moving mobile carriers. The tension limits, reduced by the task's margin, are the facets of the available wrench
-    set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to time-optimal path parameterization based
-    on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points, so tensions jump there.
-    The extra `timing` installs it.
+    The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
+    limits of mobile carriers that move. The tension limits, reduced by the task's margin, enter as the facets of the
+    available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to time-optimal path
+    parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant between grid points,
+    so tensions jump there. The extra `timing` installs it.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.

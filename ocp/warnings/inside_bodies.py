@@ -33,7 +33,7 @@ def into_places(seen: Instants, limits: Sequence[Limit], limited: Sequence[np.nd
             radius, row = robot.carrier_radius[index], int(values[:, column].argmin())
             if limit.low < radius - LEAST and values[row, column] < radius - LEAST:
                 name, distance = robot.carriers[index].name, quantity(abs(values[row, column]), "m", 3)
-                comes = f"comes to {distance} from" if values[row, column] >= 0 else f"is {distance} inside"
+                comes = f"comes within {distance} of" if values[row, column] >= 0 else f"is {distance} inside"
                 sentence = f"the centre of {name} {comes} {limit.called!r} at t = {seen.times[row]:.3f} s"
                 wide = f", inside the radius of its body, {quantity(radius, 'm', 3)}"
                 meetings.append((float(radius - values[row, column]), sentence + wide))
@@ -49,8 +49,8 @@ def into_each_other(seen: Instants) -> list[str]:
         row, least = int(apart.argmin()), radii[i] + radii[j]
         if apart[row] < least - LEAST:
             names = f"{robot.carriers[i].name} and {robot.carriers[j].name}"
-            sentence = f"the centres of {names} come to {quantity(apart[row], 'm', 3)} at t = {seen.times[row]:.3f} s"
-            wide = f", less than the radii of their bodies together, {quantity(least, 'm', 3)}"
+            sentence = f"the centres of {names} are {quantity(apart[row], 'm', 3)} apart at t = {seen.times[row]:.3f} s"
+            wide = f", less than the sum of the radii of their bodies, {quantity(least, 'm', 3)}"
             meetings.append((float(least - apart[row]), sentence + wide))
     return _worst(meetings, "limits.carrier_separation: radius keeps them apart")
 
@@ -100,5 +100,5 @@ def between_points(seen: Instants, limits: Sequence[Limit], limited: Sequence[np
     others = f" (and {len(meetings) - 1} more)" * (len(meetings) > 1)
     return [
         f"{called} passes between the points of the platform: it is {quantity(-depth, 'm', 3)} inside the hull of "
-        f"centre of mass and attachments{when}{others}; a platform.body in the robot's file would keep it out"
+        f"its centre of mass and attachments{when}{others}; a platform.body in the robot's file would keep it out"
     ]

@@ -49,7 +49,7 @@ def outside_frame(seen: Instants) -> list[str]:
             sentences.append(
                 f"{LEAVES}: {part} is {quantity(beyond[row, point], 'm', 3)} "
                 f"{side.name} at t = {seen.times[row]:.3f} s, at ({where}) m; "
-                "limits.platform_box bounds where it goes"
+                "limits.platform_box can keep it inside"
             )
     return sentences
 

@@ -96,7 +96,7 @@ class Miss(Event):
 
     @override
     def describe(self, robot: Robot) -> str:
-        return f"the controller missed {quantity(self.duration, 's')}"
+        return f"the controller paused for {quantity(self.duration, 's')}"
 
     @override
     def begin(self, running: Running) -> None:

@@ -13,10 +13,10 @@ from .event import Event, Running, number_in
 
 
 class Carry(RigidLoad, Event):
-    """The platform carries a load from now on, instead of the last one; a mass of 0 releases it.
+    """The platform carries a load from now on, instead of any earlier one; a mass of 0 releases it.
 
     The load moves with the platform when it is picked up, as in the phases of a plan, so no velocity changes. Wind and
-    pushes act at the CoM of both.
+    pushes act at the common CoM.
     """
 
     kind: Literal["carry"] = "carry"
@@ -44,5 +44,5 @@ class Carry(RigidLoad, Event):
 
     @override
     def begin(self, running: Running) -> None:
-        """Give the platform the mass, CoM and inertia of both; the state of a plant describes the CoM."""
+        """Give the platform the mass, CoM and inertia of platform and load; the state of a plant describes the CoM."""
         running.carry(self.on(running.plant.robot))

@@ -168,7 +168,7 @@ function run({ at, rest }) {
     const tensions = instant ? instant.tensions : DATA.t_min.map(() => NaN);
     const spare = tensions.map((t, i) => Math.min(t - DATA.t_min[i], DATA.t_max[i] - t)), nearest = spare.indexOf(Math.min(...spare));
     const facts = [];
-    if (nearest >= 0) facts.push(`tension margin ${quantity(spare[nearest], "N")}, of cable ${nearest + 1}`);
+    if (nearest >= 0) facts.push(`tension margin ${quantity(spare[nearest], "N")} (cable ${nearest + 1})`);
     if (instant && Number.isFinite(instant.margin)) facts.push(`capacity margin ${quantity(instant.margin, "N")}`);
     $("margins").textContent = facts.join("; ");
     $("proof").textContent = instant && instant.certificate ? described(instant.certificate) : "";

@@ -37,6 +37,4 @@ class WrenchClosure(Condition):
         count = wrench_rows(robot).size
         if robot.m > count:
             return None
-        return (
-            f"wrench closure of {count} degrees of freedom takes at least {count + 1} cables; the robot has {robot.m}"
-        )
+        return f"wrench closure of {count} degrees of freedom needs {count + 1} cables or more; the robot has {robot.m}"

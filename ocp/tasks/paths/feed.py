@@ -72,7 +72,9 @@ class FeedPath(PathBase):
                     f"points[{index + 1}] must differ from points[{index}]; to stop at a point, write dwell"
                 )
             if max(abs(a - b) for a, b in zip(before[3:], after[3:], strict=True)) > SAME:
-                raise ValueError(f"points[{index + 1}] must have the attitude of points[0]: at a feed it does not turn")
+                raise ValueError(
+                    f"points[{index + 1}] must have the attitude of points[0], which is constant on a path of kind feed"
+                )
         return self
 
     @cached_property
@@ -120,7 +122,8 @@ class FeedPath(PathBase):
         if between.any():
             worst = int(np.argmin(np.where(between, slower, np.inf)))
             percent = quantity(100 * slower[worst], "%", digits=3)
-            text += f"; slower in {between.sum()} corners, down to {percent} of it at points[{worst}]"
+            corners = f"{between.sum()} corner{'s' * int(between.sum() > 1)}"
+            text += f"; slower in {corners}, down to {percent} of the feed at points[{worst}]"
         stops = int(self.curve.sharp[1:-1].sum())
         return text + (f"; {stops} stop{'s' * (stops > 1)} between the ends" if stops else "")
 

@@ -138,8 +138,8 @@ class WaypointPath(PathBase):
         for index, (before, after) in enumerate(pairwise(self.times or ())):
             if dwell[index] >= after - before:
                 raise ValueError(
-                    f"dwell[{index}] must be less than the {after - before:g} s from point to point by times, got "
-                    f"{dwell[index]:g} s"
+                    f"dwell[{index}] must be less than the {after - before:g} s that times give until the next point, "
+                    f"got {dwell[index]:g} s"
                 )
 
     def _check_pitch(self) -> None:
