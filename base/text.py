@@ -17,7 +17,9 @@ PREFIXES = ("n", "u", "m", "", "k", "M", "G")  # in steps of a thousand
 PREFIXED = ("N", "m", "s", "rad", "g", "W", "Hz", "Pa")  # symbols that take a prefix
 OTHERS = {"m^2": ("mm^2", 1e6), "m^3": ("cm^3", 1e6)}  # what a small value is written in, and how many make one
 UNITS = rf"[{''.join(PREFIXES)}c]?(?:{'|'.join(PREFIXED)})|degrees?"
-INSIDE = re.compile(rf"(?<=\d) (?=(?:{UNITS}|\d{{3}})\b|%)|(?:(?<=\bN)|(?<=\bkg)) (?=m\b)")  # of "10 340 N m", "95 %"
+INSIDE = re.compile(  # "10 340 N m", "95 %", "t = 1.5 s"
+    rf"(?<=\d) (?=(?:{UNITS}|\d{{3}})\b|%)|(?:(?<=\bN)|(?<=\bkg)) (?=m\b)|(?<=\b[a-z]) (?== )|(?<=\b[a-z] =) (?=\S)"
+)
 
 
 def quantity(value: Number, unit: str = "", digits: int = DIGITS) -> str:

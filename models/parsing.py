@@ -133,9 +133,11 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     if kind == "union_tag_not_found":
         return f"{field}.kind is missing: one of {', '.join(tags)}"
     if kind == "too_short":
-        return f"{field} must have at least {context['min_length']} items, got {context['actual_length']}"
+        least = context["min_length"]
+        return f"{field} must have at least {least} item{'s' * (least != 1)}, got {context['actual_length']}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
-        message = f"must be a mapping with {_keys(node)}, got {shown(value)}"
+        kinds = f", one of {', '.join(tags)}" if tags else ""
+        message = f"must be a mapping with {_keys(node)}{kinds}, got {shown(value)}"
     else:
         message = detail["msg"]
         if kind == "string_pattern_mismatch":

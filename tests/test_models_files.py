@@ -71,7 +71,7 @@ WRONG = {
         r"carriers\[1\]\.reach\.min must not exceed max, .* m along y, got 3 m",
     ),
     "zero length": ("anchor: [0, 0, 2]", "anchor: [0, 0.1, 0.75]", r"cables\[0\] must have a length > 0 m at home"),
-    "no cables": (GOOD[GOOD.index("cables:") :], "cables: []\n", r"cables must have at least 1 items, got 0"),
+    "no cables": (GOOD[GOOD.index("cables:") :], "cables: []\n", r"cables must have at least 1 item, got 0"),
     "position of two": ("attachment: [0, 0, 0]", "attachment: [0, 0]", r"attachment must be 3 numbers, got \[0, 0\]$"),
     "duplicate key": (
         "source: a test",

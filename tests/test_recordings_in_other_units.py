@@ -211,7 +211,7 @@ def test_an_ahrs_in_north_east_down(tmp_path):
     user.write(tmp_path / "ned.csv", head.replace("_deg", "").split(","), rows)  # degrees, though nothing says so
     options = ("--free", "offsets", "--fix", "--json")
     told = json.loads(towline("calibrate", robot, "ned.csv", *options, cwd=tmp_path).stdout)
-    assert any("degrees read as radians, in a frame of north, east, down" in note for note in told["notes"])
+    assert any("degrees read as radians, in axes north, east, down" in note for note in told["notes"])
     for one, offset in zip(told["parameters"], offsets, strict=True):
         assert abs(one["value"] - offset) < 4 * one["sigma"] + 5e-3
 

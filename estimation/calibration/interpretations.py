@@ -70,10 +70,10 @@ def interpretations(turns: bool) -> list[Interpretation]:
             )
     result += [Interpretation(text, turned=turned) for text, turned in conventions.items()]
     for axis, turn in FROM_NED.items():
-        text = f"in a frame of north, east, down and a body's of forward, right, down, with x of {{G}} to the {axis}"
+        text = f"in axes north, east, down (of the body: forward, right, down), with x of {{G}} to the {axis}"
         result += [
             Interpretation(
-                f"the poses look measured {text}",
+                f"the poses seem to be measured {text}",
                 lambda x, turn=turn: x @ turn.T,
                 lambda R, _, turn=turn: turn @ R @ FROM_FRD,
             ),

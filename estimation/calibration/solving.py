@@ -222,10 +222,11 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     equations = int(np.maximum(spare, 0).sum())
     wanted = int((parameters.varies & np.isinf(model.prior_sigmas)).sum())
     if equations < wanted or equations == 0:
-        poses = f" beside {int(unknown.any(axis=1).sum())} unknown poses" if unknown.any() else ""
+        lost = int(unknown.any(axis=1).sum())
+        poses = f" with {lost} unknown pose{'s' * (lost > 1)}" if lost else ""
         raise InputError(
-            f"measurements must have as many lengths as there are parameters{poses}, {wanted}, or a prior, got "
-            f"{len(measurements)} samples of {robot.m} cables, which leave {equations}"
+            f"measurements must give an equation for each of the {wanted} parameters without a prior, got {equations} "
+            f"from {len(measurements)} samples of {robot.m} cables{poses}"
         )
 
 

@@ -142,7 +142,7 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     there = np.asarray(np.isfinite(poses[..., :3]).any(axis=(0, 2)))
     lost = ", ".join(robot.carriers[i].name for i in moving if not there[i])
     if lost:
-        read.notes.append(f"the log has no poses of {lost}, which are taken to be at home")
+        read.notes.append(f"the log has no poses of {lost}: taken to be at home")
     if not there[moving].any():
         return read
     poses[:, ~there], thrusts[:, ~there] = robot.carrier_home[~there], np.nan
@@ -155,7 +155,7 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     if not kept.any():
         raise InputError("lengths and poses of carriers must have samples at the same times, got none")
     if not kept.all():
-        read.notes.append(f"{quantity(int((~kept).sum()))} samples without poses of carriers are left out")
+        read.notes.append(f"samples left out because carriers have no poses: {quantity(int((~kept).sum()))}")
     tensions = None
     axis = ned_frame(robot, measured.poses, poses)
     if axis is not None:
@@ -254,9 +254,8 @@ def measurements_of(
     if position is not None and orientation is not None:
         orientation = at_times(position.times, orientation, found.orientation[0])
     if position is not None and (lost := frozen(position.values)).any():
-        notes.append(
-            f"{quantity(int(lost.sum()))} positions are left out, which repeat the one before until the platform jumps"
-        )
+        count = quantity(int(lost.sum()))
+        notes.append(f"positions left out because they repeat the one before until the platform jumps: {count}")
         position = Samples(position.times, np.where(lost[:, None], np.nan, position.values))
     pose = position or orientation
     source = (found.position or found.orientation or (main,))[0]
@@ -289,7 +288,7 @@ def measurements_of(
     if tensions is not None:
         kept &= _kept(tensions.values, found.tensions)
     if not kept.all():
-        notes.append(f"left out, without all lengths or tensions: {quantity(int((~kept).sum()))}")
+        notes.append(f"samples left out because lengths or tensions are missing: {quantity(int((~kept).sum()))}")
     arguments: dict[str, Any] = {"times": None if lengths.times is None else (lengths.times - begin)[kept]}
     for name, one in (("tensions", tensions), ("poses", position), ("orientations", orientation)):
         if one is not None:
@@ -357,7 +356,7 @@ def _merged(
     if not kept.any():
         raise InputError("lengths and poses must have samples at the same times, got none")
     if not kept.all():
-        notes.append(f"{quantity(int((~kept).sum()))} samples that not all sensors have are left out")
+        notes.append(f"samples left out because not all sensors have them: {quantity(int((~kept).sum()))}")
     forces = None if forces is None else Samples(at[kept], forces[kept])
     turned = None if quaternions is None else quaternions[kept]
     return Samples(at[kept], moved[kept]), forces, places[kept], turned

@@ -41,8 +41,8 @@ def motion_facts(plan: PlanData) -> list[Fact]:
     if plan.scenario.phases.extremes:
         facts.append(("loads", LOADS))
     if (stop := plan.stop) is not None:
-        over = f"over {quantity(stop.distance, 'm')} from t = {stop.begins:.3f} s"
-        facts.append(("stops", f"in at most {quantity(stop.duration, 's')}, {over}"))
+        worst = f"from t = {stop.begins:.3f} s, over {quantity(stop.distance, 'm')}"
+        facts.append(("stops", f"in at most {quantity(stop.duration, 's')} ({worst})"))
     if task.wind is not None:
         facts.append(("wind", _task_wind(task)))
     return facts

@@ -162,7 +162,7 @@ def _check_jumps(scenario: Scenario, phases: Phases, where: str) -> None:
     task = scenario.task
     if not phases.jumps:
         return
-    change = f"since the load changes at {phases.jumps[0]:g} s with no adjacent phase on the ground: tensions jump"
+    change = f"because tensions jump where the load changes off the ground, at {phases.jumps[0]:g} s"
     if task.limits.tension_rate is not None:
         raise InputError(
             f"{where}: limits.tension_rate must be left out {change}, got {task.limits.tension_rate:g} N/s"
