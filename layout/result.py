@@ -126,11 +126,13 @@ class Design(Drawn, Reported, Displayed):
         if self.requirements.clearance > 0.0:
             text += f", cables {quantity(self.clearance, 'm')} apart"
         if self.requirements.cable_length is not None and self.lengths is not None:
-            text += f", cables of {quantity_range(self.lengths, 'm')}"
+            text += f", cable lengths {quantity_range(self.lengths, 'm')}"
         if self.judgement is not None:
-            text += "".join(f", {quantity(distance, 'm')} from {name}" for name, distance in self.judgement.distances)
+            text += "".join(
+                f", cables {quantity(distance, 'm')} from {name}" for name, distance in self.judgement.distances
+            )
             if self.requirements.cable_floor_clearance is not None:
-                text += f", not below z = {quantity(self.judgement.height, 'm')}"
+                text += f", no cable below z = {quantity(self.judgement.height, 'm')}"
         return text
 
     def _headline(self) -> str:

@@ -38,6 +38,7 @@ BLOCK = 4  # windows that follow each other are fitted, or validate the fit
 GAIN = 0.99  # of the squared residuals of validation windows: what a fit must leave at most
 DRIVES = ("lengths", "tensions", "forces")
 LATEST = 0.2  # [s]
+FACTORS = ("mass", "stiffness")  # relative to the file
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,13 +200,18 @@ class Replay(Drawn, Reported, Displayed):
         ratios = {name: rms[name] / noise[name] for name in rms}
         first, worst = next(iter(rms)), max(ratios, key=lambda name: ratios[name])
         shown = [first] if ratios[worst] < 2 * max(ratios[first], 1.0) else [first, worst]
-        each = (f"{name} residual {_of(name, rms[name])} rms, noise {_of(name, noise[name])}" for name in shown)
+        each = (
+            f"{name.removesuffix('s')} residual {_of(name, rms[name])} rms, noise {_of(name, noise[name])}"
+            for name in shown
+        )
         text = "; ".join(each)
         if self.windows.recorded.doubt:
             return f"{text}; {self.windows.recorded.doubt}"
         if self.named:
             best = self.found[0]
-            text += f"; {' or '.join(self.named)} explains {_share(best)}: {_value(best.name, best.value)}"
+            text += (
+                f"; {' or '.join(self.named)} explains {_share(best)} of the residuals: {_value(best.name, best.value)}"
+            )
             after = self._rms(self.explained or {})
             more = any(after[name] > 2 * noise[name] for name in after)
             return f"{text}; the remainder has other causes" if more else text
@@ -251,7 +257,10 @@ class Replay(Drawn, Reported, Displayed):
             remark = "" if one.named else "no reduction" if one.shown else "not determined by this recording"
             if one.name in self.named[1:]:
                 remark = "not distinguishable from the first"
-            sigma = quantity(one.sigma * (1e3 if one.name == "delay" else 1.0), digits=2)
+            if one.name in FACTORS:
+                sigma = f"{max(100 * one.sigma, 0.001):.2g} %"
+            else:
+                sigma = quantity(one.sigma, "s" if one.name == "delay" else "N", 2)
             value = f"{_value(one.name, one.value)} +- {sigma}" if one.shown else "-"
             rows.append((one.name, _value(one.name, one.before), value, _share(one) if one.named else "-", remark))
         title, columns = "Parameters that may explain them, each fitted alone", ("", "model", "best", "explains", "")
@@ -332,7 +341,7 @@ def _of(kind: str, value: float) -> str:
 
 
 def _value(name: str, value: float) -> str:
-    if name in ("mass", "stiffness"):
+    if name in FACTORS:
         return f"{value:.4g} times the file's"
     return quantity(1e3 * value, "ms", 3) if name == "delay" else quantity(value, "N", 3)
 

@@ -18,6 +18,7 @@ from .reasons import exceeded, in_phase, reasons, up
 WORTH_A_NUMBER = 1e-3  # [N], of a margin
 RESOLVED = 1e-3  # [mm, mrad]: a smaller error of a simulation is rounding
 SAME_LENGTH = 1e-9  # [m]
+FEW = 3  # pairs of tension limits that are written out
 AT_REST = 1e-5  # [m/s]: a smaller speed of a cable is rounding
 TRY = "What you can try"
 
@@ -214,8 +215,8 @@ def _tensions(plan: PlanData) -> list[Fact]:
     pairs = list(dict.fromkeys(f"{quantity(low, 'N')} to {quantity(high, 'N')}" for low, high in limits))
     relaxed = robot.t_min.any() and any(phase.slack for phase in plan.scenario.phases.all)
     slack = "; at least 0 N where cables may be slack" if relaxed else ""
-    more = f", and {len(pairs) - 1} more (by cable)" * (len(pairs) > 1)
-    return [*facts, ("limits", f"{pairs[0]}{more}{slack}"), *_jumps(plan)]
+    more = f", and {len(pairs) - FEW} more" * (len(pairs) > FEW) + " (by cable)" * (len(pairs) > 1)
+    return [*facts, ("limits", f"{', '.join(pairs[:FEW])}{more}{slack}"), *_jumps(plan)]
 
 
 def _robots(plan: PlanData) -> list[Fact]:
