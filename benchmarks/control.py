@@ -356,22 +356,22 @@ Runs of {report.count} steps of 1 ms in gusts, with elastic cables.
 
 ## Whole steps, from state to command
 
-Ratio: to {STANDARD}.
+The ratio is relative to {STANDARD}.
 
 {steps_table}
 
 ## Quadratic programs of predictive control
 
-Ratios: to `{REFERENCE}` and to `{TOWLINE}`, medians over turns of {BLOCK}. Error: of the first stage's \
-controls, in units of their range. Residual: of the conditions of optimality, in the same units, all stages.
-Failures: no result, or an error of more than {FAILED:g}.
+The ratios are relative to `{REFERENCE}` and to `{TOWLINE}`, as medians over turns of {BLOCK}. The error is that of \
+the first stage's controls, divided by their range. The residual is that of the optimality conditions of all stages, in \
+the same units. A failure is a missing result, or an error of more than {FAILED:g}.
 
 {programs_table}
 
 ## Errors of the position
 
-{report.seeds} flights, the same gusts for all controllers. Ratio: of a run's largest error to that with \
-{STANDARD}, median of the runs.
+Number of runs: {report.seeds}, with the same gusts for all controllers. The ratio is that of a run's largest error to \
+the error with {STANDARD}, as the median over the runs.
 
 {errors_table}
 """

@@ -26,11 +26,14 @@ from .options import (
 from .outputs import check_outputs
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..estimation import PoseEstimate
     from ..models import Robot
 
 SIX = "x y z roll pitch yaw"
 FEWEST_FIT = 0.95  # of the samples of a log
+LEFT_OUT = 1e6  # [m], the standard deviation of a length that has no influence
 
 
 @parameters(f"""
@@ -86,7 +89,7 @@ def pose(
         poses = [other.pose.tolist() for other in others]
         print_json({"robot": loaded.name, **estimate.to_dict(), "others": poses})
     else:
-        _show(loaded, estimate, others)
+        _show(loaded, estimate, others, measured)
     if not estimate.consistent:
         raise typer.Exit(1)
 
@@ -147,7 +150,19 @@ def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
     return bool(np.abs(one.pose[:3] - other.pose[:3]).max() < 0.01 * robot.length and np.abs(turned).max() < 0.01)
 
 
-def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:
+def _may_be_wrong(estimate: PoseEstimate, lengths: np.ndarray) -> list[int]:
+    """Return the cables of which a single wrong length explains the residuals: a pose fits the others of (m,)."""
+    import numpy as np
+
+    from ..estimation import pose_from_lengths
+
+    robot, carriers = estimate.robot, estimate.carrier_pose
+    sigmas = np.where(np.eye(robot.m, dtype=bool), LEFT_OUT, estimate.sigma)
+    fits = (pose_from_lengths(robot, lengths, carrier_pose=carriers, sigma=sigma).consistent for sigma in sigmas)
+    return [cable for cable, fit in enumerate(fits) if fit]
+
+
+def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate], lengths: np.ndarray) -> None:
     import numpy as np
 
     from ..base.text import quantity, quantity_row
@@ -172,9 +187,10 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         typer.echo(
             "Nearly singular: the lengths are not linear within the sigmas, so the sigmas are only a rough measure."
         )
-    if not estimate.consistent and robot.m > robot.dof_mask.sum():
-        off = int(np.argmax(estimate.suspects()))
-        typer.echo(f"The most likely wrong length is that of cables[{off}].")
+    if not estimate.consistent and robot.m > robot.dof_mask.sum() + 1:
+        cables = _may_be_wrong(estimate, lengths)
+        named = " or ".join(f"cables[{k}]" for k in cables) if len(cables) < robot.m else "any one cable"
+        typer.echo(f"A wrong length of {named} explains this." if named else "No single wrong length explains this.")
     for other in others:
         held = "" if other.taut else ", which cables cannot hold at rest"
         typer.echo(f"Also fits: ({quantity_row(np.round(other.pose, 6))}) [m, rad]{held}")

@@ -41,7 +41,9 @@ def test_lengths_that_no_pose_has_give_one():
     lengths = Dynamics(robot).cable_lengths(robot.home) + 0.5 * np.eye(8)[3]
     done = run("pose", "cogiro", "--lengths", text(lengths), code=1)
     assert "NO POSE FITS THE LENGTHS" in done.stdout
-    assert "The most likely wrong length is that of cables[" in done.stdout
+    assert "A wrong length of cables[3] explains this." in done.stdout
+    done = run("pose", "cogiro", "--lengths", text(lengths - 0.5 * np.eye(8)[6] + 0.3 * np.eye(8)[1]), code=1)
+    assert "No single wrong length explains this." in done.stdout
 
 
 def test_three_cables_hang_and_too_short_ones_do_not():

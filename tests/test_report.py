@@ -106,7 +106,7 @@ def test_report_of_an_infeasible_plan_tells_the_certificate(impossible):
     assert number(why["short by"]) == pytest.approx(certificate.shortfall, rel=1e-3)
     for cable in certificate.binding:
         assert str(cable + 1) in why["limits"]
-    assert "(0.6 N), with the margin of 0.1 N" in why["limits"]
+    assert "(0.6 N), with a margin of 0.1 N" in why["limits"]
     without = ~np.isfinite(impossible.audit.tensions).all(axis=1)
     missing = impossible.audit.times[without]
     fact = told["Tensions", "no feasible tensions"]
@@ -203,7 +203,7 @@ def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path)
             if hasattr(part, "facts"):
                 told += [(name, typeset(fact).replace("`", "")) for name, fact in part.facts]  # code has a font instead
             else:
-                rows = [("", typeset("".join(row))) for row in part.rows]
+                rows = [("", "".join(typeset(cell) for cell in row)) for row in part.rows]
                 told += [("".join(typeset(name) for name in part.columns), ""), *rows]
         assert [tuple(row) for row in page.rows] == told
         assert "viewport" in text

@@ -102,7 +102,7 @@ def test_commands_write_the_page(tmp_path):
         done = command(name, *arguments, "--report", f"{name}.html", cwd=tmp_path)
         assert f"    {name}.html" in done.stdout
         page = html.unescape((tmp_path / f"{name}.html").read_text())
-        assert done.stdout.partition(": ")[2].partition("\n")[0].partition(", ")[2] in page
+        assert typeset(done.stdout.partition(": ")[2].partition("\n")[0].partition(", ")[2]) in page
     for name, *arguments in [*commands, ("calibrate", "cogiro", "log.csv"), ("design", "cogiro", "lift.yaml")]:
         refused = command(name, *arguments, "--report", "page.txt", cwd=tmp_path, code=2)
         assert not (tmp_path / "page.txt").exists()

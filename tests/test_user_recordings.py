@@ -28,7 +28,7 @@ def test_four_cables_with_a_motion_capture_of_another_clock(tmp_path):
     robot = user.hanging_robot(tmp_path)
     files = (robot, "winches.csv", "--poses", "mocap.csv")
     values, told = found(towline("calibrate", *files, "--json", cwd=tmp_path))
-    assert any("samples left out because they repeat the time of the one before: 1" in note for note in told["notes"])
+    assert any("samples skipped because they repeat the time of the one before: 1" in note for note in told["notes"])
     clock = next(note for note in told["notes"] if "clock of the poses is" in note)
     assert float(clock.split(" is ")[1].split(" s ahead")[0]) + told["clock"] == pytest.approx(0.041, abs=2e-4)
     for i in range(4):
@@ -111,7 +111,7 @@ def test_missing_readings_and_a_table_of_two_sensors(tmp_path):
     rows[40][1:5] = ["nan"] * 4
     (tmp_path / "gaps.csv").write_text("\n".join([head, *(",".join(row) for row in rows)]))
     said = towline("calibrate", robot, "gaps.csv", "--free", "offsets,scales,clock", cwd=tmp_path).stdout
-    assert "samples left out because lengths or tensions are missing: 2" in said
+    assert "samples skipped because lengths or tensions are missing: 2" in said
     joined = []
     for row in rows:
         joined += [[*row[:5], "", ""], [f"{float(row[0]) + 0.004:.6g}", "", "", "", "", *row[5:]]]
@@ -194,7 +194,7 @@ def test_a_motion_capture_that_repeats_the_last_pose(tmp_path):
     user.write(tmp_path / "mocap.csv", ["time_s", "TX", "TY", "TZ", "RX", "RY", "RZ", "RW"], rows)
     files = (robot, "winches.csv", "--poses", "mocap.csv")
     values, told = found(towline("calibrate", *files, "--json", cwd=tmp_path))
-    said = "positions left out because they repeat the one before until the platform jumps: 99"
+    said = "positions skipped because they repeat the one before until the platform jumps: 99"
     assert any(said in note for note in told["notes"])
     for i in range(4):
         for k, axis in enumerate("xyz"):

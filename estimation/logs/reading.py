@@ -155,7 +155,7 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     if not kept.any():
         raise InputError("lengths and poses of carriers must have samples at the same times, got none")
     if not kept.all():
-        read.notes.append(f"samples left out because carriers have no poses: {quantity(int((~kept).sum()))}")
+        read.notes.append(f"samples skipped because carriers have no poses: {quantity(int((~kept).sum()))}")
     tensions = None
     axis = ned_frame(robot, measured.poses, poses)
     if axis is not None:
@@ -255,7 +255,7 @@ def measurements_of(
         orientation = at_times(position.times, orientation, found.orientation[0])
     if position is not None and (lost := frozen(position.values)).any():
         count = quantity(int(lost.sum()))
-        notes.append(f"positions left out because they repeat the one before until the platform jumps: {count}")
+        notes.append(f"positions skipped because they repeat the one before until the platform jumps: {count}")
         position = Samples(position.times, np.where(lost[:, None], np.nan, position.values))
     pose = position or orientation
     source = (found.position or found.orientation or (main,))[0]
@@ -288,7 +288,7 @@ def measurements_of(
     if tensions is not None:
         kept &= _kept(tensions.values, found.tensions)
     if not kept.all():
-        notes.append(f"samples left out because lengths or tensions are missing: {quantity(int((~kept).sum()))}")
+        notes.append(f"samples skipped because lengths or tensions are missing: {quantity(int((~kept).sum()))}")
     arguments: dict[str, Any] = {"times": None if lengths.times is None else (lengths.times - begin)[kept]}
     for name, one in (("tensions", tensions), ("poses", position), ("orientations", orientation)):
         if one is not None:
@@ -356,7 +356,7 @@ def _merged(
     if not kept.any():
         raise InputError("lengths and poses must have samples at the same times, got none")
     if not kept.all():
-        notes.append(f"samples left out because not all sensors have them: {quantity(int((~kept).sum()))}")
+        notes.append(f"samples skipped because not all sensors have them: {quantity(int((~kept).sum()))}")
     forces = None if forces is None else Samples(at[kept], forces[kept])
     turned = None if quaternions is None else quaternions[kept]
     return Samples(at[kept], moved[kept]), forces, places[kept], turned

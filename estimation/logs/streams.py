@@ -56,7 +56,7 @@ class Reader:
                 again = np.diff(times, prepend=np.nan) == 0
                 if 0 < again.mean() <= MOST_REPEATED:
                     count = quantity(int(again.sum()))
-                    self.notes.append(f"samples left out because they repeat the time of the one before: {count}")
+                    self.notes.append(f"samples skipped because they repeat the time of the one before: {count}")
                     times, values = times[~again], values[~again]
             elif times is not None:  # of messages, which may be recorded twice, or late
                 times, rows = np.unique(times, return_index=True)

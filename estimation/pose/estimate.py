@@ -145,7 +145,7 @@ class PoseEstimate(Displayed):
     def suspects(self) -> np.ndarray:
         """Return residuals over their standard deviations, (..., m); the largest marks the most likely wrong reading.
 
-        It is 0 for a cable without redundancy.
+        It is 0 for a cable without redundancy. The lengths are linearised, so a large error may mark another cable.
         """
         J = self._weighted_gradient()  # (..., m, 6)
         hat = np.einsum("...ij,...jk,...lk->...il", J, np.linalg.pinv(np.swapaxes(J, -1, -2) @ J), J)
