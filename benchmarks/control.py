@@ -363,8 +363,8 @@ The ratio is relative to {STANDARD}.
 ## Quadratic programs of predictive control
 
 The ratios are relative to `{REFERENCE}` and to `{TOWLINE}`, as medians over turns of {BLOCK}. The error is that of \
-the first stage's controls, divided by their range. The residual is that of the optimality conditions of all stages, in \
-the same units. A failure is a missing result, or an error of more than {FAILED:g}.
+the first stage's controls, divided by their range. The residual is that of the optimality conditions of all stages, \
+in the same units. A failure is a missing result, or an error of more than {FAILED:g}.
 
 {programs_table}
 
