@@ -158,7 +158,7 @@ def test_wrong_calls_are_one_line(model):
         simulate(model, model.home, LengthControl(model), duration=0.01, drive="tensions")
     with pytest.raises(InputError, match="flying carrier 'quad1'"):
         LengthControl("multi-quadrotor-3")
-    with pytest.raises(InputError, match="stiffness must be given, or be in the robot's file"):
+    with pytest.raises(InputError, match="stiffness must be given, here or in the robot's file"):
         LengthControl("cogiro")
     assert LengthControl("cogiro", stiffness=EA).robot.m == 8
     with pytest.raises(InputError, match="stiffness"):

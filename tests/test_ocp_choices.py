@@ -189,7 +189,7 @@ WRONG = {
     "range": ({"duration": {"min": 2, "max": 1}}, "task: duration.min must be at most max, 1, got 2"),
     "range of a circle": (
         {"path": CIRCLE, "duration": {"min": 1, "max": 2}},
-        "duration must be a number .s., got a range, while path of kind circle has times of its own",
+        "duration must be a number .s., because path of kind circle has its own times, got a range",
     ),
     "tube": ({"tube": {"position": "loose"}}, "tube.position must be a number or .*'free', got 'loose'"),
     "range of what": (

@@ -58,6 +58,6 @@ def test_zero_stands_for_six_zeros_in_files_too(tmp_path):
 )
 def test_a_free_duration_of_a_path_that_moves_at_its_end_is_refused_in_one_line(ends):
     path = HALT["path"] | {"timing": "uniform"}
-    with pytest.raises(InputError, match="duration must be a number where a velocity is given at the") as error:
+    with pytest.raises(InputError, match="duration must be a number, because a velocity is given at the") as error:
         plan("cogiro", HALT | {"path": path, "initial": None, "duration": {"min": 0.2, "max": 4}} | ends)
     assert "\n" not in str(error.value)
