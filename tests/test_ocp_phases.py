@@ -320,7 +320,10 @@ def phase(index, **fields):
         (phase(3, name="lift"), r"phases\[3\].name must be unique, got 'lift' twice"),
         (phase(0, ground={}), r"phases\[0\].path must be of kind rest in a phase on the ground, got line"),
         (phase(1, load=None), r"phases\[1\].load must weigh at least as much as that of phases\[2\]"),
-        (phase(1, ground={"support": [[2, 0, 0], [2, 1, 0]]}), r"phases\[1\].ground.support must have points all round"),
+        (
+            phase(1, ground={"support": [[2, 0, 0], [2, 1, 0]]}),
+            r"phases\[1\].ground.support must have points all round",
+        ),
         (phase(1, ground={"suport": []}), "suport is not a known key, did you mean 'support'"),
         (changed(duration=5), "duration must be left out with phases"),
         (changed(path={"kind": "rest", "pose": LOW}), "path must be left out with phases"),
@@ -329,8 +332,8 @@ def phase(index, **fields):
         (changed(tube={"position": 0.1, "waypoints": "exact"}), "tube.waypoints must be free with phases"),
         ({"phases": TAKE_OFF, "objective": {"margin": 5}}, "phases.ground.slack must be false with a margin to choose"),
         ({"phases": TAKE_OFF, "initial": {"pose": [0, 0, 1, 0, 0, 0]}}, "initial must be left out if the first phase"),
-        ({"phases": IN_THE_AIR, "limits": {"tension_rate": 500}}, "limits.tension_rate must be left out since the"),
-        ({"phases": IN_THE_AIR, "tube": {"position": 0.1}}, "tube and base must fix the motion because tensions jump where the load"),
+        ({"phases": IN_THE_AIR, "limits": {"tension_rate": 500}}, "limits.tension_rate must be left out because"),
+        ({"phases": IN_THE_AIR, "tube": {"position": 0.1}}, "tube and base must fix the motion because"),
         ({}, "path is missing"),
     ],
 )

@@ -399,7 +399,9 @@ def test_exact_waypoints_are_passed_beside_legs():
     """Legs pass their points at the blend; the platform goes through them, if the tube reaches that far."""
     path = {"kind": "waypoints", "points": [[0, 0, 1], [0.3, 0, 1.1], [0.5, 0.2, 1.1], [0.5, 0.4, 1]], "blend": 0.02}
     task = {"path": path, "duration": 4, "steps": 40}
-    with pytest.raises(InputError, match=r"tube.position must be at least 0.0.* m, the distance at which the legs pass points\[1\]"):
+    with pytest.raises(
+        InputError, match=r"tube.position must be at least 0.0.* m, the distance at which the legs pass points\[1\]"
+    ):
         plan(load("ipanema-1"), {**task, "tube": {"position": 0.001, "waypoints": "exact"}})
     found = plan(load("ipanema-1"), {**task, "tube": {"position": 0.05, "ends": "exact", "waypoints": "exact"}})
     assert found.feasible, found.report()
