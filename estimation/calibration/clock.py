@@ -58,8 +58,11 @@ def moves_smoothly(robot: Robot, measurements: Measurements) -> bool:
         return False
     track = PoseTrack(measurements.times, position, rotation, used)
     left = rows[1::2][track.inside(0.0)[rows[1::2]]]
-    apart, spread = track.at(0.0)[0][left] - position[left], position[left] - position[left].mean(axis=0)
-    return bool(left.size) and float(np.vdot(apart, apart)) < SMOOTH**2 * float(np.vdot(spread, spread))
+    if not left.size:
+        return False
+    apart, spread = track.at(0.0)[0][left] - position[left], position[left] - np.median(position[left], axis=0)
+    sizes = np.linalg.norm([apart, spread], axis=2)  # (2, n), whose medians hardly depend on a few wrong positions
+    return bool(np.median(sizes[0]) < SMOOTH * np.median(sizes[1]))
 
 
 def _by_cable_speeds(model: Model) -> float:

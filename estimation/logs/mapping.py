@@ -15,7 +15,7 @@ from ...base.inputs import file_path
 from ...models.parsing import read_yaml
 from ...models.part import COORDINATES, Part
 from ...models.robot import Robot
-from .names import UNITS, Role, measured_name, role
+from .names import UNITS, Role, measured_name, role, unit_of
 from .recording import Recording, Topic, plain
 
 AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
@@ -156,6 +156,23 @@ def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrie
     return Fields(**found, time=_times(recordings, given))
 
 
+def listed(recordings: Sequence[Recording], but: Fields | None = None) -> str:
+    """Return the names of the fields of recordings, the first dozen, except those with a role and some others."""
+    used = {(id(one.topic), one.name) for of in but or () for one in of}
+    names = [
+        plain(topic.full(name))
+        for one in recordings
+        for topic in one.topics.values()
+        for name in topic.fields
+        if but is None or not (role(topic.full(name), topic.fields[name]) or (id(topic), name) in used)
+    ]
+    if len(names) < (1 if but is None else 2):  # a position has two coordinates or more
+        return "none" if but is None else ""
+    return (
+        f"{', '.join(names[:MOST_LISTED])}{' ...' if len(names) > MOST_LISTED else ''}; a map (--fields) may name them"
+    )
+
+
 def _times(recordings: Sequence[Recording], given: LogMap | None) -> tuple[Field, ...]:
     """Return the times of all tables: that of the map, and the usual ones of tables that have none from there."""
     named = _named(recordings, "time", given) if given else ()
@@ -202,7 +219,7 @@ def _usual(
     groups: dict[tuple[int, str, str, str], list[tuple[Role, Field]]] = {}
     for recording, topic, name in everything:
         full = _within(topic.full(name), prefix) if prefix else topic.full(name)
-        found = role(full if what != "commands" else measured_name(full) or "")
+        found = role(full if what != "commands" else measured_name(full) or "", topic.fields[name])
         if found is None or found.role not in roles:
             continue
         key = (id(recording), topic.name if what == "time" else "", found.role, found.group)
@@ -282,6 +299,8 @@ def _in_units(one: Field, kind: str, stated: bool) -> Field:
     number, _, unit = one.unit.rpartition(" ")
     with suppress(ValueError):  # such as 20 N
         one = one._replace(unit=unit, factor=float(number)) if number else one
+    if one.unit not in UNITS[kind]:
+        one = one._replace(unit=unit_of(one.unit))
     if one.unit not in UNITS[kind] or not 0 < abs(one.factor) < np.inf:
         hint = f" (or a multiple, such as [0.05 {next(iter(UNITS[kind]))}])" if one.unit else ""
         raise InputError(f"the unit of {one.full} must be one of {', '.join(UNITS[kind])}, got {one.unit!r}{hint}")

@@ -25,8 +25,8 @@ UNITS = {
 _BEFORE = r"(?:.*[./_ ])?"
 _AFTER = r"(?:[./_ ](?:length|len|position|pos|data|value))*"
 _NUMBER = r"[_ ]?[\[(]?(\d+)[\])]?"
-_OF = r"(?:(?:cable|rope|wire|winch)[_ ]?)?"
-_BODY = r"(?:payload|load|platform|end[_ ]?effector|ee|mp|mocap|vicon|optitrack|body|object|pose"
+_OF = r"(?:(?:cable|rope|wire|winch|tether|tendon)[_ ]?)?"
+_BODY = r"(?:payload|load|platform|plat|end[_ ]?effector|ee|tcp|mp|mocap|vicon|optitrack|body|rb|object|pose"
 _BODY += r"|state(?:_?estimate)?)"
 _DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?)"
 _CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
@@ -37,8 +37,10 @@ _VECTOR = r"(?:[./_ ](?:vector|data|value))*[./_ ]?\[?([xyz])\]?"
 # The groups are what tells the fields of a role apart: the cable's number or name, the axis, or both.
 PATTERNS = {
     "lengths": (
-        rf"{_BEFORE}{_OF}(?:l|len|lengths?|cables?|ropes?|wires?|winch(?:es)?|drums?|encoders?|enc){_NUMBER}{_AFTER}",
-        rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)\[(\d+)\]",
+        rf"{_BEFORE}{_OF}(?:l|rho|len|lengths?|cables?|ropes?|wires?|tethers?|tendons?|winch(?:es)?|drums?|encoders?|enc)"
+        rf"{_NUMBER}{_AFTER}",
+        rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)[\[.](\d+)\]?",
+        r"field\.position(\d+)",  # of a JointState that `rostopic echo -p` wrote
         r".*/position\[[^\]]*?(\d+)(?:[_ ][^\]0-9]+)?\]",  # also of winch_1_joint
         r".*/joints\[[^\]]*?(\d+)\]\.position",
     ),
@@ -52,14 +54,15 @@ PATTERNS = {
     "position": (
         rf"{_BEFORE}(?:position|translation|pos|point)[./_ ]?([xyz])",
         r"/?[pt]?[_ ]?([xyz])",
+        r".*/t([xyz])",
         rf"{_BEFORE}{_BODY}(?:[./_ ]state)?[./_ ][pt]?([xyz])",
     ),
     "quaternion": (
         rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",
-        r"/?r([xyzw])",
+        r"(?:.*/)?r([xyzw])",
         rf"{_BEFORE}q\[([0-3])\]",  # w, x, y, z, in logs of PX4
     ),
-    "angles": (rf"{_BEFORE}(roll|pitch|yaw)",),
+    "angles": (rf"{_BEFORE}(roll|pitch|yaw)", r"(?:.*/)?r([xyz])"),  # rx with a unit
     "thrusts": (rf"{_BEFORE}thrusts?{_SENSED}[_ ]?\[?(\d*)\]?{_SENSED}",),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
     "directions": (
@@ -73,7 +76,7 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
     "time": (
-        rf"%?(t|(?:ros[_ ]?)?times?|time_?us|time \(seconds\)|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds)",
+        rf"[%_]*(t|(?:ros|sim|log|recv|rec)?[_ ]?times?|time_?us|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds)",
         r"(elapsed(?:[_ ]time)?)",
         rf"{_BEFORE}((?:milli|micro|nano)s(?:ec(?:ond)?s?)?)",  # since an Arduino was switched on
     ),
@@ -84,8 +87,14 @@ LEAST_COUNTED, SLOWEST = 100.0, 0.5  # step of times that are no seconds; time b
 _COMMAND = re.compile(
     r"[./_ ]?(?:cmd|commands?|commanded|desired|setpoints?|targets?|refs?|references?)(?=[./_ \[]|\d|$)"
 )
-_SUFFIX = re.compile(r"(.+?)\s*(?:[_ ]|\()(mm|cm|m|rad|deg|ms|us|ns|s|n|kn)\)?")
-_EXACT = {unit.lower(): unit for units in UNITS.values() for unit in units}
+# What is measured, of columns that say so beside others: x_gt, l1_meas, actual_length_1.
+_MEASURED = re.compile(
+    r"[./_ ]?(?<![a-z])(?:meas(?:ured)?|act(?:ual)?|gt|ground[_ ]?truth|mocap|vicon|optitrack)(?![a-z])"
+)
+_WORDS = {unit: unit.lower() for unit in ("mm", "cm", "m", "rad", "deg", "ms", "us", "ns", "s", "N", "kN")}  # of units
+_WORDS |= {"s": "s|secs?|seconds?", "ms": "ms|milliseconds?", "us": "us|microseconds?", "ns": "ns|nanoseconds?"}
+_WORDS |= {"deg": "deg|degrees?|°", "rad": "rad|radians?", "m": "m|met(?:er|re)s?", "mm": "mm|millimet(?:er|re)s?"}
+_SUFFIX = re.compile(rf"(.+?)\s*(?:[_ ]|\()({'|'.join(_WORDS.values())})\)?")
 
 
 class Role(NamedTuple):
@@ -100,28 +109,50 @@ class Role(NamedTuple):
     unit: str = ""
 
 
-def role(name: str) -> Role | None:
-    """Return the role of a field, with its topic's name before it, or None if the name is not a usual one."""
+def role(name: str, stated: str = "") -> Role | None:
+    """Return the role of a field, with its topic's name before it, or None if the name is not a usual one.
+
+    `stated` is its unit, if there is one beside the name: `rx [deg]` is an angle, and `rx` is of a quaternion.
+    """
     low = name.lower().lstrip(". ")
-    for text, unit in ((low, ""), *([(found[1], _EXACT[found[2]])] if (found := _SUFFIX.fullmatch(low)) else [])):
+    texts = [(low, "")]
+    if found := _SUFFIX.fullmatch(low):
+        texts.append((found[1], unit_of(found[2])))
+    texts += [(bare, unit) for text, unit in texts if (bare := _MEASURED.sub("", text).lstrip("./_ ")) != text]
+    for text, unit in texts:
         for which, patterns in PATTERNS.items():
+            if (which == "lengths" and _NO_LENGTH.search(text.rpartition("/")[2])) or (
+                unit and unit not in UNITS[which]
+            ):
+                continue
             for pattern in patterns:
-                match = (
-                    None
-                    if which == "lengths" and _NO_LENGTH.search(text.rpartition("/")[2])
-                    else re.fullmatch(pattern, text)
-                )
-                if match and (not unit or unit in UNITS[which]):
-                    group = text
-                    for first, last in reversed(match.regs[1:]):
-                        group = f"{group[:first]}#{group[last:]}"
-                    parts = sorted(match.groups(), key=lambda part: not (part.isdigit() or not part))
-                    if which == "quaternion" and parts[0].isdigit():
-                        parts = ["wxyz"[int(parts[0])]]
-                    if which == "time" and (short := re.search("us$|(milli|micro|nano)s", text)):
-                        unit = {"milli": "ms", "nano": "ns"}.get(short[1] or "", "us")
-                    return Role(which, " ".join(parts), group, unit)
+                match = re.fullmatch(pattern, text)
+                if match and not (which == "quaternion" and stated in ANGLES):
+                    return _role(which, match, unit, low)
     return None
+
+
+def unit_of(word: str) -> str:
+    """Return the unit that a word means, such as s of "Seconds", or the word itself."""
+    return next((unit for unit, words in _WORDS.items() if re.fullmatch(words, word.lower())), word)
+
+
+def _role(which: str, match: re.Match[str], unit: str, name: str) -> Role:
+    """Return the role of a name from which a unit and words such as "measured" may be cut off for the match."""
+    group = text = match.string
+    for first, last in reversed(match.regs[1:]):
+        group = f"{group[:first]}#{group[last:]}"
+    if words := _MEASURED.search(name):
+        # x and x_gt are of different groups.
+        group = name.replace(text, group, 1) if text in name else f"{group} {words[0]}"
+    parts = sorted(match.groups(), key=lambda part: not (part.isdigit() or not part))
+    if which == "quaternion" and parts[0].isdigit():
+        parts = ["wxyz"[int(parts[0])]]
+    if which == "angles" and parts[0] in "xyz":
+        parts = [("roll", "pitch", "yaw")["xyz".index(parts[0])]]
+    if which == "time" and (short := re.search("us$|(milli|micro|nano)s", text)):
+        unit = {"milli": "ms", "nano": "ns"}.get(short[1] or "", "us")
+    return Role(which, " ".join(parts), group, unit)
 
 
 def measured_name(name: str) -> str | None:

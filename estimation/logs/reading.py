@@ -17,8 +17,8 @@ from .cable_directions import in_world, vectors
 from .carrier_poses import carriers_at, tensions_by_thrust
 from .clocks import Seen, clock_of_poses, set_clocks_of_carriers
 from .encoders import lengths_of
-from .frozen import frozen
-from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, read_map
+from .frozen import seen
+from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, listed, read_map
 from .measurements import Measurements, changed
 from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .opening import recordings
@@ -104,6 +104,8 @@ def read_log(
         found = _fields([*first, *others] if given else first, others, given, known)
         everything = [*first, *others]
         read = measurements_of(found, everything, sigma, known, given)._replace(recordings=everything)
+        if not found.position and (unknown := listed(everything, found)):
+            read.notes.append(f"no positions are read, and of unknown names are {unknown}")
         if known is not None and len(everything) > 1:
             _set_clocks(read, known, given)
         if not carriers:
@@ -211,14 +213,13 @@ def _fields(
         found = found._replace(directions=tuple(field for one in of for field in one if all(of)))
     if others and not given:
         of_poses = fields_of(others, None, m, moving, free_axes(robot))
+        if not of_poses.position and not of_poses.orientation:
+            raise InputError(f"poses must have columns x, y, z or an orientation, got {listed(others)}")
         times = found.time + of_poses.time
         found = found._replace(position=of_poses.position, orientation=of_poses.orientation, time=times)
     seen = found.position or found.directions
     if not found.lengths and not (robot is not None and robot.fixed_lengths is not None and seen):
-        names = [topic.full(name) for one in all_ for topic in one.topics.values() for name in topic.fields]
-        listed = ", ".join(names[:12]) + (" ..." if len(names) > 12 else "")
-        hint = "; a map (--fields) may name them" if names else ""
-        raise InputError(f"must have columns l0, l1, ... of lengths, got {listed or 'none'}{hint}")
+        raise InputError(f"must have columns l0, l1, ... of lengths, got {listed(all_)}")
     return found
 
 
@@ -251,12 +252,11 @@ def measurements_of(
             f"{like} rises as a time does, but is not read as one; if it is, name it in a map: 'time: {like} [s]'"
         )
     begin = float(times[0]) if times is not None and times[0] > COUNTED else 0.0
+    together = bool(found.position and found.orientation) and found.position[0].topic is found.orientation[0].topic
+    position, orientation, unseen = seen(position, orientation, together)
+    notes += unseen
     if position is not None and orientation is not None:
         orientation = at_times(position.times, orientation, found.orientation[0])
-    if position is not None and (lost := frozen(position.values)).any():
-        count = quantity(int(lost.sum()))
-        notes.append(f"positions skipped because they repeat the one before until the platform jumps: {count}")
-        position = Samples(position.times, np.where(lost[:, None], np.nan, position.values))
     pose = position or orientation
     source = (found.position or found.orientation or (main,))[0]
     together, clock = source.topic is main.topic, None

@@ -3,7 +3,6 @@
 import io
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,13 +12,12 @@ from ...base.declared import check_hdf5
 from ...base.errors import InputError
 from ...base.inputs import printable
 from ...base.netcdf import check_units
+from .csv_text import plain_csv
 from .measurements import Sigma
-from .names import FORCES, UNITS, role
+from .names import FORCES, role
 from .recording import Recording, Samples, Topic
 
-MOST_ABOVE, LONGEST_HEADER = 20, 100_000  # lines above the numbers, and their characters
-KNOWN_UNITS = {"", *(unit for units in UNITS.values() for unit in units)}
-DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
+NANOSECONDS = re.compile(r"(?i)(?:nsecs?|nanosec(?:ond)?s?)$")
 MOST_FIELDS = 40_000_000  # of a CSV file
 ALWAYS_ACCEPTED = 40_000_000  # [bytes] of numbers, however well a log is compressed
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -44,58 +42,23 @@ def from_csv(content: bytes, where: str) -> Recording:
         units[name] = unit
         return 1.0
 
-    columns, lines = read_columns(one_header(_with_points(text)), note, gaps=True, most=MOST_FIELDS)
+    columns, lines = read_columns(plain_csv(text), note, gaps=True, most=MOST_FIELDS)
     if not lines:
         raise InputError("must have a line for each sample below its header, got none")
-    return Recording(where, "CSV", {"": _table(columns, units)})
+    _with_whole_stamps(columns)
+    return Recording(where, "CSV", {"": _table(columns, {name: units.get(name, "") for name in columns})})
 
 
-def _with_points(text: str) -> str:
-    """Return a table with decimal points, of one with decimal commas between semicolons or tabs."""
-    for line in text[:LONGEST_HEADER].splitlines()[: MOST_ABOVE + 1]:
-        cells = re.split("[;\t]", line)
-        if len(cells) > 1 and 2 * sum(map(bool, map(DECIMAL_COMMA.fullmatch, cells))) >= len(cells):
-            return text.replace(",", ".")
-    return text
-
-
-def one_header(text: str) -> str:
-    """Return CSV with one line of names: motion capture systems write several, and others one of units below names."""
-    lines = text[:LONGEST_HEADER].splitlines()[: MOST_ABOVE + 1]
-    mark = max(",;\t", key="".join(lines).count)
-    table = [[cell.strip().strip('"') for cell in line.split(mark)] for line in lines]
-    first = next((k for k, row in enumerate(table) if _is_data(row, *table[k + 1 : k + 2])), 0)
-    rows = [
-        row
-        for row, line in zip(table[:first], lines, strict=False)
-        if len(row) == len(table[first]) and line[:1] != "#"
-    ]
-    if not rows or (len(rows) == 1 and all(not line.strip() or line[:1] == "#" for line in lines[: first - 1])):
-        return text
-    units = [cell.strip("[]()") for cell in rows[-1]]
-    stated = len(rows) > 1 and all(unit in KNOWN_UNITS for unit in units)
-    names = ["/".join(dict.fromkeys(filter(None, column))) for column in zip(*rows[: len(rows) - stated], strict=True)]
-    titles = [f"{name} [{unit}]" if stated and unit else name for name, unit in zip(names, units, strict=True)]
-    below = text.split("\n", first)[-1] if "\n" in text else ""
-    return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines
-
-
-def _is_data(row: Sequence[str], below: Sequence[str] = ()) -> bool:
-    """Return whether at least half of the fields that are not empty are numbers, the first one among them.
-
-    If the first field is empty, all others must be numbers, in the row below too: rows of names may number markers.
-    """
-    filled = [cell for cell in row if cell]
-    if row[0]:
-        return _is_number(row[0]) and 2 * sum(map(_is_number, filled)) >= len(filled)
-    return bool(filled) and all(map(_is_number, filled)) and all(map(_is_number, filter(None, below)))
-
-
-def _is_number(cell: str) -> bool:
-    with suppress(ValueError):
-        float(cell)
-        return True
-    return False
+def _with_whole_stamps(columns: dict[str, np.ndarray]) -> None:
+    """Join stamps of whole seconds and the nanoseconds beyond them, as messages of ROS have them, in place."""
+    for name in [name for name in columns if NANOSECONDS.search(name)]:
+        stem = NANOSECONDS.sub("", name)
+        whole = next(
+            (one for one in columns if re.fullmatch(rf"{re.escape(stem)}(?:s|secs?|seconds)", one, re.I)), None
+        )
+        if whole is not None:
+            stamps = columns.pop(whole) + 1e-9 * columns.pop(name)
+            columns[stem.rstrip("./_ ") or "stamp"] = stamps
 
 
 def from_netcdf(content: bytes, where: str) -> Recording:

@@ -1,0 +1,118 @@
+"""`plain_csv`: the text of a table as others write it, with one line of names, separators, points and seconds."""
+
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import UTC, datetime
+from itertools import accumulate
+
+from .names import UNITS
+
+MOST_ABOVE, LONGEST_HEADER = 20, 100_000  # lines above the numbers, and their characters
+KNOWN_UNITS = {"", *(unit for units in UNITS.values() for unit in units)}
+DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
+_CLOCK = r"\d\d?:\d\d:\d\d(?:\.\d+)?"
+DATE = re.compile(rf"(?<![\d-])\d{{4}}-\d\d-\d\d[T ]{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
+TIME_OF_DAY = re.compile(rf"(?<![\d:]){_CLOCK}(?![\d:])")
+
+
+def plain_csv(text: str) -> str:
+    """Return CSV with one header, commas, semicolons or tabs between columns, decimal points, and times in seconds.
+
+    Dates count from 1970, in UTC unless they name another zone, and times of day from midnight.
+    """
+    return _one_header(_with_points(_with_seconds(_with_tabs(text))))
+
+
+def _head(text: str) -> list[str]:
+    return text[:LONGEST_HEADER].splitlines()[: MOST_ABOVE + 1]
+
+
+def _with_tabs(text: str) -> str:
+    """Return a table with tabs, of one with spaces between numbers, whose names are commented out or not."""
+    lines = _head(text)
+    for line in lines:
+        cells = line.split()
+        if len(cells) > 1 and all(map(_is_number, cells)):
+            return re.sub(r"[ \t]+", "\t", re.sub(r"(?m)^(#?)[ \t]+|[ \t]+$", r"\1", text))
+        if re.search("[,;\t]", line) and line[:1] != "#":
+            break
+    return text
+
+
+def _with_seconds(text: str) -> str:
+    """Return a table with numbers for dates and times of day."""
+    begin = "\n".join(line for line in _head(text) if line[:1] != "#")
+    if DATE.search(begin):
+        text = DATE.sub(lambda found: _since_1970(found[0]), text)
+    return TIME_OF_DAY.sub(lambda found: _since_midnight(found[0]), text) if TIME_OF_DAY.search(begin) else text
+
+
+def _since_1970(date: str) -> str:
+    with suppress(ValueError):
+        found = datetime.fromisoformat(date)
+        return f"{(found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp():.6f}"
+    return date
+
+
+def _since_midnight(time: str) -> str:
+    hours, minutes, seconds = time.split(":")
+    return f"{3600 * int(hours) + 60 * int(minutes) + float(seconds):.9g}"
+
+
+def _with_points(text: str) -> str:
+    """Return a table with decimal points, of one with decimal commas between semicolons or tabs."""
+    for line in _head(text):
+        cells = re.split("[;\t]", line)
+        if len(cells) > 1 and 2 * sum(map(bool, map(DECIMAL_COMMA.fullmatch, cells))) >= len(cells):
+            return text.replace(",", ".")
+    return text
+
+
+def _one_header(text: str) -> str:
+    """Return CSV with one line of names: motion capture systems write several, and others one of units below names.
+
+    Names that are commented out, as those of `numpy.savetxt`, are names if no others are above the numbers.
+    """
+    lines = _head(text)
+    mark = max(",;\t", key="".join(lines).count)
+    table = [[cell.strip().strip('"') for cell in line.split(mark)] for line in lines]
+    first = next((k for k, row in enumerate(table) if _is_data(row, table[k + 1] if k + 1 < len(table) else row)), 0)
+    above = [(row, line) for row, line in zip(table[:first], lines, strict=False) if len(row) == len(table[first])]
+    rows = [row for row, line in above if line[:1] != "#"]
+    commented = not rows and bool(above)
+    if commented:
+        rows = [[cell.lstrip("# ") for cell in above[-1][0]]]
+    plain = all(not line.strip() or line[:1] == "#" for line in lines[: first - 1])
+    if not rows or (len(rows) == 1 and plain and not commented):
+        return text
+    units = [cell.strip("[]()") for cell in rows[-1]]
+    stated = len(rows) > 1 and all(unit in KNOWN_UNITS for unit in units)
+    *above_names, last = rows[: len(rows) - stated]
+    # The name of a body may stand above the first of its columns only.
+    above_names = [list(accumulate(row, lambda before, cell: cell or before)) for row in above_names]
+    names = ["/".join(dict.fromkeys(filter(None, column))) for column in zip(*above_names, last, strict=True)]
+    titles = [f"{name} [{unit}]" if stated and unit else name for name, unit in zip(names, units, strict=True)]
+    below = text.split("\n", first)[-1] if "\n" in text else ""
+    return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines
+
+
+def _is_data(row: Sequence[str], below: Sequence[str]) -> bool:
+    """Return whether at least half of the fields that are not empty are numbers, the first one among them.
+
+    If the first field is empty, all others must be numbers, in the row below too: rows of names may number markers.
+    A single number is the rate of what follows with more columns.
+    """
+    filled = [cell for cell in row if cell]
+    if len(row) == 1 < len(below):
+        return False
+    if row[0]:
+        return _is_number(row[0]) and 2 * sum(map(_is_number, filled)) >= len(filled)
+    return bool(filled) and all(map(_is_number, filled)) and all(map(_is_number, filter(None, below)))
+
+
+def _is_number(cell: str) -> bool:
+    with suppress(ValueError):
+        float(cell)
+        return True
+    return False
