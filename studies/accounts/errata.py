@@ -6,7 +6,7 @@ from .account import Account
 from .claim import Claim, Verdict, value_text
 
 BY_THE_PAPER = "By the paper"  # head of what it prints, or of what follows from that
-MEANING = "“By the paper” is a number that it prints, or the one that follows from what it prints."
+MEANING = "“By the paper” marks what the paper prints, or what follows from it."
 COMPARED = re.compile(r"(?P<statement>.*\S) \((?P<quantity>.*)\)\.", re.DOTALL)  # what the numbers of a claim are
 READ = (
     "The paper was read as text recognised from its pages (OCR): a single wrong symbol may be an error of the "
@@ -19,7 +19,7 @@ def errata(account: Account) -> str:
     lines = [
         f"# Errata of {account.paper.source}",
         "",
-        "Each entry is a claim of the paper, the reason why it is not reproduced, and the numbers that were compared. "
+        "Each entry gives a claim of the paper, the values that were compared, and why the claim is not reproduced. "
         f"{MEANING} {READ}",
     ]
     titles = {

@@ -147,8 +147,8 @@ def six_cables() -> str:
     J = np.hstack([vectors, np.cross(arms, vectors)]).T / np.linalg.norm(vectors, axis=1)
     ranks = rank(Dynamics(robot).wrench_matrix(pose)), rank(J)
     return (
-        f"between two similar hexagons, this toolkit's choice, the rank is {ranks[0]}, with crossed pairs of the same "
-        f"points {ranks[1]}"
+        f"the rank is {ranks[0]} between two similar hexagons, which is this toolkit's choice, and {ranks[1]} with "
+        "crossed pairs of the same points"
     )
 
 
