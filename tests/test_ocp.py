@@ -554,7 +554,7 @@ def test_wrong_tasks_are_one_line(case):
 def test_tasks_that_do_not_fit_the_robot():
     with pytest.raises(InputError, match="base must be left out, got kind free: the carriers of robot 'ipanema-1'"):
         plan(load("ipanema-1"), {"path": CIRCLE, "base": {"kind": "free"}})
-    with pytest.raises(InputError, match=r"without platform\.aero"):
+    with pytest.raises(InputError, match=r"has no platform\.aero"):
         plan(load("ipanema-1"), {"path": CIRCLE, "wind": [1, 0, 0]})
     with pytest.raises(InputError, match="which is of kind ground"):
         plan(load("ipanema-1"), {"path": CIRCLE, "base": {"kind": "given", "paths": {"frame": CIRCLE}}})

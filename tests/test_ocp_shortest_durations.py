@@ -123,7 +123,7 @@ def test_what_no_known_law_of_a_path_that_dwells_keeps_is_not_called_infeasible(
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"tube": {"position": 0.1}}, "duration must be a number .s. where path has a dwell"),
+        ({"tube": {"position": 0.1}}, "duration must be a number .s., because path has a dwell"),
         ({"duration": {"min": 0.1, "max": 0.8}}, "more than the 0.8 s for which path dwells, got 0.8 s"),
     ],
 )
