@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from towline import Dynamics, InputError, Planner, export_fmu, load, plan, simulate
 from towline.control import Predictive, Stop, longest_stop, references, stop
 from towline.models.parsing import to_yaml
+from towline.ocp.search.stops_within import stopping_within
 
 from .framed import framed
 
@@ -94,6 +95,29 @@ def test_no_stop_takes_longer_than_the_longest(made):
     assert longest.begins in [its.begins for its in stops]
     with pytest.raises(InputError, match="period must be such that there are at most 10000 of them, got 1e-05 s"):
         longest_stop(found, 1e-5)
+
+
+def test_where_the_planner_finds_only_a_much_slower_motion_the_fastest_law_is_slowed_down():
+    path = {"kind": "line", "start": [-0.4, 0, 0.8], "end": [0.5, 0.2, 1.2]}
+    fastest = {"path": path, "duration": {"min": 0.2, "max": 9}, "objective": {"time": 0.05}}
+    planner, calls = Planner(load("point-mass-3"), fastest), []
+    slow = plan("point-mass-3", {"path": path, "duration": 4})
+
+    def climb(*call):
+        calls.append(call)
+        return slow
+
+    fast = planner.plan()
+    found = stopping_within(fast, planner.scenario, 0.2, climb)
+    assert found.feasible
+    assert len(calls) == 1
+    assert fast.duration < found.duration < slow.duration
+    for time in np.random.default_rng(1).uniform(0, found.duration, 5):
+        assert stop(found, time).duration <= 0.2 + 0.008
+    share = np.linspace(0, 1, 7)  # the same law, slower: where it is after each share of its time
+    rows = [(each.duration, *(each.trajectory[name].values for name in ("time", "pose"))) for each in (fast, found)]
+    places = [np.interp(share * duration, times, poses[:, 0]) for duration, times, poses in rows]
+    np.testing.assert_allclose(*places, atol=1e-3)
 
 
 WITHIN = {"path": {"kind": "line", "start": [-1, -0.5, 1], "end": [1, 0.5, 1.5]}, "stop_within": 0.25}

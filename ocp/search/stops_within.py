@@ -14,10 +14,12 @@ from ...base.text import quantity
 from ...models.part import PositiveRange
 from ...models.trajectory import Motion, Trajectory
 from ...statics.stops import longest_stop_along
+from ..audits.audit import audit
 from ..audits.excess import Excess
 from ..plan import Plan
 from ..result import PlannerStep
 from ..tasks.deviation import Deviation
+from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 
@@ -42,15 +44,23 @@ def stopping_within(
         return plan
     span, begun, tried = scenario.duration_range, time.perf_counter(), 0
     short, enough = plan, None  # of two durations, the plan that stops too late and the one that stops in time
+    shortest = 0.0  # of the durations that `climb` finds
     while tried < ROUNDS and span is not None and plan.stop is not None:
         if plan.feasible and plan.stop.duration >= NEAR * seconds:
             break
         target = min(_between(short, enough, seconds), span.max)
         if (span.max if enough is None else enough.duration) <= CLOSE * short.duration:
             break
-        task = scenario.task.model_copy(update={"duration": PositiveRange(min=target, max=span.max)})
-        start = None if plan.deviation is None else plan.deviation.stretched(target / plan.duration)
-        plan, tried = _judged(climb(replace(scenario, task=task, duration=target), start), scenario, seconds), tried + 1
+        if target < shortest:
+            found = _slowed(short, target)
+            if found is None:
+                break
+        else:
+            task = scenario.task.model_copy(update={"duration": PositiveRange(min=target, max=span.max)})
+            start = None if plan.deviation is None else plan.deviation.stretched(target / plan.duration)
+            found = climb(replace(scenario, task=task, duration=target), start)
+            shortest = found.duration if found.duration > CLOSE * target else shortest
+        plan, tried = _judged(found, scenario, seconds), tried + 1
         if plan.feasible:
             best = enough = plan
         else:
@@ -60,6 +70,21 @@ def stopping_within(
     said = f"{tried} tried" + f", {quantity(best.duration, 's')} suffices" * best.feasible
     stages = (*first.stages, PlannerStep("slower, to stop in time", said, time.perf_counter() - begun))
     return replace(best, stages=stages)
+
+
+def _slowed(plan: Plan, target: float) -> Plan | None:
+    """Return the motion of a plan with a time law of its own in `target` seconds, with all speeds in proportion.
+
+    None for other plans, and if the audit of the slower motion does not pass.
+    """
+    path = plan.scenario.path
+    if plan.deviation is not None or not isinstance(path, TimedPath) or path.smoothing is not None or path.dwell:
+        return None
+    speeds = [plan.duration / target * speed for speed in path.speeds]
+    scenario = plan.scenario.along(TimedPath.model_validate(dict(path) | {"speeds": speeds}), target)
+    audited = audit(scenario, None)
+    found = replace(plan, scenario=scenario, status=MotionStatus.FEASIBLE, audit=audited, stop=None)
+    return found if audited.passed else None
 
 
 def _between(short: Plan, enough: Plan | None, seconds: float) -> float:
