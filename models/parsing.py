@@ -140,6 +140,8 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
         message = f"must be a mapping with {_keys(node)}{kinds}, got {shown(value)}"
     else:
         message = detail["msg"]
+        if message == "must be a list" and (items := node.get("prefixItems")):
+            message += f" of {len(items)} {items[0].get('type', 'item')}s"
         if kind == "string_pattern_mismatch":
             message = TITLES if " " in context["pattern"] else NAMES
         if kind != "value_error" or not isinstance(value, dict):
