@@ -225,3 +225,15 @@ def test_wrong_keys_are_one_line(keys, message):
     path = {"kind": "feed", "points": [[0, 0, 1], [1, 0, 1]], "acceleration": 1} | keys
     with pytest.raises(InputError, match=message):
         plan(load("cogiro"), {"path": path})
+
+
+@pytest.mark.parametrize("robot", ["multi-quadrotor-3", "multi-quadrotor-6"])
+def test_a_team_whose_thrust_cannot_jump_is_told_so_at_once(robot):
+    """The force on a carrier jumps with the platform's acceleration: across its thrust axis, which turns steadily."""
+    points = [[0, 0, 0], [1, 0, 0], [1, 1, 0.3]]
+    feed = {"kind": "feed", "points": points, "feed": 0.5, "acceleration": 1, "tolerance": 0.05}
+    phases = {"phases": [{"name": "paint", "path": feed}]}
+    for task in ({"path": feed}, phases):
+        with pytest.raises(InputError, match="must be waypoints or samples if the planner") as refused:
+            plan(robot, {**task, "base": {"kind": "free"}})
+        assert "\n" not in str(refused.value)

@@ -14,7 +14,7 @@ from ..limits.limits import Limits
 from .ends import carrier_ends, platform_ends
 from .initial import Final, Initial, check_ends
 from .limit_list import bodies
-from .paths import WaypointPath
+from .paths import FeedPath, SequencePath, WaypointPath
 from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, Scenario
 from .task import FreeBase, Task
 from .task_limits import OF_CARRIERS
@@ -38,6 +38,7 @@ def check_task(robot: Robot, task: Task) -> None:
     _check_waypoints(task, where)
     _check_cycle(task, where)
     _check_stops(robot, task, where)
+    _check_feed(robot, task, where)
     if task.final is not None and task.final.carrier_pose is not None and carrier_ends(task) == "periodic":
         raise InputError(f"{where}: base.ends must not be periodic with final.carrier_pose, got periodic")
 
@@ -126,6 +127,17 @@ def _check_stops(robot: Robot, task: Task, where: str) -> None:
     ):
         if others:
             raise InputError(f"{where}: stop_within must be left out with {what}, got {task.stop_within:g} s")
+
+
+def _check_feed(robot: Robot, task: Task, where: str) -> None:
+    """Refuse paths whose acceleration jumps where flying carriers would have to jump in attitude with it."""
+    flying = any(carrier.efforts for carrier in robot.carriers) and task.base.kind == "free"
+    parts = [part.path for part in task.path.parts] if isinstance(task.path, SequencePath) else [task.path]
+    if flying and any(isinstance(part, FeedPath) for part in parts):
+        raise InputError(
+            f"{where}: path.kind must be waypoints or samples if the planner moves flying carriers, since they cannot "
+            "turn their thrust as suddenly as a steady speed begins and ends, got feed"
+        )
 
 
 def _check_times(task: Task, where: str) -> None:
