@@ -95,7 +95,9 @@ class _Search:
             if self.found.starts == 0 and self._requirements.start == "robot":
                 own = self._y.copy()
                 self._improve("the robot's own layout", _FIRST_STEP)
-                self._take(own)  # the audit may find that the linear programs have made it worse
+                if not self._met():
+                    self._settle(_SOON)
+                self._take(own)  # audits may find that the linear programs have made it worse
             elif self._share() < _STARTING or (not self._met() and self.found.starts % 2):
                 next(starts)
             else:
