@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -227,9 +228,8 @@ def save(canvas: Figure, path: Path) -> Path:
             temporary.write_text(svg(canvas), encoding="utf-8")
         else:
             metadata = {"CreationDate": None} if form == "pdf" else None
-            with rc_context({"pdf.fonttype": 42}):
+            with rc_context({"pdf.fonttype": 42}), _laid_out_once(canvas):
                 canvas.savefig(temporary, dpi=DPI, format=form, metadata=metadata)
-    canvas.set_layout_engine("none")
     return path
 
 
@@ -252,7 +252,29 @@ def svg(canvas: Figure) -> str:
 
     stream = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with rc_context({"svg.fonttype": "path", "svg.hashsalt": "towline"}):
+    with rc_context({"svg.fonttype": "path", "svg.hashsalt": "towline"}), _laid_out_once(canvas):
         canvas.savefig(stream, format="svg", metadata=nothing)
-    canvas.set_layout_engine("none")  # laid out again, the figure would differ
     return stream.getvalue()
+
+
+@contextmanager
+def _laid_out_once(canvas: Figure) -> Iterator[None]:
+    """Lay a figure out when it is first saved, since a second layout would differ, and draw it once each time.
+
+    Matplotlib draws a figure with a layout twice, the first time into nothing.
+    """
+    draw = canvas.draw
+
+    def lay_out_or_draw(renderer: Any) -> None:
+        engine = canvas.get_layout_engine()
+        if "draw_path" in vars(renderer) and engine is not None:  # which does nothing there
+            engine.execute(canvas)
+        else:
+            draw(renderer)
+
+    canvas.draw = lay_out_or_draw
+    try:
+        yield
+    finally:
+        del canvas.draw
+        canvas.set_layout_engine("none")
