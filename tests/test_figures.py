@@ -179,7 +179,7 @@ def test_units_are_typeset():
     assert style.typeset("amplitude [um]") == "amplitude [µm]"
     assert style.typeset("acceleration [m/s^2, rad/s^2], jerk [m/s^3]") == "acceleration [m/s², rad/s²], jerk [m/s³]"
     names = [text.get_text() for text in FIGURES["limits"]().legends[0].get_texts()]
-    assert any(name.startswith("carrier acceleration (at most 1.2 m/s²): ") for name in names)
+    assert any(name.startswith("carrier acceleration (at most 1.2\N{NO-BREAK SPACE}m/s²): ") for name in names)
 
 
 @pytest.mark.parametrize("value", [0.0, 5.0, -3.0, 1e-7])
