@@ -17,8 +17,8 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 @parameters("""
     OTHER: A second plan or simulation file, for comparison.
-    --html: HTML file to write instead of serving a page. The file works without a server, and for a robot also
-        without the extra viewer.
+    --html: HTML file to write instead of serving a page. The file works without a server, and for a robot or a
+        workspace also without the extra viewer.
     --robot: Robot file of a workspace whose robot is not in the library.
     --host: Address to listen on; 127.0.0.1 accepts only this machine.
     --port: Port to listen on; if it is taken, the next free port is used; 0: any free port.
