@@ -170,7 +170,7 @@ class Prices(Part):
 
 
 class Requirements(Part):
-    """Requirements of a design: what is free, poses and wrenches. In a file: YAML with these keys."""
+    """Requirements of a design: what is free, poses and wrenches. A requirement file is YAML with these keys."""
 
     name: Title = optional("name of the requirements, for reports and file names", "design")
     free: Annotated[tuple[Free, ...], Field(min_length=1, max_length=200)] = Field(

@@ -59,7 +59,7 @@ class MotionEstimate(NamedTuple):
 
 
 class PoseFilter(Displayed):
-    """Estimate pose and velocity of a platform from any of lengths, poses, an inertial sensor and tensions.
+    """Estimate pose and velocity of a platform from lengths, poses, an inertial sensor or tensions, or several of them.
 
     The first update must have lengths or a pose. A search starts again if most lengths are wrong.
 

@@ -152,7 +152,7 @@ def _or_phases(schema: dict[str, Any]) -> None:
 
 
 class Task(Part):
-    """A planning task. In a file: YAML with these keys."""
+    """A planning task. A task file is YAML with these keys."""
 
     model_config = ConfigDict(json_schema_extra=_or_phases)
 
