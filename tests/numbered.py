@@ -18,7 +18,7 @@ NAMED = {"Eq.": r"Eqs?\.", "figure": "figures?", "Table": "Table", "step": "step
 ERRATA = Path(__file__).parent.parent / "docs" / "errata"
 SECTIONS = {
     Verdict.REPRODUCED: [],
-    Verdict.DIFFERS: ["What is printed, and what holds"],
+    Verdict.DIFFERS: ["Printed results that differ, and what is correct"],
     Verdict.IMPOSSIBLE: ["Impossible"],
     Verdict.NOT_DETERMINED: ["Not printed in the paper"],
     Verdict.REPAIRED: ["What is possible instead"],

@@ -23,7 +23,7 @@ def errata(account: Account) -> str:
         f"{MEANING} {READ}",
     ]
     titles = {
-        Verdict.DIFFERS: "What is printed, and what holds",
+        Verdict.DIFFERS: "Printed results that differ, and what is correct",
         Verdict.IMPOSSIBLE: "Impossible",
         Verdict.NOT_DETERMINED: "Not printed in the paper",
         Verdict.REPAIRED: "What is possible instead",

@@ -1,6 +1,6 @@
 """The pairing of anchors and attachments: with the printed one J has no inverse.
 
-While the platform is level, at any position and yaw, the six lines A_i B_i have Pluecker coordinates that are affine in
+While the platform is level, at any position and yaw, the six lines A_i B_i have Plücker coordinates that are affine in
 cos a_i and sin a_i, a_i = 60 degrees (i - 1): their only products of second order are r_A r_B sin(yaw) times
 cos^2 a_i + sin^2 a_i, a constant. Six points of three functions, 1, cos a_i and sin a_i, span three dimensions at most.
 """
