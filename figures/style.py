@@ -277,4 +277,4 @@ def _laid_out_once(canvas: Figure) -> Iterator[None]:
         yield
     finally:
         del canvas.draw
-        canvas.set_layout_engine("none")
+    canvas.set_layout_engine("none")
