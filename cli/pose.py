@@ -26,14 +26,11 @@ from .options import (
 from .outputs import check_outputs
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from ..estimation import PoseEstimate
     from ..models import Robot
 
 SIX = "x y z roll pitch yaw"
 FEWEST_FIT = 0.95  # of the samples of a log
-LEFT_OUT = 1e6  # [m], the standard deviation of a length that has no influence
 
 
 @parameters(f"""
@@ -89,7 +86,7 @@ def pose(
         poses = [other.pose.tolist() for other in others]
         print_json({"robot": loaded.name, **estimate.to_dict(), "others": poses})
     else:
-        _show(loaded, estimate, others, measured)
+        _show(loaded, estimate, others)
     if not estimate.consistent:
         raise typer.Exit(1)
 
@@ -135,6 +132,7 @@ def _of_log(
         for i, name in enumerate(SIX.split()):
             middle = 1e3 * float(np.median(sigmas[:, i]))
             size = quantity(middle, "mm" if i < 3 else "mrad", 3) if np.isfinite(middle) else "undetermined"
+            size = size if robot.dof_mask[i] else "fixed"
             typer.echo(f"  median sigma of {name}: {size}")
         for line in (*read.notes, *found.lines()):
             typer.echo(f"  {line}")
@@ -150,22 +148,11 @@ def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
     return bool(np.abs(one.pose[:3] - other.pose[:3]).max() < 0.01 * robot.length and np.abs(turned).max() < 0.01)
 
 
-def _may_be_wrong(estimate: PoseEstimate, lengths: np.ndarray) -> list[int]:
-    """Return the cables of which a single wrong length explains the residuals: a pose fits the others of (m,)."""
-    import numpy as np
-
-    from ..estimation import pose_from_lengths
-
-    robot, carriers = estimate.robot, estimate.carrier_pose
-    sigmas = np.where(np.eye(robot.m, dtype=bool), LEFT_OUT, estimate.sigma)
-    fits = (pose_from_lengths(robot, lengths, carrier_pose=carriers, sigma=sigma).consistent for sigma in sigmas)
-    return [cable for cable, fit in enumerate(fits) if fit]
-
-
-def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate], lengths: np.ndarray) -> None:
+def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:
     import numpy as np
 
     from ..base.text import quantity, quantity_row
+    from ..estimation.pose.wrong_lengths import can_explain, wrong_cables
 
     verdict = "a pose fits the lengths" if estimate.consistent else "NO POSE FITS THE LENGTHS; the closest one is shown"
     if estimate.by_gravity and not estimate.converged:
@@ -187,8 +174,8 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate], leng
         typer.echo(
             "Nearly singular: the lengths are not linear within the sigmas, so the sigmas are only a rough measure."
         )
-    if not estimate.consistent and robot.m > robot.dof_mask.sum() + 1:
-        cables = _may_be_wrong(estimate, lengths)
+    if not estimate.consistent and can_explain(estimate):
+        cables = wrong_cables(estimate)
         named = " or ".join(f"cables[{k}]" for k in cables) if len(cables) < robot.m else "any one cable"
         typer.echo(f"A wrong length of {named} explains this." if named else "No single wrong length explains this.")
     for other in others:

@@ -13,6 +13,7 @@ from scipy.stats import chi2, ncx2
 from towline import InputError, Robot, available, core, load, solve_batch
 from towline.estimation.pose.estimate import gradient, moved
 from towline.estimation.pose.problem import problem_of
+from towline.estimation.pose.wrong_lengths import wrong_cables
 from towline.models import branches, points, pose_from_lengths
 from towline.models.dynamics import dynamics_of
 from towline.models.record import record_of
@@ -120,6 +121,19 @@ def test_a_length_that_is_off_is_noticed_as_often_as_theory_predicts():
     assert np.mean(~estimate.consistent) == pytest.approx(power.mean(), abs=0.005)
     certain = free[np.arange(len(poses)), cable] > 0.3
     assert np.mean(estimate.suspects().argmax(axis=1)[certain] == cable[certain]) > 0.75
+
+
+@pytest.mark.parametrize("name", ["ipanema-2", "cogiro", "caroca-pulleys"])
+def test_the_wrong_length_is_found_however_far_it_moves_the_pose(name):
+    """By 0.5 m and more, where a linear test finds another cable for half of the errors."""
+    robot = load(name)
+    rng, home = np.random.default_rng(3), dynamics_of(robot).cable_lengths(robot.home)
+    for cable in range(robot.m):
+        lengths = home + rng.normal(0, 5e-4, robot.m)
+        lengths[cable] += rng.uniform(0.5, 0.7) * rng.choice([-1, 1])
+        found = pose_from_lengths(robot, lengths)
+        assert not found.consistent
+        assert cable in wrong_cables(found)
 
 
 def test_the_estimate_is_that_of_another_least_squares():

@@ -27,17 +27,21 @@ from ..logs.recording import COUNTED
 from ..logs.smoothing import FEWEST, Parabolas, within
 from .estimate import FALSE_ALARM, PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, pose_from_lengths
+from .wrong_lengths import TOLD_APART, can_explain, wrong_cables
 
 MOST_TRACKED = 2000  # samples that are followed one by one; all others begin between them
 BLOCK = 5000  # samples whose poses are fitted together
 MOST_NAMED = 12
+LOOKS = 100  # samples of those that no pose fits, which are fitted without each cable
 CERTAIN = 4.0  # standard deviations by which residuals must exceed the stated ones
 VISIBLE = 1e-3  # of the cables' length, of a swing that is named
-TOLD_APART = 4.0  # standard deviations by which one cable is more likely wrong than another
 
 
 class Wrong(NamedTuple):
-    """Successive samples that no pose fits, from `first` to `last`, and the cables of which one is wrong, from 0."""
+    """Successive samples that no pose fits, from `first` to `last`, and the cables of which one is wrong, from 0.
+
+    Without cables, no single wrong length explains the samples.
+    """
 
     first: int
     last: int
@@ -100,8 +104,11 @@ class LogPoses(Displayed):
         wrong: list[Wrong] = []
         for run in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) > 1) + 1):
             together = every[run].sum(axis=0)
-            cables = np.flatnonzero(together >= together.max() - TOLD_APART**2)
-            wrong.append(Wrong(int(rows[run[0]]), int(rows[run[-1]]), tuple(cables.tolist())))
+            cables = tuple(np.flatnonzero(together >= together.max() - TOLD_APART**2).tolist())
+            if len(wrong) < MOST_NAMED and not self.more and can_explain(self.estimate):
+                some = np.linspace(0, len(run) - 1, min(LOOKS, len(run))).astype(int)
+                cables = wrong_cables(self.estimate, rows[run[some]].tolist())
+            wrong.append(Wrong(int(rows[run[0]]), int(rows[run[-1]]), cables))
         return tuple(wrong)
 
     @cached_property
@@ -139,7 +146,8 @@ class LogPoses(Displayed):
             which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
             at = "" if self.times is None else f" (from {self._time(one.first)})"
             names = " or ".join(f"cables[{cable}]" for cable in one.cables)
-            yield f"{which}{at}: no pose fits; most likely the length of {names} is wrong"
+            why = f"most likely the length of {names} is wrong" if names else "no single wrong length explains this"
+            yield f"{which}{at}: no pose fits; {why}"
         if len(self.wrong) > MOST_NAMED:
             yield f"and {quantity(len(self.wrong) - MOST_NAMED)} more"
 
