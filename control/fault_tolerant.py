@@ -214,8 +214,9 @@ def _without(robot: Robot, index: int, options: dict[str, Any]) -> Rest | None:
     home, name = robot.home, robot.carriers[index].name
     found = formation(Robot.model_validate(data), home, robot.carrier_home[carriers], lengths[cables])
     if not found.exists:
-        lacks = f"{quantity_row(found.missing[:3], 'N')} and {quantity_row(found.missing[3:], 'N m')}"
-        warn(f"{robot.name} cannot rest without {name}: the missing wrench is {lacks} about the CoM", stacklevel=3)
+        force, moment = quantity_row(found.missing[:3], "N"), quantity_row(found.missing[3:], "N m")
+        lacks = f"a force of {force} and a moment of {moment} about the CoM are missing"
+        warn(f"{robot.name} cannot rest without {name}: {lacks}", stacklevel=3)
         return None
     data["platform"]["home"] = found.pose.tolist()
     for carrier, pose in zip(data["carriers"], found.carrier_pose.tolist(), strict=True):

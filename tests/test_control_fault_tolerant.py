@@ -82,7 +82,7 @@ def test_where_no_formation_exists_the_missing_wrench_is_named():
     assert lacks == pytest.approx(np.abs(found.missing).max(), rel=1e-4)
     assert lacks > 1.0
     missing = ", ".join(f"{one:.4g}" for one in np.round(found.missing[:3], 9) + 0.0)
-    with pytest.warns(UserWarning, match=f"cannot rest without quad1: the missing wrench is {missing} N and"):
+    with pytest.warns(UserWarning, match=f"cannot rest without quad1: a force of {missing} N and"):
         controller = FaultTolerant(robot)
     run = simulate(robot, robot.home, controller, duration=0.1, events=["lose quad1 at 0.05"])
     assert controller.lost.reason == "quad1 has lost its thrust: the others cannot carry the platform"

@@ -235,6 +235,7 @@ class Sweep(Displayed, Reported):
         ends = ["reason"] * any(row.reason for row in self.rows)
         columns += [[row.reason for row in self.rows] for _ in ends]
         named = [name if units[name] == "1" else f"{name} [{units[name]}]" for name in _NUMBERS]
+        named = [name.replace("tension_max", "largest tension") for name in named]
         numeric = [k for k, axis in enumerate(self.cases.axes) if axis.numeric]
         numeric += range(len(heads) + 1, len(heads) + 1 + len(_NUMBERS))
         return Table("", [*heads, "status", *named, *ends], list(zip(*columns, strict=True)), numeric)
