@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline import InputError, load, read_measurements
+from towline import InputError, Measurements, load, read_measurements
 from towline.estimation.calibration import calibrate
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
@@ -266,3 +266,22 @@ def test_a_first_row_of_data_may_begin_with_an_empty_cell():
     numbered = ",,1,1\nframe,time [s],x [m],z [m]\n0,0.1,1.5,2\n1,0.2,1.6,2\n"  # markers above names are no data
     table = from_csv(numbered.encode(), "markers.csv").topics[""]
     assert list(table.fields) == ["frame", "time", "1/x", "1/z"]
+
+
+def test_auto_finds_that_cables_lie_in_layers_on_their_drums(tmp_path):
+    """The radius of a drum grows with the cable on it; without `build-up` scales and offsets made up for it."""
+    draw, path = np.random.default_rng(3), user.planar(tmp_path, 2)[0]
+    robot = load(path)
+    t = np.arange(0, 40, 0.2)
+    place = np.column_stack([1.45 + 0.9 * np.sin(1.1 * t), 0 * t, 1.1 + 0.65 * np.sin(1.37 * t + 0.4)])
+    turned = Rotation.from_euler("y", 0.1 * np.sin(0.9 * t)[:, None])
+    ends = [np.array([getattr(cable, end) for cable in robot.cables]) for end in ("anchor", "attachment")]
+    wound, offsets = 0.004, draw.normal(0, 0.02, 4)
+    lengths = user.lengths_at(*ends, place, turned.as_matrix())
+    readings = (np.sqrt(1.02**2 + 4 * wound * (lengths - offsets)) - 1.02) / (2 * wound)
+    readings += draw.normal(0, 5e-4, readings.shape)
+    measured = Measurements(readings, place, turned.as_quat())
+    found = calibrate(robot, measured, free="auto")
+    assert found.free == ("anchors", "offsets", "scales", "build-up")
+    assert found.noise < 6e-4
+    np.testing.assert_allclose([cable.encoder.build_up for cable in found.robot.cables], wound, atol=4e-4)

@@ -53,7 +53,9 @@ NESTED: tuple[tuple[str, ...], ...] = (
     ("anchors", "offsets"),
     ("anchors", "attachments", "offsets"),
     ("anchors", "offsets", "scales"),
+    ("anchors", "offsets", "scales", "build-up"),
     ("anchors", "attachments", "offsets", "scales"),
+    ("anchors", "attachments", "offsets", "scales", "build-up"),
     ("anchors", "attachments", "offsets", "radii"),
     ("anchors", "attachments", "offsets", "scales", "radii"),
 )
@@ -117,12 +119,11 @@ def compare(solved: Solved, free: tuple[str, ...], prior: dict[str, float]) -> H
 def select(robot: Robot, measurements: Measurements, outliers: bool) -> tuple[str, ...]:
     """Return the smallest parameter set whose cross-validation error is close to the best.
 
-    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales, pulley radii and,
-    with tensions, stiffness; with a clock offset if times and poses of a motion were measured. Attachments are left out
-    if the platform hardly turns. Before, mass, CoM and
-    friction are added one by one if they let the balance of forces of the validation samples be predicted better. With
-    `outliers`, slips and outliers are removed first. Raises `InputError` if there are too few measurements even for the
-    offsets.
+    The sets are empty (the file), offsets alone, anchors, both, and these with attachments, scales, build-up, pulley
+    radii and, with tensions, stiffness; with a clock offset if times and poses of a motion were measured. Attachments
+    are left out if the platform hardly turns. Before, mass, CoM and friction are added one by one if they let the
+    balance of forces of the validation samples be predicted better. With `outliers`, slips and outliers are removed
+    first. Raises `InputError` if there are too few measurements even for the offsets.
     """
     sets = [one for one in NESTED if "radii" not in one or robot.pulley_radii.any()]
     turns = turning(robot, measurements)
