@@ -181,14 +181,14 @@ class Robot(Part):
     def _headline(self) -> str:
         kinds = [carrier.kind for carrier in self.carriers]
         carriers = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-        return f"{self.name}: {self.m} cable{'s' * (self.m != 1)}; carriers: {carriers}"
+        return f"{self.name}: {self.m} cable{'s' * (self.m != 1)}, {carriers} carrier{'s' * (len(kinds) != 1)}"
 
     def _facts(self) -> Iterable[Fact]:
         return [
             ("mass", quantity(self.platform.mass, "kg")),
             ("moves", ", ".join(self.platform.dof)),
             ("home", f"({quantity_row(self.home)}) [m, rad]"),
-            ("cables there", quantity_range(np.linalg.norm(self.home_anchors - self.home_attachments, axis=1), "m")),
+            ("cable lengths there", quantity_range(np.linalg.norm(self.home_anchors - self.home_attachments, axis=1), "m")),
             ("t_min", quantity_range(self.t_min, "N")),
             ("t_max", quantity_range(self.t_max, "N")),
             ("drive", self.drive),

@@ -108,7 +108,7 @@ function described(proof) {
   const force = proof.direction.slice(0, 3), moment = proof.direction.slice(3).map((x) => x * DATA.length);
   const along = [];
   if (norm(force) >= FORCELESS) along.push(`force ${vector(force)}`);
-  if (norm(moment) >= FORCELESS) along.push(`moment ${vector(moment)} over the length of ${quantity(DATA.length, "m")}`);
+  if (norm(moment) >= FORCELESS) along.push(`moment ${vector(moment)} (divided by the characteristic length, ${quantity(DATA.length, "m")})`);
   const cables = (list, name) => (list.length ? `${name} of cable${list.length > 1 ? "s" : ""} ${list.join(", ")}` : "");
   const limits = [cables(proof.atMin, "t_min"), cables(proof.atMax, "t_max")].filter(Boolean).join("; ");
   return `Along ${along.join(", ")}: needed ${quantity(proof.demand, "N")}, available at most ` +
