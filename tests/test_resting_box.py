@@ -46,6 +46,23 @@ def test_where_home_is_too_high_the_box_is_about_the_nearest_sample():
     assert box.low[2] <= box.centre[2] <= box.high[2] < 2.9
 
 
+@pytest.mark.parametrize(
+    ("body", "below", "beside"),
+    [
+        (None, 0.0, 0.0),  # a point
+        ({"kind": "box", "min": [-0.1, -0.3, -0.4], "max": [0.1, 0.3, 0]}, 0.4, 0.3),  # its yaw turns y to x
+        ({"kind": "capsule", "start": [0, 0, 0], "end": [0, 0, -0.2], "radius": 0.15}, 0.35, 0.15),
+    ],
+)
+def test_all_of_it_is_above_the_floor_and_in_the_room_with_the_body(body, below, beside):
+    data = camera([0, 0, 1.5, 0, 0, np.pi / 2], body=body).model_dump() | {"floor": 0.25}
+    box = resting_box(Robot.model_validate(data | {"workspace_box": {"min": [-0.5, -2, 0], "max": [5, 2, 2.5]}}))
+    assert box.low[2] == pytest.approx(0.25 + below)
+    assert box.low[0] == pytest.approx(-0.5 + beside)
+    assert box.high[2] <= 2.5 + 1e-9
+    assert (box.resting[:, 2] >= 0.25 + below - 1e-6).all()
+
+
 @pytest.mark.parametrize("name", ["cogiro", "planar-4", "wang-flying", "the-cable-robot-simulator"])
 def test_the_scalar_solver_finds_tensions_at_the_corners(name):
     robot = load(name)
