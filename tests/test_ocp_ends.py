@@ -10,9 +10,12 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from towline import InputError
-from towline.models import Dynamics, load
+from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan
 from towline.ocp.audits.audit import audit
+from towline.ocp.proofs.infeasible_ends import infeasible_ends
+from towline.ocp.tasks.lay_out import lay_out
+from towline.ocp.tasks.task import read_task
 
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
 TUBE = {"position": 0.05, "attitude": 0.1}
@@ -286,3 +289,22 @@ def test_a_team_carries_its_load_along_exact_lines_and_legs_one_after_the_other(
     again = plan(robot, found.scenario.task)  # which says all that was chosen
     assert again.feasible
     assert [part.path.timing for part in again.scenario.task.path.parts] == ["smoother", "smoother"]
+
+
+@pytest.mark.parametrize(("beyond", "proven"), [(0.001, True), (-0.001, False)])
+def test_a_cable_of_fixed_length_must_reach_from_the_end_to_the_nearest_point_of_its_carriers_reach(beyond, proven):
+    """The attachments are below one reach box: its nearest points are straight above them, at its lowest height."""
+    data = load("wang-ctmrts").model_dump() | {"drive": "fixed-length"}
+    data["carriers"] = [data["carriers"][0] | {"name": carrier["name"]} for carrier in data["carriers"]]
+    data["cables"] = [cable | {"length": 1.2} for cable in data["cables"]]
+    robot = Robot.model_validate(data)
+    carrier = robot.carriers[0]
+    end = [*carrier.home[:2], carrier.motion_limits.reach.min[2] - 1.2 - beyond]
+    path = {"kind": "line", "start": [*carrier.home[:2], 0.1], "end": end}
+    task = {"path": path, "duration": 5, "base": {"kind": "free"}, "tube": {"position": 0.01, "ends": "rest"}}
+    proof = infeasible_ends(lay_out(robot, read_task(task)))
+    about = [] if proof is None else [excess for excess in proof.excess if excess.limit == "cable_length"]
+    assert bool(about) == proven
+    if proven:
+        assert about[0].value - about[0].bound == pytest.approx(beyond)
+        assert "its reach" in str(about[0])

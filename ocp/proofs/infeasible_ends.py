@@ -167,21 +167,38 @@ def _at_no_attitude(
 def _stretched(
     scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
 ) -> list[Excess]:
-    """Return the worst cable that cannot keep the length that its drive fixes, if its carrier's position is given."""
+    """Return the worst cable that cannot keep the length that its drive fixes, wherever in its reach its carrier is."""
     robot = scenario.robot
     if robot.fixed_lengths is None:
         return []
-    off = np.abs(scenario.dynamics.cable_lengths(platform.pose, carriers.pose) - robot.fixed_lengths)
+    fixed, lengths = robot.fixed_lengths, scenario.dynamics.cable_lengths(platform.pose, carriers.pose)
+    nearest = _nearest_lengths(scenario, platform.pose, carriers.pose)
+    off, given = np.empty_like(lengths), np.empty(lengths.shape, bool)
     for which, rows in enumerate((slice(0, 1), slice(1, 2), slice(2, None))):
         free = freedom[which][:, 0].max(axis=1)
-        tied = (free[0] < FREE) & (free[1:] == GIVEN)[robot.carrier_of_cable]
-        off[rows] -= np.where(tied, _reach(scenario, freedom[which]), np.inf)
+        given[rows] = (free[1:] == GIVEN)[robot.carrier_of_cable]
+        off[rows] = np.where(given[rows], np.abs(lengths[rows] - fixed), nearest[rows] - fixed)
+        off[rows] -= _reach(scenario, freedom[which]) if free[0] < FREE else np.inf
     row, cable = np.unravel_index(off.argmax(), off.shape)
     if off[row, cable] <= LENGTH_TOLERANCE:
         return []
-    length = float(scenario.dynamics.cable_lengths(platform.pose[row], carriers.pose[row])[cable])
-    kept, why = float(robot.fixed_lengths[cable]), "the drive fixed-length keeps it constant"
-    return [Excess("cable_length", f"cable {cable + 1}", float(times[row]), length, kept, "m", "exactly", why)]
+    length, why = lengths[row, cable], "the drive fixed-length keeps it constant"
+    if not given[row, cable]:
+        length, why = nearest[row, cable], f"{why}; here its carrier is as near as its reach permits"
+    about = f"cable {cable + 1}"
+    return [Excess("cable_length", about, float(times[row]), float(length), float(fixed[cable]), "m", "exactly", why)]
+
+
+def _nearest_lengths(scenario: Scenario, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
+    """Return the smallest lengths of cables, wherever in its reach box a carrier is, (n, m) [m]; -inf without one."""
+    robot, attachments = scenario.robot, scenario.dynamics.points(platform, carriers)[1]
+    nearest = np.full(attachments.shape[:2], -np.inf)
+    for cable, owner in enumerate(robot.carrier_of_cable):
+        box, at = robot.carriers[owner].motion_limits.reach, attachments[:, cable]
+        if box is not None:
+            apart = np.maximum(np.maximum(np.subtract(box.min, at), np.subtract(at, box.max)), 0.0)
+            nearest[:, cable] = np.linalg.norm(apart, axis=1) - np.linalg.norm(robot.anchors[cable])
+    return nearest
 
 
 def _hurried(
