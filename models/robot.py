@@ -188,7 +188,10 @@ class Robot(Part):
             ("mass", quantity(self.platform.mass, "kg")),
             ("moves", ", ".join(self.platform.dof)),
             ("home", f"({quantity_row(self.home)}) [m, rad]"),
-            ("cable lengths there", quantity_range(np.linalg.norm(self.home_anchors - self.home_attachments, axis=1), "m")),
+            (
+                "cable lengths there",
+                quantity_range(np.linalg.norm(self.home_anchors - self.home_attachments, axis=1), "m"),
+            ),
             ("t_min", quantity_range(self.t_min, "N")),
             ("t_max", quantity_range(self.t_max, "N")),
             ("drive", self.drive),

@@ -325,3 +325,21 @@ def test_a_motion_is_feasible_if_and_only_if_it_has_tensions_whatever_the_size_o
         assert not found.feasible or short <= 1e-6
         if found.feasible:
             assert (found.audit.tensions <= smaller.t_max).all()
+
+
+@pytest.mark.parametrize(("name", "duration"), [("multi-quadrotor-3", 0.6), ("wang-ctmrts", 1.2)])
+def test_the_certificate_of_few_cables_is_that_of_the_worst_instant(name, duration):
+    """By least squares at each instant, whose residual is missing whatever the tensions are."""
+    robot = load(name)
+    end = np.add(robot.home[:3], [1.5, 0, 0])
+    task = {"path": {"kind": "line", "start": robot.home[:3].tolist(), "end": end.tolist()}, "duration": duration}
+    found = plan(robot, task)
+    worst, motion = found.certificate, found.audit.motion
+    assert worst.shortfall == pytest.approx(max(each.shortfall for each in found.infeasible_spans))
+    required = Dynamics(robot).required_wrench(*motion)
+    matrices = Dynamics(robot).wrench_matrix(motion.pose, found.audit.carriers.pose)
+    scale = np.array([1, 1, 1, *3 * [1 / robot.length]])
+    for row in range(0, len(required), 50):
+        A, w = scale[:, None] * matrices[row], scale * required[row]
+        missing = np.linalg.norm(w - A @ np.linalg.lstsq(A, w)[0])  # of tensions of any sign
+        assert missing <= worst.shortfall * (1 + 1e-6)

@@ -330,7 +330,7 @@ CASES = {
         lambda b: {"reach": {"min": [b, 0.2, 1.0], "max": [2.4, 0.7, 1.4]}},
         share=1.01,
         least=True,
-        about="robot1 x",
+        about="robot1 along x",
         soft=0.05,
         where="carrier",
     ),

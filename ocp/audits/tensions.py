@@ -102,7 +102,9 @@ class Distribution:
                 short = violation[impossible]
                 if few:
                     in_range = _short_in_range(scaled_A[impossible], scaled_w[impossible], low, high)
-                    beyond, short = float(in_range.max()), np.where(in_range > 0, in_range, short)
+                    beyond = float(in_range.max())
+                    if beyond > 0:  # what is tolerated outside the span is no failure
+                        short = np.where(short > tolerance, short, in_range)
                 singly.append(int(impossible[np.argmax(short)]))
         worst_row: int | None = None
         for k in singly:
@@ -126,7 +128,10 @@ class Distribution:
             return closest if violation <= self.tolerance else np.full(problem.m, np.nan), violation, certificate
         within = _in_span(problem.scaled_A[None], problem.scaled_w[None])[0] / problem.row_scale
         in_range = TensionProblem(problem.A, within, problem.t_min, problem.t_max, length=problem.length)
-        return closest, violation, certify(in_range) or certificate
+        inside = certify(in_range)
+        if inside is None or certificate.shortfall > max(inside.shortfall, self.tolerance):
+            inside = certificate
+        return closest, violation, inside
 
 
 def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:

@@ -84,7 +84,7 @@ class CarrierReach(Limit):
     name, unit, shown = "carrier_reach", "m", False
 
     def __init__(self, robot: Robot, index: int, axis: int, low: float, high: float):
-        self.labels = (f"{robot.carriers[index].name} {'xyz'[axis]}",)
+        self.labels = (f"{robot.carriers[index].name} along {'xyz'[axis]}",)
         self.low, self.high = low, high
         self.hull = Hull(index, 0, (axis,))
         self._index, self._axis = index, axis
@@ -127,7 +127,8 @@ class CarrierEffort(Limit):
     def __init__(self, robot: Robot, index: int, which: int, effort: Effort):
         self._index, self._which = index, which
         self.name, self.unit, self.low, self.high = effort.name, effort.unit, effort.low, effort.high
-        self.labels = tuple(f"{robot.carriers[index].name} {axis}".rstrip() for axis in effort.axes)
+        way = " about " if effort.unit == "N m" else " along "
+        self.labels = tuple(robot.carriers[index].name + (way + axis if axis else "") for axis in effort.axes)
         self.scale = effort.scale or robot.force_scale
 
     @override

@@ -96,7 +96,7 @@ class PlatformBox(Limit):
 
     def __init__(self, axis: int, low: float, high: float):
         self._axis, self.low, self.high = axis, low, high
-        self.labels = (f"platform {'xyz'[axis]}",)
+        self.labels = (f"platform along {'xyz'[axis]}",)
 
     @override
     def values(self, state: State) -> ca.SX:
