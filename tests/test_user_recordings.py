@@ -12,6 +12,7 @@ from towline.estimation.calibration import calibrate
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log
+from towline.estimation.logs.measurements import changed
 from towline.estimation.logs.tables import from_csv
 
 from . import user_recordings as user
@@ -180,6 +181,25 @@ def test_frames_of_an_ahrs(what, tmp_path):
     for i in range(4):
         value, sigma = fixed[f"cables[{i}].offset"]
         assert abs(value - offsets[i]) < 4 * sigma + 5e-3
+
+
+@pytest.mark.parametrize("heading", [0, 25])
+def test_offsets_turn_a_small_platform_as_another_heading_does(heading, tmp_path):
+    """Offsets and the CoM explain orientations that are right; otherwise the fit finds the heading."""
+    offsets = np.array([0.05, -0.04, 0.03, 0.06])
+    robot = load(user.hanging_robot(tmp_path))
+    user.statics(tmp_path, offsets)
+    given = read_measurements(tmp_path / "statics.csv", robot=robot, sigma={"lengths": 1e-3, "rotation": 0.009})
+    turned = Rotation.from_euler("z", heading, degrees=True) * Rotation.from_euler("xyz", given.poses[:, 3:])
+    found = mistake(robot, changed(given, poses=np.hstack([given.poses[:, :3], turned.as_euler("xyz")])))
+    if heading == 0:
+        assert found is None
+        return
+    assert "about (0, 0, -1)" in found.text
+    error = (
+        Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_euler("xyz", given.poses[:, 3:]).inv()
+    )
+    assert np.degrees(error.magnitude()).max() < 1.0
 
 
 def test_a_motion_capture_that_repeats_the_last_pose(tmp_path):

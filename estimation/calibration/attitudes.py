@@ -2,6 +2,7 @@
 
 The orientation in which the platform hangs or is held by its cables follows from the lengths, and differs from the
 measured one by a rotation of the sensor's world, such as that to magnetic north, or of the sensor on the platform.
+Offsets of the readings and a wrong CoM turn a small platform as much, so fits with these unknown decide.
 """
 
 from typing import NamedTuple
@@ -16,11 +17,18 @@ from ...models.robot import Robot
 from ..logs.encoders import lengths_of
 from ..logs.measurements import Measurements, changed, measured_poses
 from ..pose.from_lengths import pose_from_lengths
+from .geometry import length_of
 from .interpretations import interpretations
+from .solving import model_of
+from .starts import fit_from
 
-MOST_SAMPLES, FEWEST = 40, 6
+MOST_SAMPLES, MOST_FITTED, FEWEST = 40, 60, 6
 CLEARLY = 3.0  # times smaller differences
-VISIBLE = np.radians(8.0)  # offsets of the readings turn a platform less
+VISIBLE = np.radians(8.0)  # smaller ones are offsets of the readings or a wrong CoM
+TILTED = np.radians(20.0)  # of a world whose vertical is another one
+LIKELIER = 0.95  # of the sum of squares that a fit with the orientations as they are leaves
+ENOUGH = 1e-3  # of the sum of squares, of a step that these fits need not take
+MOST_TURNED, ACCURATE = np.radians(30.0), np.radians(0.1)
 
 
 class Misread(NamedTuple):
@@ -47,30 +55,79 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         return None
     rows, expected = rows[good], Rotation.from_matrix(points.rotations(estimate.pose[good, 3:]))
     tried: list[tuple[float, float, str, Rotation, Rotation, int]] = []
-    none = Rotation.identity()
+    none, up = Rotation.identity(), -np.array(robot.gravity) / max(np.linalg.norm(robot.gravity), 1e-12)
     ways = [way for way in interpretations(True) if way.turned is not None or not way.text]
     for k, way in enumerate(ways):
         R = rotation[rows] if way.turned is None else way.turned(rotation[rows], given.poses[rows, 3:])
         seen = Rotation.from_matrix(R)
         outer, inner = (expected * seen.inv()).mean(), (seen.inv() * expected).mean()
-        for left, right, frame in ((none, none, ""), (outer, none, "world"), (none, inner, "sensor")):
+        heading = Rotation.from_rotvec(2 * np.arctan2(up @ outer.as_quat()[:3], outer.as_quat()[3]) * up)
+        # An inertial sensor knows the vertical: only its heading is wrong, unless its axes have another order.
+        world = heading if (outer * heading.inv()).magnitude() < TILTED else outer
+        for left, right, frame in ((none, none, ""), (world, none, "world"), (none, inner, "sensor")):
             size = float(np.median((left * seen * right * expected.inv()).magnitude()))
             corrections = (k > 0) + bool(frame)
-            about = (left * right).as_rotvec()
-            angle = float(np.linalg.norm(about))
-            axis = quantity_row(np.round(about / max(angle, 1e-12), 2), digits=2)
-            size_of = quantity(np.degrees(angle), "deg", 3)
-            turned = f"the {frame} of the orientations looks turned by {size_of} about ({axis})"
-            text = " and ".join(part for part in (way.text, turned if frame else "") if part)
-            tried.append((size * CLEARLY**corrections, size, text, left, right, k))
+            tried.append((size * CLEARLY**corrections, size, frame, left, right, k))
     best = min(tried, key=lambda one: one[0])
-    if not best[2] or tried[0][1] < VISIBLE:
+    if best is tried[0] or tried[0][1] < VISIBLE:
         return None
-    _, size, text, left, right, k = best
-    turn = ways[k].turned
-    every = rotation if turn is None else turn(rotation, np.nan_to_num(given.poses[:, 3:]))
-    angles = points.angles((left * Rotation.from_matrix(every) * right).as_matrix())
-    poses = np.hstack([given.poses[:, :3], np.where(known[:, 3:], angles, np.nan)])
-    by = [quantity(np.degrees(part), "deg", 2) for part in (size, tried[0][1])]
-    text = f"{text}: they differ from those by the lengths by {by[0]}, not by {by[1]}"
-    return Misread(text, changed(given, poses=poses))
+    try:
+        as_given = _fitted(robot, given)[0]
+    except InputError:  # too few samples for a fit
+        as_given = np.inf
+    likeliest: Misread | None = None
+    least = LIKELIER * as_given  # offsets and the CoM may explain the differences as well
+    for one in (best, tried[1]):  # the most probable error, and another heading
+        _, size, frame, left, right, k = one
+        turn = ways[k].turned
+        every = rotation if turn is None else turn(rotation, np.nan_to_num(given.poses[:, 3:]))
+        whole = left * Rotation.from_matrix(every) * right
+        if as_given < np.inf:
+            more = _heading(robot, given, whole, up) if frame == "world" else none
+            left, whole = more * left, more * whole
+            cost = _fitted(robot, _turned(given, whole))[0]
+            if cost > least:
+                continue
+            least = cost
+        about = (left * right).as_rotvec()
+        angle = float(np.linalg.norm(about))
+        axis = quantity_row(np.round(about / max(angle, 1e-12), 2), digits=2)
+        turned = (
+            f"the {frame} of the orientations looks turned by {quantity(np.degrees(angle), 'deg', 3)} about ({axis})"
+        )
+        text = " and ".join(part for part in (ways[k].text, turned if frame else "") if part)
+        now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, tried[0][1]))
+        text = f"{text}: they differ from those by the lengths by {now}, not by {before}"
+        likeliest = Misread(text, _turned(given, whole))
+        if as_given == np.inf:
+            break
+    return likeliest
+
+
+def _turned(given: Measurements, rotation: Rotation) -> Measurements:
+    """Return measurements with other orientations where they were measured."""
+    assert given.poses is not None
+    angles = np.where(np.isfinite(given.poses[:, 3:]), points.angles(rotation.as_matrix()), np.nan)
+    return changed(given, poses=np.hstack([given.poses[:, :3], angles]))
+
+
+def _fitted(robot: Robot, given: Measurements) -> tuple[float, np.ndarray]:
+    """Return the sum of squares with offsets and the CoM fitted, and turns (n, 3) [rad] from measured orientations."""
+    few = np.unique(np.linspace(0, len(given) - 1, min(len(given), MOST_FITTED)).astype(int))
+    groups = ("offsets", "com") if robot.m < robot.dof_mask.sum() else ("offsets",)
+    model = model_of(robot, given.only(np.isin(np.arange(len(given)), few)), groups, {})
+    found = fit_from(model, model.begin(), length_of(robot), enough=ENOUGH)[0]
+    return found.cost, Rotation.from_matrix(found.state.turn).as_rotvec()
+
+
+def _heading(robot: Robot, given: Measurements, rotation: Rotation, up: np.ndarray) -> Rotation:
+    """Return the turn about the vertical after which the platform's mean turn from the orientations is 0, or none."""
+    from scipy.optimize import brentq
+
+    def turn(angle: float) -> float:
+        other = _turned(given, Rotation.from_rotvec(angle * up) * rotation)
+        return float((_fitted(robot, other)[1] @ up).mean())
+
+    if not turn(-MOST_TURNED) > 0 > turn(MOST_TURNED):
+        return Rotation.identity()
+    return Rotation.from_rotvec(brentq(turn, -MOST_TURNED, MOST_TURNED, xtol=ACCURATE) * up)
