@@ -10,7 +10,7 @@ from typing_extensions import override
 
 from ..base.errors import InputError
 from ..base.inputs import number, required, shown
-from ..core import control_step, control_take, control_thrusts
+from ..core import control_step, control_thrusts
 from ..models.files import as_robot
 from ..models.record import record_of
 from ..models.robot import Robot
@@ -34,6 +34,7 @@ from .settings import limits_of, reach_of, set_reach, settings_of
 from .state import State
 from .tension_loop import TensionLoop
 
+TAKE_ALONE = -1  # in place of how tensions are solved: `control_step` then only takes state and reference
 GAINS = "kd", "kp", "ki"  # of the settings, in the order of the powers of the bandwidth
 HELD_FOR = 0.75  # over the bandwidth: the longest time between steps; from 1 on the loop is unstable (Jury)
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
@@ -202,7 +203,6 @@ class ComputedTorque(Controller):
         self._problems = problems = InPlace(rows, 6, m, self.robot.length)
         orders = self._carriers if self._moves_carriers else None
         memory = self._cables, self._platform, self._of_carriers
-        self._inputs = self._robot, self._measured, self._cables, self._wanted, orders, problems.t_ref
         self._arrays = self._measured, self._wanted, orders, *memory, problems.memory
         for part in (self._loop, self._ahead, self._lead):
             if part is not None:
@@ -287,7 +287,7 @@ class ComputedTorque(Controller):
             self._sent_lately.remember(self._last, dt)
         else:
             state, reference = self._as_floats(state, reference)
-            control_take(state, reference, *self._inputs)
+            control_step(0.0, 0.0, *scales, TAKE_ALONE, state, reference, *own, None, *self._arrays)
             cables, age = self._cables, time - seen
             otherwise = cables["known"] - cables["then"]
             self._sent_lately.remember(self._last, dt)
@@ -324,7 +324,6 @@ class ComputedTorque(Controller):
     def _carry(self, load: Any, time: float) -> None:
         """Use the model of the robot with a load from a time on [s]."""
         self._robot = self._carried.change(load, time)
-        self._inputs = self._robot, *self._inputs[1:]
 
     def _command(
         self,

@@ -48,7 +48,6 @@ def horizon_solve(
     memory: Any,
     residuals: Any,
 ) -> tuple[int, bool]: ...
-def control_take(state: Any, reference: Any, robot: Any, *arrays: Any) -> None: ...
 def control_step(
     dt: float,
     since: float,

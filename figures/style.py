@@ -267,7 +267,7 @@ def _laid_out_once(canvas: Figure) -> Iterator[None]:
 
     def lay_out_or_draw(renderer: Any) -> None:
         engine = canvas.get_layout_engine()
-        if "draw_path" in vars(renderer) and engine is not None:  # which does nothing there
+        if "draw_path" in vars(renderer) and engine is not None:  # drawing is switched off
             engine.execute(canvas)
         else:
             draw(renderer)

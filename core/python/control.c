@@ -105,31 +105,6 @@ static int are_given(PyObject *state, PyObject *reference) {
     return PyTuple_Check(state) && PyTuple_Size(state) >= 5 && PyTuple_Check(reference) && PyTuple_Size(reference) >= 7;
 }
 
-TOWLINE_PY(control_take) {
-    enum { ROBOT, MEASURED, CABLES, REFERENCE, CARRIERS, T_REF, ALL };
-    arrays given;
-    PyObject *state = count > 1 ? arguments[0] : NULL, *reference = count > 1 ? arguments[1] : NULL;
-    if (!state || !are_given(state, reference)) {
-        PyErr_SetString(PyExc_TypeError, "the function takes a state, a reference and arrays");
-        return NULL;
-    }
-    if (!take(&given, arguments + 2, count - 2, ALL, MEASURED)) { return NULL; }
-    const towline_robot *robot = robot_of(&given);
-    const Py_ssize_t rows = given.size[REFERENCE] / ORDER;
-    int fits = robot && given.of[MEASURED] && given.of[CABLES] && given.of[REFERENCE] && given.of[T_REF];
-    if (fits) {
-        const Py_ssize_t c = robot->carriers, m = robot->cables;
-        const Py_ssize_t sizes[ALL] = {0, MOTION * (1 + c), m * PER_CABLE, ORDER, ORDER * c, m};
-        fits = have_rows(&given, MEASURED, ALL, rows, sizes);
-    }
-    if (!fits) { return done(&given, 0); }
-    fits = put_state(state, robot, rows, given.of[MEASURED], given.of[CABLES]) &&
-           put_reference(reference, robot, rows, given.of[REFERENCE], given.of[CARRIERS], given.of[T_REF]);
-    release(&given);
-    if (!fits) { return NULL; }
-    Py_RETURN_NONE;
-}
-
 /* Release the arrays, and return a number, or NULL with an exception if they do not fit. */
 static PyObject *number_done(arrays *given, int fits, double number) {
     PyObject *nothing = done(given, fits);
@@ -288,6 +263,10 @@ TOWLINE_PY(control_step) {
             !put_reference(reference, robot, rows, of[REFERENCE], of[CARRIERS], at.t_ref)) {
             release(&given);
             return NULL;
+        }
+        if (solves < 0) {
+            release(&given);
+            return Py_BuildValue("(iii)", 0, 0, 0);
         }
         hear_command(cables, rows * m, PyTuple_GetItem(state, TENSIONS_OF_STATE) != Py_None);
     }

@@ -50,14 +50,13 @@ FUNCTION(horizon_solve, "(N, n, m, p, processor, beginning, iterations_max, tole
          "Solve the problem in memory; return how many iterations it took, and whether it converged.")
 
 /* control.c */
-FUNCTION(control_take, "(state, reference, robot, measured, cables, wanted, carriers, t_ref)",
-         "Copy a state and a reference, arrays of float64, to where the other functions read them.")
 FUNCTION(control_step,
          "(dt, since, length, distance, angle, solves, state, reference, robot, controller, late, measured, wanted, "
          "carriers, cables, platform, memory, problems)",
          "Take a state and a reference unless they are None, update the memory of each row, write the problem of "
-         "tension distribution of this step, and solve it if `solves` is 1, or 2: in lanes. Return how many cables "
-         "count as cut, how many rows are optimal, and how many may be so far from their reference.")
+         "tension distribution of this step, and solve it if `solves` is 1, or 2: in lanes; if it is -1, only take "
+         "them. Return how many cables count as cut, how many rows are optimal, and how many may be so far from their "
+         "reference.")
 FUNCTION(control_thrusts,
          "(dt, robot, controller, measured, carriers, tensions, cables, platform, memory, turning, actuation)",
          "Write the commands of the actuators of flying carriers; return the most that a thrust lacks [N].")
