@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from towline import InputError, load, plan, read_task, time_along
+from towline import Dynamics, InputError, load, plan, read_task, time_along
 from towline.ocp.tasks.paths import FeedPath
 
 
@@ -237,3 +237,21 @@ def test_a_team_whose_thrust_cannot_jump_is_told_so_at_once(robot):
         with pytest.raises(InputError, match="must be waypoints or samples if the planner") as refused:
             plan(robot, {**task, "base": {"kind": "free"}})
         assert "\n" not in str(refused.value)
+
+
+def test_a_phase_begins_and_ends_at_its_feed_unless_the_ground_is_next():
+    """The tensions on both sides of the joint are those of their own accelerations: they balance the wrench."""
+    feed = {"kind": "feed", "points": [[0, 0, 1], [0, 0, 1.5], [1, 1, 1.5]], "feed": 0.6, "acceleration": 2}
+    down = {"name": "down", "duration": 2, "path": {"kind": "line", "start": [0, 0, 2], "end": [0, 0, 1]}}
+    found = plan("cogiro", {"phases": [down, {"name": "paint", "path": feed}]})
+    assert found.feasible
+    instants = found.audit.times
+    rows = np.flatnonzero(np.abs(instants - 2.0) < 2.5e-3)
+    rise = found.audit.motion.acceleration[rows, 2]
+    assert {round(float(value), 1) for value in rise} == {0.0, 2.0}
+    A = Dynamics(load("cogiro")).wrench_matrix(found.audit.motion.pose[rows])
+    lift = (A @ found.audit.tensions[rows][..., None])[:, 2, 0]
+    np.testing.assert_allclose(lift, load("cogiro").platform.mass * (9.81 + rise), rtol=1e-9)
+    on_ground = {"name": "pick", "duration": 0.5, "ground": {}}
+    with pytest.raises(InputError, match="must begin with the acceleration"):
+        plan("cogiro", {"phases": [down, on_ground, {"name": "paint", "path": feed}]})

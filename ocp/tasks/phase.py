@@ -104,6 +104,6 @@ def path_of(phases: Sequence[Phase]) -> SequencePath:
             joined.append((path, lasting(path, longest)))
         except ValueError as error:
             raise ValueError(f"{key}.{error}") from None
-    check_continuity(joined, "phases")
+    check_continuity(joined, "phases", [k for k, phase in enumerate(phases) if phase.ground is not None])
     parts = tuple(Piece(path=path, duration=seconds) for path, seconds in joined)
     return SequencePath(kind="sequence", frame=joined[0][0].frame, parts=parts)
