@@ -22,8 +22,8 @@ class Command(NamedTuple):
         answered: (...), status of the step, an index of `ANSWERS`: tensions give the required wrench ("as planned"); an
             earlier solution is used ("shifted plan"); tensions with the closest wrench ("soft wrench"); the last
             command is held ("hold"); computed torque, because the robot does not move as predicted ("not as modelled");
-            or tensions as planned, but the platform is more than a tenth of the cables' length or 0.5 rad off ("off the
-            reference").
+            or tensions as planned, but the platform is more than a tenth of the cables' length, 0.5 m or 0.5 rad off
+            ("off the reference").
         direction, shortfall: If no tensions inside the limits and rates give the required wrench: the direction of the
             missing wrench, (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying
             carrier has too little thrust for them, or does not turn as commanded because its actuators were at their

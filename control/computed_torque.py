@@ -31,12 +31,11 @@ from .one_at_a_time import OneAtATime
 from .records import CABLE, CARRIER, PLATFORM, TURNING
 from .reference import Reference
 from .settings import limits_of, reach_of, set_reach, settings_of
+from .slow_loops import SlowLoops
 from .state import State
 from .tension_loop import TensionLoop
 
 TAKE_ALONE = -1  # in place of how tensions are solved: `control_step` then only takes state and reference
-GAINS = "kd", "kp", "ki"  # of the settings, in the order of the powers of the bandwidth
-HELD_FOR = 0.75  # over the bandwidth: the longest time between steps; from 1 on the loop is unstable (Jury)
 SOMETHING = 1e-3  # of its upper limit: what a cable is commanded at least for its reports to mean something
 QUICK = 6.0  # [rad/s]: the bandwidth of a carrier's deviation, unless a slower loop has to follow it
 
@@ -61,7 +60,8 @@ class ComputedTorque(Controller):
             Default: 10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers;
             see `sensors`. If the first two steps, or three in a row, are more than 0.75 / w apart, the default is
             lowered, because the loop is unstable from 1 / w on, and restored after two steps that are closer together.
-            A given bandwidth is kept, with a warning.
+            A given bandwidth is kept, with a warning. If carriers fly, all bandwidths are lowered by the same factor,
+            because their attitude loops need the same: steps of at most 0.75 / `attitude`.
         damping: Damping ratio z: Kd = 2 z w.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
@@ -133,8 +133,9 @@ class ComputedTorque(Controller):
         far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
         self._settings["attitude"] = self._attitude = loops.attitude
-        self._gains, self._adapts = {name: self._settings[name].copy() for name in GAINS}, bandwidth is None
-        self._usual_longest = (HELD_FOR if self._adapts else 1.0) / max(self._settings["kd"].max() / 2, ROUNDING)
+        self._flies = bool(self._settings["by_wrench"].any())
+        self._slow_loops = SlowLoops(self._settings, bandwidth is None, usual.bandwidth)
+        self._usual_longest = self._slow_loops.longest
         loop, lag = number("tension_loop", tension_loop, 0.0, 1e3), number("tension_lag", tension_lag, 0.0, 1.0)
         has_lead = lag > WINCHES_KEEP and self.robot.fixed_lengths is None
         self._ahead = Lead(lag, WINCHES_KEEP, *self._limits) if has_lead else None
@@ -142,7 +143,6 @@ class ComputedTorque(Controller):
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None
         self._robot, self._carried = record_of(self.robot), CarriedLoad(self.robot)
-        self._flies = bool(self._settings["by_wrench"].any())
         self._moves_carriers = self._flies or bool(far.any())
         self._lead = rotor_lead(self.robot, rotors) if rotors else None
         self._is_plain = not self._moves_carriers and self._loop is None and self._ahead is None
@@ -186,7 +186,6 @@ class ComputedTorque(Controller):
         """Create the memory for one robot, or for each row of a batch."""
         m, count = self.robot.m, len(self.robot.carriers)
         self._time: float | None = None
-        ComputedTorque._speed_up(self)
         self._elapsed = 0.0
         self._carried.reset()
         self._robot = record_of(self.robot)
@@ -196,7 +195,8 @@ class ComputedTorque(Controller):
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
         self._carriers = np.zeros((rows, count, 3, 6))  # how they should move, where they have a command of their own
         self._cables, self._platform = np.zeros((rows, m), CABLE), np.zeros(rows, PLATFORM)
-        self._platform["attitude"], self._platform["integrates"] = self._attitude, 1
+        self._platform["integrates"] = 1
+        ComputedTorque._speed_up(self)
         self._of_carriers = np.zeros((rows, count), CARRIER)
         self._actuation = np.zeros((rows, count, max(len(carrier.actuators) for carrier in self.robot.carriers)))
         self._turning = np.zeros(rows, TURNING) if self._flies else None
@@ -306,20 +306,16 @@ class ComputedTorque(Controller):
         return dt, state, reference
 
     def _slow_down(self, period: float) -> None:
-        """Lower default gains for commands that are held for a period [s], or warn of given ones: see `HELD_FOR`."""
-        fastest = float(self._settings["kd"].max()) / 2
-        self._longest = period * (1 + ROUNDING) if self._adapts else np.inf
-        if self._adapts:
-            for order, name in enumerate(GAINS, 1):
-                self._settings[name] *= (HELD_FOR / (period * fastest)) ** order
-        else:
-            warn(f"bandwidth must be at most {1 / period:.3g} rad/s for steps {period:.3g} s apart", stacklevel=2)
+        """Lower bandwidths for commands that are held for a period [s], or warn of given ones."""
+        self._longest, most = self._slow_loops.slow_down(period)
+        self._platform["attitude"] = np.minimum(self._platform["attitude"], self._settings["attitude"])
+        if most < np.inf:
+            warn(f"bandwidth must be at most {most:.3g} rad/s for steps {period:.3g} s apart", stacklevel=2)
 
     def _speed_up(self) -> None:
-        """Use the usual gains."""
-        for name, gain in self._gains.items():
-            self._settings[name] = gain
-        self._longest = self._usual_longest
+        """Use the usual bandwidths."""
+        self._slow_loops.speed_up()
+        self._platform["attitude"], self._longest = self._attitude, self._usual_longest
 
     def _carry(self, load: Any, time: float) -> None:
         """Use the model of the robot with a load from a time on [s]."""

@@ -5,8 +5,9 @@ import numpy as np
 from ..models.robot import Robot
 from .command import OFF, PLANNED, SHIFTED
 
-FAR = 0.1  # of the mean length of the cables at home: position
+FAR, MOST = 0.1, 0.5  # position: of the mean length of the cables at home, and at most [m]
 TURNED = 0.5  # [rad], each of roll, pitch and yaw
+OFF_TARGET, LEFT = 0.1, 0.5  # of these: errors that have to decrease, and how much of them a prediction may leave
 
 
 class Deviation:
@@ -17,7 +18,7 @@ class Deviation:
 
     def __init__(self, robot: Robot):
         lengths = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
-        self.most = FAR * float(lengths.mean()), TURNED  # [m, rad]
+        self.most = min(FAR * float(lengths.mean()), MOST), TURNED  # [m, rad]
 
     def are_far(self, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return which poses (..., 6) are away from their references (..., 6)."""
@@ -25,6 +26,14 @@ class Deviation:
             off = poses - wanted
             turned = np.abs((off[..., 3:] + np.pi) % (2 * np.pi) - np.pi).max(axis=-1) > TURNED
             return np.asarray((np.square(off[..., :3]).sum(axis=-1) > self.most[0] ** 2) | turned)
+
+    def stays(self, errors: np.ndarray) -> bool:
+        """Return whether predicted errors, (K, 6) [m, rad], begin as more than negligible and do not decrease.
+
+        Errors that are reported in any case do not.
+        """
+        first, last = np.linalg.norm(errors[[0, -1]] / np.repeat(self.most, 3), axis=1)
+        return bool(first > OFF_TARGET and last > LEFT * first and not self.are_far(errors[0], np.zeros(6)))
 
     def status(self, answered: np.ndarray, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the status of each platform, (N,), from that of its tensions; poses and references are (N, 6)."""

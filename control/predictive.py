@@ -54,7 +54,8 @@ class Predictive(ComputedTorque):
     `ComputedTorque` and predicted to be constant.
 
     Each step uses the new solution (status "as planned"), or the last one while it lasts ("shifted plan"), or the
-    command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold").
+    command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold"). A solution is
+    "soft wrench" as well if it leaves the error, and the `ComputedTorque` lacks tensions.
 
     The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. This
     `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
@@ -71,8 +72,9 @@ class Predictive(ComputedTorque):
             robots with winches. At most 1.2 / `stage` has an effect.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may
             leave their reference, which is slower, of 0.025 s if carriers correct errors. If the first two steps, or
-            three in a row, and the references of `follow` are more than twice as far apart, up to 0.21 s, a stage lasts
-            as long as a step. A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
+            three in a row, and the references of `follow` are more than twice as far apart (if carriers fly, at all
+            further apart), up to 0.21 s, a stage lasts as long as a step. A given duration is kept, with a warning if
+            steps are more than 1.2 / `bandwidth` apart.
         reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
             scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's
             weight. With cables of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables'
@@ -142,9 +144,8 @@ class Predictive(ComputedTorque):
         self._stages = whole_number("stages", stages, 1, 200)
         self._stage = number("stage", usual.stage if stage is None else stage, 1e-4, 10.0)
         loops: dict[str, Any] = {"rate": rate, "place": place, "attitude": own.attitude, "patience": patience}
-        loops["rotor_lag"] = rotor_lag
-        self._beside = ComputedTorque(the_robot, reach=given, sensors=sensors, **loops)
-        loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag}
+        self._beside = ComputedTorque(the_robot, reach=given, sensors=sensors, rotor_lag=rotor_lag, **loops)
+        loops |= {"tension_loop": tension_loop, "tension_lag": tension_lag, "rotor_lag": rotor_lag}
         super().__init__(the_robot, observer=own.observer, reach=reach, **loops)
         set_reach(self._settings, reacts)
         self._followed, self._far = np.flatnonzero(flies & ~far.any(axis=1)), (far, flies)
@@ -160,7 +161,9 @@ class Predictive(ComputedTorque):
         self._from_the_start: HandOver | None = None
         self._steps, self._adapts = np.array([np.nan]), stage is None
         fastest = FASTEST / max(self._bandwidth.max(), ROUNDING)
-        self._usual_longest = max(self._stage, min(fastest, 2 * self._stage) if self._adapts else fastest) + ROUNDING
+        within = (1 if self._flies else 2) * self._stage
+        self._longest_stage = max(self._stage, min(fastest, within) if self._adapts else fastest) + ROUNDING
+        self._usual_longest = min(self._longest_stage, self._slow_loops.longest_turn)
         self.reset()
         if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
             self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
@@ -168,11 +171,11 @@ class Predictive(ComputedTorque):
 
     def _lay_out(self, stage: float) -> None:
         """Prepare the program with stages of a duration [s], without a solution."""
-        if self._steps[0] != stage:
-            self._steps = np.full(self._stages, stage)
+        if self._steps[0] != stage or self._turned != self._settings["attitude"]:
+            self._steps, self._turned = np.full(self._stages, stage), float(self._settings["attitude"])
             self._times = np.concatenate([[0.0], np.cumsum(self._steps)])
             # What is under way for longer than half of the stages would leave nothing to decide.
-            delay = min(2.0 / self._attitude, self._times[-1] / 2), stage
+            delay = min(2.0 / self._turned, self._times[-1] / 2), stage
             self._moved, reaches = moved_coordinates(self.robot, *self._far, self._strongest, self._boxes, delay)
             self._sizes = self._stages, 12 + 2 * self._moved.count, self.robot.m + self._moved.count
             self._room = self._limits.rate * self._times[1:, None]  # for tensions, until the end of each stage
@@ -186,14 +189,21 @@ class Predictive(ComputedTorque):
     @override
     def _slow_down(self, period: float) -> None:
         """Let a stage last as long as a command if references are as far apart, or warn of given stages."""
-        if not self._adapts:
-            self._longest = np.inf
+        longest, stage = self._longest, self._steps[0]
+        if self._flies:
+            super()._slow_down(period)
+        if period <= self._longest_stage:
+            longest = self._longest_stage
+        elif not self._adapts:
+            longest = np.inf
             warn(
                 f"stage must be at least {period:.3g} s, since steps are so far apart, or bandwidth lower", stacklevel=2
             )
         elif period <= min(PAUSE, self._preview.period + ROUNDING):
-            self._longest = period + ROUNDING
-            self._lay_out(period)
+            longest, stage = period + ROUNDING, period
+        self._longest = min(longest, self._longest) if self._flies else longest
+        if stage != self._steps[0] or self._turned != self._settings["attitude"]:
+            self._lay_out(stage)
 
     @override
     def _speed_up(self) -> None:
@@ -205,8 +215,9 @@ class Predictive(ComputedTorque):
         count, m, f = self._sizes[0], self.robot.m, self._moved.count
         A, B = stage_at_home(self.robot, self._moved, self._steps[0], self._statics)
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
-        bandwidth = np.minimum(self._bandwidth, FASTEST / self._steps[0])
-        self._weights = weights(self.robot, bandwidth, reaches, self._returning, self._steps[0], moves)
+        part = self._turned / self._attitude
+        bandwidth = np.minimum(part * self._bandwidth, FASTEST / self._steps[0])
+        self._weights = weights(self.robot, bandwidth, reaches, part * self._returning, self._steps[0], moves)
         self._efforts = np.concatenate([np.ones(m), (self._weights.states[12 : 12 + f]) / self._steps[0]])
         self._end = terminal(A, B, self._weights)
         self._penalty = FIRM * self.robot.length * float(np.diag(self._end)[:3].max())
@@ -248,7 +259,7 @@ class Predictive(ComputedTorque):
             agree(self, self._beside)
             tensions = self._sent(beside.tensions[None])[0]
             return beside._replace(tensions=tensions, answered=answered, unexplained=unexplained)
-        tensions, proof = self._predict(time, dt, reference), self._nowhere
+        tensions, proof = self._predict(time, dt, reference), self._nowhere  # also without cables, or overloaded
         instead = np.reshape(beside.answered, 1), (beside.direction[None], np.reshape(beside.shortfall, 1))
         if tensions is None:
             tensions, (answered, proof) = beside.tensions[None], instead
@@ -257,14 +268,14 @@ class Predictive(ComputedTorque):
             else:
                 self._watch.skip(dt, tensions[0] - self._cables["last"][0] if self._has_winches else 0 * tensions[0])
             self._moved.rest(self._steps[0], self._carriers[0])
-        elif self._is_missing and beside.answered == SOFT:  # the program has a solution even without cables
+        elif beside.answered == SOFT and (self._is_missing or self._deviation.stays(self._horizon.states[:, :6])):
             answered, proof = instead
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
         command = self._command(reference, tensions, answered, proof, alone=True)
         agree(self._beside, self)
         if self._turning is not None and (lag := self._turning["lag"][0]):
-            self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._attitude:.0f}")
+            self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._turned:.0f}")
         return command._replace(unexplained=unexplained)
 
     def _compare(self, time: float, dt: float, reference: Reference) -> None:
@@ -273,14 +284,12 @@ class Predictive(ComputedTorque):
             return
         if not self._carried.is_later(self._seen):  # of tensions that bore another load
             self._watch.interrupt()
-        cables, m = self._cables[0], self.robot.m
-        otherwise = cables["known"] - cables["last"] if self._has_winches else np.zeros(m)
+        cables = self._cables[0]
+        otherwise = cables["known"] - cables["last"] if self._has_winches else np.zeros(self.robot.m)
         self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
         if self.handed_over is not None and self._beside._settings["reacts"]:
-            carriers = np.stack(reference[3:6], axis=1)
             self._moved.now(dt, self._measured[0], self._preview.moved_of(self._preview.rows([reference])))
-            offsets = self._moved.offsets(carriers)
-            if offsets is not None:
+            if (offsets := self._moved.offsets(np.stack(reference[3:6], axis=1))) is not None:
                 memory, (offset, rate) = self._beside._of_carriers[0], offsets
                 memory["offset"], memory["offset_rate"] = offset - dt * rate, rate  # this step adds the rest
 
@@ -307,8 +316,7 @@ class Predictive(ComputedTorque):
         wanted, carriers, planned, ramps, loads = self._preview.at(time, now, start[3:6])
         states, controls = self._shifted(time, start, wanted, planned)
         h, m = self._horizon, self.robot.m
-        # Carriers that fly are where they are, not where they should be.
-        for which in self._followed:
+        for which in self._followed:  # carriers that fly are where they are, not where they should be
             carriers[:, which, :3] += self._measured[0, 1 + which, :3] - carriers[0, which, :3]
         of_carriers, disturbance = (self._moved.freed, self._moved.tethers), self._platform["disturbance"][0]
         for load, own in loads:
@@ -318,8 +326,7 @@ class Predictive(ComputedTorque):
         # The model knows what the reference does not, the estimated disturbance: a solution would be off by a balance
         # of errors and tensions for as long as it stays.
         control_aim(self.robot.length, h.A, h.B, h.c, self._steps, self._efforts, wanted, planned)
-        under_way = self._moved.under_way()
-        for k, more in enumerate(under_way):
+        for k, more in enumerate(under_way := self._moved.under_way()):
             h.c[k] += h.B[k, :, m:] @ (planned[k, m:] + more)
             h.B[k, :, m:] = 0.0
         if self._surroundings.rows:

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
-from towline import load, simulate
+from towline import Dynamics, load, simulate
 from towline.control import ANSWERS, ComputedTorque, Controller, LengthControl, Predictive, Reference, State
-from towline.control.deviation import FAR, TURNED, Deviation
+from towline.control.deviation import FAR, MOST, TURNED, Deviation
 
 PLANNED, OFF = ANSWERS.index("as planned"), ANSWERS.index("off the reference")
 COGIRO = load("cogiro")
@@ -15,7 +16,7 @@ COGIRO = load("cogiro")
 
 def longest(robot):
     """Return the distance beyond which a platform is away, from the cables' lengths."""
-    return FAR * np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
+    return min(FAR * np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean(), MOST)
 
 
 @given(st.lists(st.floats(-3, 3), min_size=6, max_size=6), st.sampled_from([0.0, 2 * np.pi, -2 * np.pi]))
@@ -59,12 +60,36 @@ def test_a_bad_run_is_not_silent(case):
 def test_a_reference_that_jumps_is_reported_until_it_is_reached(make):
     controller, still = make(COGIRO), np.zeros_like(COGIRO.carrier_home)
     state = State(COGIRO.home, np.zeros(6), COGIRO.carrier_home, still)
-    for k, (x, yaw, status) in enumerate([(0.9, 0.0, PLANNED), (1.5, 0.0, OFF), (0.0, 0.6, OFF), (0.0, 6.2, PLANNED)]):
+    for k, (x, yaw, status) in enumerate([(0.4, 0.0, PLANNED), (0.6, 0.0, OFF), (0.0, 0.6, OFF), (0.0, 6.2, PLANNED)]):
         pose = COGIRO.home + np.array([x, 0, 0, 0, 0, yaw])
         tensions = np.full(COGIRO.m, 300.0)
         reference = Reference(pose, np.zeros(6), np.zeros(6), COGIRO.carrier_home, still, still, tensions)
         # So far apart that the motion of this state, which stays where it is, is not compared with the model.
         assert controller.step(0.3 * k, state, reference).answered in (status, ANSWERS.index("soft wrench"))
+
+
+def test_no_robot_is_metres_off_as_planned():
+    """FAST's cables are 300 m long: a tenth of them is no distance that goes unreported."""
+    fast = load("fast")
+    assert Deviation(fast).are_far(fast.home + 0.6 * np.eye(6)[0], fast.home)
+
+
+def test_predictive_control_does_not_call_an_overload_as_planned():
+    """With its CoM off, a linear program finds no tensions that hold the platform; the program of a step has always."""
+    robot, off = load("wang-ctmrts-6"), -0.0172
+    com = tuple((np.array(robot.platform.com) + off).tolist())
+    actual = Dynamics(robot.model_copy(update={"platform": robot.platform.model_copy(update={"com": com})}))
+    w = np.asarray(actual.required_wrench(robot.home, np.zeros(6), np.zeros(6)))
+    bounds = np.stack([robot.t_min, robot.t_max], axis=1)
+    assert linprog(np.zeros(6), A_eq=actual.wrench_matrix(robot.home), b_eq=w, bounds=bounds).status == 2
+    controller = Predictive(robot)
+    run = simulate(robot, robot.home, controller, duration=0.8, period=4e-3, mismatch={"com": off})
+    assert controller.handed_over is None
+    assert run.error.max() > 0.1
+    growing = np.append(np.diff(run.error) > 0, False) & (run.error > 0.02)
+    assert growing.sum() > 50
+    assert (run.record.answered[growing] != PLANNED).all()
+    assert run.answered["soft wrench"] > 50
 
 
 def test_rows_of_a_batch_have_their_own_status():

@@ -53,6 +53,45 @@ def test_the_bandwidth_is_lowered_where_held_commands_would_make_the_loop_unstab
         pushed(robot, ComputedTorque(robot, bandwidth=6.0), 0.15)
 
 
+@pytest.mark.parametrize(
+    ("name", "kind", "period"),
+    [
+        *(
+            (name, ComputedTorque, period)
+            for name in ("multi-quadrotor-3", "multi-quadrotor-6", "flycrane")
+            for period in (0.03, 0.1)
+        ),
+        ("multi-quadrotor-4", Predictive, 0.04),
+        ("multi-quadrotor-6", Predictive, 0.1),
+    ],
+)
+def test_teams_hold_their_load_in_slow_loops(name, kind, period):
+    """Attitude loops of 40 rad/s are unstable then: teams tumbled, 30 m off after 4 s with steps of 0.1 s."""
+    robot = load(name)
+    controller = kind(robot)
+    run = pushed(robot, controller, period)
+    attitude = float(controller._settings["attitude"])
+    assert is_stable(attitude**2, 2 * attitude, period)
+    assert not is_stable(40.0**2, 2 * 40.0, period)
+    assert run.error.max() < 0.03  # a free mass: 0.03 g (0.2 s)^2 / 2 in the push, and 60 mm/s after it
+    assert run.error[-round(0.5 / period) :].max() < 4e-3
+    assert run.answered["as planned"] == len(run.error)
+
+
+def test_all_bandwidths_of_a_team_are_lowered_by_the_same_factor_and_restored():
+    robot = load("multi-quadrotor-3")
+    controller = ComputedTorque(robot)
+    usual = {name: controller._settings[name].copy() for name in ("attitude", "place", "observer", "kd", "kp")}
+    pushed(robot, controller, 0.05)
+    for name, value in usual.items():
+        np.testing.assert_allclose(controller._settings[name], value * (15 / 40) ** (1 + (name == "kp")), rtol=1e-6)
+    controller.reset()
+    for name, value in usual.items():
+        np.testing.assert_array_equal(controller._settings[name], value)
+    with pytest.warns(UserWarning, match=r"bandwidth must be at most 0.562 rad/s for steps 0.05 s apart"):
+        pushed(robot, ComputedTorque(robot, bandwidth=1.5), 0.05)
+
+
 def test_given_stages_that_are_shorter_than_the_steps_are_warned_of():
     robot = load("planar-4")
     with pytest.warns(UserWarning, match=r"stage must be at least 0.06 s, since steps are so far apart") as told:

@@ -17,13 +17,13 @@
 #include "control/internal.h"
 
 static const double LATE = 1.5;    /* over the bandwidth: a lag of 2 is where the loop gets unstable */
-static const double WINDOW = 0.05; /* [s], in which orders and rates are compared */
+static const double WINDOW = 2;    /* over the bandwidth: in which orders and rates are compared */
 static const double FASTEST = 1e4; /* [rad/s]: nothing turns faster */
 static const double SEEN = 0.01;   /* [rad]: what the lag makes of a carrier's attitude until it is believed */
 
 /* Update one axis, whose comparison starts again where a number is none, and return dr/dt. */
 static double follow(double bandwidth, double dt, double order, double rate, towline_turning_axis *it) {
-    const double share = 1 - exp(-bandwidth * dt), slow = dt / WINDOW;
+    const double share = 1 - exp(-bandwidth * dt), slow = dt * bandwidth / WINDOW;
     it->order += dt * order - slow * it->order;
     it->usual += slow * (rate - it->usual);
     const double change = rate - it->usual - it->late_rate;
@@ -38,7 +38,8 @@ static double follow(double bandwidth, double dt, double order, double rate, tow
 
 void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt, const double ordered[][3],
                          const towline_carrier_memory *carriers, towline_turning *it) {
-    const int again = !it->has_begun || dt > WINDOW;
+    const double window = WINDOW / bandwidth;
+    const int again = !it->has_begun || dt > window;
     double along = 0, square = 0;
     if (again) {
         memset(it, 0, sizeof *it);
@@ -57,7 +58,7 @@ void towline_measure_lag(const towline_robot *robot, double bandwidth, double dt
             }
         }
     }
-    const double slow = dt / WINDOW, late = LATE / bandwidth, rate = SEEN * WINDOW * bandwidth * bandwidth / late;
+    const double slow = dt / window, late = LATE / bandwidth, rate = SEEN * WINDOW * bandwidth / late;
     if (!again) {
         it->along += slow * (along - it->along);
         it->square += slow * (square - it->square);

@@ -1,0 +1,61 @@
+"""`SlowLoops`: bandwidths for commands that are held for a long time."""
+
+import numpy as np
+
+from .as_floats import ROUNDING
+
+GAINS = "kd", "kp", "ki"  # of the settings, in the order of the powers of the bandwidth
+LOOPS = "attitude", "place", "carrier_bandwidth", "observer"  # the other bandwidths of the settings
+HELD_FOR = 0.75  # over the bandwidth: the longest time between steps; from 1 on a loop is unstable (Jury)
+
+
+class SlowLoops:
+    """Lower the bandwidths of a controller whose steps are far apart, see `HELD_FOR`.
+
+    The attitude loops of flying carriers are the fastest. All others are closed around them, so they are lowered by
+    the same factor.
+
+    - `settings`: those of the controller, which are changed.
+    - `adapts`: whether the bandwidth of the error may be lowered.
+    - `usual`: default bandwidth of the error [rad/s].
+    """
+
+    def __init__(self, settings: np.ndarray, adapts: bool, usual: float):
+        self._settings, self._adapts = settings, adapts
+        self._flies = bool(settings["by_wrench"].any())
+        self._usual = {name: settings[name].copy() for name in (*GAINS, *LOOPS)}
+        self._share = usual / float(settings["attitude"])
+        held = (HELD_FOR if adapts else 1.0) / max(self._bandwidth, ROUNDING)
+        self.longest = min(held, self.longest_turn)  # time between steps without a change [s]
+
+    @property
+    def _bandwidth(self) -> float:
+        return float(self._settings["kd"].max()) / 2
+
+    @property
+    def longest_turn(self) -> float:
+        """Return the longest time between steps for the attitude loops [s], infinite if no carrier flies."""
+        return HELD_FOR / float(self._settings["attitude"]) if self._flies else np.inf
+
+    def slow_down(self, period: float) -> tuple[float, float]:
+        """Lower bandwidths for steps `period` [s] apart.
+
+        Return the longest time between steps until they should be lowered again [s], and the largest bandwidth
+        [rad/s] if a given one is larger, otherwise infinity.
+        """
+        given, most = self._bandwidth, 1.0 / period
+        part = min(HELD_FOR / (period * given) if self._adapts else 1.0, self.longest_turn / period, 1.0)
+        if self._flies:
+            for name in LOOPS:
+                self._settings[name] *= part
+            most = min(most, self._share * float(self._settings["attitude"]))
+        if self._adapts:
+            for order, name in enumerate(GAINS, 1):
+                self._settings[name] *= part**order
+        longest = period * (1 + ROUNDING) if self._adapts or self._flies else np.inf
+        return longest, np.inf if self._adapts or given <= most else most
+
+    def speed_up(self) -> None:
+        """Use the usual bandwidths."""
+        for name, value in self._usual.items():
+            self._settings[name] = value
