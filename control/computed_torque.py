@@ -61,7 +61,8 @@ class ComputedTorque(Controller):
             see `sensors`. If the first two steps, or three in a row, are more than 0.75 / w apart, the default is
             lowered, because the loop is unstable from 1 / w on, and restored after two steps that are closer together.
             A given bandwidth is kept, with a warning. If carriers fly, all bandwidths are lowered by the same factor,
-            because their attitude loops need the same: steps of at most 0.75 / `attitude`.
+            because their attitude loops need the same: steps of at most 0.75 / `attitude`. Carriers that do not fly and
+            correct errors need 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z w.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no

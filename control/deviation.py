@@ -7,7 +7,7 @@ from .command import OFF, PLANNED, SHIFTED
 
 FAR, MOST = 0.1, 0.5  # position: of the mean length of the cables at home, and at most [m]
 TURNED = 0.5  # [rad], each of roll, pitch and yaw
-OFF_TARGET, LEFT = 0.1, 0.5  # of these: errors that have to decrease, and how much of them a prediction may leave
+OFF_TARGET, LEFT = 0.2, 0.5  # of these: errors that have to decrease, and how much of them a prediction may leave
 
 
 class Deviation:

@@ -38,6 +38,7 @@ TOLERANCE = 1e-6  # of the residuals of a solution
 ITERATIONS, COLD_ITERATIONS = 20, 30
 NEARLY, GOOD = 0.1, 1e-3  # residuals, not converged, of an iterate for the next step to begin with, and of one to use
 USUAL_REACH = 0.06  # of the cables' mean length
+SWINGING = 0.45  # the same as the next of carriers that correct errors, and with which they return to their reference
 FASTEST = 1.2  # over a stage, or a longer time between steps: bandwidth that commands held so long permit
 FIRM = 1.0  # of the slope of the cost at the end, a robot's length off: the penalty of tube and bodies
 NEAR = 0.5  # of the largest acceleration of a carrier: beyond, it is bounded
@@ -69,7 +70,7 @@ class Predictive(ComputedTorque):
             cables of fixed length.
         bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
             Default: 40, but less if carriers correct errors: 8 for teams with cables of fixed length, 6 for towing
-            robots with winches. At most 1.2 / `stage` has an effect.
+            robots with winches. At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may
             leave their reference, which is slower, of 0.025 s if carriers correct errors. If the first two steps, or
             three in a row, and the references of `follow` are more than twice as far apart (if carriers fly, at all
@@ -160,10 +161,11 @@ class Predictive(ComputedTorque):
         self._watch = Watch(scale, self.robot.force_scale / self.robot.platform.mass, noise, loud, blind)
         self._from_the_start: HandOver | None = None
         self._steps, self._adapts = np.array([np.nan]), stage is None
-        fastest = FASTEST / max(self._bandwidth.max(), ROUNDING)
+        self._fastest = SWINGING if correct else FASTEST
+        fastest = self._fastest / max(self._bandwidth.max(), ROUNDING)
         within = (1 if self._flies else 2) * self._stage
         self._longest_stage = max(self._stage, min(fastest, within) if self._adapts else fastest) + ROUNDING
-        self._usual_longest = min(self._longest_stage, self._slow_loops.longest_turn)
+        self._usual_longest = min(self._longest_stage, self._slow_loops.longest_inner)
         self.reset()
         if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
             self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
@@ -215,9 +217,9 @@ class Predictive(ComputedTorque):
         count, m, f = self._sizes[0], self.robot.m, self._moved.count
         A, B = stage_at_home(self.robot, self._moved, self._steps[0], self._statics)
         moves = A[6:12, 12 : 12 + f] / self._steps[0]
-        part = self._turned / self._attitude
-        bandwidth = np.minimum(part * self._bandwidth, FASTEST / self._steps[0])
-        self._weights = weights(self.robot, bandwidth, reaches, part * self._returning, self._steps[0], moves)
+        part, most = self._turned / self._attitude, self._fastest / self._steps[0]
+        bandwidth, returning = np.minimum(part * self._bandwidth, most), min(part * self._returning, most)
+        self._weights = weights(self.robot, bandwidth, reaches, returning, self._steps[0], moves)
         self._efforts = np.concatenate([np.ones(m), (self._weights.states[12 : 12 + f]) / self._steps[0]])
         self._end = terminal(A, B, self._weights)
         self._penalty = FIRM * self.robot.length * float(np.diag(self._end)[:3].max())

@@ -12,8 +12,8 @@ HELD_FOR = 0.75  # over the bandwidth: the longest time between steps; from 1 on
 class SlowLoops:
     """Lower the bandwidths of a controller whose steps are far apart, see `HELD_FOR`.
 
-    The attitude loops of flying carriers are the fastest. All others are closed around them, so they are lowered by
-    the same factor.
+    The attitude loops of flying carriers are the fastest, or the loops of other carriers that correct errors. All other
+    loops are closed around them, so they are lowered by the same factor.
 
     - `settings`: those of the controller, which are changed.
     - `adapts`: whether the bandwidth of the error may be lowered.
@@ -22,20 +22,21 @@ class SlowLoops:
 
     def __init__(self, settings: np.ndarray, adapts: bool, usual: float):
         self._settings, self._adapts = settings, adapts
-        self._flies = bool(settings["by_wrench"].any())
+        corrects = bool(settings["corrects"] and settings["reacts"])
+        self._inner = "attitude" if settings["by_wrench"].any() else "carrier_bandwidth" if corrects else None
         self._usual = {name: settings[name].copy() for name in (*GAINS, *LOOPS)}
         self._share = usual / float(settings["attitude"])
         held = (HELD_FOR if adapts else 1.0) / max(self._bandwidth, ROUNDING)
-        self.longest = min(held, self.longest_turn)  # time between steps without a change [s]
+        self.longest = min(held, self.longest_inner)  # time between steps without a change [s]
 
     @property
     def _bandwidth(self) -> float:
         return float(self._settings["kd"].max()) / 2
 
     @property
-    def longest_turn(self) -> float:
-        """Return the longest time between steps for the attitude loops [s], infinite if no carrier flies."""
-        return HELD_FOR / float(self._settings["attitude"]) if self._flies else np.inf
+    def longest_inner(self) -> float:
+        """Return the longest time between steps for the loops of carriers [s], infinite if there are none."""
+        return HELD_FOR / max(float(self._settings[self._inner]), ROUNDING) if self._inner else np.inf
 
     def slow_down(self, period: float) -> tuple[float, float]:
         """Lower bandwidths for steps `period` [s] apart.
@@ -44,15 +45,15 @@ class SlowLoops:
         [rad/s] if a given one is larger, otherwise infinity.
         """
         given, most = self._bandwidth, 1.0 / period
-        part = min(HELD_FOR / (period * given) if self._adapts else 1.0, self.longest_turn / period, 1.0)
-        if self._flies:
+        part = min(HELD_FOR / (period * given) if self._adapts else 1.0, self.longest_inner / period, 1.0)
+        if self._inner:
             for name in LOOPS:
                 self._settings[name] *= part
             most = min(most, self._share * float(self._settings["attitude"]))
         if self._adapts:
             for order, name in enumerate(GAINS, 1):
                 self._settings[name] *= part**order
-        longest = period * (1 + ROUNDING) if self._adapts or self._flies else np.inf
+        longest = period * (1 + ROUNDING) if self._adapts or self._inner else np.inf
         return longest, np.inf if self._adapts or given <= most else most
 
     def speed_up(self) -> None:

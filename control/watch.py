@@ -107,6 +107,7 @@ class Watch:
         `otherwise` are the measured differences from the commanded tensions since the last step, (m,) [N].
         """
         gap, self._unseen = self._unseen + dt, 0.0  # since the last state
+        self._solved = min(self._solved, time)  # at first there is none yet
         if dt > WINDOW:
             self._solved = max(self._solved, time)
         if self._acceleration is None or dt > PAUSE:

@@ -9,7 +9,7 @@ from scipy.linalg import solve_continuous_are
 
 from towline import plan
 from towline.base.errors import InputError
-from towline.control import ANSWERS, ComputedTorque, Predictive, Reference, State
+from towline.control import ANSWERS, ComputedTorque, Controller, Predictive, Reference, State
 from towline.control.carrier_references import Freed
 from towline.control.keep_out import Surroundings, _distance
 from towline.control.records import TETHER
@@ -211,6 +211,42 @@ def test_a_team_carries_its_load_though_it_is_pushed_and_a_quadrotor_heavier_tha
     assert rms[0] < 0.25 * rms[1]
     assert pushed[0].error[-1] < 2e-3
     assert pushed[0].answered["as planned"] > 0.99 * len(pushed[0].error)
+
+
+@pytest.mark.parametrize("name", ["ipanema-1", "ipanema-2"])
+def test_a_motion_in_the_plane_of_symmetry_of_a_robot_has_solutions(name):
+    """What is zero by symmetry is nothing but rounding, and no residual: no step had a solution of its own before."""
+    robot = load(name)
+    controller, converged = Predictive(robot), []
+
+    class Witness(Controller):
+        def step(self, time, state, reference):
+            command = controller.step(time, state, reference)
+            converged.append(controller._horizon.converged)
+            return command
+
+        def follow(self, *coming):
+            controller.follow(*coming)
+
+    line = {
+        "kind": "line",
+        "start": robot.home[:3].tolist(),
+        "end": (robot.home[:3] + np.array([0.2, 0, 0.2])).tolist(),
+    }
+    run = simulate(robot, line, Witness(), duration=0.3)
+    assert all(converged)
+    assert run.answered["as planned"] == len(run.error)
+    assert run.error.max() < 4e-3  # 18 mm of ipanema-2 by computed torque
+
+
+def test_predictive_control_without_any_solution_is_given_up(monkeypatch):
+    """Computed torque has the robot then, which is not to be called predictive control."""
+    robot = load("planar-4")
+    controller = Predictive(robot)
+    monkeypatch.setattr(Horizon, "residuals", Residuals(1.0, 1.0, 1.0, 1.0))
+    simulate(robot, robot.home, controller, duration=0.2)
+    assert controller.handed_over is not None
+    assert controller.handed_over.time < 0.1
 
 
 def test_a_motion_is_flown_that_runs_out_of_tensions_step_by_step():

@@ -78,6 +78,15 @@ def test_teams_hold_their_load_in_slow_loops(name, kind, period):
     assert run.answered["as planned"] == len(run.error)
 
 
+@pytest.mark.parametrize(("kind", "period"), [(ComputedTorque, 0.2), (Predictive, 0.12), (Predictive, 0.2)])
+def test_towing_robots_hold_their_load_in_slow_loops(kind, period):
+    """Carriers that correct errors with 6 rad/s made the loop unstable, half a metre off after 12 s."""
+    run = pushed(load("wang-ctmrts"), kind(load("wang-ctmrts")), period)
+    assert run.error.max() < 0.015
+    assert run.error[-5:].max() < 5e-3
+    assert run.answered["as planned"] == len(run.error)
+
+
 def test_all_bandwidths_of_a_team_are_lowered_by_the_same_factor_and_restored():
     robot = load("multi-quadrotor-3")
     controller = ComputedTorque(robot)

@@ -6,15 +6,19 @@
  */
 #include "horizon/internal.h"
 
-static const double FLOOR = 1e-10; /* added to scales, for problems whose solution is zero */
+static const double FLOOR = 1e-10;  /* added to scales, for problems whose solution is zero */
+static const double ROUNDED = 1e-6; /* of the gradient by which one variable alone would cost as much as all together */
 
 static double larger3(double x, double y, double z) { return larger(larger(x, y), z); }
 
-/* Write what is left of the Lagrangian's gradient at a stage: H z + h + G' y of the next + E' f - y + forces of bounds. */
-static void measure_gradient(const towline_horizon *h, int k) {
+/*
+ * Write what is left of the Lagrangian's gradient at a stage: H z + h + G' y of the next + E' f - y + forces of bounds.
+ * Return z' H z.
+ */
+static double measure_gradient(const towline_horizon *h, int k) {
     const int wp = h->wp, is_last = k == h->N, width = k > 0 ? h->w : h->m;
     const double *z = h->at.z + k * wp, *y = h->at.y + k * wp, *linear = h->h + k * wp;
-    double *left = h->gradient + k * wp, *cost = h->work, *dual = cost + wp, *penalty = dual + wp,
+    double total = 0, *left = h->gradient + k * wp, *cost = h->work, *dual = cost + wp, *penalty = dual + wp,
            *terms = penalty + wp;
     const matrix H = hessian_of(h, k, h->w);
     set(cost, 3 * wp, 0);
@@ -28,6 +32,7 @@ static void measure_gradient(const towline_horizon *h, int k) {
         }
     }
     for (int i = 0; i < wp; i++) {
+        total += z[i] * cost[i];
         left[i] = cost[i] + dual[i] + penalty[i] + linear[i] - y[i];
         terms[i] = larger3(larger3(fabs(cost[i]), fabs(dual[i]), fabs(penalty[i])), fabs(linear[i]), fabs(y[i]));
     }
@@ -44,6 +49,7 @@ static void measure_gradient(const towline_horizon *h, int k) {
         h->worst.gradient[i] = larger(fabs(left[i]), h->worst.gradient[i]);
         h->scale.gradient[i] = larger(terms[i], h->scale.gradient[i]);
     }
+    return total;
 }
 
 /* Write the products of distances to bounds and multipliers, and how large controls are. */
@@ -113,6 +119,24 @@ static void add_floor(double *scale, int count) {
     for (int i = 0; i < count; i++) { scale[i] += FLOOR; }
 }
 
+/*
+ * Add to the scale of each variable's gradient what no digit is right of: where symmetry makes a variable zero, all of its
+ * terms are rounding, and where the solution is zero, those of all. `cost` is z' H z of all stages, to which that of the
+ * ranges of controls is added.
+ */
+static void add_rounding(const towline_horizon *h, double cost) {
+    for (int i = 0; i < h->m; i++) {
+        if (h->range[i] < INFINITY) { cost += h->curvature[i] * h->range[i] * h->range[i]; }
+    }
+    for (int i = 0; i < h->w; i++) {
+        double curvature = 0;
+        for (int k = i < h->m ? 0 : 1; k <= h->N - (i < h->m); k++) {
+            curvature = larger(*entry(hessian_of(h, k, h->w), i, i), curvature);
+        }
+        h->scale.gradient[i] += ROUNDED * sqrt(curvature * larger(cost, 0));
+    }
+}
+
 /* Finish the scales. That of a control has its range, but no more of it than an unlimited control would use. */
 static void finish_scales(const towline_horizon *h) {
     const towline_extremes *scale = &h->scale;
@@ -141,7 +165,8 @@ double horizon_measure(const towline_horizon *h, towline_residuals *residuals) {
     const towline_extremes *worst = &h->worst, *scale = &h->scale;
     clear(h, worst);
     clear(h, scale);
-    for (int k = 0; k <= h->N; k++) { measure_gradient(h, k); }
+    double cost = 0;
+    for (int k = 0; k <= h->N; k++) { cost += measure_gradient(h, k); }
     for (int k = 0; k < h->N; k++) {
         measure_controls(h, k);
         measure_dynamics(h, k);
@@ -153,6 +178,7 @@ double horizon_measure(const towline_horizon *h, towline_residuals *residuals) {
         *residuals = none;
         return INFINITY;
     }
+    add_rounding(h, cost);
     finish_scales(h);
     residuals->stationarity = largest_ratio(worst->gradient, scale->gradient, h->w);
     residuals->dynamics = largest_ratio(worst->gap, scale->gap, h->n);
