@@ -24,7 +24,7 @@ from .starts import fit_from
 
 MOST_SAMPLES, MOST_FITTED, FEWEST = 40, 60, 6
 CLEARLY = 3.0  # times smaller differences
-VISIBLE = np.radians(8.0)  # smaller ones are offsets of the readings or a wrong CoM
+VISIBLE = np.radians(3.0)  # smaller ones are noise, or small offsets of the readings
 TILTED = np.radians(20.0)  # of a world whose vertical is another one
 LIKELIER = 0.95  # of the sum of squares that a fit with the orientations as they are leaves
 ENOUGH = 1e-3  # of the sum of squares, of a step that these fits need not take
@@ -69,7 +69,7 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
             corrections = (k > 0) + bool(frame)
             tried.append((size * CLEARLY**corrections, size, frame, left, right, k))
     best = min(tried, key=lambda one: one[0])
-    if best is tried[0] or tried[0][1] < VISIBLE:
+    if tried[0][1] < VISIBLE:
         return None
     try:
         as_given = _fitted(robot, given)[0]
@@ -77,7 +77,7 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         as_given = np.inf
     likeliest: Misread | None = None
     least = LIKELIER * as_given  # offsets and the CoM may explain the differences as well
-    for one in (best, tried[1]):  # the most probable error, and another heading
+    for one in (tried[1],) if best is tried[0] else (best, tried[1]):  # the most probable error, and another heading
         _, size, frame, left, right, k = one
         turn = ways[k].turned
         every = rotation if turn is None else turn(rotation, np.nan_to_num(given.poses[:, 3:]))
