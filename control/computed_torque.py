@@ -1,6 +1,5 @@
 """`ComputedTorque`: desired acceleration, the wrench required for it, and the tensions that produce this wrench."""
 
-import os
 from collections.abc import Mapping
 from typing import Any
 from warnings import warn
@@ -11,9 +10,8 @@ from typing_extensions import override
 from ..base.errors import InputError
 from ..base.inputs import number, required, shown
 from ..core import control_step, control_thrusts
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..models.record import record_of
-from ..models.robot import Robot
 from ..solvers.in_place import InPlace
 from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
 from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
@@ -103,7 +101,7 @@ class ComputedTorque(Controller):
 
     def __init__(
         self,
-        robot: Robot | str | os.PathLike[str],
+        robot: AnyRobot,
         bandwidth: Any = None,
         damping: Any = 1.0,
         integral: Any = 0.0,

@@ -1,7 +1,6 @@
 """`FaultTolerant`: control of a team of flying carriers that continues without one that has lost its thrust."""
 
 import inspect
-import os
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 from warnings import warn
@@ -12,7 +11,7 @@ from typing_extensions import override
 from ..base.errors import InputError
 from ..base.inputs import required
 from ..base.text import quantity_row
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot
 from ..statics.formation import formation
 from .as_floats import as_floats
@@ -84,7 +83,7 @@ class FaultTolerant(Controller):
         InputError: If the robot has other carriers or winches, or an argument has a wrong value.
     """
 
-    def __init__(self, robot: Robot | str | os.PathLike[str], **options: Any):
+    def __init__(self, robot: AnyRobot, **options: Any):
         known = inspect.signature(Predictive).parameters
         if unknown := [name for name in options if name not in known or name == "robot"]:
             raise InputError(f"{unknown[0]} must be an argument of Predictive, one of {', '.join(list(known)[1:])}")

@@ -1,6 +1,5 @@
 """`LengthControl`: for winches that take lengths, as most industrial ones do."""
 
-import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,8 +8,7 @@ from typing_extensions import override
 from ..base.errors import InputError
 from ..base.inputs import number, repeated, required, shown
 from ..models.dynamics import dynamics_of
-from ..models.files import as_robot
-from ..models.robot import Robot
+from ..models.files import AnyRobot, as_robot
 from ..models.trajectory import moved_on
 from .as_floats import as_floats, is_time, measured_at, rows_of
 from .command import HOLD, OFF, PLANNED, Command
@@ -57,7 +55,7 @@ class LengthControl(Controller):
 
     def __init__(
         self,
-        robot: Robot | str | os.PathLike[str],
+        robot: AnyRobot,
         stiffness: float | Sequence[float] | np.ndarray | None = None,
         lag: float = 0.0,
         proportional: float | None = None,

@@ -1,13 +1,11 @@
 """`OpenLoop`: the plan without feedback."""
 
-import os
-
 import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
 from ..base.inputs import required
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot
 from .as_floats import as_floats, rows_of
 from .command import HOLD, PLANNED, Command
@@ -29,7 +27,7 @@ class OpenLoop(Controller):
 
     batches = True
 
-    def __init__(self, robot: Robot | str | os.PathLike[str]):
+    def __init__(self, robot: AnyRobot):
         self.robot = as_robot(robot)
         flying = [carrier.name for carrier in self.robot.carriers if carrier.actuators]
         if flying:

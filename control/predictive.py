@@ -1,6 +1,5 @@
 """`Predictive`: model predictive control with limits of tensions and carriers."""
 
-import os
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
@@ -12,8 +11,7 @@ from typing_extensions import override
 from ..base.errors import InputError
 from ..base.inputs import number, whole_number
 from ..core import control_aim, control_stages
-from ..models.files import as_robot
-from ..models.robot import Robot
+from ..models.files import AnyRobot, as_robot
 from ..models.shapes import Shape
 from ..solvers.horizon import Horizon
 from ..solvers.in_place import InPlace
@@ -105,7 +103,7 @@ class Predictive(ComputedTorque):
 
     def __init__(
         self,
-        robot: Robot | str | os.PathLike[str],
+        robot: AnyRobot,
         bandwidth: Any = None,
         stages: int = 20,
         stage: float | None = None,

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.inputs import shown
 from ..models import Robot
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..ocp.planner import plan
 from .evaluation import Evaluation, Rows, rows_of, with_tasks
 from .goal import goal_of
@@ -27,7 +27,7 @@ from .variables import Variables, variables_of
 
 
 def design(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     free: Sequence[Free | dict[str, Any]] | None = None,
     require: Sequence[Requirement | dict[str, Any]] | None = None,
     maximise: str = "margin",

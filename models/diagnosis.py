@@ -1,6 +1,5 @@
 """Diagnose a robot at its home pose: the rank of its wrench matrix and the reason, and implausible numbers."""
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from ..base.display import Displayed
 from ..base.text import quantity, quantity_row
 from .dynamics import Dynamics
+from .files import AnyRobot
 from .robot import Robot
 
 RANK_TOLERANCE = 1e-9  # of the largest singular value; exact singularities come out near 1e-16
@@ -29,7 +29,7 @@ class Diagnosis(Displayed):
     warnings: list[str]  # sentences about numbers that are valid but implausible
 
 
-def diagnose(robot: Robot | str | os.PathLike[str]) -> Diagnosis:
+def diagnose(robot: AnyRobot) -> Diagnosis:
     """Diagnose `robot` at its home pose, with its carriers at home."""
     dynamics = Dynamics(robot)
     robot = dynamics.robot

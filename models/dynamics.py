@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from functools import cached_property, lru_cache
 
 import casadi as ca
@@ -15,7 +14,7 @@ from ..base.inputs import flag, required
 from . import elasticity
 from .arrays import Array, one_array, several_arrays
 from .batch import SYMBOLIC, as_array, call, is_symbolic
-from .files import as_robot
+from .files import AnyRobot, as_robot
 from .mechanics import Mechanics
 from .motion import Motion
 from .part import LARGEST
@@ -47,7 +46,7 @@ class Dynamics(Displayed):
     of these. Every method raises it, in one line, for an argument of a wrong shape or value.
     """
 
-    def __init__(self, robot: Robot | str | os.PathLike[str]):
+    def __init__(self, robot: AnyRobot):
         self.robot = as_robot(robot)
         self._functions = WorldFunctions(self.robot)
 

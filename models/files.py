@@ -4,12 +4,16 @@ import difflib
 import os
 from functools import cache
 from pathlib import Path
+from typing import TypeAlias
 
 from ..base.errors import InputError
 from ..base.inputs import file_path, shown
 from .library import FOLDER, available
 from .parsing import read_yaml
 from .robot import Robot
+
+AnyRobot: TypeAlias = Robot | str | os.PathLike[str]
+"""A robot, the name of one in the library, or the path of a robot file."""
 
 
 def load(name: str | os.PathLike[str]) -> Robot:

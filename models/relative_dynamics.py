@@ -13,7 +13,6 @@ alpha_A = dP_a dTheta_a + P_a ddTheta_a. Without the carrier's motion D_B is the
 Source: paper F, Eqs. 26 to 38 as corrected.
 """
 
-import os
 from functools import cached_property
 
 import casadi as ca
@@ -24,7 +23,7 @@ from ..base.errors import InputError
 from . import kinematics, rigid_body
 from .arrays import Array, one_array, several_arrays
 from .batch import call
-from .files import as_robot
+from .files import AnyRobot, as_robot
 from .motion import Motion
 from .robot import Robot
 from .rotation import Matrix, angles_of, body_rate, inverse_rate_matrix, rate_matrix_derivative, rotation, turning
@@ -42,7 +41,7 @@ class RelativeDynamics(Displayed):
     Every method raises it, in one line, for an argument of a wrong shape or value.
     """
 
-    def __init__(self, robot: Robot | str | os.PathLike[str]):
+    def __init__(self, robot: AnyRobot):
         self.robot = as_robot(robot)
         if (count := len(self.robot.carriers)) != 1:
             raise InputError(f"relative must have a robot with one carrier, got {self.robot.name!r} with {count}")

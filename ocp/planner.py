@@ -11,8 +11,7 @@ from typing import Any
 from ..base.display import Displayed
 from ..base.errors import InputError
 from ..base.inputs import number
-from ..models import Robot
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from .nlp.rows import Mesh
 from .nlp.solver import Progress, Solver, check_progress
 from .nlp.waiting import heeding
@@ -37,7 +36,7 @@ LEAST_SHARE = 1e-9  # of robots that must keep their limits, or that need not
 
 
 def plan(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     task: Task | dict[str, Any] | str | os.PathLike[str],
     progress: Progress | None = None,
     start: Plan | AnyPath | dict[str, Any] | None = None,
@@ -92,7 +91,7 @@ class Planner(Displayed):
 
     def __init__(
         self,
-        robot: Robot | str | os.PathLike[str],
+        robot: AnyRobot,
         task: Task | dict[str, Any] | str | os.PathLike[str],
         initial: Initial | Measured | dict[str, Any] | None = None,
         robust: float | None = None,

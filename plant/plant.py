@@ -1,7 +1,6 @@
 """`Plant`: simulate a robot with slack cables, winches, wind and disturbances."""
 
 import math
-import os
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -13,9 +12,8 @@ from ..base.inputs import leading, number, one_of, repeated, shown, whole_number
 from ..core import run_plant
 from ..models.batch import as_array
 from ..models.dynamics import dynamics_of
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..models.record import FREE, IMPOSED, RESTS, record_of
-from ..models.robot import Robot
 from . import layout
 from .packing import SETTINGS, command_rows, given_or, leading_of, place
 from .reading import Reading
@@ -77,7 +75,7 @@ class Plant:
 
     def __init__(
         self,
-        robot: Robot | str | os.PathLike[str],
+        robot: AnyRobot,
         drive: str = "lengths",
         contacts: str = "located",
         stiffness: float | Sequence[float] | np.ndarray | None = None,

@@ -22,7 +22,7 @@ from ..estimation.logs.reading import Paths
 from ..estimation.logs.recorded import read_recorded
 from ..figures.drawn import Drawn
 from ..figures.report import Report, Reported, Section, Table
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..models.parsing import to_yaml
 from ..models.robot import Robot
 from .explanations import Explanation, Matching, tied
@@ -268,7 +268,7 @@ class Replay(Drawn, Reported, Displayed):
 
 
 def replay(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     log: Paths,
     poses: Paths | None = None,
     fields: str | os.PathLike[str] | None = None,

@@ -20,7 +20,7 @@ from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
 from ..estimation.logs.opening import is_recording
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..models.parsing import validate
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
@@ -48,7 +48,6 @@ LONGEST = 1e6  # periods of one flight
 MOST_RUNS = 10_000_000
 
 
-AnyRobot: TypeAlias = Robot | str | os.PathLike[str]
 AnyNoise: TypeAlias = Noise | dict[str, Any] | None
 
 

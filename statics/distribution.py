@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import InputError
 from ..base.inputs import real_array
+from ..models.files import AnyRobot
 from ..models.part import LARGEST
 from ..models.robot import Robot
 from ..solvers.problem import TensionProblem
@@ -23,7 +23,7 @@ COINCIDENT = 1e-9  # [m]: a shorter cable has no direction
 
 
 def tensions(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     pose: ArrayLike,
     velocity: ArrayLike | None = None,
     acceleration: ArrayLike | None = None,

@@ -1,6 +1,5 @@
 """Natural frequencies of a robot with elastic cables, and the tensions with which they are largest."""
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ from ..base.errors import InputError
 from ..base.inputs import finite_array
 from ..models.dynamics import dynamics_of
 from ..models.elasticity import frequency, whitening
-from ..models.files import as_robot
+from ..models.files import AnyRobot, as_robot
 from ..models.robot import Robot
 from ..solvers.methods.stiffest import Stiffest
 from ..solvers.solution import TensionSolution
@@ -22,7 +21,7 @@ __all__ = ["StiffestTensions", "natural_frequencies", "stiffest"]
 
 
 def natural_frequencies(
-    robot: Robot | str | os.PathLike[str], pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None
+    robot: AnyRobot, pose: ArrayLike, tensions: ArrayLike, carrier_pose: ArrayLike | None = None
 ) -> np.ndarray:
     """Return the natural frequencies of small undamped motions about equilibria, ascending, (..., k) [Hz].
 
@@ -73,10 +72,7 @@ class StiffestTensions(Displayed):
 
 
 def stiffest(
-    robot: Robot | str | os.PathLike[str],
-    pose: ArrayLike,
-    carrier_pose: ArrayLike | None = None,
-    w: ArrayLike | None = None,
+    robot: AnyRobot, pose: ArrayLike, carrier_pose: ArrayLike | None = None, w: ArrayLike | None = None
 ) -> StiffestTensions:
     """Compute the tensions inside their limits that give w and maximise the lowest natural frequency.
 

@@ -265,9 +265,12 @@ def test_wrong_input_is_one_line(arguments, message):
     assert "\n" not in str(caught.value)
 
 
-def test_the_name_of_a_robot_is_no_robot():
-    with pytest.raises(InputError, match="robot must be a Robot, got 'wang-flying'"):
-        sample("wang-flying", REST)
+def test_a_robot_is_given_by_its_name_as_everywhere():
+    by_name, loaded = (sample(robot, REST, samples=100, keep="none") for robot in ("wang-flying", load("wang-flying")))
+    assert by_name.attrs["accepted"] == loaded.attrs["accepted"] > 0
+    for wrong, message in ((7, "robot must be a Robot, .* got 7"), ("wang-flyin", "wang-flying")):
+        with pytest.raises(InputError, match=message):
+            sample(wrong, REST)
 
 
 def test_many_cables_have_no_place_by_lengths():

@@ -10,7 +10,7 @@ from ..base.display import Displayed
 from ..base.errors import InputError
 from ..base.inputs import finite_array, required, whole_number
 from ..base.writing import whole_file
-from ..models import Robot
+from ..models.files import AnyRobot, as_robot
 from ..models.stl import HEADER, RECORD
 from .condition import Condition
 from .places import Places
@@ -45,7 +45,7 @@ class Mesh(Displayed):
 
 
 def boundary(
-    robot: Robot,
+    robot: AnyRobot,
     condition: Condition,
     low: ArrayLike,
     high: ArrayLike,
@@ -63,7 +63,7 @@ def boundary(
     Raises:
         InputError: If an argument has a wrong type or value, or the box is flat.
     """
-    required("robot", robot, Robot)
+    robot = as_robot(robot)
     required("condition", condition, Condition)
     low, high = finite_array("low", low, (3,)), finite_array("high", high, (3,))
     if not (high > low).all():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
 from ..base.inputs import required, shown
-from ..models import Robot
+from ..models.files import AnyRobot, as_robot
 from .metrics import METRICS
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw(result: xr.Dataset, robot: Robot | None = None) -> Figure:
+def draw(result: xr.Dataset, robot: AnyRobot | None = None) -> Figure:
     """Draw the metrics of a workspace as contours, or, if it has none, where samples were accepted.
 
     Args:
@@ -32,8 +32,6 @@ def draw(result: xr.Dataset, robot: Robot | None = None) -> Figure:
     required("result", result, xr.Dataset)
     if "reached" not in result:
         raise InputError(f"result must be a result of sample, got a dataset with {shown(list(result.data_vars))}")
-    if robot is not None:
-        required("robot", robot, Robot)
-    anchors = None if robot is None else robot.home_anchors
+    anchors = None if robot is None else as_robot(robot).home_anchors
     metrics = [str(name) for name in result.data_vars if name in METRICS]
     return metric_map(result, metrics, anchors) if metrics else reached(result, anchors)

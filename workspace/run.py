@@ -19,6 +19,7 @@ from ..base.execution import Execution, ExecutionOptions, Progress, Workers, sta
 from ..base.inputs import one_of, required, shown, whole_number, with_fields
 from ..base.version import __version__
 from ..models import Robot
+from ..models.files import AnyRobot, as_robot
 from .condition import Condition, condition_from, for_robots
 from .counts import Counter, Counts
 from .dataset import dataset
@@ -38,7 +39,7 @@ KIND = Kind("workspace", "chunk")  # a result is which samples are accepted, one
 
 
 def sample(
-    robot: Robot,
+    robot: AnyRobot,
     condition: Condition | Mapping[str, Any],
     region: Region | Mapping[str, Any] | None = None,
     samples: int = 60_000,
@@ -59,7 +60,7 @@ def sample(
     samples, because beyond `points_max` samples only counts are kept.
 
     Args:
-        robot: From `load` or `Robot.model_validate`.
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
         condition: A `Condition`, or a mapping with its `kind` and keys.
         region: A `Region`, or a mapping of its keys; default: a box about home and anchors, everything else at home.
         samples: Number of samples. A grid and adaptive refinement have at most this many.
@@ -101,7 +102,7 @@ def sample(
         SolverError: If workers end before their work is done, or the extra `cluster` is not installed.
     """
     start = time.perf_counter()
-    required("robot", robot, Robot)
+    robot = as_robot(robot)
     condition = condition_from(dict(condition) if isinstance(condition, Mapping) else condition)
     condition = for_robots(condition, robust)
     region = Region.model_validate({} if region is None else region)

@@ -1,6 +1,5 @@
 """`next_poses`: the most informative poses to measure next (D-optimal design)."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ...base.errors import InputError
 from ...base.inputs import flag, real_array, shown, whole_number
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements
 from .calibration import Calibration
@@ -26,7 +25,7 @@ LARGEST = 100_000  # candidates
 
 
 def next_poses(
-    robot: Robot | str | os.PathLike[str] | Calibration,
+    robot: AnyRobot | Calibration,
     candidates: ArrayLike | None = None,
     count: int = 10,
     free: str | Sequence[str] = ("anchors", "offsets"),

@@ -1,11 +1,9 @@
 """`calibrate`: estimate robot parameters from measurements."""
 
-import os
 from collections.abc import Mapping, Sequence
 
 from ...base.inputs import flag
-from ...models.files import as_robot
-from ...models.robot import Robot
+from ...models.files import AnyRobot, as_robot
 from ..logs.measurements import Measurements, check_measurements
 from .calibration import Calibration
 from .cross_validation import select
@@ -15,7 +13,7 @@ from .solving import check_enough, solve, usual
 
 
 def calibrate(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     measurements: Measurements,
     free: str | Sequence[str] | None = None,
     prior: Mapping[str, float] | None = None,

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from ...base.errors import InputError
 from ...base.text import quantity
 from ...models import points
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from .alignment import Clock
 from .cable_directions import in_world, vectors
@@ -57,7 +57,7 @@ def read_measurements(
     path: Paths,
     sigma: float | Mapping[str, float] | None = None,
     poses: Paths | None = None,
-    robot: Robot | str | os.PathLike[str] | None = None,
+    robot: AnyRobot | None = None,
     fields: str | os.PathLike[str] | None = None,
 ) -> Measurements:
     """Read measurements from a log: CSV, NetCDF, MCAP, or a bag of ROS 1 or ROS 2.
@@ -84,7 +84,7 @@ def read_log(
     path: Paths,
     sigma: float | Mapping[str, float] | None = None,
     poses: Paths | None = None,
-    robot: Robot | str | os.PathLike[str] | None = None,
+    robot: AnyRobot | None = None,
     fields: str | os.PathLike[str] | None = None,
     carriers: bool = True,
 ) -> Log:

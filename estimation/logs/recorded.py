@@ -9,7 +9,7 @@ import numpy as np
 from ...base.csv_columns import LENGTHS
 from ...base.display import Displayed
 from ...base.errors import InputError
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from ..calibration.plausibility import mistake
 from ..pose.from_log import poses_from_log
@@ -43,10 +43,7 @@ class Recorded(Displayed):
 
 
 def read_recorded(
-    robot: Robot | str | os.PathLike[str],
-    log: Paths,
-    poses: Paths | None = None,
-    fields: str | os.PathLike[str] | None = None,
+    robot: AnyRobot, log: Paths, poses: Paths | None = None, fields: str | os.PathLike[str] | None = None
 ) -> Recorded:
     """Read the motion and the commands of a robot from a log.
 

@@ -5,14 +5,12 @@ cables one remains, and others whose lengths differ by less than the noise. No m
 Descents from attitudes spread evenly over SO(3) find most of them.
 """
 
-import os
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.inputs import whole_number
 from ...models import points
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from ...statics.equilibria import equilibria
 from .estimate import PoseEstimate, largest_cost
@@ -23,7 +21,7 @@ from .taut import taut
 
 
 def branches(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     lengths: ArrayLike,
     carrier_pose: ArrayLike | None = None,
     sigma: ArrayLike = SIGMA,

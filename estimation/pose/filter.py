@@ -6,7 +6,6 @@ error to the reference, whose bandwidth may be far below that of the motion. Err
 alpha) and, once an inertial sensor is used, the biases of its rates and accelerations.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -18,10 +17,9 @@ from ...base.errors import InputError
 from ...base.inputs import finite_array, number, real_array, shown
 from ...core import lines
 from ...models import points
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.part import LARGEST
 from ...models.record import record_of
-from ...models.robot import Robot
 from .from_lengths import pose_from_lengths
 from .one_rotation import axes_of, cross, turn_by, vector_of
 
@@ -81,7 +79,7 @@ class PoseFilter(Displayed):
 
     def __init__(
         self,
-        robot: Robot | str | os.PathLike[str],
+        robot: AnyRobot,
         sigma: Mapping[str, float] | None = None,
         jerk: Sequence[float] | None = None,
         sensor: ArrayLike = (0.0, 0.0, 0.0),

@@ -1,6 +1,5 @@
 """`pose_from_lengths`: the pose of the platform from the lengths of its cables."""
 
-import os
 from functools import lru_cache
 
 import numpy as np
@@ -10,7 +9,7 @@ from ...base.errors import InputError
 from ...base.inputs import leading, repeated, shown
 from ...core import extent, one_pose_from_lengths
 from ...models.batch import as_array
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.part import LARGEST
 from ...models.robot import Robot
 from .estimate import PoseEstimate
@@ -23,7 +22,7 @@ MOST = 1e100  # [m]: larger ones, and inverses of smaller ones, cannot be square
 
 
 def pose_from_lengths(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     lengths: ArrayLike,
     start: ArrayLike | None = None,
     carrier_pose: ArrayLike | None = None,

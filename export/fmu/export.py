@@ -21,7 +21,7 @@ from ...base.writing import check_writable, whole_file
 from ...control.planned_references import references_at
 from ...control.trajectory import read_trajectory
 from ...core import MOST_CABLES
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from ...plant import Plant
 from ...plant.plant import DRIVES
@@ -48,11 +48,7 @@ _MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
 def export_fmu(
-    robot: Robot | str | os.PathLike[str],
-    file: str | os.PathLike[str],
-    part: str = "plant",
-    drive: str | None = None,
-    reference: Any = None,
+    robot: AnyRobot, file: str | os.PathLike[str], part: str = "plant", drive: str | None = None, reference: Any = None
 ) -> str | None:
     """Write a robot as a unit for co-simulation with FMI 3.0: its C sources, and the binary for this platform.
 

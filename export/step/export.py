@@ -13,7 +13,7 @@ from ...base.inputs import file_path, one_of
 from ...base.version import __version__
 from ...base.writing import whole_folder
 from ...models.dynamics import Dynamics
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from ...models.tape_c import literal, operations, to_c_function
 from .costs import costs, lines_of
@@ -33,9 +33,7 @@ _FLOAT = """#ifndef TOWLINE_FLOAT
 """
 
 
-def export_step(
-    robot: Robot | str | os.PathLike[str], folder: str | os.PathLike[str], precision: str = "double"
-) -> Path:
+def export_step(robot: AnyRobot, folder: str | os.PathLike[str], precision: str = "double") -> Path:
     """Write one control step of a robot as C: from its state and a desired acceleration to tensions and certificate.
 
     The folder gets `towline_step.h` and `towline_step.c`, which need only a C99 compiler with `sin`, `cos` and `sqrt`,

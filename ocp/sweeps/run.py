@@ -17,7 +17,7 @@ from ...base.inputs import file_path
 from ...base.version import __version__
 from ...base.writing import check_writable
 from ...models import Robot
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ..tasks.status import MotionStatus
 from ..tasks.task import Task, read_task
 from .axis import read_axes
@@ -31,7 +31,7 @@ Progress = Callable[[int, int, int], None]
 
 
 def sweep(
-    robot: Robot | str | os.PathLike[str],
+    robot: AnyRobot,
     task: Task | dict[str, Any] | str | os.PathLike[str],
     vary: Mapping[str, Iterable[Any]],
     *,

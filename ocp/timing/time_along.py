@@ -15,7 +15,7 @@ import numpy as np
 from ...base.errors import InputError, SolverError
 from ...base.inputs import whole_number
 from ...models import Robot
-from ...models.files import as_robot
+from ...models.files import AnyRobot, as_robot
 from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS
 from ..limits.limits import Limits
@@ -48,9 +48,7 @@ CLOSEST = 1e-3  # of a step of a grid: points that are nearer to each other are 
 COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer grid, if by less some distance everywhere
 
 
-def time_along(
-    robot: Robot | str | os.PathLike[str], task: Task | dict[str, Any] | str | os.PathLike[str], *, grid: int = 200
-) -> Plan:
+def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[str], *, grid: int = 200) -> Plan:
     """Find the fastest motion along a task's path, from standstill to standstill, with every tension inside its limits.
 
     Only the geometry of the path matters, not its own time law. Straight legs stop at corners (`blend: 0`), reversals
