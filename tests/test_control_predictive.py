@@ -531,7 +531,7 @@ def test_a_calm_motion_at_the_lowest_tensions_is_answered_as_planned():
     line = {"kind": "line", "start": robot.home[:3].tolist(), "end": end.tolist()}
     flight = simulate(robot, line, duration=1.0, controller=Predictive(robot))
     assert flight.answered["as planned"] == 1000
-    assert (flight.record.commanded <= robot.t_min * (1 + 1e-6)).any()
+    assert (flight.record.commanded <= robot.t_min + 1e-9).any()  # [N]; t_min is 0, which no factor makes larger
 
 
 def test_a_controller_that_was_used_before_flies_as_a_new_one():
