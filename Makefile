@@ -30,10 +30,11 @@ lint: .venv/dev.stamp
 types: .venv/dev.stamp
 	$(BIN)/pyrefly check --python-interpreter-path $(BIN)/python
 
-# Each worker starts with half of the tests in order, so that what a file's tests share is computed once. Linear algebra has
-# one thread: two workers with two each would wait for one another.
+# Three workers for two processors, because many tests wait for a browser, a command or a cluster. Each starts with a third
+# of the tests in order, so that what a file's tests share is computed once. Linear algebra has one thread: workers with two
+# each would wait for one another.
 unit: .venv/dev.stamp
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal
 
 # The documentation site, in site/; a warning is an error, as long as no --quiet keeps it from being counted.
 docs: .venv/dev.stamp
