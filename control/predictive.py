@@ -53,8 +53,8 @@ class Predictive(ComputedTorque):
     `ComputedTorque` and predicted to be constant.
 
     Each step uses the new solution (status "as planned"), or the last one while it lasts ("shifted plan"), or the
-    command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold"). A solution is
-    "soft wrench" as well if it leaves the error, and the `ComputedTorque` lacks tensions.
+    command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold"). A step is also
+    "soft wrench" if its solution leaves an error that the `ComputedTorque` has no tensions to correct.
 
     The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. This
     `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
@@ -69,11 +69,11 @@ class Predictive(ComputedTorque):
         bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
             Default: 40, but less if carriers correct errors: 8 for teams with cables of fixed length, 6 for towing
             robots with winches. At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
-        stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s, but of 0.03 s if carriers may
-            leave their reference, which is slower, of 0.025 s if carriers correct errors. If the first two steps, or
-            three in a row, and the references of `follow` are more than twice as far apart (if carriers fly, at all
-            further apart), up to 0.21 s, a stage lasts as long as a step. A given duration is kept, with a warning if
-            steps are more than 1.2 / `bandwidth` apart.
+        stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
+            leave their reference, because they are slower; of 0.025 s if carriers correct errors. Stages become as long
+            as the steps, at most 0.21 s, if the first two steps, or three in a row, and the references of `follow` are
+            farther apart than twice the default (if carriers fly, than the default). A given duration is kept, with a
+            warning if steps are more than 1.2 / `bandwidth` apart.
         reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
             scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's
             weight. With cables of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables'

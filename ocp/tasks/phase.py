@@ -40,7 +40,8 @@ class Load(RigidLoad):
         """Return the loads that decide whether tensions exist for all within the tolerances, (k, 10); k is 0 without.
 
         The wrench of a load is affine in its mass, and in its CoM, if its inertia about the nominal CoM is in
-        proportion to the mass. So each wrench is a mean of those of the corners, and the available ones are convex.
+        proportion to the mass. So each wrench is a weighted mean of the corners' wrenches, and the set of available
+        ones is convex.
         """
         masses = np.unique([self.mass * (1 - self.mass_tolerance), self.mass * (1 + self.mass_tolerance)])
         offsets = list(product(*(np.unique([-off, off]) + 0.0 for off in self.com_tolerance)))
