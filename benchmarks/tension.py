@@ -222,9 +222,12 @@ def markdown(report: Report) -> str:
         "",
         f"Measured on {report.machine}.",
         f"Random problems per task: {report.count}. Rounds after a warm-up round: {report.repeats}.",
-        "The column required has the tolerance that a solver was given. A solver is out if it exceeds the time limit.",
-        f"The ratio is that of the times to `{REFERENCE}` in the same round. The error is the largest error of a "
-        "tension, divided by the largest tension; it is - if there is nothing to compare.",
+        'The column "required" gives the tolerance of each solver. '
+        'A solver is marked "out" if it exceeds the time limit.',
+        f"The ratio is the time of a solver divided by that of `{REFERENCE}` in the same round. The error is the "
+        "largest error of a tension, divided by the largest tension, or a dash if there is nothing to compare.",
+        "The contender with `rho` solves the soft problems with this option of `solve_batch`, the weight of the wrench "
+        "error, instead of as problems with additional variables.",
         f"A failure is a missing result, an error above {FAILED:g}, or a result for an infeasible problem.",
     ]
     for task in dict.fromkeys(row.task for row in report.rows):
