@@ -79,7 +79,7 @@ def plan(
 
 
 class Planner(Displayed):
-    """Plan similar tasks repeatedly, reusing programs and the last solution.
+    """Plan a task repeatedly, reusing programs and the last solution.
 
     Args:
         robot: As for `plan`.
