@@ -134,7 +134,7 @@ def test_a_flight_has_drag_without_wind(robot):
     assert claim.computed == pytest.approx(largest, rel=1e-3)
     assert claim.verdict is Verdict.DIFFERS
     # 60 m, 50 m and 62.45 m in 10 s
-    assert f"{np.sqrt(6**2 + 5**2 + 6.245**2):.1f} m/s, {np.hypot(6, 5):.1f} m/s of it horizontally" in claim.why
+    assert f"{np.sqrt(6**2 + 5**2 + 6.245**2):.1f} m/s ({np.hypot(6, 5):.1f} m/s horizontally)" in claim.why
 
 
 def test_a_repair_states_what_its_quadrotor_does(circle):
