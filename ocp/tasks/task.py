@@ -187,7 +187,7 @@ class Task(Part):
         "aerodynamic forces"
     )
     limits: TaskLimits = TaskLimits()
-    steps: Whole = optional("number of intervals of the transcription", 100, ge=4, le=20_000)
+    steps: Whole = optional("number of intervals between the nodes of the planner", 100, ge=4, le=20_000)
     scheme: SchemeName | None = optional(
         "acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
         "spline: a smooth cubic B-spline; default: linear, or hermite if the audit of a linear plan reports that "
