@@ -35,17 +35,18 @@ def together(values: np.ndarray, names: list[str], height: float) -> tuple[np.nd
     return values[:, [group[0] for group in groups]], texts
 
 
-def name_at_the_end(ax: style.Axes, values: np.ndarray, names: list[str], about: str = "cable ") -> None:
-    """Write the names of curves beside their ends, whose last values are (k,), by default numbers of cables.
+def name_at_the_end(ax: style.Axes, values: np.ndarray, names: list[str], cables: bool = True) -> None:
+    """Write the names of curves beside their ends, whose last values are (k,).
 
-    The highest also has the text `about` before it.
+    If they are numbers of `cables`, the highest has the word "cable" or "cables" before it.
     """
     low, high = ax.get_ylim()
     places = (np.clip(values, low, high) - low) / (high - low)
     order = np.argsort(places)
     gap = min(GAP, HIGHEST / max(len(order) - 1, 1))
     for cable, place in zip(order, _spread(places[order], gap), strict=True):
-        text, size = f"{about if cable == order[-1] else ''}{names[cable]}", style.NOTE * gap / GAP
+        about = ("cables " if "," in names[cable] else "cable ") if cables and cable == order[-1] else ""
+        text, size = f"{about}{names[cable]}", style.NOTE * gap / GAP
         ax.annotate(text, (1.0, places[cable]), (1.05, place), fontsize=size, **BESIDE)
 
 

@@ -30,7 +30,7 @@ def envelopes(flights: xr.Dataset) -> style.Figure:
     for index, (variable, extreme) in enumerate(names.values()):
         _draw_band(tensions, flights, flights[variable].values, 1 + index, extreme)
     ends = [_last(flights[variable].sel(quantile=0.5).values) for variable, _ in names.values()]
-    name_at_the_end(tensions, np.array(ends), list(names), about="")
+    name_at_the_end(tensions, np.array(ends), list(names), cables=False)
     for ax in (errors, tensions):
         ax.set_xlim(0.0, float(flights.attrs["duration_s"]))
     errors.plot([], [], color=GREY, linewidth=1.5, label="median of the runs")
