@@ -114,7 +114,8 @@ def _numbers(rows: Rows, mark: str, titles: list[str], used: list[int], gaps: bo
     for row, (number, line) in enumerate(rows):
         cells = _split(line, mark)
         if len(cells) != len(titles):
-            raise InputError(f"line {number} must have {len(titles)} values like the header, got {len(cells)}")
+            values = f"{len(titles)} value{'s' * (len(titles) != 1)}"
+            raise InputError(f"line {number} must have {values} like the header, got {len(cells)}")
         table[row] = [_value(cells[k], gaps) for k in used]
         wrong = np.flatnonzero(np.isinf(table[row]))
         if wrong.size:

@@ -37,8 +37,8 @@ from .watching import watching
     --figures: Folder for figures: path.png, views.png, tensions.png and, if applicable, base.png (carriers), limits.png
         and convergence.png.
     --animate: File for a film of the motion: .gif, or .mp4 with ffmpeg.
-    --robust SHARE: Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension
-        limits must hold; default: the task's value.
+    --robust SHARE: The tension limits must hold for this fraction, such as 0.95, of all robots within the
+        uncertainty of the robot file; default: the task's value.
     --vary KEY=VALUES: Plan once per value of a field: 'margin=0:20:5' (start:stop:step), 'duration=4,6,8',
         'scheme=linear,hermite'. KEY is a dotted key of the task, such as tube.position, or of the robot, such as
         robot.platform.mass. 'robot=cogiro,my.yaml' and 'task=a.yaml,b.yaml' vary the whole robot or task. Repeat the

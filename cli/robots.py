@@ -174,15 +174,18 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
     if box is None:
         movable = any(carrier.moves for carrier in robot.carriers)
         hint = ["    (in a plan with `base: {kind: free}` the carriers can move too)"] if movable else []
-        where = "at none of the positions that were sampled"
-        return [f"  can rest, {attitude} and with its carriers at home, {where}", *hint]
+        where = "at any of the sampled positions"
+        return [f"  cannot rest, {attitude} and with its carriers at home, {where}", *hint]
     sides = [
         f"{'xyz'[axis]} {quantity_range([box.low[axis], box.high[axis]], 'm', 3)}"
+        if np.isfinite(box.high[axis])
+        else f"{'xyz'[axis]} at least {quantity(box.low[axis], 'm', 3)}"
         for axis in np.flatnonzero(robot.dof_mask[:3])
         if np.isfinite(box.low[axis])
     ]
     if not box.samples:
-        where = f"in the box {', '.join(sides)}" if sides else "at any position"
+        box_or_half_space = "in the box" if np.isfinite(box.high[robot.dof_mask[:3] > 0]).all() else "anywhere with"
+        where = f"{box_or_half_space} {', '.join(sides)}" if sides else "at any position"
         return [
             f"  can rest, {attitude}, {where}",
             "    (the carriers move with it, because the cable lengths are constant)",

@@ -38,8 +38,8 @@ METRICS = (
     --define FILE.py: Python file with conditions of your own.
     --metric NAME: Metric to compute at the samples that the file keeps; --figure draws it: {METRICS}. May be repeated.
         Default: none.
-    --robust SHARE: Fraction, such as 0.95, of the robots consistent with the file's uncertainty for which the tension
-        conditions hold at all accepted poses simultaneously. Default: the nominal robot only.
+    --robust SHARE: The tension conditions hold at all accepted poses simultaneously for this fraction, such as 0.95, of
+        all robots within the uncertainty of the robot file. Default: the nominal robot only.
     --box: Box of positions [m]: 'xmin ymin zmin; xmax ymax zmax'. Default: a box about home and the anchors.
     --attitude: One attitude 'roll pitch yaw', or a range 'min min min; max max max' [rad]. Default: the attitude at
         home.
@@ -49,7 +49,7 @@ METRICS = (
     --samples: Number of samples, such as 60000 or 1e8.
     --method: Sampling method: random, sobol, grid or adaptive.
     --seed: Seed of the random numbers.
-    --size: Smallest cell edge of the method adaptive [m]. Default: as small as the number of samples permits.
+    --size: With the method adaptive: smallest edge of a cell [m]. Default: as small as the number of samples permits.
 {long_run()}
     --keep: Samples to keep in the file, at most a million: accepted, all or none.
     --out: NetCDF file to write (an existing one is overwritten), or new .zarr folder. Default: ROBOT-workspace.nc in
@@ -263,7 +263,7 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reaso
             typer.echo(f"  {name} from {quantity(least)} to {quantity(most, 'm')}")
     for name, of in summary.get("metrics", {}).items():
         unit = of["unit"].replace("1", "")
-        text = "no value" if of["min"] is None else " to ".join(quantity(of[end], digits=4) for end in ("min", "max"))
+        text = "no value" if of["min"] is None else quantity_range((of["min"], of["max"]), unit, digits=4)
         middle = "" if of["min"] is None else f", median {quantity(of['median'], unit, digits=4)}"
         typer.echo(f"  {name.replace('_', ' ')} {text}{middle}")
     typer.echo(f"  {quantity(summary['seconds'], 's', digits=3)} in total, start-up included")

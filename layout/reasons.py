@@ -110,7 +110,7 @@ def _of_boxes(variables: Variables, by_high: np.ndarray, by_low: np.ndarray) -> 
         if axis:
             sums[part, axis[0]] = sums.get((part, axis[0]), 0.0) + float(up + down)
     return [
-        Advice(f"boxes of {part}s longer by 1 m at both ends along {axis}", gain, "N/m")
+        Advice(f"boxes of {part}s longer by 1 m at each end along {axis}", gain, "N/m")
         for (part, axis), gain in sums.items()
         if gain > _SMALL
     ]

@@ -73,5 +73,5 @@ class Cable(Part):
     @model_validator(mode="after")
     def _limits_in_order(self) -> Self:
         if self.t_min > self.t_max:
-            raise ValueError(f"t_min must not exceed t_max, {self.t_max:g} N, got {self.t_min:g} N")
+            raise ValueError(f"t_min must not exceed t_max ({self.t_max:g} N), got {self.t_min:g} N")
         return self

@@ -194,7 +194,7 @@ class GroundCarrier(Carrier):
 
 
 class PrescribedCarrier(Carrier):
-    """A carrier with imposed motion that disturbs the platform (paper F's quadrotor)."""
+    """A carrier with imposed motion that disturbs the platform, such as a quadrotor."""
 
     coordinates: ClassVar[tuple[int, ...]] = (*POSITION, *TILT, *YAW)
 
@@ -202,7 +202,7 @@ class PrescribedCarrier(Carrier):
 
 
 class MobileCarrier(Carrier):
-    """The end of a robot (paper C): a point that moves inside a reach box and keeps the orientation of its home."""
+    """The end of a robot: a point that moves inside a reach box and keeps the orientation of its home."""
 
     tows: ClassVar[bool] = True
 

@@ -37,8 +37,8 @@ def _dynamics_of(robot: Robot) -> Dynamics:
 class Dynamics(Displayed):
     """Compute the kinematics and dynamics of one robot, for arrays and CasADi expressions.
 
-    Everything is in {G}; `relative` has the form of paper F, in the frame {A} of a single carrier. Arrays may have
-    leading batch dimensions, which broadcast. If `pose` is a CasADi SX or MX, the result is one too.
+    Everything is in {G}; `relative` has the form of paper F (docs/theory.md), in the frame {A} of a single carrier.
+    Arrays may have leading batch dimensions, which broadcast. If `pose` is a CasADi SX or MX, the result is one too.
 
     The numeric core evaluates arrays if it supports the quantity and the size of the robot, otherwise CasADi.
 

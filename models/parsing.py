@@ -83,7 +83,7 @@ def parse_yaml(text: str, model: type[Model], where: str, folder: Path | None = 
             warnings.simplefilter("ignore")  # ruamel warns of what YAML 1.1 would have made of a number
             data = reader.load(text)
     except (YAMLError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
-        raise InputError(f"{where}: is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
+        raise InputError(f"{where}: text is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
     if not isinstance(data, dict):
         raise InputError(f"{where}: must hold a mapping with {_keys(json_schema(model))}, got {shown(data)}")
     return validate(data, model, where, folder)
@@ -207,7 +207,8 @@ def _without_branches(details: list[Any]) -> list[Any]:
             result += [one | {"loc": one["loc"][:at] + one["loc"][at + 1 :]} for one in listed]
         else:
             plain = [one["msg"] for one in branches if not one["type"].startswith("model")]
-            first_one, *rest = dict.fromkeys(plain)
+            # Last the text that has an "or" of its own.
+            first_one, *rest = sorted(dict.fromkeys(plain), key=lambda text: "than or equal" in text)
             rest = [text.removeprefix("must be ") for text in rest]
             result.append(first | {"loc": place, "msg": " or ".join([first_one, *rest])})
     return result

@@ -117,7 +117,7 @@ class Range(Part):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.min > self.max:
-            raise ValueError(f"min must be at most max, {self.max:g}, got {self.min:g}")
+            raise ValueError(f"min must be at most max ({self.max:g}), got {self.min:g}")
         return self
 
 

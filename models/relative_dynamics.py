@@ -32,6 +32,8 @@ from .rotation import Matrix, angles_of, body_rate, inverse_rate_matrix, rate_ma
 class RelativeDynamics(Displayed):
     """Compute the dynamics as paper F does: in {A}, with the carrier's motion in a separate term, D_B (Eq. 38).
 
+    docs/theory.md names the paper.
+
     `pose`, `velocity` and `acceleration` are those of the platform frame relative to {A}, in the axes of {A};
     `carrier_pose`, `carrier_velocity` and `carrier_acceleration` are those of {A} in {G}, default: at home and at rest.
     Each is (..., 6) [m, rad], since the only carrier needs no dimension of its own.

@@ -92,7 +92,7 @@ def aerodynamic_wrench(robot: Robot, pose: Matrix, velocity: Matrix, wind: Matri
     """
     aero = robot.platform.aero
     if aero is None:
-        raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero, got a wind")
+        raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero")
     V = wind - com_velocity(robot, pose, velocity)
     pressure_area = 0.5 * aero.air_density * aero.area
     along = V[0:2] ** 2 if aero.form == "printed" else V[0:2] * ca.fabs(V[0:2])

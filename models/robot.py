@@ -47,7 +47,7 @@ class Robot(Part):
     source: str = Field(min_length=1, description="source of the numbers, and which of them are assumed")
     gravity: Vector3 = optional("acceleration of gravity in {G} [m/s^2]", (0.0, 0.0, -9.81))
     drive: Drive = optional(
-        "drives that move the platform (paper C). fixed-length: carriers, with cables of constant length; "
+        "drives that move the platform. fixed-length: carriers, with cables of constant length; "
         "variable-length: winches, with mobile carriers at home; both: carriers and winches. Default: "
         "fixed-length "
         "if all cables hang from quadrotors or mobile carriers and none has a winch, an encoder or a pulley; else both",
@@ -138,7 +138,7 @@ class Robot(Part):
         return Robot.model_validate({**data, "cables": cables})
 
     def drawn(self, count: int, seed: int = 0) -> tuple[Robot, ...]:
-        """Sample `count` robots from the `uncertainty` of the file; the samples themselves are exact.
+        """Sample `count` robots from the `uncertainty` of the file; the samples have no uncertainty of their own.
 
         The first robots of a `seed` do not depend on the count.
 

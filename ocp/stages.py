@@ -172,8 +172,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
         closest = search.solve("elastic program", Mesh(mesh.steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             search.audit(closest)
-            short = quantity(closest.slack, "N")
-            return _closest(search, f"the search ended at a motion that is short by {short}")
+            return _closest(search, "the search ended at a motion without feasible tensions")
         outcome = search.solve("nonlinear program", mesh, closest.deviation)
     return _closest(search, refine(search, outcome))
 

@@ -209,7 +209,7 @@ class Plant:
         """
         robot, count = self.robot, len(self.robot.carriers)
         if wind is not None and robot.platform.aero is None:
-            raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero, got a wind")
+            raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero")
         actuators = max([len(carrier.actuators) for carrier in robot.carriers])
         home = robot.carrier_home
         parts = {

@@ -108,7 +108,7 @@ class SimulationData(Displayed):
             lines.append(f"the position is undefined at t = {self.times[at]:.3f} s")
         elif self.error[at] > self.tolerance:
             lines.append(
-                f"error of {quantity(1e3 * self.error[at], 'mm')} at t = {self.times[at]:.3f} s "
+                f"error of {quantity(1e3 * self.error[at], 'mm', digits=3)} at t = {self.times[at]:.3f} s "
                 f"(tolerance {quantity(1e3 * self.tolerance, 'mm')})"
             )
         room = room_of(self.robot)

@@ -51,10 +51,10 @@ class Mismatch(Part):
     carrier_lag: Lag = optional("time constant of carriers whose motion is commanded [s]", 0.0)
 
     def check(self, robot: Robot) -> None:
-        """Check that the robot has what should differ.
+        """Check that the robot has the parts to which the differences refer.
 
         Raises:
-            InputError: If it has not.
+            InputError: If it lacks one.
         """
         if self.geometry and robot.uncertainty is None:
             raise InputError("mismatch.geometry must be false for a robot file without an uncertainty, got true")

@@ -41,7 +41,7 @@ def read_wind(robot: Robot, wind: Any, gusts: float) -> Wind | None:
             raise InputError(f"gusts must be 0 without a wind, got {gusts:g} m/s")
         return None
     if robot.platform.aero is None:
-        raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero, got a wind")
+        raise InputError(f"wind must be left out for robot {robot.name!r}, which has no platform.aero")
     if callable(wind):
         function: Any = wind
         if gusts:

@@ -60,8 +60,8 @@ class StandardForm(NamedTuple):
     def is_optimal(self, tensions: Array) -> bool:
         r"""Return whether multipliers prove that tensions, (m,) [N], which give w inside the limits, are the optimum.
 
-        At the point of least norm, the gradient of the cost, s itself, has no part in the null space of the equations
-        that the multipliers of active limits do not balance:
+        At the point of least norm, multipliers of the active limits balance the part of the cost's gradient, s itself,
+        that is in the null space of the equations:
 
         $$
         N s = N \mu, \qquad \mu_i \ge 0 \text{ at } lower_i, \quad \mu_i \le 0 \text{ at } upper_i, \quad

@@ -201,7 +201,7 @@ def test_advice_is_the_slope_of_optima_solved_again():
     gains = {one.change: one.gain for one in found.advice}
     for change, step, name in (("stronger", 0.1, "t_max of every cable higher by 1 N"),
                                ("slacker", 0.1, "t_min of every cable lower by 1 N"),
-                               ("longer", 1e-3, "boxes of anchors longer by 1 m at both ends along x")):  # fmt: skip
+                               ("longer", 1e-3, "boxes of anchors longer by 1 m at each end along x")):  # fmt: skip
         ahead, behind = (optimum(**{change: s * step})[3] for s in (1, -1))
         assert gains.get(name, 0.0) == pytest.approx((ahead - behind) / (2 * step), rel=1e-3, abs=1e-3), name
 

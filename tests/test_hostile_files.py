@@ -111,7 +111,9 @@ def test_many_wrong_items_take_time_in_proportion():
 def test_a_yaml_file_of_many_items_is_refused_before_the_rest_is_read(item):
     """Half a million took half a minute: each becomes several objects of the YAML reader, then an error of its own."""
     text = f"name: many\npath:\n  points: [{', '.join([item] * 100_000)}}}"  # what ends it is never reached
-    with pytest.raises(InputError, match=r"^many\.yaml: is not YAML \(has more than 30000 values and keys, line 3\)"):
+    with pytest.raises(
+        InputError, match=r"^many\.yaml: text is not YAML \(has more than 30000 values and keys, line 3\)"
+    ):
         parse_yaml(text, Task, "many.yaml")
 
 

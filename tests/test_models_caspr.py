@@ -248,7 +248,10 @@ WRONG_CABLES = {
         ("<force_min>1.0<", "<force_min>-1.0<"),
         r"cable_ideal 'left': t_min must be greater than or equal to 0",
     ),
-    "limits crossed": (("<force_min>1.0<", "<force_min>90<"), r"'left': t_min must not exceed t_max, 80 N, got 90 N"),
+    "limits crossed": (
+        ("<force_min>1.0<", "<force_min>90<"),
+        r"'left': t_min must not exceed t_max \(80 N\), got 90 N",
+    ),
     "third link": (
         ("<link>1</link><location>-0.5", "<link>2</link><location>-0.5"),
         r"'left' must run from the ground, link 0, straight to link 1, got the links 0, 2",

@@ -42,7 +42,7 @@ WRONG = {
     "limits crossed": (
         "t_min: 1, t_max: 10",
         "t_min: 20, t_max: 10",
-        r"cables\[1\]\.t_min must not exceed t_max, 10 N, got 20 N",
+        r"cables\[1\]\.t_min must not exceed t_max \(10 N\), got 20 N",
     ),
     "pushing cable": ("t_min: 1,", "t_min: -1,", r"cables\[1\]\.t_min must be greater than or equal to 0, got -1"),
     "unknown carrier": (

@@ -277,7 +277,7 @@ def test_margins_count_in_every_wind():
 @pytest.mark.parametrize(
     ("wind", "message"),
     [
-        ({"min": [1, 0, 0], "max": [0, 0, 0]}, "wind.min must be at most max, 0 m/s along x, got 1 m/s"),
+        ({"min": [1, 0, 0], "max": [0, 0, 0]}, "wind.min must be at most max (0 m/s) along x, got 1 m/s"),
         ({"min": [1, 0, 0]}, "wind.max is missing"),
         ({"min": [1, 0, 0], "max": [1, 0, 0], "mx": [1, 0, 0]}, "is not a known key, did you mean 'max'"),
         ({"speed": 0}, "wind.speed must be greater than 0, got 0"),
@@ -313,10 +313,10 @@ def test_the_first_line_says_what_holds_in_any_wind():
     assert found.feasible
     assert found.margin > 1
     first = found.report().splitlines()[0]
-    assert first.endswith("every tension at least 0.3 N inside its limits, in any of its winds")
+    assert first.endswith("every tension at least 0.3 N inside its limits, in every wind of the task")
     assert (
         plan("wang-flying", task)
         .report()
         .splitlines()[0]
-        .endswith("every tension inside its limits, in any of its winds")
+        .endswith("every tension inside its limits, in every wind of the task")
     )

@@ -240,7 +240,7 @@ def test_fewer_processors_inside_of_a_block():
             {"region": {"carriers": {"nobody": {"min": [0, 0, 0], "max": [1, 1, 1]}}}},
             "region.carriers must have the names frame, got 'nobody'",
         ),
-        ({"region": {"lengths": {"min": 2, "max": 1}}}, "lengths.min must be at most max, 1, got 2"),
+        ({"region": {"lengths": {"min": 2, "max": 1}}}, "lengths.min must be at most max (1), got 2"),
         ({"region": {"lengths": {"min": 0.1, "max": 0.2}}}, "long enough for the three cables to meet"),
         ({"region": {"box": 1}}, "is not a known key"),
         ({"region": 5}, "region"),

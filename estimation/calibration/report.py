@@ -17,6 +17,7 @@ MOST_LISTED = 12
 MOST_NAMED = 4
 LACKS = 3.0  # times the stated standard deviation, of residuals that noise alone does not cause
 LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually better than
+SMALLEST = 1e-6  # [m]: a smaller residual or change of a length means nothing
 HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
 
 
@@ -70,6 +71,8 @@ def facts(result: CalibrationData) -> list[Fact]:
 
 
 def _mm(length: float) -> str:
+    if abs(length) < SMALLEST:
+        return f"under {quantity(1e3 * SMALLEST, 'mm')}"
     return quantity(1e3 * length, "mm", digits=3)
 
 
@@ -90,7 +93,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         )
     elif held_out.after > 1.5 * fitted:
         lines.append(
-            f"the residual on training samples is only {_mm(fitted)}: for so many parameters, more samples are needed"
+            f"the residual on training samples is smaller, {_mm(fitted)}: so many parameters need more samples"
         )
     return lines
 
@@ -146,8 +149,9 @@ def _one(one: Parameter) -> tuple[str, str, str, str]:
     usual = {"m": (1e3, "mm"), "s": (1e3, "ms"), "1": (1e6, "ppm"), "1/N": (1e6, "1/MN"), "1/m": (1e6, "ppm/m")}
     factor, unit = usual.get(one.unit, (1.0, one.unit))
     sigma = quantity(factor * one.sigma, unit, digits=2) if np.isfinite(one.sigma) else "not determined"
-    change = quantity(factor * one.correction, unit, digits=4)
-    value = f"{one.value:.6g} {one.unit}" if "/" in one.unit else f"{one.value:.6f} {one.unit}".removesuffix(" 1")
+    change = quantity(0.0 if unit == "mm" and abs(one.correction) < SMALLEST else factor * one.correction, unit)
+    decimals = round(one.value, 6) + 0.0  # zero without a sign
+    value = f"{one.value:.6g} {one.unit}" if "/" in one.unit else f"{decimals:.6f} {one.unit}".removesuffix(" 1")
     return one.name, value, sigma, change
 
 
@@ -174,7 +178,7 @@ def _of_open(result: CalibrationData) -> list[Part]:
         names = ", ".join(loose[:MOST_NAMED]) + (
             f" and {len(loose) - MOST_NAMED} more" if len(loose) > MOST_NAMED else ""
         )
-        lines.append(f"hardly determined: {names}; measure other poses, or give a prior")
+        lines.append(f"poorly determined: {names}; measure other poses, or give a prior")
     if not texts:
         return [*lines, "all directions of the parameters are observable"]
     count = f"{len(texts)} unobservable direction{'s' * (len(texts) > 1)}"

@@ -113,7 +113,7 @@ class LogPoses(Displayed):
 
     @cached_property
     def swing(self) -> float:
-        """Return about how far (rms) accelerations move a platform that gravity holds [m]; 0 without such samples."""
+        """Estimate how far (rms) accelerations move a platform that is posed by gravity [m]; 0 without such samples."""
         estimate, rows = self.estimate, np.asarray(self.estimate.by_gravity)
         if self.times is None or len(self.times) <= 2 * FEWEST or not rows.any():
             return 0.0

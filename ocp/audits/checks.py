@@ -179,7 +179,8 @@ def _tube_ends(audited: Instants) -> list[Excess]:
                 counts = word == "exact" or unit == "m" or per == "/s"
                 counts |= per == "/s^2" and at_rest_without_acceleration(scenario.robot, None, place[0])
                 if counts:
-                    why = "distance from its path" if word == "exact" or not per else "it must rest there"
+                    why = "distance from its path" if not per else "difference from the motion of its path"
+                    why = "it must rest there" if per and word == "rest" else why
                     exceeded += _missed("tube.ends", "platform", end, off, tolerance, unit + per, why)
     return exceeded
 

@@ -56,8 +56,9 @@ class Excess(Displayed):
             return f"with tensions inside their limits the wrench is off by {quantity(self.value, self.unit)}{at}{why}"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "
         value, bound = (quantity(number, self.unit) for number in (self.value, self.bound))
-        if value == bound:
-            value, bound = (quantity(number, self.unit, digits=6) for number in (self.value, self.bound))
+        for digits in (6, 9, 12):
+            if value == bound:
+                value, bound = (quantity(number, self.unit, digits=digits) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value
         return f"{self.limit} of {self.about} must be {side}{bound}, is {value}{at}{why}"
 

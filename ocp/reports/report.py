@@ -149,8 +149,8 @@ def _of_the_motion(plan: PlanData) -> str:
         return f"shortest duration {quantity(plan.duration, 's', 6)}"
     if plan.feasible:
         # The planned tensions are those of one wind and load; with the others they exist, with the required margin.
-        where = ", in any of its winds" if plan.scenario.wind_set is not None else ""
-        where = ", with any of its loads" if plan.scenario.phases.extremes else where
+        where = ", in every wind of the task" if plan.scenario.wind_set is not None else ""
+        where = ", with every load of the task" if plan.scenario.phases.extremes else where
         margin = plan.scenario.hard_margin if where else plan.margin
         if margin is None or margin < WORTH_A_NUMBER:
             return f"every tension inside its limits{where}"
@@ -177,7 +177,9 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
     fact = f"{quantity(relaxed.possible, relaxed.unit)}{relaxed.detail and f' {relaxed.detail}'} (audited)"
     if relaxed.name == "duration":
         longer = relaxed.possible > relaxed.requested
-        side, other = ("shortest", "; `towline time` computes the fastest time law") if longer else ("longest", "")
+        side = "shortest" if longer else "longest"
+        timed = longer and not plan.scenario.platform_free and not plan.scenario.carrier_free
+        other = "; `towline time` computes the fastest time law" if timed else ""
         return "feasible duration", f"{fact}, close to the {side} feasible one for this time law{other}"
     others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]
     return f"feasible {relaxed.name}", fact + (f", together with {', '.join(others)}" if others else "")

@@ -52,8 +52,8 @@ class Tube(Part):
         "state at the start and the end. free: anywhere in the tube; periodic: the end state equals the start state, "
         "without a stop, for a path that ends where it starts; rest: position on the path, zero velocity and "
         "acceleration (angular acceleration is free with few cables or fixed lengths); exact: position and velocity of "
-        "the path, free acceleration; default: rest if the path (of another kind than rest) starts and ends at rest "
-        "and the base is not of kind given, otherwise free"
+        "the path, free acceleration; default: rest if the path starts and ends at rest but is not of kind rest, and "
+        "the base is not of kind given; otherwise free"
     )
     waypoints: Literal["free", "exact"] = optional(
         "exact: the platform passes through the points of a path of kind waypoints, even if the path rounds them",
@@ -172,8 +172,8 @@ class Task(Part):
     final: Final | None = optional("state in which the motion ends; default: as `ends` require")
     margin: NonNegative = optional("smallest distance of every tension from its limits [N]", 0.0)
     robust: Share | None = optional(
-        "fraction, such as 0.95, of the robots consistent with the robot file's `uncertainty` for which all tensions "
-        "must keep the margin from their limits, to first order; default: only the nominal robot"
+        "fraction, such as 0.95: all tensions must keep the margin from their limits for this fraction of all robots "
+        "within the `uncertainty` of the robot file, to first order; default: only for the nominal robot"
     )
     stop_within: Positive | None = optional(
         "time within which the robot must be able to stop on its path from every instant of the plan, inside the "
@@ -189,7 +189,7 @@ class Task(Part):
     limits: TaskLimits = TaskLimits()
     steps: Whole = optional("number of intervals between the nodes of the planner", 100, ge=4, le=20_000)
     scheme: SchemeName | None = optional(
-        "acceleration within an interval: linear; hermite: quadratic, with A t = w in the middle too; "
+        "acceleration within an interval: linear; hermite: quadratic, and tensions give the wrench in the middle too; "
         "spline: a smooth cubic B-spline; default: linear, or hermite if the audit of a linear plan reports that "
         "carriers cannot follow the motion between the nodes"
     )

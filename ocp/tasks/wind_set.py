@@ -57,7 +57,7 @@ class WindBox(Part):
     def _in_order(self) -> Self:
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
             if low > high:
-                raise ValueError(f"min must be at most max, {high:g} m/s along {axis}, got {low:g} m/s")
+                raise ValueError(f"min must be at most max ({high:g} m/s) along {axis}, got {low:g} m/s")
         return self
 
     @property

@@ -70,8 +70,8 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
         Plan: Audited like every plan. Its task contains the time law, so `plan` audits the same motion again; `law`
             contains the active limit on each part of the path (`bottlenecks`). If infeasible, no tensions inside their
             limits give the required wrench at `law.at` at any speed and acceleration (at the ends: at rest). The motion
-            then only shows the path, in 10 s. If not-found, every grid point allows some speed, but no time law
-            connects them, or none passes the audit.
+            then has no time law: it only shows the path, and lasts 10 s. If not-found, every grid point allows some
+            speed, but no time law connects them, or none passes the audit.
 
     Raises:
         InputError: If an argument is invalid, the task does not fit the robot or has keys that a time law along a path

@@ -12,7 +12,7 @@ from .motion import Motion
 
 
 class SamplePath(PathBase):
-    """Interpolate samples by a quintic spline; its speeds at the ends follow from the samples near them."""
+    """Samples that a quintic spline interpolates; its speeds at the ends follow from the samples near them."""
 
     kind: Literal["samples"]
     times: tuple[Finite, ...] = Field(min_length=6, description="times, increasing from 0 [s]")
