@@ -181,11 +181,12 @@ def simulate(
 
 @contextmanager
 def _named(events: list[str]) -> Iterator[None]:
-    """Let errors name the option --event in place of an item of the argument `events`."""
+    """Let errors name --event and PLAN in place of an item of the argument `events` and of `reference`."""
     try:
         yield
     except InputError as error:
-        text = re.sub(r"^events\[(\d+)\]", lambda item: f"--event {shown(events[int(item[1])])}", str(error))
+        text = str(error).replace("reference must be a plan", "PLAN must be a plan", 1)
+        text = re.sub(r"^events\[(\d+)\]", lambda item: f"--event {shown(events[int(item[1])])}", text)
         raise InputError(text) from None
 
 

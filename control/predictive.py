@@ -67,8 +67,9 @@ class Predictive(ComputedTorque):
         robot: A `Robot`, the name of one in the library, or the path of a robot file. A carrier may have at most three
             cables of fixed length.
         bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
-            Default: 40, but less if carriers correct errors: 8 for teams with cables of fixed length, 6 for towing
-            robots with winches. At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
+            Default: 40, but less if carriers correct errors, as they do with cables of fixed length or with fewer
+            cables than degrees of freedom: 8 for teams with cables of fixed length, 6 for towing robots with winches.
+            At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
             leave their reference, because they are slower; of 0.025 s if carriers correct errors. Stages become as long
             as the steps, at most 0.21 s, if the first two steps, or three in a row, and the references of `follow` are

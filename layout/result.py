@@ -247,7 +247,7 @@ class Design(Drawn, Reported, Displayed):
 
     def _binding_row(self, one: Binding) -> list[str]:
         limits = [
-            f"{name} of {', '.join(str(i + 1) for i in cables)}"
+            f"{name} of cable{'s' * (len(cables) > 1)} {', '.join(str(i + 1) for i in cables)}"
             for name, cables in (("t_max", one.at_max), ("t_min", one.at_min))
             if cables
         ]
