@@ -44,7 +44,7 @@ class Mismatch(Part):
     mass: Factor = optional("factor of the platform's mass and inertia", 1.0)
     com: Offset = optional("distance of the CoM from that of the file, along each axis [m]", 0.0)
     stiffness: Factor = optional("factor of the stiffness of cables", 1.0)
-    tension_gain: Factor = optional("tension that a winch gives, as a factor of the command", 1.0)
+    tension_gain: Factor = optional("tension that a winch gives, divided by the command", 1.0)
     friction: Force = optional("dry friction of winches and pulleys, as a force on a cable [N]", 0.0)
     winch_lag: Lag = optional("time constant with which winches follow commands [s]", 0.0)
     rotor_lag: Lag = optional("time constant of the actuators of flying carriers [s]", 0.0)
