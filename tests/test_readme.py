@@ -183,8 +183,9 @@ def test_every_public_name_is_in_the_reference(package):
         PAGES[f"docs/api/{linked}.md"] for linked in re.findall(r"^\[`\w+`\]\(([\w-]+)\.md\):", page, re.MULTILINE)
     )
     for name in importlib.import_module(f"towline.{package}").__all__:
-        # A name that its module has too is given by its full path: `towline.solvers.solve.solve`.
-        assert re.search(rf"^::: towline\.{re.escape(package)}\.((solve|simulate)\.)?{name}$", page, re.MULTILINE), name
+        # A name that a module has too is given by its full path: `towline.solvers.solve.solve`.
+        path = rf"towline\.{re.escape(package)}\.((solve|simulate|planner)\.)?{name}"
+        assert re.search(rf"^::: {path}$", page, re.MULTILINE), name
 
 
 def test_the_reference_lists_every_name_of_the_front_door():
