@@ -50,7 +50,7 @@ class ComputedTorque(Controller):
     permits ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted; with fewer cables than degrees of
     freedom, 0.1 % along each cable and 10 % in all. Carriers follow the reference, or deviate from it within their
     `reach` to help the tensions. This damps the swing of loads of towing robots and of teams of quadrotors, with fewer
-    cables than degrees of freedom. Quadrotors have separate loops for position and attitude (see `thrusts`).
+    cables than degrees of freedom. Quadrotors have separate loops for position and attitude (core/control/thrusts.c).
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -73,10 +73,11 @@ class ComputedTorque(Controller):
             acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but a quarter of `place` if flying carriers
             only take over steady disturbances. With a larger bandwidth, carriers that turn and the damping of their
             cables make the observer's loop unstable.
-        place, attitude: Bandwidths of the position and attitude loops of flying carriers [rad/s], see `thrusts`.
-            Default of `attitude`: 40, or less if the known lags of rotors and sensors require it
-            (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn so late that the
-            attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the inverse of the lag.
+        place, attitude: Bandwidths of the position and attitude loops of flying carriers [rad/s]
+            (core/control/thrusts.c). Default of `attitude`: 40, or less if the known lags of rotors and sensors require
+            it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn so late that
+            the attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the inverse of the
+            lag.
         patience: Time for which the sensor of a cable may report no tension, although one is commanded, until the cable
             is treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again
             once its sensor reports a tension. Cables of fixed length are never treated as cut. If no sensor reports a

@@ -56,7 +56,7 @@ class Predictive(ComputedTorque):
     command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold"). A step is also
     "soft wrench" if its solution leaves an error that the `ComputedTorque` has no tensions to correct.
 
-    The velocity that the model predicts for the commands is compared with the measured one, see `Watch`. This
+    The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). This
     `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
     `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity requires
     more tension than the limits permit, or if carriers turn too late (core/control/turning.c). It controls the robot
@@ -72,9 +72,9 @@ class Predictive(ComputedTorque):
             At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
             leave their reference, because they are slower; of 0.025 s if carriers correct errors. Stages become as long
-            as the steps, at most 0.21 s, if the first two steps, or three in a row, and the references of `follow` are
-            farther apart than twice the default (if carriers fly, than the default). A given duration is kept, with a
-            warning if steps are more than 1.2 / `bandwidth` apart.
+            as the steps, at most 0.21 s, if steps are long: if both the references of `follow` and the first two steps,
+            or three steps in a row, are farther apart than twice the default (with carriers that fly: than the
+            default). A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
         reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
             scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's
             weight. With cables of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables'

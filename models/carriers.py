@@ -162,7 +162,8 @@ class Carrier(Part):
     ) -> Matrix | None:
         """Return the acceleration of its pose, (6, 1), or None if it is imposed; arguments as in `required_effort`.
 
-        It is that by `thrust` (1, 1) along its z axis [N] and `torque` (3, 1) about its axes [N m].
+        It results from `thrust` (1, 1) along its z axis [N], `torque` (3, 1) about its axes [N m], `pull` and
+        gravity.
         """
         return None
 

@@ -29,7 +29,7 @@ class InPlace:
     - `A`, `w`: wrench matrices, shape (rows, n, m), and required wrenches, shape (rows, n), [N] and [N m].
     - `bounds`, `t_ref`: lowest and highest tensions, shape (2, rows, m), and tensions to stay near, shape (rows, m)
       [N].
-    - `tensions`: the tensions [N], shape (rows, m); nan where the numbers of a row are no problem.
+    - `tensions`: the tensions [N], shape (rows, m); nan where the numbers of a row do not define a problem.
     - `code`: status of each row, shape (rows,): `STATUSES[int(code)]`.
     - `solves`: how it does so: one after another (1), in lanes (2), or not at all (0).
     - `direction`, `shortfall`: where no tensions give w: a verified direction, shape (rows, n), along which they miss

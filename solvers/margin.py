@@ -43,10 +43,10 @@ class Margin(NamedTuple):
 def capacity_margin(problem: TensionProblem) -> Margin:
     """Return the capacity margin of a wrench, its gradient and the direction of least reserve.
 
-    Outside, minus the value is the distance from w to the set: the certificate's shortfall (except if the problem is
-    singular: the certificate then counts only the part outside the range of A). Inside, every facet is checked: all
-    subsets of rank - 1 cables, 56 for m = 8 and 792 for m = 12 with six equations. Cables with t_min = t_max are left
-    out.
+    If w is outside the available wrench set, the value is negative. Its magnitude is the distance from w to the set,
+    which is the certificate's shortfall, except for a singular problem, whose certificate counts only the part outside
+    the range of A. If w is inside, every facet is checked: all subsets of rank - 1 cables, 56 for m = 8 and 792 for
+    m = 12 with six equations. Cables with t_min = t_max are left out.
 
     If the set is flat (the rank of the other cables is below n), it has no interior in the space of all wrenches. The
     margin of a wrench in the set, within `TensionProblem.tolerance`, is then measured in the subspace of the wrenches

@@ -23,8 +23,8 @@ class Status(StrEnum):
     that answers all the same (`Method.always_answers`)."""
 
     INVALID = "invalid"
-    """A row of a batch whose numbers are no problem: NaN, crossed limits, a weight that is not positive. A single
-    problem like that is an `InputError`."""
+    """A row of a batch whose numbers do not define a problem: NaN, crossed limits, a weight that is not positive. A
+    single problem like that is an `InputError`."""
 
     FAILED = "failed"
     """A back end gave up, or called the problem infeasible and could not be believed, or the method has no result here

@@ -51,9 +51,9 @@ class Tube(Part):
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
         "state at the start and the end. free: anywhere in the tube; periodic: the end state equals the start state, "
         "without a stop, for a path that ends where it starts; rest: position on the path, zero velocity and "
-        "acceleration (angular acceleration is free with few cables or fixed lengths); exact: position and velocity of "
-        "the path, free acceleration; default: rest if the path starts and ends at rest but is not of kind rest, and "
-        "the base is not of kind given; otherwise free"
+        "acceleration (free angular acceleration if the robot has fewer cables than degrees of freedom, or cables of "
+        "fixed length); exact: position and velocity of the path, free acceleration; default: rest if the path starts "
+        "and ends at rest but is not of kind rest, and the base is not of kind given; otherwise free"
     )
     waypoints: Literal["free", "exact"] = optional(
         "exact: the platform passes through the points of a path of kind waypoints, even if the path rounds them",
@@ -105,9 +105,10 @@ class FreeBase(Part):
     )
     turn_acceleration_max: Positive | None = optional("largest second derivative of each Euler angle [rad/s^2]")
     ends: Literal["free", "rest", "periodic", "exact"] | None = optional(
-        "state at the start and the end. free: any state; rest: zero velocity, and zero linear acceleration (free with "
-        "few cables or fixed lengths); periodic: the end state equals the start state; exact: the states of `around`; "
-        "default: as `tube.ends` if that is rest or periodic, otherwise free"
+        "state at the start and the end. free: any state; rest: zero velocity, and zero linear acceleration (free "
+        "if the robot has fewer cables than degrees of freedom, or cables of fixed length); periodic: the end state "
+        "equals the start state; exact: the states of `around`; default: as `tube.ends` if that is rest or "
+        "periodic, otherwise free"
     )
 
 

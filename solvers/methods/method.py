@@ -44,9 +44,9 @@ class Method(ABC):
     """Where the method is published."""
 
     exact: ClassVar[bool]
-    """True if the method ends at the optimum of its own criterion. Where rounding makes such a method lose a point on
-    the very boundary of the available wrench set, `solve` computes least squares in exact arithmetic and, if the
-    criterion is another one, calls the method once more for the cables that have a choice there."""
+    """True if the method ends at the optimum of its own criterion. If w is on the boundary of the available wrench set
+    and the method fails because of rounding, `solve` computes least squares in exact arithmetic. If the criterion is
+    another one, `solve` then calls the method again, for the cables whose tensions are not determined there."""
 
     continuous: ClassVar[bool] = False
     """True if the tensions follow A, w and the limits without a jump wherever the feasible tensions have an interior,
