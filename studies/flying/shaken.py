@@ -124,7 +124,7 @@ def blow(robot: Robot) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
 
     Both by the time between two samples of the noise.
     """
-    body, names = circle(0.0, FLIGHT), [f"a sample each {hold * PERIOD * 1e3:g} ms" for hold in HOLDS]
+    body, names = circle(0.0, FLIGHT), [f"a sample every {hold * PERIOD * 1e3:g} ms" for hold in HOLDS]
     winds = []
     for hold in HOLDS:
         times = hold * PERIOD * np.arange(-(-(len(FLIGHT) - 1) // hold))

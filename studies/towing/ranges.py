@@ -80,9 +80,9 @@ def _ranges(drive: Drive, samples: Loops) -> list[Claim]:
         elif differs:
             inferred = value_text(tuple(computed.tolist()), "m")
             why = (
-                "With robot-ends at the printed x and y and heights, which are inside any boxes, the range is already "
+                "With robot-ends at the printed x, y and heights, which every possible box contains, the range is "
+                f"already {_beside(least, printed)}; with inferred boxes it is {inferred}."
             )
-            why += f"{_beside(least, printed)}; with inferred boxes it is {inferred}."
         else:
             why = f"{not_printed}section 5.3. With these the range is {_beside(computed, printed)}."
         claims.append(
