@@ -67,6 +67,12 @@ def quantity_range(values: Iterable[Number], unit: str = "", digits: int = DIGIT
     return f"{text} {unit}" if unit else text
 
 
+def any_of(names: Iterable[str]) -> str:
+    """Write of which things one is meant: "cables[1]", "one of cables[1], cables[2]"; empty for none."""
+    listed = list(names)
+    return "one of " * (len(listed) > 1) + ", ".join(listed)
+
+
 def unbroken(text: str) -> str:
     """Return text in which no line breaks between a number and its unit, by no-break spaces, as pages need it."""
     return INSIDE.sub("\u00a0", text)

@@ -151,7 +151,7 @@ def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
 def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:
     import numpy as np
 
-    from ..base.text import quantity, quantity_row
+    from ..base.text import any_of, quantity, quantity_row
     from ..estimation.pose.wrong_lengths import can_explain, wrong_cables
 
     verdict = "a pose fits the lengths" if estimate.consistent else "NO POSE FITS THE LENGTHS; the closest one is shown"
@@ -176,7 +176,7 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         )
     if not estimate.consistent and can_explain(estimate):
         cables = wrong_cables(estimate)
-        named = " or ".join(f"cables[{k}]" for k in cables) if len(cables) < robot.m else "any one cable"
+        named = any_of(f"cables[{k}]" for k in cables) if len(cables) < robot.m else "any one cable"
         typer.echo(f"A wrong length of {named} explains this." if named else "No single wrong length explains this.")
     for other in others:
         held = "" if other.taut else ", which cables cannot hold at rest"

@@ -4,6 +4,7 @@ SI units throughout: metres, kilograms, seconds, newtons, radians. Poses are (x,
 R = Rz(yaw) Ry(pitch) Rx(roll).
 """
 
+import re
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
 
@@ -50,6 +51,11 @@ def optional(description: str, default: Any = None, **constraints: Any) -> Any:
     return Field(default=default, description=description, **constraints)
 
 
+def _in_words(kind: type) -> str:
+    """Return the name of a class as errors have it: "wrench-feasible"."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", kind.__name__).lower()
+
+
 class Part(Displayed, BaseModel):
     """The base of all parts: they are frozen, and an unknown key is an error."""
 
@@ -62,7 +68,7 @@ class Part(Displayed, BaseModel):
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            raise InputError(one_line(error, type(self).__name__.lower(), type(self))) from None
+            raise InputError(one_line(error, _in_words(type(self)), type(self))) from None
 
     # As of pydantic's own: parts inside of parts are checked without a call of it, so that errors keep their place.
     __init__.__pydantic_base_init__ = True  # pyrefly: ignore[missing-attribute]
@@ -75,7 +81,7 @@ class Part(Displayed, BaseModel):
         try:
             return super().model_validate(obj, **options)
         except ValidationError as error:
-            raise InputError(one_line(error, cls.__name__.lower(), cls)) from None
+            raise InputError(one_line(error, _in_words(cls), cls)) from None
 
     @override
     def __str__(self) -> str:

@@ -14,7 +14,7 @@ the fraction P of the robots at all poses simultaneously:
   |g . dp| <= k sqrt(g^T Sigma g) for every g (Scheffe);
 - a motion (`motion_factor`): along it the row of each cable, scaled to variance 1, is a curve of length L_i on the unit
   sphere. Rice's formula bounds the probability that it exceeds k anywhere by 2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2).
-  The sum over the cables is 1 - P. The factor is usually half of the first one, and never taken larger.
+  The sum over the cables is 1 - P. The factor is usually half of the first one, and is taken to be at most that.
 
 Source: H. Scheffe, Biometrika 40, 1953; S. O. Rice, Bell System Technical Journal 24, 1945; D. Q. Naiman, Annals of
 Statistics 14, 1986.

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...base.display import Displayed
 from ...base.inputs import check_ending, file_path
-from ...base.text import quantity
+from ...base.text import any_of, quantity
 from ...base.writing import whole_file
 from ...models import points
 from ...models.part import COORDINATES
@@ -145,7 +145,7 @@ class LogPoses(Displayed):
         for one in self.wrong[:MOST_NAMED]:
             which = f"sample {one.first}" if one.first == one.last else f"samples {one.first} to {one.last}"
             at = "" if self.times is None else f" (from {self._time(one.first)})"
-            names = " or ".join(f"cables[{cable}]" for cable in one.cables)
+            names = any_of(f"cables[{cable}]" for cable in one.cables)
             why = f"most likely the length of {names} is wrong" if names else "no single wrong length explains this"
             yield f"{which}{at}: no pose fits; {why}"
         if len(self.wrong) > MOST_NAMED:
