@@ -631,4 +631,4 @@ def test_cables_are_as_long_as_the_winches_permit(monkeypatch):
         robot, [anchors], [{"poses": [[0, 0, 2.5, 0, 0, 0]]}], cable_length={"min": 8, "max": 9}, time_limit=0.2
     )
     assert far.status == "not-found"
-    assert "and a cable length of 8 to 9 m" in far.report()
+    assert "a margin of 1 N, a cable length of 8 to 9 m;" in far.report()
