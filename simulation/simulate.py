@@ -29,7 +29,7 @@ from ..plant import Plant
 from ..plant.steps import default_drive, steps_in
 from .command_conversion import Orders
 from .conditions import Conditions
-from .events import Carry, Event, read_events
+from .events import Carry, Event, Stick, read_events
 from .experiment import Experiment
 from .flights import copies, flights, plant_of, summary
 from .flying import fly
@@ -194,6 +194,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
 
         reference = validate({"path": reference}, Task, "reference").path
     trajectory, period = read_trajectory(robot, reference, meets.duration), meets.period
+    drive = meets.drive or default_drive(robot)
     named = read_events(robot, meets.events, events)
     happening = tuple(event for _, event in named)
     parts = _in_turn(robot, trajectory, happening)
@@ -208,7 +209,9 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
     for where, event in named:
         if event.at >= periods * period:
             raise InputError(f"{where} must begin before the end at {periods * period:g} s, got {event.at:g} s")
-    mismatch, drive = required("mismatch", meets.mismatch, Mismatch), meets.drive or default_drive(robot)
+        if isinstance(event, Stick):
+            _check_winches(robot, drive, where)
+    mismatch = required("mismatch", meets.mismatch, Mismatch)
     mismatch.check(robot)
     plant = Plant(robot, drive=drive)
     return plant, Experiment(
@@ -223,6 +226,15 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
         doubt="; ".join(dict.fromkeys(part.doubt for _, part in parts if part.doubt)),
         mismatch=mismatch,
     )
+
+
+def _check_winches(robot: Robot, drive: str, where: str) -> None:
+    """Check that a winch that sticks changes the motion: in the drive "tensions" it would only seem to."""
+    if robot.fixed_lengths is not None:
+        raise InputError(f"{where} must be left out for robot {robot.name!r}, which has no winches")
+    if drive == "tensions":
+        others = f"for another drive, every cable of {robot.name!r} needs a stiffness or a winch in the robot file"
+        raise InputError(f"{where} must be left out with drive 'tensions', in which winches hold no length; {others}")
 
 
 def _in_turn(robot: Robot, first: Trajectory, events: Sequence[Event]) -> list[tuple[float, Trajectory]]:

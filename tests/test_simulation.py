@@ -185,6 +185,20 @@ def test_a_stuck_winch_holds_the_unstrained_length_of_its_cable():
     assert np.abs(flight.record.tensions - flight.record.commanded)[1410:, 1].max() > 1.0
 
 
+@pytest.mark.parametrize(
+    ("robot", "drive", "message"),
+    [
+        ("cogiro", None, "drive 'tensions', in which winches hold no length; .* 'cogiro' needs a stiffness or a winch"),
+        ("wang-flying", "tensions", "events\\[0\\] must be left out with drive 'tensions'"),
+        ("multi-quadrotor-3", None, "must be left out for robot 'multi-quadrotor-3', which has no winches"),
+    ],
+)
+def test_a_winch_that_would_stick_without_an_effect_is_refused(robot, drive, message):
+    """Where cables have the commanded tension, or a fixed length, the motion would be the same to the last bit."""
+    with pytest.raises(InputError, match=message):
+        simulate(robot, load(robot).home, events=["stick 2 at 0.1"], duration=0.2, drive=drive)
+
+
 def test_a_controller_that_misses_its_time_leaves_the_last_command(crane):
     calm = simulate("ipanema-1", crane)
     missed = simulate("ipanema-1", crane, events=["miss 0.03 at 1.5"])

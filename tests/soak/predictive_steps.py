@@ -20,6 +20,7 @@ from towline.base.errors import InputError
 from towline.benchmarks.harness import head, row
 from towline.control import ANSWERS, Command, Controller, Predictive, Reference, State
 from towline.models import Robot, load
+from towline.plant.steps import default_drive
 from towline.simulation import simulate
 
 from .control_steps import kept
@@ -134,9 +135,10 @@ def _conditions(robot: Robot, rng: np.random.Generator) -> dict[str, Any]:
             "delay": float(rng.choice([0.0, 0.002, 0.02])),
         }
     flying = [carrier.name for carrier in robot.carriers if carrier.actuators]
+    sticks = robot.fixed_lengths is None and default_drive(robot) != "tensions"
+    kinds = ["cut", *["stick"] * sticks, *["miss"] * 4, *["lose"] * bool(flying)]
     faults = []
     for _ in range(rng.integers(0, 4)):
-        kinds = ["cut", "stick", *["miss"] * 4, *(["lose"] if flying else [])]
         kind, at = rng.choice(kinds), rng.uniform(0, 0.95 * duration)
         part = f"{rng.integers(robot.m) + 1}"
         if kind == "miss":
