@@ -92,7 +92,9 @@ def fly(
     motion = (first.pose, first.velocity, first.carrier_pose, first.carrier_velocity)
     start = np.zeros(m) if first.tensions is None else np.maximum(first.tensions, 0.0)
     periods = Periods(plant, period, conditions.substeps)
-    running = Running(plant, periods, np.tile(plant.start(*motion, tensions=start), (flights, 1)))
+    fixed = robot.fixed_lengths if plant.drive == "lengths" else None  # which plans meet to some nm
+    state = plant.start(*motion, tensions=start if fixed is None else None, lengths=fixed)
+    running = Running(plant, periods, np.tile(state, (flights, 1)))
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
     history, tensions = np.zeros((flights, 2, plant.size)), np.zeros((flights, 2, m))
     end, numbers = history[:, 1], history.reshape(-1)

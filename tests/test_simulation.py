@@ -223,6 +223,16 @@ def test_a_carrier_that_loses_its_thrust_has_its_weight_and_its_cable_alone():
     assert np.nanmax(flight.trajectory["actuation"].sel(carrier="quad2", actuator="thrust").values[200:]) > 0
 
 
+def test_cables_of_fixed_length_carry_the_weight_from_the_start_of_a_rounded_plan():
+    """By statics, where the plan's cables are 6 nm too long: no winch reels these in and lets the platform drop."""
+    robot = load("multi-quadrotor-3")
+    pose = np.array(robot.home) - [0, 0, 6e-9, 0, 0, 0]
+    tensions = simulate(robot, pose, duration=0.02).record.tensions
+    anchors, attachments = Dynamics(robot).points(robot.home, robot.carrier_home)
+    along = (anchors - attachments) / np.linalg.norm(anchors - attachments, axis=1)[:, None]
+    np.testing.assert_allclose(tensions @ along[:, 2], robot.platform.mass * 9.81, rtol=1e-3)
+
+
 def test_winding_makes_the_tension_that_is_ordered():
     """The tension of a linear cable with damper, whose length moves evenly in a first period, then with acceleration.
 
