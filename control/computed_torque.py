@@ -70,14 +70,14 @@ class ComputedTorque(Controller):
             `core/control/compensation.c`): position [m] and attitude [rad]. Default: 0, but 0.5 m with fewer cables
             than degrees of freedom.
         carrier_bandwidth, carrier_acceleration: Bandwidth of the carriers' deviation [rad/s], and its largest
-            acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but a quarter of `place` if flying carriers
-            only take over steady disturbances. With a larger bandwidth, carriers that turn and the damping of their
-            cables make the observer's loop unstable.
+            acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but a quarter of `place` if cables enough
+            for all degrees of freedom hang from flying carriers: with a larger one, carriers that turn and the damping
+            of their cables make the observer's loop unstable.
         place, attitude: Bandwidths of the position and attitude loops of flying carriers [rad/s]
             (core/control/thrusts.c). Default of `attitude`: 40, or less if the known lags of rotors and sensors require
-            it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn so late that
-            the attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the inverse of the
-            lag.
+            it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn with so
+            much lag that the attitude loop would be unstable (core/control/turning.c), `attitude` is lowered to the
+            inverse of the lag.
         patience: Time for which the sensor of a cable may report no tension, although one is commanded, until the cable
             is treated as cut [s] and the others replace it. The cable then gets its smallest tension, and is used again
             once its sensor reports a tension. Cables of fixed length are never treated as cut. If no sensor reports a

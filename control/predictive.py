@@ -59,9 +59,9 @@ class Predictive(ComputedTorque):
     The velocity that the model predicts for the commands is compared with the measured one (control/watch.py). This
     `ComputedTorque` takes over until `reset` ("not as modelled") if a tenth of the weight, in addition to the noise of
     `sensors`, is unexplained over about 50 ms, if there is no solution for that long, if noise of the velocity requires
-    more tension than the limits permit, or if carriers turn too late (core/control/turning.c). It controls the robot
-    from the start, with a warning, if the loop is unstable at home because carriers turn before they accelerate, as
-    with cables that begin below their CoM.
+    more tension than the limits permit, or if carriers turn with too much lag (core/control/turning.c). It controls the
+    robot from the start, with a warning, if the loop is unstable at home because carriers turn before they accelerate,
+    as with cables that begin below their CoM.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. A carrier may have at most three

@@ -56,7 +56,7 @@ def test_a_dive_below_the_floor_is_warned_of_with_depth_place_and_time(tmp_path)
     assert float(said[2]) == pytest.approx(time, abs=0.02)
     assert float(said[5]) == pytest.approx(depth, abs=1e-3)
     assert sentence in found.report()
-    assert "below the floor (z = 0 of {G})" in found.save_report(tmp_path / "report.html").read_text()
+    assert "below the floor (z\u00a0=\u00a00 of {G})" in found.save_report(tmp_path / "report.html").read_text()
     assert found.to_dict()["warnings"] == [sentence]
     timing = time_along(COGIRO, DIVE)
     assert "below the floor" in timing.report()
