@@ -14,7 +14,7 @@ from towline.estimation.calibration.normal_equations import NormalEquations
 from towline.estimation.calibration.parameters import OF_CABLE, Parameters
 from towline.estimation.calibration.sightings import SEEN
 from towline.estimation.calibration.solving import model_of
-from towline.estimation.logs import names
+from towline.estimation.logs import names, read_log
 from towline.estimation.pose.from_log import poses_from_log
 
 from . import user_recordings as user
@@ -74,9 +74,20 @@ def test_frames_and_signs_are_found(frame, sign, load_seen, said, recorded, robo
     read = read_measurements(log, robot=robot)
     truth = np.stack([-q for *_, q in recorded[2]], axis=1)
     np.testing.assert_allclose(read.directions, truth, atol=0.07)
+    assert not any("unknown names" in note for note in read_log(log, robot=robot).notes)
     done = towline("pose", robot, "--log", log, cwd=tmp_path).stdout
     assert (said or "") in done
     assert ("look recorded" in done) == (said is not None)
+
+
+def test_a_load_that_no_camera_sees_is_not_at_rest(recorded, robot, tmp_path):
+    """Accelerations of up to 1 m/s^2 are a tenth of the weight: as errors of a rest they would hide the load's mass."""
+    log = user.flight(tmp_path / "flight.csv", recorded, user.directions_of(recorded[2]), NAMES, load=False)
+    read = read_measurements(log, {"lengths": 1e-3, "directions": 0.01}, robot=robot)
+    found = {one["name"]: one for one in calibrate(robot, read, ("offsets", "mass")).to_dict()["parameters"]}
+    for name, truth in (("cables[0].offset", 0.02), ("cables[1].offset", -0.01), ("mass", 0.4)):
+        assert abs(found[name]["value"] - truth) < 4 * found[name]["sigma"]
+    assert found["mass"]["sigma"] < 0.005
 
 
 def test_angles_from_straight_down(recorded, robot, tmp_path):

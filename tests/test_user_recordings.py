@@ -249,6 +249,30 @@ def test_a_file_for_each_computer(offsets, tmp_path):
     assert "no pose fits" not in towline("pose", robot, *logs, cwd=tmp_path).stdout
 
 
+@pytest.mark.parametrize("world", ["up", "down"])
+def test_clocks_of_drones_that_record_north_east_down(world, tmp_path):
+    """A rigid load that turns under three drones: body axes that point down move the ends of its cables."""
+    robot, draw, t = load("multi-quadrotor-3"), np.random.default_rng(0), np.arange(0, 20, 0.02)
+    place = np.column_stack([np.sin(0.9 * t), 0.7 * np.sin(1.2 * t), 0.3 * np.sin(0.7 * t)])
+    turn = Rotation.from_euler("xyz", np.column_stack([0.1 * np.sin(t), 0.1 * np.sin(1.3 * t), 0.5 * np.sin(0.4 * t)]))
+    tracks = {"load": (0.0, place, turn)}
+    for i, ahead in enumerate((3.2, -7.7, 5.1)):
+        q = robot.carrier_home[i, :3] - robot.attachments[i] + 0.3 * np.sin(np.outer(t, [0.5, 0.8, 0.6]) + i)
+        line = robot.cables[i].length * q / np.linalg.norm(q, axis=1)[:, None]
+        level = Rotation.from_euler("z", 0.2 * np.sin(0.3 * t[:, None] + i))
+        tracks[f"quad{i + 1}"] = ahead, place + turn.apply(robot.attachments[i]) + line, level
+    ned, down = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]]), Rotation.from_matrix(np.diag([1.0, -1, -1]))
+    for name, (ahead, p, R) in tracks.items():
+        if world == "down":
+            p, R = p @ ned, Rotation.from_matrix(ned) * R * down
+        table = np.column_stack([user.EPOCH + t + ahead, p + draw.normal(0, 5e-4, p.shape), R.as_quat()])
+        user.write(tmp_path / f"{name}.csv", ["stamp", *"xyz", *(f"q{axis}" for axis in "xyzw")], table, form="%.14g")
+    notes = read_log([tmp_path / f"{name}.csv" for name in tracks], robot=robot).notes
+    for name, (ahead, *_) in list(tracks.items())[1:]:
+        (said,) = [note for note in notes if f"clock of {name}" in note]
+        assert float(re.search(r"is ([\d.]+) s", said)[1]) == pytest.approx(abs(ahead), abs=3e-3)
+
+
 @pytest.mark.parametrize("stamps", [[2.0], [2.0 + 0.01 * k for k in range(20)], [np.nan]])
 def test_a_clock_that_was_set_late_and_a_missing_time(stamps, tmp_path):
     """A drone stamps its first samples from boot on, which is decades before the others."""

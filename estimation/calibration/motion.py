@@ -68,7 +68,11 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     rest = rest._replace(signs=signs, smooth=local)
     position, rotation, known = measured_poses(robot, measurements)
     if not known[:, robot.dof_mask > 0].all():
-        return rest._replace(sigma=np.abs(lengths.bends).max(axis=1))
+        bends = [np.abs(lengths.bends).max(axis=1)]
+        if measurements.carrier_poses is not None:  # a load follows its carriers, also on cables of fixed length
+            carriers = measurements.carrier_poses[..., :3]
+            bends += [np.linalg.norm(local.fitted(one).bends, axis=1) for one in np.swapaxes(carriers, 0, 1)]
+        return rest._replace(sigma=np.max(bends, axis=0))
     placed = local.fitted(position)
     quaternions = continuous(Rotation.from_matrix(rotation).as_quat())
     turned, inverse = local.fitted(quaternions), quaternions * [-1, -1, -1, 1]

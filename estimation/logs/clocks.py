@@ -13,6 +13,7 @@ from ...models.robot import Robot
 from .alignment import Clock, align
 from .carrier_poses import angles_at, carriers_at
 from .mapping import Field, LogMap, carrier_fields
+from .north_east_down import from_ned, ned_frame, platform_from_ned
 from .recording import Recording, Samples, check_rising
 from .streams import Reader
 
@@ -126,11 +127,11 @@ def set_clocks_of_carriers(
     The right offset is the one at which the distance from anchor to attachment changes as the length does: hardly, if
     the lengths are constant. Clocks of one rate are assumed.
     """
-    notes: list[str] = []
+    tracks: dict[int, tuple[Recording, np.ndarray, np.ndarray]] = {}
+    middle = robot.carrier_home[None].copy()  # (1, c, 6)
     for index, carrier in enumerate(robot.carriers):
         found = carrier_fields(all_, given, carrier.name)
-        source = found.position[0].recording if found.position else None
-        if source is None or source in of_poses or not carrier.moves:
+        if not found.position or not carrier.moves:
             continue
         reader = Reader(found)
         own, position = reader.stream(found.position)
@@ -139,9 +140,20 @@ def set_clocks_of_carriers(
         angles = angles_at(own, reader, found) if found.orientation else np.full_like(position, np.nan)
         poses = np.hstack([position, np.where(np.isfinite(angles), angles, carrier.home[3:])])
         kept = np.isfinite(position).all(axis=1) & _lasting(own)
-        if kept.sum() < 4:
+        if kept.sum() >= 4:
+            tracks[index] = found.position[0].recording, own[kept], poses[kept]
+            middle[0, index, :3] = np.median(position[kept], axis=0)
+    known = seen.poses[np.isfinite(seen.poses[:, :3]).all(axis=1)]
+    # Bodies turn about other axes in a frame of north, east, down, which moves the ends of their cables.
+    axis = ned_frame(robot, np.median(known, axis=0, keepdims=True), middle) if len(known) else None
+    if axis is not None:
+        seen = seen._replace(poses=np.asarray(platform_from_ned(robot, seen.poses, axis)))
+    notes: list[str] = []
+    for index, (source, own, poses) in tracks.items():
+        if source in of_poses:
             continue
-        offset = _offset(robot, index, own[kept], poses[kept], seen)
+        carrier = robot.carriers[index]
+        offset = _offset(robot, index, own, poses if axis is None else from_ned(poses, axis), seen)
         if offset:
             source.ahead = offset
             where = "ahead of" if offset > 0 else "behind"

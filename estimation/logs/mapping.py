@@ -156,9 +156,9 @@ def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrie
     return Fields(**found, time=_times(recordings, given))
 
 
-def listed(recordings: Sequence[Recording], but: Fields | None = None) -> str:
+def listed(recordings: Sequence[Recording], but: Sequence[Fields] | None = None) -> str:
     """Return the names of the fields of recordings, the first dozen, except those with a role and some others."""
-    used = {(id(one.topic), one.name) for of in but or () for one in of}
+    used = {(id(one.topic), one.name) for fields in but or () for of in fields for one in of}
     names = [
         plain(topic.full(name))
         for one in recordings

@@ -104,7 +104,9 @@ def read_log(
         found = _fields([*first, *others] if given else first, others, given, known)
         everything = [*first, *others]
         read = measurements_of(found, everything, sigma, known, given)._replace(recordings=everything)
-        if not found.position and (unknown := listed(everything, found)):
+        moving = [carrier.name for carrier in known.carriers if carrier.moves] if known else []
+        of_carriers = [carrier_fields(everything, given, name) for name in moving]
+        if not found.position and (unknown := listed(everything, [found, *of_carriers])):
             read.notes.append(f"no positions are read, and of unknown names are {unknown}")
         if known is not None and len(everything) > 1:
             _set_clocks(read, known, given)
