@@ -25,12 +25,12 @@ CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]
 class LengthControl(Controller):
     r"""Command unstrained lengths: those of the plan, ahead of the winches, and a correction by the measured pose.
 
-        L0 = l(x) / (1 + t / EA) + J (P e + I * integral of e)
+        L0 = l(x) / (1 + s) + J (P e + I * integral of e)
 
-    with the planned pose x and tensions t at the time when the winches will have followed, the Jacobian J of the
-    lengths, and the error e of the measured pose. The tensions of a robot with more cables than degrees of freedom
-    follow from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to that time, to
-    first order.
+    with the strains s at which cables with the stiffness EA and the file's damping have the planned tensions, the
+    planned pose x and tensions at the time when the winches will have followed, the Jacobian J of the lengths, and the
+    error e of the measured pose. The tensions of a robot with more cables than degrees of freedom follow from the
+    lengths; they are not controlled. With a lag, e and its integral are extrapolated to that time, to first order.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
@@ -74,6 +74,7 @@ class LengthControl(Controller):
                 f"freedom, because its tensions depend on it, got none for {self.robot.name!r}"
             )
         self._EA = repeated("stiffness", given, self.robot.m)
+        self._damping = np.array([cable.damping or 0.0 for cable in self.robot.cables])
         if not (self._EA > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
         self._lag = number("lag", lag, 0.0, 1.0)
@@ -88,6 +89,7 @@ class LengthControl(Controller):
         self._time: float | None = None
         self._sum: np.ndarray | None = None  # integral of the error, (..., 6)
         self._tensions: np.ndarray | None = None  # planned at the last step, (..., m)
+        self._strain: np.ndarray | None = None  # commanded at the last step, (..., m)
 
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
@@ -108,7 +110,8 @@ class LengthControl(Controller):
         age = 0.0 if state.time is None else time - measured_at(state.time, time)
         corrected, held = self._correction(dt, age, state, reference)
         pose, carriers, tensions = self._ahead(dt, reference)
-        lengths = self._dynamics.cable_lengths(pose, carriers) / (1.0 + tensions / self._EA) + corrected
+        far = self._dynamics.cable_lengths(pose, carriers)
+        lengths = far / (1.0 + self._strained(dt, tensions, far)) + corrected
         self._time, self._tensions = float(time), reference.tensions
         command = planned_command(self.robot, reference, rows)
         status = np.where(self._deviation.are_far(state.pose, moved_on(reference[:3], -age)[0]), OFF, PLANNED)
@@ -130,6 +133,14 @@ class LengthControl(Controller):
         if dt > 0 and self._tensions is not None and self._tensions.shape == tensions.shape:
             tensions = tensions + lag / dt * (tensions - self._tensions)
         return pose, carriers, tensions
+
+    def _strained(self, dt: float, tensions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """Return the strains s at which damped cables have these tensions, t = EA s + C L0 ds/dt, (..., m)."""
+        strain, settling = tensions / self._EA, self._damping * lengths / self._EA  # [s]
+        if self._strain is not None and self._strain.shape == strain.shape:
+            strain = strain + np.exp(-dt / np.maximum(settling, 1e-9)) * (self._strain - strain)
+        self._strain = strain
+        return strain
 
     def _correction(self, dt: float, age: float, state: State, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
         """Return the corrections of the lengths [m], (..., m), and where they are held at their bound, (...)."""

@@ -6,7 +6,7 @@ import pytest
 from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, LengthControl, Reference, State, references
 from towline.control.command import HOLD, PLANNED
-from towline.models import Robot
+from towline.models import Dynamics, Robot
 
 EA = 2e5
 
@@ -43,6 +43,21 @@ def test_it_keeps_the_plan_with_other_cables_and_winches(model, motion, factor, 
     assert np.sqrt(np.mean(run.error**2)) < 2e-3
     assert run.error.max() < 5e-3
     assert run.answered["as planned"] == len(run.references)
+
+
+def test_dampers_have_their_share_of_a_tension_that_jumps():
+    """By the law of a spring and a damper side by side, t = EA e / L0 + C de/dt, of a platform at rest."""
+    robot, dt = elastic("planar-4", 3e4), 1e-4  # 60 N s/m: a strain follows its tension after some ms
+    far = Dynamics(robot).cable_lengths(robot.home)
+    control, lengths = LengthControl(robot), []
+    pulls = [20.0 + np.arange(4), 60.0 - 5 * np.arange(4)]  # [N], before and after
+    for k in range(200):
+        planned = Reference(robot.home, np.zeros(6), np.zeros(6), *np.zeros((3, 1, 6)), pulls[k >= 100])
+        lengths.append(wound(control.step(k * dt, State(robot.home, np.zeros(6), *np.zeros((2, 1, 6))), planned)))
+    L = np.array(lengths)
+    tensions = 3e4 * (far / L[1:] - 1) - 60 * np.diff(L, axis=0) / dt
+    assert np.abs(tensions[:99] - pulls[0]).max() < 1e-6
+    assert np.abs(tensions[99:] - pulls[1]).max() < 0.03 * 40  # of the jump
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.2])
