@@ -11,6 +11,7 @@ import pytest
 
 from towline import InputError, load, plan, simulate
 from towline.control import ComputedTorque, OpenLoop, Predictive, references
+from towline.control.trajectory import read_trajectory
 from towline.models import Dynamics
 from towline.simulation import Cut, Event, Follow, Push, Wall
 from towline.simulation.events import read_events
@@ -117,6 +118,26 @@ def two_plans(robot, tmp_path_factory):
     folder = tmp_path_factory.mktemp("plans")
     first, second = (plan(robot, {"path": path, "duration": 1.5}) for path in (LINE, ON))
     return first, second, second.save(folder / "second.nc")
+
+
+@pytest.mark.parametrize(("name", "body", "whose"), [
+    ("wang-ctmrts", 0, "which"), ("wang-ctmrts", 2, "whose carrier 'robot2'"), ("wang-ctmrts", None, None),
+    ("multi-quadrotor-3", 3, "whose carrier 'quad3'"),
+])  # fmt: skip
+def test_a_jump_of_the_reference_is_reported_also_if_only_a_carrier_jumps(name, body, whose):
+    team = load(name)
+    here = read_trajectory(team, team.home, None)
+
+    def elsewhere(times):
+        platform, carriers = ([part.copy() for part in parts] for parts in here.at(times))
+        if body is not None:
+            moved, order = (platform, carriers)[body > 0], (slice(None), *([body - 1] if body else []))
+            moved[0][(*order, 0)] += 0.03
+            moved[1][(*order, 1)] += 0.2
+        return tuple(platform), tuple(carriers)
+
+    doubt = Follow(plan=team.home, at=1.0).follow(team, here._replace(at=elsewhere), 1.0).doubt
+    assert doubt == (f"another plan, {whose} jumps by 30 mm and 0.2 m/s at the hand-over" if whose else "")
 
 
 def test_the_reference_becomes_another_plan(robot, two_plans):

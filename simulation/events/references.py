@@ -76,11 +76,21 @@ class Follow(Event):
     def follow(self, robot: Robot, trajectory: Trajectory, time: float) -> Trajectory:
         """Return the plan, with a note if its start differs from the reference at the time [s]."""
         new = self._trajectory(robot)
-        (before, _), (after, _) = trajectory.at(np.array([time])), new.at(np.zeros(1))
-        pose, velocity = (after[i][0] - before[i][0] for i in (0, 1))
-        pose[3:] = (pose[3:] + np.pi) % (2 * np.pi) - np.pi
-        if max(np.abs(pose).max(), np.abs(velocity).max()) <= JUMP:
+        jumps = _motions(new, 0.0) - _motions(trajectory, time)  # (2, 1 + c, 6)
+        jumps[0, :, 3:] = (jumps[0, :, 3:] + np.pi) % (2 * np.pi) - np.pi
+        flies = [bool(carrier.actuators) for carrier in robot.carriers]
+        jumps[:, 1:, 3:][:, flies] = 0.0  # their attitudes follow from their accelerations
+        most = np.abs(jumps).max(axis=(0, 2))
+        if most.max() <= JUMP:
             return new
-        moved, faster = (float(np.linalg.norm(part[:3])) for part in (pose, velocity))
-        jump = f"jumps by {quantity(1e3 * moved, 'mm')} and {quantity(faster, 'm/s')} at the hand-over"
-        return new._replace(doubt="; ".join(filter(None, [new.doubt, f"another plan, which {jump}"])))
+        which = 0 if most[0] > JUMP else int(np.argmax(most))
+        moved, faster = np.linalg.norm(jumps[:, which, :3], axis=1).tolist()
+        whose = f"whose carrier {robot.carriers[which - 1].name!r}" if which else "which"
+        jump = f"{whose} jumps by {quantity(1e3 * moved, 'mm')} and {quantity(faster, 'm/s')} at the hand-over"
+        return new._replace(doubt="; ".join(filter(None, [new.doubt, f"another plan, {jump}"])))
+
+
+def _motions(trajectory: Trajectory, time: float) -> np.ndarray:
+    """Return poses and velocities of the platform and of the carriers at a time [s], (2, 1 + c, 6)."""
+    platform, carriers = trajectory.at(np.array([time]))
+    return np.stack([np.vstack([platform[i], carriers[i][0]]) for i in (0, 1)])
