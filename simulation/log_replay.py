@@ -107,6 +107,19 @@ class Replay(Drawn, Reported, Displayed):
         return [] if self.windows.recorded.doubt else tied(self.found)
 
     @property
+    def notes(self) -> list[str]:
+        """Return remarks, one line each; one of them if a delay may be that of commands held between samples."""
+        windows = self.windows
+        step = float(np.median(np.diff(windows.recorded.times)))
+        late = [one.value for one in self.found if one.name in self.named and one.name == "delay"]
+        if windows.measured_command or not late or not 0.25 * step < late[0] < 0.75 * step:
+            return windows.notes
+        held = (
+            f"if the controller holds each command until the next, they act half a sample late: --delay {step / 2:.3g}"
+        )
+        return [*windows.notes, held]
+
+    @property
     def robot(self) -> Robot:
         """Return the robot with the fitted parameters; without a fit, that of the file."""
         file, fitted = self.windows.recorded.robot, self.fitted
@@ -151,7 +164,7 @@ class Replay(Drawn, Reported, Displayed):
             "explanations": [one._asdict() for one in self.found],
             "fitted": None if self.fitted is None else self.fitted._asdict(),
             "validation": self.validation,
-            "notes": windows.notes,
+            "notes": self.notes,
         }
 
     def save(self, file: str | os.PathLike[str]) -> Path:
@@ -190,7 +203,7 @@ class Replay(Drawn, Reported, Displayed):
             about=f"{robot.name}, replay of {quantity(float(times[-1] - times[0]), 's')}",
             status="passed" if self.passed else "failed",
             summary=self._summary(),
-            parts=[Section("", self._facts()), self._residual_table(), *explanations, *self.windows.notes],
+            parts=[Section("", self._facts()), self._residual_table(), *explanations, *self.notes],
             drawings=self._drawings,
             files=[("The robot's file", to_yaml(robot))],
         )

@@ -183,13 +183,17 @@ def test_the_right_team_leaves_the_noise_of_short_windows(tmp_path):
     assert result.rms()["position"] < 2 * NOISE["pose"]
 
 
-def test_a_robot_that_is_late_has_a_positive_delay(tmp_path):
+@pytest.mark.parametrize(("late", "name"), [(20, "tension_"), (5, "tension_cmd_")])
+def test_a_robot_that_is_late_has_a_positive_delay(late, name, tmp_path):
     rows = np.arange(0, len(motion("tensions")[1]["time"]) - 20, 10)
-    found, early = columns("tensions", rows), columns("tensions", rows + 20)  # commands 20 ms before they act
-    found |= {name: values for name, values in early.items() if "tension" in name}
+    found, early = columns("tensions", rows), columns("tensions", rows + late)  # commands 20 or 5 ms before they act
+    found = {of: values for of, values in found.items() if "tension" not in of}
+    found |= {of.replace("tension_", name): values for of, values in early.items() if "tension" in of}
     result = replay("planar-4", written(tmp_path / "late.csv", found))
     assert result.named == ["delay"]
-    assert result.found[0].value == pytest.approx(0.02, abs=0.002)
+    assert result.found[0].value == pytest.approx(1e-3 * late, abs=0.002)
+    # Commands of 100 Hz that a controller holds act 5 ms late on average.
+    assert any("--delay 0.005" in note for note in result.notes) == (late == 5)
 
 
 def test_what_a_recording_does_not_show_is_not_named(tmp_path):
