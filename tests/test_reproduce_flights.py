@@ -144,7 +144,7 @@ def test_a_repair_states_what_its_quadrotor_does(circle):
     assert np.abs(carrier[:, 3:]).max() < 1e-9
     bend = np.diff(carrier[::20, :2], 2, axis=0) / (20 * PERIOD) ** 2
     claim = flights._followed("VI.B-flown", "circle", {"circle": circle})
-    (stated,) = re.findall(r"level, .* accelerations of up to ([\d.]+) m/s\^2", claim.why)
+    (stated,) = re.findall(r"horizontal accelerations of up to ([\d.]+) m/s\^2", claim.why)
     assert float(stated) == pytest.approx(np.linalg.norm(bend, axis=1).max(), rel=0.15)
     assert "below the assumed t_min = 0.5 N for 0.0% of the time" in claim.why
     assert data["tensions"].values.min() > 0.5
