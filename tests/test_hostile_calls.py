@@ -610,7 +610,8 @@ def complaint(subject: Subject, name: str, wrong: Any) -> str | None:
         text = str(error)
         if not text.isprintable() or len(text) > LONGEST:
             return f"not one short line: {text[:200]!r}"
-        named = [name, *ALSO.get(name, ()), *ALSO.get(f"{subject.label}.{name}", ()), subject.label.lower()]
+        label = re.sub("(?<=[a-z])(?=[A-Z])", "-", subject.label).lower()  # of WrenchFeasible "wrench-feasible"
+        named = [name, *ALSO.get(name, ()), *ALSO.get(f"{subject.label}.{name}", ()), label]
         if isinstance(wrong, str | Path):
             named.append(printable(str(wrong)))
         return None if any(word in text for word in named) else f"does not name {name}: {text}"
