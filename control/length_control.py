@@ -99,7 +99,8 @@ class LengthControl(Controller):
         the plan of that time.
 
         Raises:
-            InputError: If an argument has a wrong shape or value, or no tensions are planned for cables that stretch.
+            InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions
+                are planned for cables that stretch.
         """
         rows = rows_of(required("state", state, State))
         state = as_floats(state, self.robot, rows)
@@ -108,10 +109,13 @@ class LengthControl(Controller):
             raise InputError(f"time must be a finite number that increases from step to step, got {shown(time)}")
         dt = 0.0 if self._time is None else float(time) - self._time
         age = 0.0 if state.time is None else time - measured_at(state.time, time)
-        corrected, held = self._correction(dt, age, state, reference)
         pose, carriers, tensions = self._ahead(dt, reference)
         far = self._dynamics.cable_lengths(pose, carriers)
-        lengths = far / (1.0 + self._strained(dt, tensions, far)) + corrected
+        strain = self._strained(dt, tensions, far)
+        if not (np.isfinite(far).all() and np.isfinite(strain).all()):
+            raise InputError(f"reference must have finite lengths of cables, got pose {shown(reference.pose.tolist())}")
+        corrected, held = self._correction(dt, age, state, reference)
+        lengths, self._strain = far / (1.0 + strain) + corrected, strain
         self._time, self._tensions = float(time), reference.tensions
         command = planned_command(self.robot, reference, rows)
         status = np.where(self._deviation.are_far(state.pose, moved_on(reference[:3], -age)[0]), OFF, PLANNED)
@@ -139,7 +143,6 @@ class LengthControl(Controller):
         strain, settling = tensions / self._EA, self._damping * lengths / self._EA  # [s]
         if self._strain is not None and self._strain.shape == strain.shape:
             strain = strain + np.exp(-dt / np.maximum(settling, 1e-9)) * (self._strain - strain)
-        self._strain = strain
         return strain
 
     def _correction(self, dt: float, age: float, state: State, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
@@ -157,10 +160,11 @@ class LengthControl(Controller):
         integral = integral if self._integral is None else self._integral
         total = before + dt * error
         ahead = proportional * (error + self._lag * drift) + integral * (total + self._lag * error)
-        wanted = (J @ ahead[..., None])[..., 0]
-        beyond = np.asarray((np.abs(wanted) > self._most).any(axis=-1))
+        with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
+            wanted = (J @ ahead[..., None])[..., 0]
+        beyond = np.asarray(~(np.abs(wanted) <= self._most).all(axis=-1))
         self._sum = np.where(beyond[..., None], before, total)
-        return np.clip(wanted, -self._most, self._most), beyond | ~known
+        return np.clip(np.nan_to_num(wanted), -self._most, self._most), beyond | ~known
 
 
 def _gains(age: float) -> tuple[float, float]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from towline import InputError, load, plan, simulate
-from towline.control import ComputedTorque, LengthControl, Reference, State, references
+from towline.control import ANSWERS, ComputedTorque, LengthControl, Reference, State, references
 from towline.control.command import HOLD, PLANNED
 from towline.models import Dynamics, Robot
 
@@ -188,6 +188,21 @@ def test_wrong_calls_are_one_line(model):
     controller.step(0.0, state, reference)
     with pytest.raises(InputError, match="time must be"):
         controller.step(0.0, state, reference)
+
+
+@pytest.mark.parametrize("huge", [1e300, 1.7e308])
+def test_a_step_with_huge_numbers_leaves_no_trace(model, huge):
+    """A state that overflows is not followed; a reference is refused. The next command is as if neither had come."""
+    state = State(model.home, np.zeros(6), model.carrier_home, np.zeros((1, 6)))
+    reference = references_at_rest(model, model.home)
+    controller = LengthControl(model)
+    usual = controller.step(0.0, state, reference).lengths
+    far = controller.step(0.001, state._replace(pose=np.full(6, huge)), reference)
+    assert far.answered == ANSWERS.index("hold")
+    assert np.abs(far.lengths - usual).max() <= 0.05 * model.length + 1e-12
+    with pytest.raises(InputError, match="reference must have finite lengths of cables, got pose"):
+        controller.step(0.002, state, reference._replace(pose=np.full(6, huge)))
+    np.testing.assert_allclose(controller.step(0.003, state, reference).lengths, usual, rtol=1e-12)
 
 
 def test_other_controllers_keep_their_drive(model):
