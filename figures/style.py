@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -220,16 +219,12 @@ def save(canvas: Figure, path: Path) -> Path:
 
     Raises `InputError` if the suffix is none of them, or the file cannot be written.
     """
-    from matplotlib import rc_context
-
     form = check_picture(path).suffix[1:].lower()
     with whole_file(path) as temporary:
         if form == "svg":
             temporary.write_text(svg(canvas), encoding="utf-8")
         else:
-            metadata = {"CreationDate": None} if form == "pdf" else None
-            with rc_context({"pdf.fonttype": 42}), _laid_out_once(canvas):
-                canvas.savefig(temporary, dpi=DPI, format=form, metadata=metadata)
+            _print(canvas, form, temporary, DPI, {"CreationDate": None} if form == "pdf" else None)
     return path
 
 
@@ -248,33 +243,27 @@ def svg(canvas: Figure) -> str:
     """Return the figure as SVG text with letters as shapes, so that no font is needed and equal figures are equal."""
     import io
 
-    from matplotlib import rc_context
-
     stream = io.StringIO()
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with rc_context({"svg.fonttype": "path", "svg.hashsalt": "towline"}), _laid_out_once(canvas):
-        canvas.savefig(stream, format="svg", metadata=nothing)
+    _print(canvas, "svg", stream, canvas.dpi, dict.fromkeys(("Creator", "Date", "Format", "Type")))
     return stream.getvalue()
 
 
-@contextmanager
-def _laid_out_once(canvas: Figure) -> Iterator[None]:
-    """Lay a figure out when it is first saved, since a second layout would differ, and draw it once each time.
+def _print(canvas: Figure, form: str, file: Any, dpi: float, metadata: dict[str, None] | None) -> None:
+    """Lay a figure out, if it is not yet, and draw it into a file.
 
-    Matplotlib draws a figure with a layout twice, the first time into nothing.
+    A second layout would differ. `savefig` draws a figure twice, the first time only for the layout.
     """
-    draw = canvas.draw
+    from matplotlib import rc_context
+    from matplotlib.backend_bases import get_registered_canvas_class
 
-    def lay_out_or_draw(renderer: Any) -> None:
-        engine = canvas.get_layout_engine()
-        if "draw_path" in vars(renderer) and engine is not None:  # drawing is switched off
-            engine.execute(canvas)
-        else:
-            draw(renderer)
-
-    canvas.draw = lay_out_or_draw
-    try:
-        yield
-    finally:
-        del canvas.draw
-    canvas.set_layout_engine("none")
+    usual, of_form = canvas.dpi, get_registered_canvas_class(form)(canvas)
+    with rc_context({"pdf.fonttype": 42, "svg.fonttype": "path", "svg.hashsalt": "towline"}):
+        try:
+            canvas.dpi = of_form.fixed_dpi or dpi  # letters have other sizes at other numbers of points
+            if (engine := canvas.get_layout_engine()) is not None:
+                engine.execute(canvas)
+            canvas.set_layout_engine("none")
+            canvas.dpi = dpi
+            getattr(of_form, f"print_{form}")(file, metadata=metadata)
+        finally:
+            canvas.dpi = usual
