@@ -70,9 +70,9 @@ class ComputedTorque(Controller):
             `core/control/compensation.c`): position [m] and attitude [rad]. Default: 0, but 0.5 m with fewer cables
             than degrees of freedom.
         carrier_bandwidth, carrier_acceleration: Bandwidth of the carriers' deviation [rad/s], and its largest
-            acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but a quarter of `place` if cables enough
-            for all degrees of freedom hang from flying carriers: with a larger one, carriers that turn and the damping
-            of their cables make the observer's loop unstable.
+            acceleration [m/s^2 and rad/s^2]. Default of the bandwidth: 6, but a quarter of `place` if the robot
+            has flying carriers and at least as many cables as degrees of freedom: with a larger one, carriers that turn
+            and the damping of their cables make the observer's loop unstable.
         place, attitude: Bandwidths of the position and attitude loops of flying carriers [rad/s]
             (core/control/thrusts.c). Default of `attitude`: 40, or less if the known lags of rotors and sensors require
             it (control/bandwidths.py); of `place`: 5, but at most a sixth of `attitude`. If carriers turn with so

@@ -22,7 +22,8 @@ def limit_rate(problem: TensionProblem, previous: ArrayLike, rate_max: ArrayLike
             N/s times the time step.
 
     Returns:
-        The same problem with both limits clipped to the range from previous - rate_max to previous + rate_max.
+        TensionProblem: The same problem; its limits are clipped to the range from previous - rate_max to
+            previous + rate_max.
 
     Raises:
         InputError: If an argument has a wrong type, shape or value.
