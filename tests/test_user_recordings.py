@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from towline import InputError, Measurements, load, read_measurements
-from towline.estimation.calibration import calibrate
+from towline.estimation.calibration import attitudes, calibrate
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log
@@ -200,6 +200,22 @@ def test_offsets_turn_a_small_platform_as_another_heading_does(heading, tmp_path
         Rotation.from_euler("xyz", found.corrected.poses[:, 3:]) * Rotation.from_euler("xyz", given.poses[:, 3:]).inv()
     )
     assert np.degrees(error.magnitude()).max() < 1.0
+
+
+def test_without_a_fit_only_clear_differences_of_orientations_are_errors(tmp_path, monkeypatch):
+    """A heading that is off by 4 degrees leaves half of the differences: offsets may do as much, nothing decides."""
+
+    def no_fit(*given):
+        raise InputError("too few samples")
+
+    robot = load(user.hanging_robot(tmp_path))
+    user.statics(tmp_path, np.array([0.05, -0.04, 0.03, 0.06]))
+    given = read_measurements(tmp_path / "statics.csv", robot=robot)
+    monkeypatch.setattr(attitudes, "_fitted", no_fit)
+    for heading, clear in ((4, False), (25, True)):
+        turned = Rotation.from_euler("z", heading, degrees=True) * Rotation.from_euler("xyz", given.poses[:, 3:])
+        poses = np.hstack([given.poses[:, :3], turned.as_euler("xyz")])
+        assert (attitudes.misread_attitudes(robot, changed(given, poses=poses)) is not None) == clear
 
 
 def test_a_motion_capture_that_repeats_the_last_pose(tmp_path):

@@ -68,17 +68,17 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
             size = float(np.median((left * seen * right * expected.inv()).magnitude()))
             corrections = (k > 0) + bool(frame)
             tried.append((size * CLEARLY**corrections, size, frame, left, right, k))
-    best = min(tried, key=lambda one: one[0])
-    if tried[0][1] < VISIBLE:
+    best, (as_they_are, other_heading) = min(tried, key=lambda one: one[0]), tried[:2]
+    if as_they_are[1] < VISIBLE:
         return None
+    likely = [best, other_heading] if best is not other_heading else [best]
     try:
         as_given = _fitted(robot, given)[0]
     except InputError:  # too few samples for a fit
-        as_given = np.inf
+        as_given, likely = np.inf, [best]
     likeliest: Misread | None = None
     least = LIKELIER * as_given  # offsets and the CoM may explain the differences as well
-    for one in (tried[1],) if best is tried[0] else (best, tried[1]):  # the most probable error, and another heading
-        _, size, frame, left, right, k = one
+    for _, size, frame, left, right, k in (one for one in likely if one is not as_they_are):
         turn = ways[k].turned
         every = rotation if turn is None else turn(rotation, np.nan_to_num(given.poses[:, 3:]))
         whole = left * Rotation.from_matrix(every) * right
@@ -89,19 +89,19 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
             if cost > least:
                 continue
             least = cost
-        about = (left * right).as_rotvec()
-        angle = float(np.linalg.norm(about))
-        axis = quantity_row(np.round(about / max(angle, 1e-12), 2), digits=2)
-        turned = (
-            f"the {frame} of the orientations looks turned by {quantity(np.degrees(angle), 'deg', 3)} about ({axis})"
-        )
-        text = " and ".join(part for part in (ways[k].text, turned if frame else "") if part)
-        now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, tried[0][1]))
-        text = f"{text}: they differ from those by the lengths by {now}, not by {before}"
+        now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, as_they_are[1]))
+        looks = " and ".join(filter(None, (ways[k].text, _said(frame, left * right))))
+        text = f"{looks}: they differ from those by the lengths by {now}, not by {before}"
         likeliest = Misread(text, _turned(given, whole))
-        if as_given == np.inf:
-            break
     return likeliest
+
+
+def _said(frame: str, turn: Rotation) -> str:
+    """Return the sentence that orientations are turned in a frame; empty without one."""
+    about = turn.as_rotvec()
+    angle = float(np.linalg.norm(about))
+    size, axis = quantity(np.degrees(angle), "deg", 3), quantity_row(np.round(about / max(angle, 1e-12), 2), digits=2)
+    return frame and f"the {frame} of the orientations looks turned by {size} about ({axis})"
 
 
 def _turned(given: Measurements, rotation: Rotation) -> Measurements:
