@@ -24,8 +24,10 @@ def curvature(residuals: Residuals, derivatives: Derivatives) -> np.ndarray:
     unit = np.divide(along, gain[..., None], out=np.zeros_like(along), where=gain[..., None] > 0)
     across = M - unit[..., None] * np.matmul(unit[..., None, :], M)
     weight = residuals.readings * gain
-    result = np.einsum("mn,mnai,mnaj->nij", weight / derivatives.lengths, M, across)
-    both = np.einsum("mn,mni,mnj->nij", weight / 2, unit, arms)
+    by_length = (weight / derivatives.lengths)[..., None, None]
+    rows = [part.swapaxes(0, 1).reshape(arms.shape[1], -1, 6) for part in (by_length * M, across)]  # (N, 3 m, 6)
+    result = rows[0].swapaxes(1, 2) @ rows[1]
+    both = ((weight / 2)[..., None] * unit).transpose(1, 2, 0) @ arms.swapaxes(0, 1)  # (N, 3, 3)
     both -= np.eye(3) * np.einsum("nii->n", both)[:, None, None]
     result[:, 3:, 3:] += both + np.swapaxes(both, 1, 2)
     more = (0, derivatives.poses.shape[2] - 6)

@@ -14,10 +14,17 @@ class Runs(NamedTuple):
     """Lengths and directions of m cables at N samples; nan where no cable is tangent to its sheave."""
 
     lengths: np.ndarray  # lengths from the anchor over the pulley to the attachment [m], (m, N)
-    directions: np.ndarray  # unit vectors in {G} along the cable towards the attachment, (m, N, 3)
+    # derivatives of the length by shift and rotation of the platform in {G}, (m, N, 6); the first three are the unit
+    # vector along the cable towards the attachment
+    by_pose: np.ndarray
     # derivatives of the length by the anchor in its carrier's frame (3), the attachment in the platform's (3) and the
     # radius of the pulley, (m, N, 7) [-]
     by_geometry: np.ndarray
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Return the unit vectors in {G} along the cables towards the attachments, (m, N, 3)."""
+        return self.by_pose[..., :3]
 
 
 def record_with(robot: Robot, table: np.ndarray) -> np.ndarray:
@@ -41,11 +48,13 @@ def runs(
     poses = np.concatenate([position, points.angles(rotation)], axis=1)
     lengths, A, by_geometry = np.empty((count, m)), np.empty((count, 6, m)), np.empty((count, m, 7))
     carriers = robot.carrier_home if carriers is None else np.ascontiguousarray(carriers)
-    lines(record_with(robot, table), poses, carriers, lengths, A, None, None, by_geometry)
+    record = record_with(robot, table)
+    record["com"] = 0.0  # so that moments are those about the platform's origin
+    lines(record, poses, carriers, lengths, A, None, None, by_geometry)
     lengths[:, table[:, 8] < 0] = np.nan
     # Cables first, in this order also in memory, as the fit goes through them.
-    directions = np.negative(A[:, :3].transpose(2, 0, 1), order="C")
-    return Runs(lengths.T.copy(), directions, by_geometry.swapaxes(0, 1).copy())
+    by_pose = np.negative(A.transpose(2, 0, 1), order="C")
+    return Runs(lengths.T.copy(), by_pose, by_geometry.swapaxes(0, 1).copy())
 
 
 def length_of(robot: Robot) -> float:

@@ -333,7 +333,7 @@ class Model(Displayed):
             return residuals, None
         gain = weights * ratio
         by_length = (gain * stretch)[..., None]
-        along = by_length * run.directions  # by the attachment in {G}
+        by_pose = by_length * run.by_pose
         cables = np.empty((m, len(position), OF_CABLE))
         cables[..., :6] = by_length * run.by_geometry[..., :6]
         cables[..., 6] = -gain
@@ -344,7 +344,6 @@ class Model(Displayed):
         cables[..., 10] = by_strain * tensions
         cables[..., 11:] = 0.0
         by_errors = (by_strain * table[:, 10:11])[..., None] * by_errors
-        by_pose = np.concatenate([along, np.cross(arms, along)], axis=2)
         others = np.zeros((m, len(position), OF_ROBOT + len(parameters.slips)))
         if velocity is not None and rate is not None:
             twist = np.concatenate([velocity, rate], axis=1)
@@ -354,7 +353,7 @@ class Model(Displayed):
             if seen is not None and seen.clock is not None and seen.poses is not None:
                 seen.clock[...] += (seen.poses @ twist[..., None])[..., 0]
             if carried is not None:
-                others[..., 0] -= np.einsum("mni,mni->mn", along, carried[0])
+                others[..., 0] -= np.einsum("mni,mni->mn", by_pose[..., :3], carried[0])
         for column, (cable, first) in enumerate(parameters.slips, start=OF_ROBOT):
             others[cable, first:, column] = -gain[cable, first:]
         forces = self._kept(forces, weighs)

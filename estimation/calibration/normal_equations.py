@@ -139,9 +139,9 @@ def _of_part(model: Model, state: State, scale: np.ndarray, damping: np.ndarray 
     if not model.poses_vary.any():
         return _Part(S, b, cost)
     inverse_root, g, of_poses = _poses(model, residuals, derivatives, damping)
-    E = np.zeros((*g.shape, size))
-    for layer in layers:
-        layer.cross(E, model.poses_vary)
+    E = layers[0].cross(model.poses_vary)
+    for layer in layers[1:]:
+        E[:, :6] += layer.cross(model.poses_vary)
     E = E if keep.all() else E[..., keep]
     if forces is not None and forces.by_pose is not None:
         E = E + np.swapaxes(forces.by_pose * model.poses_vary[:, None], 1, 2) @ H
@@ -180,16 +180,20 @@ class _Layer(NamedTuple):
         right[: m * width] += inner(self.J, self.e[..., None]).ravel()
         right[m * width :] += inner(flat, self.e.reshape(-1, 1))[:, 0]
 
-    def cross(self, E: np.ndarray, vary: np.ndarray) -> None:
-        """Add G_k'J_k to E (N, 6 + d, P), in place, for the coordinates of poses that vary, (N, 6 + d)."""
+    def cross(self, vary: np.ndarray) -> np.ndarray:
+        """Return G_k'J_k, (N, 6 or more, P), with rows of zeros for coordinates of poses that do not vary."""
         m, count, k, size = self.poses.shape
         width = self.J.shape[2]
-        G = np.moveaxis(self.poses, (0, 2), (2, 3)) * vary[:, :size, None, None]  # (N, 6, m, k)
-        for i in range(m):
-            own, part = G[:, :, i], self.J[i].reshape(count, k, width)
-            E[:, :size, i * width : (i + 1) * width] += own * part if k == 1 else own @ part
+        G = np.ascontiguousarray(self.poses.transpose(1, 3, 0, 2)) * vary[:, :size, None, None]  # (N, 6, m, k)
+        J = np.ascontiguousarray(self.J.reshape(m, count, k, width).swapaxes(0, 1))  # (N, m, k, width)
         others = np.moveaxis(self.others.reshape(m, count, k, -1), 0, 1).reshape(count, m * k, -1)
-        E[:, :size, m * width :] += G.reshape(count, size, m * k) @ others
+        E = np.empty((count, size, m * width + others.shape[2]))
+        of_cables = E[..., : m * width].reshape(count, size, m, width)  # a view
+        np.multiply(G[..., 0, None], J[:, None, :, 0], out=of_cables)
+        for i in range(1, k):
+            of_cables += G[..., i, None] * J[:, None, :, i]
+        E[..., m * width :] = G.reshape(count, size, m * k) @ others
+        return E
 
 
 def _layers(
@@ -249,14 +253,17 @@ def _poses(
     return np.linalg.inv(root), g, own
 
 
-def pose_steps(model: Model, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """Return Newton's steps of poses with parameters as they are, (N, 6), and the decrease to expect of each, (N,)."""
+def pose_steps(model: Model, state: State) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return Newton's steps of poses with parameters as they are, (N, 6).
+
+    For each sample also return the decrease of the sum of squares to expect and the sum itself, (N,).
+    """
     parts = [_steps(part, *part.linearised(own)) for _, part, own in model.parts(state)]
-    steps, decreases = (np.concatenate(of) for of in zip(*parts, strict=True))
-    return steps, decreases
+    steps, decreases, squares = (np.concatenate(of) for of in zip(*parts, strict=True))
+    return steps, decreases, squares
 
 
-def _steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tuple[np.ndarray, np.ndarray]:
+def _steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     vary = model.poses_vary
     inverse_root, g, _ = _poses(model, residuals, derivatives, None)
     bent = curvature(residuals, derivatives) * (vary[:, :, None] & vary[:, None, :])
@@ -265,7 +272,8 @@ def _steps(model: Model, residuals: Residuals, derivatives: Derivatives) -> tupl
         np.swapaxes(vectors / np.sqrt(np.maximum(np.abs(1 + values), FLATTEST))[:, None], 1, 2) @ inverse_root
     )
     y = np.matmul(inverse_root, g[..., None])
-    return -np.matmul(np.swapaxes(inverse_root, 1, 2), y)[..., 0], (y[..., 0] ** 2).sum(axis=1)
+    steps = -np.matmul(np.swapaxes(inverse_root, 1, 2), y)[..., 0]
+    return steps, (y[..., 0] ** 2).sum(axis=1), residuals.of_samples
 
 
 def pose_covariances(model: Model, state: State) -> np.ndarray:

@@ -2,25 +2,29 @@
 
 A platform that never turns, for example, does not tell how its attachments are turned. Its estimated orientations
 differ by their noise, though, and the derivatives at them by parameters differ like those of a platform that turns.
-With sigma points at plus and minus the columns c_j of a root of the covariance of an estimated pose, the normal matrix
-S of such derivatives exceeds the one at the true poses by
+With sigma points q + c_j, where the c_j add up to zero and all c_j c_j' to the covariance of an estimated pose q, the
+normal matrix S of such derivatives exceeds the one at the true poses by
 
-    B = 1/2 sum_j S(q + c_j) + S(q - c_j) - 2 S(q)
+    B = sum_j S(q + c_j) - S(q)
 
-on average, to second order (simulation extrapolation, SIMEX). A minimum of the sum of squares is then as uncertain as
-(S - B)^-1 S (S - B)^-1: the sum itself has the curvature S - B, and its gradient at the truth the covariance S.
+on average, to second order (simulation extrapolation, SIMEX). The fewest such points are the corners of a regular
+simplex, one more than coordinates; each pose has its own or, at random, the opposite one, so that terms of third order
+average out. A minimum of the sum of squares is then as uncertain as (S - B)^-1 S (S - B)^-1: the sum itself has the
+curvature S - B, and its gradient at the truth the covariance S.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import helmert
 
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .observability import Observability, observability
 
-ONE_BY_ONE = 2000  # samples; more need no sigma points along single axes, because random ones average out
-DRAWS = 2
+MANY = 2000  # samples; pairs of opposite random points do for them, because what these add averages out
+PAIRS = 2
 
 
 def seeming_information(model: Model, state: State, equations: NormalEquations, scale: np.ndarray) -> np.ndarray:
@@ -28,18 +32,27 @@ def seeming_information(model: Model, state: State, equations: NormalEquations, 
     B, root = np.zeros_like(equations.S), equations.inverse_root
     if root is None or not B.size or not np.isinf(model.pose_sigmas).any():
         return B
-    count, size = root.shape[:2]
-    weights = np.eye(size)[:, None]  # (k, 1 or N, 6), whose sum of w w' is I
-    if count > ONE_BY_ONE:
-        weights = np.random.default_rng(0).choice((-1.0, 1.0), (DRAWS, count, size)) / np.sqrt(DRAWS)
-    for weight in weights:
-        dq = np.einsum("nji,nj->ni", root, np.broadcast_to(weight, (count, size))) * model.poses_vary
-        if not dq.any():
-            continue
-        for sign in (1.0, -1.0):
-            moved = model.moved(state, np.zeros_like(state.x), sign * dq)
-            B += (NormalEquations.at(model, moved, scale).S - equations.S) / 2
+    for point in _sigma_points(model, *root.shape[:2]):
+        dq = np.einsum("nji,nj->ni", root, point) * model.poses_vary
+        moved = model.moved(state, np.zeros_like(state.x), dq)
+        B += NormalEquations.at(model, moved, scale).S - equations.S
     return B
+
+
+def _sigma_points(model: Model, count: int, size: int) -> Iterator[np.ndarray]:
+    """Yield changes of all poses, (N, 6) in standard deviations, whose products add up to the identity for each."""
+    random = np.random.default_rng(0)
+    if count > MANY:
+        for _ in range(PAIRS):
+            point = random.choice((-1.0, 1.0), (count, size)) / np.sqrt(2 * PAIRS)
+            yield from (point, -point)
+        return
+    varied = np.flatnonzero(model.poses_vary.any(axis=0))
+    side = random.choice((-1.0, 1.0), (count, 1))
+    for corner in helmert(len(varied) + 1).T:
+        point = np.zeros((count, size))
+        point[:, varied] = side * corner
+        yield point
 
 
 def observed(model: Model, state: State, length: float) -> Observability:
