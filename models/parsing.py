@@ -123,7 +123,8 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     key = str(place[-1]) if place else ""
     field = printable(field, LONGEST_TEXT // 2)  # leaves enough of the line for what is wrong with it
     if kind == "extra_forbidden":
-        return f"{field} is not a known key{_close(key, _known(holder))} (known keys: {_keys(holder)})"
+        meant = _close(key, _known(holder)) or _elsewhere(key, place, json_schema(model))
+        return f"{field} is not a known key{meant} (known keys: {_keys(holder)})"
     if kind == "missing":
         description = holder.get("properties", {}).get(key, {}).get("description")
         return f"{field} is missing" + (f": {description}" if description else "")
@@ -284,6 +285,20 @@ def _known(schema: dict[str, Any]) -> list[str]:
 def _close(text: str, known: list[str]) -> str:
     close = difflib.get_close_matches(text, known, n=1) or difflib.get_close_matches(text.lower(), known, n=1)
     return f", did you mean {close[0]!r}?" if close else ""
+
+
+def _elsewhere(key: str, place: tuple[int | str, ...], schema: dict[str, Any]) -> str:
+    """Return a hint to the mapping that a key belongs in: one below the one that has it, or the whole file."""
+    nodes = [("", _walk(place, schema)[1])]
+    for name, node in nodes:  # grows while it is walked: nearer mappings first
+        variants = node.get("discriminator", {}).get("mapping", {})
+        kinds = [node, *(_step(node, kind, schema) for kind in variants)]
+        if name and any(key in kind.get("properties", {}) for kind in kinds):
+            return f", did you mean '{name}.{key}'?"
+        if name.count(".") < 2:
+            below = {part: _step(kind, part, schema) for kind in kinds for part in kind.get("properties", {})}
+            nodes += [(f"{name}.{part}" if name else part, each) for part, each in below.items()]
+    return f", did you mean {key!r} at the top level?" if len(place) > 1 and key in _known(schema) else ""
 
 
 def _resolve(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:

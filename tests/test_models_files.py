@@ -59,6 +59,11 @@ WRONG = {
         r"cables\[0\]\.atachment is not a known key, did you mean 'attachment'\?",
     ),
     "unknown key": ("source: a test", "source: a test\nsorce: b", r"sorce is not a known key, did you mean 'source'\?"),
+    "key of the platform": (
+        "source: a test",
+        "source: a test\nmass: 3",
+        r" mass is not .*, did you mean 'platform\.mass'\?",
+    ),
     "key of a carrier": ("speed_max: 1,", "speed_max: 1, speed: 1,", r"carriers\[1\]\.speed is not a known key"),
     "home out of reach": (
         "home: [0, 0, 3,",

@@ -539,6 +539,12 @@ WRONG = {
     ),
     "NaN": ({"path": {**CIRCLE, "radius": float("nan")}}, "path.radius must be .*got nan"),
     "key": ({"path": CIRCLE, "marign": 1}, "marign is not a known key, did you mean 'margin'"),
+    "key of limits": ({"path": CIRCLE, "keep_out": []}, r"keep_out is not .*, did you mean 'limits\.keep_out'\?"),
+    "key of some paths": ({"path": CIRCLE, "blend": 1}, r"blend is not a known key, did you mean 'path\.blend'\?"),
+    "key of the task": (
+        {"path": {**CIRCLE, "margin": 1}},
+        r"path\.margin is .*, did you mean 'margin' at the top level\?",
+    ),
     "steps": ({"path": CIRCLE, "steps": 1}, "steps must be greater than or equal to 4, got 1"),
 }
 
