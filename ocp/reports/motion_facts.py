@@ -10,6 +10,7 @@ from ..tasks.paths import FeedPath, TimedPath
 from ..tasks.task import Task
 from ..tasks.wind_set import WindBox, WindDisc
 
+CLOSE = 1e-3  # relative difference of a duration from the shortest allowed
 LOADS = "any within their tolerances; the tensions shown are those with the loads as given"
 
 
@@ -26,7 +27,7 @@ def motion_facts(plan: PlanData) -> list[Fact]:
     if isinstance(path, TimedPath) and path is not task.path:
         law = ", with the fastest time law" if path.smoothing is None else ", in a tube about its fastest time law"
     facts = [
-        ("duration", quantity(plan.scenario.duration, "s", digits=6)),
+        ("duration", quantity(plan.scenario.duration, "s", digits=6) + ("" if law else _chosen(plan))),
         ("path", f"{kind} in {'{G}' if task.path.frame == 'world' else task.path.frame}{law}"),
     ]
     if isinstance(task.path, FeedPath):
@@ -46,6 +47,14 @@ def motion_facts(plan: PlanData) -> list[Fact]:
     if task.wind is not None:
         facts.append(("wind", _task_wind(task)))
     return facts
+
+
+def _chosen(plan: PlanData) -> str:
+    """Return why a duration that the planner chose is not the shortest, where time costs nothing."""
+    span, costs = plan.scenario.duration_range, plan.scenario.task.objective.time is not None
+    if not plan.feasible or span is None or costs or plan.scenario.duration <= span.min * (1 + CLOSE):
+        return ""
+    return ", of the lowest cost; time does not add to it without `objective: {time: 1}`"
 
 
 def _accuracy(plan: PlanData) -> list[Fact]:
