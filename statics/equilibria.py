@@ -35,7 +35,7 @@ from ..models.rotation import rotation
 NEWTON = 40  # most steps
 UNSTABLE = 1e-3  # [Hz]; slower than this counts as neutral
 DESCENTS = 4  # from a saddle, along its unstable motion
-SAME = 1e-5  # poses nearer than this, in metres and radians times `Robot.length`, are one solution
+SAME = 1e-5  # poses nearer than this, in sizes of the robot and radians, are one solution
 
 
 @dataclass(frozen=True)
@@ -174,39 +174,40 @@ def _displaced(pose: np.ndarray, twist: np.ndarray, com: np.ndarray) -> np.ndarr
 def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.ndarray) -> Equilibrium | None:
     """Search for the equilibrium pose from `start`, or return None; it leaves saddles along their unstable motion."""
     dynamics, solver, rows = dynamics_of(robot), _energy_program(robot), np.flatnonzero(robot.dof_mask)
+    size, units = _size(robot), _units(robot)
     for _ in range(DESCENTS):
-        result = solver(x0=start[rows], p=carriers.T.ravel(), lbg=-np.inf, ubg=longest**2)
+        result = solver(x0=(start / units)[rows], p=carriers.T.ravel(), lbg=-np.inf, ubg=(longest / size) ** 2)
         if not solver.stats()["success"]:
             return None
         pose = robot.home.copy()
-        pose[rows] = result["x"].full().ravel()
+        pose[rows] = result["x"].full().ravel() * units[rows]
         pose[3:] = np.arctan2(np.sin(pose[3:]), np.cos(pose[3:]))
         # The constraint is on l^2, whose gradient is 2 l times that of l.
-        tensions = np.maximum(result["lam_g"].full().ravel() * 2 * longest, 0.0)
+        tensions = np.maximum(result["lam_g"].full().ravel() * robot.weight * 2 * longest / size, 0.0)
         candidate = _judge(robot, dynamics, pose, carriers, tensions)
-        if candidate.residual > 1e-6 * robot.weight:
+        if candidate.residual > 1e-6 * robot.weight or (candidate.lengths - longest).max() > 1e-6 * size:
             return None
         frequencies, modes = dynamics.natural_frequencies(pose, tensions, carriers)
         if not len(frequencies) or frequencies[0] > -UNSTABLE:
             return replace(candidate, neutral=bool(np.abs(frequencies).min(initial=np.inf) < UNSTABLE))
         mode = modes[:, 0]
-        size = max(np.linalg.norm(mode[:3]) / robot.length, np.linalg.norm(mode[3:]))  # in robot lengths, radians
-        start = _displaced(pose, 0.1 * mode / size, np.array(robot.platform.com))
+        motion = max(np.linalg.norm(mode[:3]) / robot.length, np.linalg.norm(mode[3:]))  # in robot lengths, radians
+        start = _displaced(pose, 0.1 * mode / motion, np.array(robot.platform.com))
     return None
 
 
 @lru_cache(maxsize=16)
 def _energy_program(robot: Robot) -> ca.Function:
-    """Return the program of a robot; the carriers' poses are its parameter."""
+    """Return the program of a robot, in its size and its weight; the carriers' poses are its parameter [m, rad]."""
     dynamics = dynamics_of(robot)
     carriers = ca.SX.sym("carriers", *robot.carrier_home.shape)
     rows = [int(i) for i in np.flatnonzero(robot.dof_mask)]
     free = ca.SX.sym("q", len(rows))
     pose = ca.SX(robot.home)
-    pose[rows] = free
+    pose[rows] = free * _units(robot)[rows]
     com = pose[0:3] + rotation(pose[3:6]) @ ca.DM(robot.platform.com)
-    energy = -robot.platform.mass * ca.dot(ca.DM(robot.gravity), com)
-    squares = dynamics.cable_lengths(pose, carriers) ** 2
+    energy = -robot.platform.mass * ca.dot(ca.DM(robot.gravity), com) / (robot.weight * _size(robot))
+    squares = (dynamics.cable_lengths(pose, carriers) / _size(robot)) ** 2
     options = {
         "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-11, "constr_viol_tol": 1e-12, "max_iter": 300},
         "print_time": False,
@@ -215,11 +216,20 @@ def _energy_program(robot: Robot) -> ca.Function:
     return ca.nlpsol("rest", "ipopt", {"x": free, "p": ca.vec(carriers), "f": energy, "g": squares}, options)
 
 
+def _size(robot: Robot) -> float:
+    """Return the longest edge of the box about all cables at home [m]."""
+    return float(np.ptp(np.vstack([robot.home_anchors, robot.home_attachments]), axis=0).max())
+
+
+def _units(robot: Robot) -> np.ndarray:
+    """Return the units of the energy program's coordinates, (6,) [m, rad]."""
+    return np.repeat([_size(robot), 1.0], 3)
+
+
 def _starts(robot: Robot, count: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
-    poses = np.tile(robot.home, (max(count, 1), 1))
-    reach = np.ptp(np.vstack([robot.home_anchors, robot.home[:3]]), axis=0).max() + robot.length
-    poses[1:, :3] += rng.uniform(-0.5, 0.5, size=(len(poses) - 1, 3)) * reach
+    poses = np.tile(robot.home, (count, 1))
+    poses[1:, :3] += rng.uniform(-0.5, 0.5, size=(len(poses) - 1, 3)) * _size(robot)
     poses[1:, 3:] += rng.uniform(-np.pi, np.pi, size=(len(poses) - 1, 3)) * [1, 0.45, 1]
     return poses
 
@@ -238,5 +248,5 @@ def _same(robot: Robot, one: Equilibrium, other: Equilibrium) -> bool:
     if one.neutral and other.neutral and abs(one.energy - other.energy) < 1e-6 * robot.weight * robot.length:
         return bool(np.abs(one.tensions - other.tensions).max() < 1e-4 * robot.weight)  # turned along a free motion
     turns = rotation(ca.DM(one.pose)[3:6]).full() - rotation(ca.DM(other.pose)[3:6]).full()
-    apart = np.linalg.norm(one.pose[:3] - other.pose[:3])
-    return bool(apart < SAME and np.abs(turns).max() * robot.length < SAME)
+    apart = np.linalg.norm(one.pose[:3] - other.pose[:3]) / _size(robot)
+    return bool(apart < SAME and np.abs(turns).max() < SAME)

@@ -207,6 +207,24 @@ def test_a_long_cable_hangs_slack():
     assert rest.tensions[0] == pytest.approx(2 * GRAVITY, rel=1e-6)
 
 
+@pytest.mark.parametrize(("size", "mass"), [(1e-4, 1e-10), (100.0, 1e4)])
+def test_rest_poses_do_not_depend_on_the_scale(size, mass):
+    """A robot of any size rests as the large one does: 3, 4, 5 again, and a platform below two crossed cables."""
+    point = hanging([([0, 0, 0], [0, 0, 0]), ([5 * size, 0, 0], [0, 0, 0])], mass, None, dof=["x", "y", "z"])
+    (rest,) = equilibria(point, [3 * size, 4 * size], starts=4)
+    np.testing.assert_allclose(rest.pose[:3] / size, [9 / 5, 0, -12 / 5], atol=1e-7)
+    np.testing.assert_allclose(rest.tensions / (mass * GRAVITY), [4 / 5, 3 / 5], rtol=1e-6)
+
+    def crossed(s, m):
+        cables = [([s, 0, s], [-0.2 * s, 0, 0]), ([-s, 0, s], [0.2 * s, 0, 0])]
+        inertia = tuple(m * s**2 * np.array([0.1, 0.2, 0.1, 0, 0, 0]))
+        return equilibria(hanging(cables, m, inertia, dof=["x", "z", "pitch"]), np.full(2, 1.8 * s), starts=6)
+
+    for one, other in zip(crossed(size, mass), crossed(1.0, 2.0), strict=True):
+        np.testing.assert_allclose(one.energy / (mass * size), other.energy / 2, rtol=1e-6)
+        np.testing.assert_allclose(one.tensions / mass, other.tensions / 2, rtol=1e-5)
+
+
 def test_rest_poses_of_a_robot_from_its_own_lengths():
     """Forward statics of the lengths at a known equilibrium finds it again, and others beside it."""
     robot = load("wang-flying")
