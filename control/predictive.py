@@ -151,7 +151,8 @@ class Predictive(ComputedTorque):
         self._followed, self._far = np.flatnonzero(flies & ~far.any(axis=1)), (far, flies)
         # Cables of a fixed length have the tensions that carriers make of them, whatever is commanded.
         self._has_winches = the_robot.fixed_lengths is None
-        self._statics = np.asarray(tensions_at(self.robot, self.robot.home, method="soft-wrench").tensions)
+        rest = tensions_at(self.robot, self.robot.home, method="soft-wrench")
+        self._statics = np.asarray(rest.tensions)
         self._preview = Preview(self.robot, self._statics * (not self._has_winches))
         self._surroundings = Surroundings(self.robot, tube, keep_out)
         scale = np.repeat([1.0, self.robot.length], 3) * self.robot.dof_mask
@@ -166,7 +167,7 @@ class Predictive(ComputedTorque):
         self._longest_stage = max(self._stage, min(fastest, within) if self._adapts else fastest) + ROUNDING
         self._usual_longest = min(self._longest_stage, self._slow_loops.longest_inner)
         self.reset()
-        if flies.any() and grows(self, self.robot, self._statics, float(self._bandwidth.min())):
+        if flies.any() and grows(self, self.robot, rest, float(self._bandwidth.min())):
             self.handed_over = self._from_the_start = HandOver(-np.inf, UNSTABLE)
             warn(f"{self.robot.name} is controlled by computed torque: {UNSTABLE}", stacklevel=2)
 

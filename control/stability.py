@@ -4,6 +4,7 @@ import numpy as np
 
 from ..models.robot import Robot
 from ..plant import Plant
+from ..solvers import TensionSolution
 from .command import OTHERWISE
 from .controller import Controller
 from .reference import Reference
@@ -17,13 +18,18 @@ MORE = 1.2  # of the velocities in the second third of the steps are in the last
 PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so little that the loop is that of first order
 
 
-def grows(controller: Controller, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
+def grows(controller: Controller, robot: Robot, rest: TensionSolution, bandwidth: float) -> bool:
     """Return whether a small error at rest at home grows in the closed loop, with the rotation of flying carriers.
 
     The loop is closed around `Plant` after a small push in all coordinates, in which unstable modes soon dominate.
     So all states are included: attitudes of carriers, delayed commands, observers. The controller of the robot is reset
-    before and afterwards. Tensions, (m,) [N], are those at rest at home; pose errors decay with `bandwidth` [rad/s].
+    before and afterwards. `rest` holds the tensions at home; pose errors decay with `bandwidth` [rad/s].
+
+    False without a test if the load cannot rest there, for example under a rough formation.
     """
+    if not rest.residual <= PUSH * robot.force_scale:
+        return False
+    tensions = np.asarray(rest.tensions)
     plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
     still = np.zeros_like(robot.carrier_home)
     reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)

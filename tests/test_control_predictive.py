@@ -211,6 +211,11 @@ def test_a_team_carries_its_load_though_it_is_pushed_and_a_quadrotor_heavier_tha
     assert rms[0] < 0.25 * rms[1]
     assert pushed[0].error[-1] < 2e-3
     assert pushed[0].answered["as planned"] > 0.99 * len(pushed[0].error)
+    out_of_balance = first.model_copy(update={"home": (first.home[0] + 0.1, *first.home[1:])})
+    rough = robot.model_copy(update={"carriers": (out_of_balance, *others)})
+    flight = simulate(robot, made, controller=Predictive(rough), duration=0.3)  # what is not at rest is not unstable
+    assert flight.answered["as planned"] == 300
+    assert flight.error.max() < 2e-3
 
 
 @pytest.mark.parametrize("name", ["ipanema-1", "ipanema-2"])
