@@ -152,13 +152,20 @@ class TensionProblem(Displayed):
         """Return N, shape (m, m - rank): orthonormal columns that span the null space of A.
 
         All tensions that give w, inside the limits or not, are A^+ w + N lambda; `TensionSolution.lambda_` is the
-        lambda of a solution. The first nonzero entry of each column is positive. Singular values of S A below 1e-10 of
-        the largest are treated as zero.
+        lambda of a solution. N is in echelon form: the first cable with an entry in a column has a positive one there,
+        and none in later columns. So it is unique, and the same on every computer. Singular values of S A below 1e-10
+        of the largest are treated as zero.
         """
         _, sigma, rows = np.linalg.svd(self.scaled_A)
-        null = rows[int(np.count_nonzero(sigma > DOUBTFUL * sigma[0])) :].T
-        first = np.argmax(np.abs(null) > _NO_ENTRY, axis=0)
-        return null * np.sign(null[first, np.arange(null.shape[1])])
+        null = rows[int(np.count_nonzero(sigma > DOUBTFUL * sigma[0])) :].T  # in any basis
+        basis = np.zeros((0, null.shape[1]))
+        for row in null:
+            for _ in range(2):  # Gram and Schmidt, twice against rounding
+                row = row - basis.T @ (basis @ row)
+            size = np.linalg.norm(row)
+            if size > _NO_ENTRY:
+                basis = np.vstack([basis, row / size])
+        return null @ basis.T
 
     def tolerance(self, tensions: Array) -> float:
         r"""Return the largest wrench error [N] at which `tensions` are accepted as giving w.

@@ -36,6 +36,21 @@ def test_tensions_are_the_pseudo_inverse_and_n_lambda(m, method):
     np.testing.assert_allclose(again.tensions, solution.tensions, rtol=0, atol=1e-9)
 
 
+def test_the_basis_depends_on_the_null_space_alone():
+    """Other rows of the same space, as from another LAPACK, frame or unit, have the same N: its echelon."""
+    rng, problem = np.random.default_rng(5), towed(6)
+    A = problem.A.copy()
+    A[:, 1] = A[:, 0]  # one line: cable 2 has no column of its own
+    for matrix in (problem.A, A):
+        N = TensionProblem(matrix, problem.w, 0, 500).null_space
+        firsts = np.argmax(np.abs(N) > 1e-9, axis=0)
+        assert (np.diff(firsts) > 0).all()
+        assert (N[firsts, np.arange(3)] > 0).all()
+        for _ in range(5):
+            mixed = rng.normal(size=(3, 3)) @ matrix
+            np.testing.assert_allclose(TensionProblem(mixed, np.zeros(3), 0, 500).null_space, N, rtol=0, atol=1e-9)
+
+
 def test_the_printed_scalar_is_used_as_it_is():
     """Inside the limits the tensions move along the null-space vector; beyond the first limit that is met they fail."""
     problem = towed(4)

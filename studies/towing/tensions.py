@@ -97,8 +97,7 @@ def _choices() -> tuple[np.ndarray, np.ndarray, float, float]:
 
 def _null_space(problem: TensionProblem) -> tuple[np.ndarray, np.ndarray]:
     """Return T' and the null vector of length one whose first entry is positive, (m,) each, if there is only one."""
-    null = np.linalg.svd(problem.A)[2][-1]
-    return np.linalg.pinv(problem.A) @ problem.w, null * np.sign(null[0])
+    return np.linalg.pinv(problem.A) @ problem.w, problem.null_space[:, -1]
 
 
 def _along_null_space() -> Drawing:
