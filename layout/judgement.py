@@ -15,6 +15,7 @@ from .evaluation import Rows
 from .room import Room
 
 _JUDGED = 100  # worst rows, by `capacity_margin`
+_RHO = 1e10  # weight of the wrench error: so large that the tensions do not change it
 
 
 class Judgement(NamedTuple):
@@ -66,7 +67,11 @@ def judge(robot: Robot, rows: Rows, room: Room, frequency: bool) -> Judgement:
 def judged_margin(robot: Robot, length: float, rows: Rows) -> float:
     """Return the smallest margin [N], by `capacity_margin` at the worst rows, with moments divided by a length [m]."""
     A, w = _problems(robot, length, rows)
-    worst = np.argsort(margins(A, w, robot.t_min, robot.t_max))[:_JUDGED]
+    values = margins(A, w, robot.t_min, robot.t_max)
+    outside = np.flatnonzero((values < 0.0) & np.isfinite(values))  # where the margins are bounds of the distances
+    if outside.size:
+        values[outside] = -solve_batch(A[outside], w[outside], robot.t_min, robot.t_max, rho=_RHO).residual
+    worst = np.argsort(values)[:_JUDGED]
     return min(capacity_margin(TensionProblem(A[k], w[k], robot.t_min, robot.t_max)).value for k in worst)
 
 

@@ -10,9 +10,9 @@ from .evaluation import Evaluation, Slopes
 from .goal import Goal
 
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
-_PER_METRE = 40.0  # force scales that a metre costs by which a bound is missed
+_PER_SIZE = 200.0  # force scales that a size of the robot costs by which a bound is missed
 _LARGEST = 1e7  # of the objective [N]
-_FOUND = 1e-5  # of the margin, or of 1 N: a smaller improvement ends the search
+_FOUND, _LITTLE = 1e-5, 0.01  # of the margin, or of a share of the force scale: less improvement ends the search
 PROGRAMS = 60  # from one start, at most
 
 
@@ -61,7 +61,7 @@ class _Program:
             ]
         )
         b = np.concatenate([part.value for part, _ in parts])
-        missing = _PER_METRE * variables.robot.force_scale
+        missing = _price_of_missing(evaluation)
         cost = np.r_[goal.price * self.scale, -1.0, missing, -goal.per_hertz, np.full(lengths, goal.per_metre)]
         below, above = (variables.low - y) / self.scale, (variables.high - y) / self.scale
         self.low, self.high = np.maximum(below, -delta), np.minimum(above, delta)
@@ -91,13 +91,13 @@ def maximise(
     - `delta`: longest step of the first program, of the range of each variable.
     - `programs`: most linear programs.
     """
-    value, every = merit(evaluation, goal, y)
+    least, (value, every) = _LITTLE * evaluation.variables.robot.force_scale, merit(evaluation, goal, y)
     for _ in range(programs):
         if delta < 1e-6 or time.perf_counter() > until or not np.isfinite(value):
             break
         program = _Program(evaluation, goal, y, delta, every)
         predicted = program.value - value
-        if not predicted > _FOUND * max(1.0, abs(value)):
+        if not predicted > _FOUND * max(least, abs(value)):
             break
         step, variables = program.solution.x[: y.size], evaluation.variables
         candidate = np.clip(y + step * program.scale, variables.low, variables.high)
@@ -118,8 +118,12 @@ def merit(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> tuple[float, np.
     """Return what `maximise` improves, the goal less the price of what the room misses [N], and all reserves."""
     every = evaluation.all_reserves(y)
     outcome = evaluation.outcome_besides(y, goal, float(every.min()))
-    price = _PER_METRE * evaluation.variables.robot.force_scale
-    return goal.value(y, outcome) - price * evaluation.missing(y), every
+    return goal.value(y, outcome) - _price_of_missing(evaluation) * evaluation.missing(y), every
+
+
+def _price_of_missing(evaluation: Evaluation) -> float:
+    """Return what it costs to miss a bound of the room [N/m]."""
+    return _PER_SIZE * evaluation.variables.robot.force_scale / evaluation.room.size
 
 
 def multipliers(evaluation: Evaluation, goal: Goal, y: np.ndarray, delta: float = 1e-3) -> Multipliers:

@@ -34,7 +34,6 @@ Count = Annotated[Whole, Field(ge=1, le=100)]
 CableNumber = Annotated[Whole, Field(ge=1)]
 MOST_PAIRED = 8  # cables: 40 320 pairings
 MOST_ROWS = 20_000  # poses times wrenches of all requirements, of each of which the search computes a margin
-LEAST_MARGIN = 1.0  # [N]: a flat available wrench set has the margin 0, and a rounding error makes that positive
 POINTS = ("anchor", "attachment")
 
 
@@ -185,9 +184,7 @@ class Requirements(Part):
         (),
     )
     margin: Positive = optional(
-        "smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]",
-        LEAST_MARGIN,
-        ge=LEAST_MARGIN,
+        "smallest accepted capacity margin, with moments divided by the `length` of the robot's file [N]", 1.0
     )
     clearance: NonNegative = optional("smallest distance between two cables [m]; 0: no limit", 0.0)
     keep_out: Annotated[tuple[AnyKeepOut, ...], Field(max_length=20)] = optional(

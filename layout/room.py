@@ -20,7 +20,7 @@ from ..workspace.conditions.interference import segment_distance
 from .requirements import Requirements
 
 _SPARE = 1e-3  # of a length: how much stricter a search is
-_LEAST_SPARE = 0.1  # [m], of which a share is spare at least, where a distance of zero is enough
+_LEAST_SPARE = 0.02  # of the size, of which a share is spare at least, where a distance of zero is enough
 
 
 class Region(NamedTuple):
@@ -77,6 +77,7 @@ class Room(NamedTuple):
     regions: tuple[Region, ...] = ()
     lowest: float = -np.inf  # height of cables in {G} [m]
     frequency: float = 0.0  # lowest natural frequency [Hz]; 0: no limit
+    size: float = 1.0  # of the robot [m]
 
     @property
     def limits_lengths(self) -> bool:
@@ -85,13 +86,13 @@ class Room(NamedTuple):
 
     def with_spare(self, share: float) -> "Room":
         """Return stricter bounds: distances and a frequency that are larger by a share, lengths a little inside."""
-        return Room(
-            self.clearance + share * max(self.clearance, _LEAST_SPARE) if self.clearance > 0.0 else 0.0,
-            self.shortest * (1.0 + _SPARE),
-            self.longest * (1.0 - _SPARE),
-            tuple(each._replace(least=each.least + share * max(each.least, _LEAST_SPARE)) for each in self.regions),
-            self.lowest,
-            self.frequency * (1.0 + share),
+        least = _LEAST_SPARE * self.size
+        return self._replace(
+            clearance=self.clearance + share * max(self.clearance, least) if self.clearance > 0.0 else 0.0,
+            shortest=self.shortest * (1.0 + _SPARE),
+            longest=self.longest * (1.0 - _SPARE),
+            regions=tuple(each._replace(least=each.least + share * max(each.least, least)) for each in self.regions),
+            frequency=self.frequency * (1.0 + share),
         )
 
     def describe(self) -> list[str]:
@@ -120,6 +121,7 @@ def room_of(robot: Robot, requirements: Requirements) -> Room:
         regions=tuple(_regions(robot, requirements)),
         lowest=-np.inf if height is None or robot.floor is None else robot.floor + height,
         frequency=requirements.natural_frequency or 0.0,
+        size=robot.size,
     )
 
 

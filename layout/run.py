@@ -12,7 +12,7 @@ from ..base.inputs import shown
 from ..models import Robot
 from ..models.files import AnyRobot, as_robot
 from ..ocp.planner import plan
-from .evaluation import Evaluation, Rows, rows_of, with_tasks
+from .evaluation import NO_BOUNDS, Evaluation, Rows, rows_of, with_tasks
 from .goal import goal_of
 from .growth import grow
 from .impossibility import find_impossibility
@@ -82,9 +82,9 @@ def design(
     # Of other pairings the boxes of the robot's own points prove nothing.
     impossible = None if wanted.free[0].pairing else find_impossibility(variables, grid)
     if impossible is not None:
-        before = judged_margin(chosen, chosen.length, grid)
+        before, clearance = judged_margin(chosen, chosen.length, grid), judge(chosen, grid, NO_BOUNDS, False).clearance
         return Design(
-            chosen, chosen, wanted, "infeasible", before, before, _nearest(Evaluation(variables, grid), None), None,
+            chosen, chosen, wanted, "infeasible", before, before, clearance, None,
             None, None, impossible, len(grid.pose_of), 0, 0, False,
         )  # fmt: skip
     if wanted.free[0].pairing:
@@ -110,12 +110,17 @@ def design(
 
 
 def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, y: np.ndarray, *how: Any) -> Design:
-    """Return the layout that was found; if only the robot itself meets the requirements, that."""
+    """Return the layout that was found; if the robot itself is nearer to the requirements, that."""
     result = _designed(chosen, variables, wanted, y, *how)
     if result.feasible:
         return result
-    kept = _designed(chosen, variables, wanted, variables.of_robot(), *how)
-    return kept if kept.feasible else result
+    room = room_of(chosen, wanted)
+
+    def rank(each: Design) -> tuple[bool, bool, float]:
+        fits = each.judgement is not None and each.judgement.keeps(room)
+        return each.feasible, fits, min(each.margin, wanted.margin)
+
+    return max(result, _designed(chosen, variables, wanted, variables.of_robot(), *how), key=rank)
 
 
 def _designed(
@@ -144,13 +149,6 @@ def _designed(
     why = reasons(Evaluation(variables, rows, room), goal, y)
     return Design(
         robot, before, wanted, "feasible" if feasible else "not-found", margin,
-        judged_margin(before, before.length, every), _nearest(placed, y), judgement,
+        judged_margin(before, before.length, every), float(placed.distances(y).min(initial=np.inf)), judgement,
         judge(before, placed.rows, room, counts), why, None, count, len(audited.pose_of), starts, stopped, plans,
     )  # fmt: skip
-
-
-def _nearest(evaluation: Evaluation, y: np.ndarray | None) -> float:
-    """Return the smallest distance between two cables [m]; default: those of the robot moved inside the boxes."""
-    if not evaluation.pairs.size:
-        return np.inf
-    return float(evaluation.distances(evaluation.variables.of_robot() if y is None else y).min())

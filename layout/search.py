@@ -25,7 +25,7 @@ Progress = Callable[[str, float, float], None]  # what is being done, the share 
 AUDITED = 100_000  # random poses
 ROOM_AUDITED = 10_000  # of them, for distances and frequencies
 FEW = 32  # rows for annealing
-_ADDED, _APART = 20, 0.15  # worst poses that an audit adds, and how far apart they are [m]
+_ADDED, _APART = 20, 0.03  # worst poses that an audit adds, and how far apart they are, in sizes of the robot
 _SOON, _ROUNDS = 2, 6  # audits after a start that does not meet the requirements, and at the end
 _ANNEALING, _IMPROVING = 0.3, 0.4  # of the time at most, for each start and each sequence of linear programs
 _STARTING, _SEARCHING = 0.45, 0.9  # of the time: when new starts end, and when only audits are left
@@ -202,7 +202,7 @@ class _Search:
         variables, goal, rng = self._variables, self.found.goal, self._rng
         rows = audited_rows(variables.robot, self._requirements, rng)
         values = Evaluation(variables, rows).margins(y)
-        worst, margin = rows.only(_apart(rows, np.argsort(values)[:300])), float(values.min())
+        worst, margin = rows.only(_apart(rows, np.argsort(values)[:300], self._room.size)), float(values.min())
         some = few(rows, rng, ROOM_AUDITED)
         evaluation = Evaluation(variables, some, self._room)
         spaces, short = evaluation.spaces(y), 0.0
@@ -210,11 +210,11 @@ class _Search:
         if spaces.size:
             least = spaces.min(axis=1)
             short = max(0.0, -float(least.min()))
-            worst = worst.joined(some.only(_apart(some, np.argsort(least)[:100])))
+            worst = worst.joined(some.only(_apart(some, np.argsort(least)[:100], self._room.size)))
         if goal.per_hertz:
             frequencies = evaluation.frequencies(y)[:, 0]
             outcome = outcome._replace(frequency=float(frequencies.min()))
-            worst = worst.joined(some.only(_apart(some, np.argsort(frequencies)[:100])))
+            worst = worst.joined(some.only(_apart(some, np.argsort(frequencies)[:100], self._room.size)))
         return outcome._replace(missing=short), worst
 
 
@@ -225,16 +225,16 @@ def audited_rows(robot: Robot, requirements: Requirements, rng: np.random.Genera
     return rows_of(robot, require, [each.sampled(count, rng) for each in require])
 
 
-def _apart(rows: Rows, order: np.ndarray) -> np.ndarray:
-    """Return rows, the worst first, whose poses are some distance from each other."""
+def _apart(rows: Rows, order: np.ndarray, size: float) -> np.ndarray:
+    """Return rows, the worst first, whose poses are some distance from each other, for a robot of a size [m]."""
     picked: list[int] = []
-    for row in order:
-        place = rows.poses[rows.pose_of[row]]
-        if all(np.abs(place - rows.poses[rows.pose_of[other]]).max() > _APART for other in picked):
-            picked.append(int(row))
+    places = rows.poses[rows.pose_of[order]] / np.repeat([size, 1.0], 3)
+    for row in range(len(order)):
+        if all(np.abs(places[row] - places[other]).max() > _APART for other in picked):
+            picked.append(row)
         if len(picked) == _ADDED:
             break
-    return np.array(picked, dtype=int)
+    return order[picked]
 
 
 def few(rows: Rows, rng: np.random.Generator, most: int) -> Rows:

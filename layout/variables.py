@@ -10,6 +10,8 @@ from ..models import Robot
 from .requirements import MOST_PAIRED, POINTS, Free, Requirements
 
 _AXES, PARTS = "xyz", ("anchor", "attachment", "t_min", "t_max")
+# A flat available wrench set has the margin 0, and a rounding error makes that positive.
+LEAST_MARGIN, LEAST_SHARE = 1.0, 0.01  # [N], or of the force scale if that is less
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,10 @@ def variables_of(robot: Robot, requirements: Requirements) -> Variables:
 
 
 def _check(robot: Robot, requirements: Requirements) -> None:
-    """Raise InputError if the requirements do not fit a robot: its cables, or a number that is free twice."""
+    """Raise InputError if requirements do not fit a robot: its size, its cables, or a number that is free twice."""
+    least = min(LEAST_MARGIN, LEAST_SHARE * robot.force_scale)
+    if requirements.margin < least:
+        raise InputError(f"margin must be at least {least:g} N for robot {robot.name!r}, got {requirements.margin:g} N")
     taken: dict[tuple[str, int], int] = {}
     for number, free in enumerate(requirements.free):
         where = f"free[{number}]"

@@ -320,6 +320,11 @@ class Robot(Part):
         arms = np.linalg.norm(self.attachments - np.array(self.platform.com), axis=1)
         return float(arms.max()) if arms.max() > 0 else 1.0
 
+    @property
+    def size(self) -> float:
+        """Return the longest edge of the box about all cables at home [m]."""
+        return float(np.ptp(np.vstack([self.home_anchors, self.home_attachments]), axis=0).max())
+
 
 def check_pulleys(offsets: np.ndarray, axes: np.ndarray, radii: np.ndarray, cables: tuple[Cable, ...]) -> None:
     """Refuse an attachment on the swivel axis of its pulley, or inside the sheave.

@@ -174,7 +174,7 @@ def _displaced(pose: np.ndarray, twist: np.ndarray, com: np.ndarray) -> np.ndarr
 def _descend(robot: Robot, start: np.ndarray, carriers: np.ndarray, longest: np.ndarray) -> Equilibrium | None:
     """Search for the equilibrium pose from `start`, or return None; it leaves saddles along their unstable motion."""
     dynamics, solver, rows = dynamics_of(robot), _energy_program(robot), np.flatnonzero(robot.dof_mask)
-    size, units = _size(robot), _units(robot)
+    size, units = robot.size, _units(robot)
     for _ in range(DESCENTS):
         result = solver(x0=(start / units)[rows], p=carriers.T.ravel(), lbg=-np.inf, ubg=(longest / size) ** 2)
         if not solver.stats()["success"]:
@@ -206,8 +206,8 @@ def _energy_program(robot: Robot) -> ca.Function:
     pose = ca.SX(robot.home)
     pose[rows] = free * _units(robot)[rows]
     com = pose[0:3] + rotation(pose[3:6]) @ ca.DM(robot.platform.com)
-    energy = -robot.platform.mass * ca.dot(ca.DM(robot.gravity), com) / (robot.weight * _size(robot))
-    squares = (dynamics.cable_lengths(pose, carriers) / _size(robot)) ** 2
+    energy = -robot.platform.mass * ca.dot(ca.DM(robot.gravity), com) / (robot.weight * robot.size)
+    squares = (dynamics.cable_lengths(pose, carriers) / robot.size) ** 2
     options = {
         "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-11, "constr_viol_tol": 1e-12, "max_iter": 300},
         "print_time": False,
@@ -216,20 +216,15 @@ def _energy_program(robot: Robot) -> ca.Function:
     return ca.nlpsol("rest", "ipopt", {"x": free, "p": ca.vec(carriers), "f": energy, "g": squares}, options)
 
 
-def _size(robot: Robot) -> float:
-    """Return the longest edge of the box about all cables at home [m]."""
-    return float(np.ptp(np.vstack([robot.home_anchors, robot.home_attachments]), axis=0).max())
-
-
 def _units(robot: Robot) -> np.ndarray:
     """Return the units of the energy program's coordinates, (6,) [m, rad]."""
-    return np.repeat([_size(robot), 1.0], 3)
+    return np.repeat([robot.size, 1.0], 3)
 
 
 def _starts(robot: Robot, count: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     poses = np.tile(robot.home, (count, 1))
-    poses[1:, :3] += rng.uniform(-0.5, 0.5, size=(len(poses) - 1, 3)) * _size(robot)
+    poses[1:, :3] += rng.uniform(-0.5, 0.5, size=(len(poses) - 1, 3)) * robot.size
     poses[1:, 3:] += rng.uniform(-np.pi, np.pi, size=(len(poses) - 1, 3)) * [1, 0.45, 1]
     return poses
 
@@ -248,5 +243,5 @@ def _same(robot: Robot, one: Equilibrium, other: Equilibrium) -> bool:
     if one.neutral and other.neutral and abs(one.energy - other.energy) < 1e-6 * robot.weight * robot.length:
         return bool(np.abs(one.tensions - other.tensions).max() < 1e-4 * robot.weight)  # turned along a free motion
     turns = rotation(ca.DM(one.pose)[3:6]).full() - rotation(ca.DM(other.pose)[3:6]).full()
-    apart = np.linalg.norm(one.pose[:3] - other.pose[:3]) / _size(robot)
+    apart = np.linalg.norm(one.pose[:3] - other.pose[:3]) / robot.size
     return bool(apart < SAME and np.abs(turns).max() < SAME)
