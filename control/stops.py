@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import InputError
 from ..base.inputs import number
-from ..statics.stops import Stop, longest_stop_along, stop_along
+from ..statics.stops import Stop, beginnings, longest_stop_along, stop_along
 from .planned_references import planned
 from .trajectory import HasTrajectory
 
@@ -62,4 +62,4 @@ def longest_stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], peri
     period = number("period", period, 1e-6, 1e9)
     if (trajectory.duration or 0.0) > MOST * period:
         raise InputError(f"period must be such that there are at most {MOST} of them, got {period:g} s")
-    return longest_stop_along(robot, trajectory, period)
+    return longest_stop_along(robot, trajectory, beginnings(trajectory, period))

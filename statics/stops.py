@@ -159,11 +159,15 @@ def _of_team(robot: Robot, found: TeamStop) -> Stop:
     return Stop(robot, float(tau[0]), float(tau[-1]), *motions, distance, certificate=None, limit=limit)
 
 
-def longest_stop_along(robot: Robot, trajectory: Trajectory, period: float) -> Stop:
-    """Return the stop as `control.longest_stop` does, on a trajectory with a duration."""
+def beginnings(trajectory: Trajectory, period: float) -> np.ndarray:
+    """Return instants of a trajectory with a duration, from one stop to the next at most a `period` apart, (n,) [s]."""
     end = trajectory.duration or 0.0
-    starts = np.linspace(0.0, end, int(np.ceil(end / period - 1e-9)) + 1)
-    stops = (stop_along(robot, trajectory, time) for time in starts.tolist())
+    return np.linspace(0.0, end, int(np.ceil(end / period - 1e-9)) + 1)
+
+
+def longest_stop_along(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> Stop:
+    """Return the longest of the stops that begin at some times, or the first infeasible one, as `control` does."""
+    stops = (stop_along(robot, trajectory, time) for time in times.tolist())
     return max(stops, key=lambda its: (not its.feasible, its.duration))
 
 

@@ -145,11 +145,7 @@ REFUSED = {
     "flying": ("multi-quadrotor-3", {}, "stop_within must be left out with flying carriers"),
     "nothing": ("cogiro", {"stop_within": 0}, "stop_within must be greater than 0, got 0"),
     "nan": ("cogiro", {"stop_within": float("nan")}, "stop_within"),
-    "loads": (
-        "cogiro",
-        {"path": None, "phases": [{"name": "lift", "duration": 2, "path": WITHIN["path"], "load": {"mass": 5}}]},
-        "stop_within must be left out with loads",
-    ),
+    "robust": ("ipanema-1", {"robust": 0.9}, "robust must be left out"),
 }
 
 
@@ -160,6 +156,23 @@ def test_what_cannot_be_stopped_is_one_line(case):
     with pytest.raises(InputError, match=message) as caught:
         plan(robot, task if "phases" in task else {"duration": 3, **task})
     assert "\n" not in str(caught.value)
+
+
+def test_stops_in_time_carry_the_loads_of_phases_within_their_tolerances():
+    """By stops with each load alone; on the ground nothing has to stop, and a longer time is offered."""
+    bag = {"mass": 300, "com": [0.1, 0, -0.2]}
+    fast = {"name": "carry", "duration": 0.8, "path": {"kind": "line", "start": [0, 0, 1], "end": [0.3, 0, 1.1]}}
+    take = {"name": "take", "duration": 0.3, "ground": {}, "path": {"kind": "rest", "pose": [0, 0, 1]}}
+    unsure = [phase | {"load": bag | {"mass_tolerance": 0.2}} for phase in (take, fast)]
+    short = plan("cogiro", {"phases": unsure, "stop_within": 0.05})
+    assert not short.feasible
+    begins = short.stop.begins - 0.3
+    alone = [stop(plan("cogiro", {"phases": [fast | {"load": bag | {"mass": m}}]}), begins) for m in (240, 300, 360)]
+    assert all(its.feasible for its in alone)
+    assert short.stop.duration == pytest.approx(max(its.duration for its in alone), rel=1e-6)
+    (offer,) = short.relaxations
+    assert (offer.name, offer.unit) == ("stop_within", "s")
+    assert plan("cogiro", {"phases": unsure, "stop_within": offer.possible}).feasible
 
 
 def test_a_remainder_is_not_planned_with_stops():

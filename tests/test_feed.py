@@ -217,6 +217,7 @@ def test_wrong_programs_are_one_line(text, message, tmp_path):
         ({"feed": 0}, "feed"),
         ({"feed": 1, "acceleration": 0}, "acceleration"),
         ({"feed": 1, "dwell": [1]}, "dwell must have one number for each of the 2 points"),
+        ({"feed": 1e-6}, r"feed must be more than 1.* m/s on .* m, got 1e-06 m/s"),
         ({"feed": 1, "points": [[0, 0, 0], [0, 0, 0]]}, r"points\[1\] must differ from points\[0\]"),
         ({"feed": 1, "points": [[0, 0, 0], [0, 0, 1, 0, 0, 1]]}, r"points\[1\] must have the attitude"),
     ],

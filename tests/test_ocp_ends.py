@@ -1,6 +1,7 @@
 """How motions start and end: at rest where the path does; and ends and paths that no choice of the planner frees."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan
 from towline.ocp.audits.audit import audit
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
+from towline.ocp.search import relaxations
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 
@@ -308,3 +310,41 @@ def test_a_cable_of_fixed_length_must_reach_from_the_end_to_the_nearest_point_of
     if proven:
         assert about[0].value - about[0].bound == pytest.approx(beyond)
         assert "its reach" in str(about[0])
+
+
+def pulls_from_reach(robot, pose):
+    """Columns of the wrenches of unit pulls of a level platform towards the corners of all reach boxes."""
+    columns = []
+    for carrier, cable in zip(robot.carriers, robot.cables, strict=True):
+        arm = np.array(cable.attachment)
+        for corner in product(*zip(carrier.reach.min, carrier.reach.max, strict=True)):
+            way = np.array(corner) - pose[:3] - arm
+            columns.append(np.r_[way, np.cross(arm, way)] / np.linalg.norm(way))
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize("name", ["wang-ctmrts-4", "wang-ctmrts-5", "wang-ctmrts-6"])
+def test_ends_that_carriers_cannot_hold_from_within_their_reach_are_proven(name, monkeypatch):
+    """By a linear program for the forces of cables towards all corners of the boxes; a nearer end is offered."""
+    monkeypatch.setattr(relaxations, "LEAST_SECONDS", 300.0)
+    robot, rng, proofs = load(name), np.random.default_rng(3), []
+    for _ in range(12):
+        way = rng.normal(size=3) * [1, 1, 0.6]
+        end = np.array(robot.home[:3]) + way / np.linalg.norm(way) * rng.uniform(0.2, 0.7)
+        path = {"kind": "line", "start": list(robot.home[:3]), "end": end.tolist()}
+        task = read_task({"path": path, "duration": 4, "base": {"kind": "free", "ends": "rest"}, "steps": 12})
+        proof = infeasible_ends(lay_out(robot, task))
+        columns = pulls_from_reach(robot, end)
+        can = linprog(np.zeros(columns.shape[1]), A_eq=columns, b_eq=[0, 0, robot.weight, 0, 0, 0])
+        assert (proof is None) == can.success
+        if proof is not None:
+            direction = proof.certificate.direction
+            assert direction[2] * robot.weight == pytest.approx(proof.certificate.shortfall)
+            at = task.path.at(np.array([proof.certificate.time]), 4).pose[0]
+            assert (direction @ pulls_from_reach(robot, at)).max() < 1e-9
+            proofs.append(task)
+    assert proofs
+    if name == "wang-ctmrts-5":
+        (offer,) = plan(robot, proofs[0]).relaxations
+        assert offer.plan.feasible
+        assert 0 < offer.possible < offer.requested

@@ -1,10 +1,12 @@
 """Phases: loads that change, ground that bears them, and tensions that rise and fall without jumps between them."""
 
 import copy
+from itertools import product
 
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from towline import time_along
@@ -513,6 +515,38 @@ def test_wrong_tolerances_are_one_line(load_keys, keys, message):
     with pytest.raises(InputError, match=message) as caught:
         plan(COGIRO, {"phases": [carried], **keys})
     assert "\n" not in str(caught.value)
-    grounded = [{"name": "stand", "duration": 0.5, "ground": {}}, line(HIGH, LOW, name="lift", load={**UNSURE})]
-    with pytest.raises(InputError, match=r"phases\[1\].load.mass_tolerance must be left out with phases on the ground"):
-        plan(COGIRO, {"phases": [{**grounded[0], "path": {"kind": "rest", "pose": [*HIGH, 0, 0, 0]}}, grounded[1]]})
+
+
+def test_a_load_within_its_tolerances_is_picked_up_from_the_ground():
+    """The ground and the cables share the weight of any load by every ratio: from none to all of it on the ground."""
+    support = [[x, y, -1] for x in (-1, 1) for y in (-1, 1)]
+    pick_up = {"name": "pick-up", "duration": 0.5, "load": UNSURE, "ground": {"support": support}}
+    phases = [line([0, 0, 3], HIGH, name="approach"), pick_up, line(HIGH, [0.5, 0, 2.5], name="lift", load=UNSURE)]
+    phases[2]["duration"] = 3
+    planned = plan(COGIRO, {"phases": phases})
+    assert planned.feasible
+    A, com = Dynamics(COGIRO).wrench_matrix(np.array([*HIGH, 0, 0, 0]), None), np.array(COGIRO.platform.com)
+    pushes = np.column_stack([np.r_[0, 0, 1, np.cross(point - com, [0, 0, 1])] for point in np.array(support)])
+    limits, own = [*zip(COGIRO.t_min, COGIRO.t_max, strict=True)], np.r_[0, 0, COGIRO.weight, 0, 0, 0]
+    for mass, x, y in product((240, 360), (-0.2, 0.2), (-0.1, 0.1)):
+        weight = np.array([0, 0, mass * 9.81])
+        its = np.r_[weight, np.cross(UNSURE["com"] + np.array([x, y, 0]) - com, weight)]
+        for share in (0, 0.5, 1):
+            assert linprog(np.zeros(8), A_eq=A, b_eq=own + (1 - share) * its, bounds=limits).success
+            assert linprog(np.zeros(4), A_eq=pushes, b_eq=share * its).success
+    pick_up["ground"] = {"support": [[0.1 + x, y, -1] for x in (-0.15, 0.15) for y in (-0.15, 0.15)]}
+    with pytest.raises(InputError, match=r"phases\[1\].ground.support must have points all round the centre of mass"):
+        plan(COGIRO, {"phases": phases})
+    surely = UNSURE | {"com_tolerance": [0.05, 0.1, 0]}
+    assert plan(COGIRO, {"phases": [phases[0], *(phase | {"load": surely} for phase in phases[1:])]}).feasible
+
+
+def test_tolerances_that_are_feasible_are_offered():
+    """Those of the planned pick-up, as a part of what is asked for: with a little more it is infeasible."""
+    fast = {"phases": [line([-2, -1, 1], [2, 1, 1.6], name="carry", load=UNSURE) | {"duration": 2.1}], "margin": 20}
+    (offer,) = [each for each in plan(COGIRO, fast).relaxations if "com_tolerance" in each.name]
+    for share, feasible in ((offer.possible / 100, True), (offer.possible / 100 + 0.03, False)):
+        x, y, z = UNSURE["com_tolerance"]
+        surer = UNSURE | {"mass_tolerance": 0.2 * share, "com_tolerance": [share * x, share * y, z]}
+        phases = [fast["phases"][0] | {"load": surer}]
+        assert plan(COGIRO, fast | {"phases": phases}).feasible == feasible

@@ -9,6 +9,7 @@ from towline.models import load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
 from towline.ocp.search import relaxations
+from towline.ocp.tasks import scenario, task_checks
 
 ROBOT = load("ipanema-1")
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
@@ -145,6 +146,17 @@ def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relax
     sent = pickle.loads(pickle.dumps(planned))
     assert [relaxed.to_dict() for relaxed in sent.relaxations] == [each.to_dict() for each in planned.relaxations]
     assert sent.relaxations
+
+
+@pytest.mark.parametrize("tube", [0, 0.02])
+def test_no_duration_is_offered_that_an_audit_cannot_sample(tube, monkeypatch):
+    """If 2.1 s were the longest: the speed needs more than 2.8 s."""
+    for module in (scenario, task_checks):
+        monkeypatch.setattr(module, "MOST_SAMPLES", 2100)
+    task = TASK | {"tube": {"position": tube}, "steps": 20, "limits": {"platform_speed": 0.4}}
+    planned = plan(ROBOT, task)
+    assert not planned.feasible
+    assert [relaxed.name for relaxed in planned.relaxations] == ["limits.platform_speed"]
 
 
 def test_limits_of_ones_own_stay_and_stay_soft():

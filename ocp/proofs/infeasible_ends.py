@@ -24,6 +24,7 @@ from ..tasks.ends import AT_REST, fixed_values
 from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 from .no_attitude import CERTAIN, no_attitude
+from .out_of_reach import out_of_reach
 from .too_fast import too_fast
 from .too_heavy import OF_WEIGHT, too_heavy
 
@@ -72,6 +73,8 @@ def infeasible_ends(scenario: Scenario) -> InfeasibleEnds | None:
     proven += [excess for excess in hurried if (excess.limit, excess.about) not in known]
     proven += too_heavy(scenario, _resting(freedom, platform, carriers))
     certificate = _without_tensions(scenario, times, freedom, platform, carriers)
+    if certificate is None:
+        certificate = _beyond_reach(scenario, times, freedom, platform, carriers)
     if not proven and certificate is None:
         proven += _at_no_attitude(scenario, times, freedom, platform, carriers)
     return InfeasibleEnds(proven, certificate) if proven or certificate is not None else None
@@ -253,6 +256,17 @@ def _excess(
     changes = f"inside the tube it changes by at most {quantity(room[which], limit.unit, digits=3)}"
     excess = Excess.of(limit, int(which), times[row], over[row, which], changes if near[which] else "")
     return float(beyond[row, which]) / limit.scale, excess
+
+
+def _beyond_reach(
+    scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
+) -> Certificate | None:
+    """Return the certificate of the worst place at which carriers cannot hold a given platform from within reach."""
+    of = np.array([0, 1] + [2] * (len(times) - 2))
+    given = ~np.array([each[0].any() for each in freedom])[of] & ~scenario.phases.resting(times)
+    free = np.array([each[1:, 0].any(axis=1) for each in freedom])[of[given]]
+    moving, bases = (Motion(*(part[given] for part in motion)) for motion in (platform, carriers))
+    return out_of_reach(scenario, times[given], moving, bases, free)
 
 
 def _without_tensions(

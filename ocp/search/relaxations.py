@@ -81,7 +81,9 @@ def _other_duration(search: Search, scenario: Scenario, left: Durations | None, 
         if near == lasts:  # no duration changes what is exceeded, and this one is audited
             return []
         lasts = near = rounded(near, up=near >= requested)
-        if (left is not None and not left.shortest <= near <= left.longest) or near > LONGEST * requested:
+        if (left is not None and not left.shortest <= near <= left.longest) or near > min(
+            LONGEST * requested, scenario.longest
+        ):
             return []
         longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
         audit = search.audit_motion(longer, None, f"audit, duration {quantity(near, 's')}")
@@ -157,7 +159,7 @@ def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
     if not soft:
         return []
     softer = scenario.task.model_copy(update={"limits": limits.model_copy(update={"soft": limits.soft | soft})})
-    outcome = _solved(
+    outcome = solved(
         search, replace(lay_out(scenario.robot, softer), path=scenario.path), start, Mesh(scenario.task.steps)
     )
     if not outcome.success:
@@ -173,20 +175,23 @@ def _longer_duration(search: Search) -> list[Relaxed]:
     if not scenario.stretches:
         return []
     requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
+    longest = min(LONGEST_CHOSEN * requested, scenario.longest)
+    if LONGER_CHOSEN * requested > longest:
+        return []
     open_task = task.model_copy(
         update={
-            "duration": PositiveRange(min=requested, max=LONGEST_CHOSEN * requested),
+            "duration": PositiveRange(min=requested, max=longest),
             "objective": task.objective.model_copy(update={"time": TIME_COUNTS * requested}),
         }
     )
-    outcome = _solved(search, lay_out(scenario.robot, open_task), None, Mesh(task.steps))
+    outcome = solved(search, lay_out(scenario.robot, open_task), None, Mesh(task.steps))
     for attempt in range(TRIES):
         if not outcome.success:
             break
         near = rounded(LONGER_CHOSEN * max(outcome.duration, requested), up=True)
         mesh = Mesh(task.steps * 2**attempt, shrink=SHRINK * (1 + attempt))
         longer = lay_out(scenario.robot, task.model_copy(update={"duration": near}))
-        outcome = _solved(search, longer, outcome.deviation.stretched(near / outcome.duration), mesh)
+        outcome = solved(search, longer, outcome.deviation.stretched(near / outcome.duration), mesh)
         audit = search.audit_motion(longer, outcome.deviation)
         if audit.passed:
             plan = Plan(longer, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0)
@@ -194,7 +199,7 @@ def _longer_duration(search: Search) -> list[Relaxed]:
     return []
 
 
-def _solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:
+def solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:
     """Solve another scenario's program, in the time that the task's limit left and no longer than the search took."""
     left = scenario.task.time_limit - search.solve_s
     beside = Search(scenario, {}, search.progress, min(left, max(search.solve_s, LEAST_SECONDS)))

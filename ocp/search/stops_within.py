@@ -5,23 +5,26 @@ first longer by as much as the stop is too long, then between one that is too sh
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ...base.text import quantity
 from ...models.part import PositiveRange
+from ...models.rigid_load import RigidLoad
 from ...models.trajectory import Motion, Trajectory
-from ...statics.stops import longest_stop_along
+from ...statics.stops import beginnings, longest_stop_along
 from ..audits.audit import audit
 from ..audits.excess import Excess
 from ..plan import Plan
-from ..result import PlannerStep
+from ..result import PlannerStep, Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
+from .relaxations import rounded
 
 LEAST_PERIOD, INSTANTS = 0.02, 200  # [s], from the beginning of one stop to that of the next; and how many at most
 ROUNDS = 10
@@ -105,7 +108,15 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
     if not plan.feasible:
         return plan
     begun = time.perf_counter()
-    its = longest_stop_along(scenario.robot, _trajectory(plan), max(LEAST_PERIOD, plan.duration / INSTANTS))
+    times = beginnings(_trajectory(plan), max(LEAST_PERIOD, plan.duration / INSTANTS))
+    times = times[~plan.scenario.phases.resting(times)]  # where the platform is on the ground, nothing has to stop
+    if not len(times):
+        return plan
+    stops = [
+        longest_stop_along(scenario.robot, _trajectory(plan, extreme), times)
+        for extreme in (None, *range(plan.scenario.phases.extremes))
+    ]
+    its = max(stops, key=lambda each: (not each.feasible, each.duration))
     said = f"in at most {quantity(its.duration, 's')}" if its.feasible else "beyond the tension limits"
     stages = (*plan.stages, PlannerStep("stops", said, time.perf_counter() - begun))
     plan = replace(plan, stop=its, stages=stages)
@@ -115,11 +126,21 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
     excess = Excess("stop_within", "platform", its.begins, its.duration, seconds, "s", "at most", why)
     status = MotionStatus.INFEASIBLE if scenario.is_fixed else MotionStatus.NOT_FOUND
     audit = replace(plan.audit, excess=[*plan.audit.excess, excess])
-    return replace(plan, status=status, audit=audit, offers=tuple)
+    offers: Callable[[], Sequence[Relaxed]] = partial(_longer_stop, plan, seconds) if its.feasible else tuple
+    return replace(plan, status=status, audit=audit, offers=offers)
 
 
-def _trajectory(plan: Plan) -> Trajectory:
-    """Return the motion of a plan over time; after its end it is the last state."""
+def _longer_stop(plan: Plan, seconds: float) -> list[Relaxed]:
+    """Return the time in which a plan's stops keep the tension limits, instead of so many seconds."""
+    assert plan.stop is not None
+    enough = rounded(plan.stop.duration, up=True)
+    task = plan.scenario.task.model_copy(update={"stop_within": enough})
+    as_slow = replace(plan, scenario=replace(plan.scenario, task=task))
+    return [Relaxed("stop_within", "s", seconds, enough, as_slow)]
+
+
+def _trajectory(plan: Plan, extreme: int | None = None) -> Trajectory:
+    """Return the motion of a plan over time, with an extreme of its loads; after its end it is the last state."""
     scenario, audit = plan.scenario, plan.audit
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
@@ -129,4 +150,13 @@ def _trajectory(plan: Plan) -> Trajectory:
         return np.stack([np.interp(times, audit.times, column) for column in audit.tensions.T], axis=1)
 
     wind = None if scenario.wind is None else np.array(scenario.wind)
-    return Trajectory(scenario.duration, at, tensions, wind=wind)
+    starts = scenario.phases.boundaries[:-1]
+    numbers = scenario.phases.loads_at(starts, extreme) if scenario.phases.carry else []
+    loads = [
+        # Unchecked: the inertia of an extreme load about its own CoM may be that of no body.
+        RigidLoad.model_construct(mass=row[0], com=tuple(row[1:4]), inertia=tuple(row[4:])) if row[0] else None
+        for row in numbers
+    ]
+    return Trajectory(
+        scenario.duration, at, tensions, wind=wind, loads=list(zip(starts.tolist(), loads, strict=bool(loads)))
+    )

@@ -14,17 +14,19 @@ from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
 from ..audits.tensions import scaled
 from ..global_path.at_rest import AtRest
+from ..nlp.rows import Mesh
 from ..plan import Plan
+from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.paths import AnyPath, CirclePath, FeedPath, LinePath, WaypointPath
 from ..tasks.paths.shifted import shifted
 from ..tasks.phase import Load
-from ..tasks.scenario import AUDIT_RATE, MOST_SAMPLES, POSITION, Scenario
+from ..tasks.scenario import POSITION, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.wind_set import WindBox, WindDisc
-from .relaxations import LONGER, near_motion, rounded, slower
+from .relaxations import LONGER, near_motion, rounded, slower, solved
 from .search import Search
 
 INSTANTS = 120  # at which tensions are asked for before a motion is audited
@@ -48,8 +50,11 @@ def near_chosen_motion(
     If no duration and no limit of the task does, it is what the platform could do exactly on its path.
     """
     found = near_motion(search, scenario, deviation, audit, slower_helps)
-    if found or scenario.carrier_free or audit.violation.max() <= audit.tolerance:
+    if found or audit.violation.max() <= audit.tolerance:
         return found
+    if scenario.carrier_free:  # only what is proven of it tells how near an end must be
+        proof = infeasible_ends(scenario)
+        return [] if proof is None or proof.certificate is None else _nearer_end(search, scenario)
     return stronger_or_nearer(search, scenario, search.audit_motion(scenario, None, "audit of the path"))
 
 
@@ -76,12 +81,13 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
         _other_yaws,
         _less_wind,
         _lighter_load,
+        _surer_load,
         _lighter_platform,
         _stronger_cables,
         _slacker_cables,
     ):
         its = make(search, scenario)
-        if not its and others and seconds * AUDIT_RATE <= MOST_SAMPLES:
+        if not its and others and seconds <= scenario.longest:
             longer = lay_out(scenario.robot, task.model_copy(update={"duration": seconds}))
             with_it = f", with a duration of {quantity(seconds, 's')}"
             its = [replace(each, detail=each.detail + with_it) for each in make(search, longer)]
@@ -123,7 +129,7 @@ def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
     fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
     others = ", the others by the same factor" if fed and path.feed is None else ""
 
-    least = scenario.duration * AUDIT_RATE / MOST_SAMPLES  # else it would last too long to be audited
+    least = scenario.duration / scenario.longest  # else it would last too long to be audited
 
     def at(share: float) -> Variation:
         share = max(share, least)
@@ -271,18 +277,38 @@ def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
     others = "in each phase" if len({*masses, 0.0}) == 2 else "the others by the same factor"
     every = f", {others}" if sum(each > 0 for each in masses) > 1 else ""
 
-    def lighter(load: Load | None, share: float) -> Load | None:
-        if load is None:
-            return None
-        inertia = tuple(share * value for value in load.inertia)
-        return load.model_copy(update={"mass": share * load.mass, "inertia": inertia})
-
     def with_loads(share: float) -> Variation:
-        carried = tuple(phase.model_copy(update={"load": lighter(phase.load, share)}) for phase in phases)
-        task = scenario.task.model_copy(update={"phases": carried})
-        return lay_out(scenario.robot, task), share * mass, f"instead of {quantity(mass, 'kg')}{every}"
+        def lighter(load: Load) -> Load:
+            inertia = tuple(share * value for value in load.inertia)
+            return load.model_copy(update={"mass": share * load.mass, "inertia": inertia})
+
+        return _carrying(scenario, lighter), share * mass, f"instead of {quantity(mass, 'kg')}{every}"
 
     return _largest(search, with_loads, f"phases[{masses.index(mass)}].load.mass", "kg")
+
+
+def _surer_load(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the largest tolerances of the loads with which it is feasible, all in proportion to the task's."""
+    if not scenario.phases.extremes:
+        return []
+
+    def with_loads(share: float) -> Variation:
+        def surer(load: Load) -> Load:
+            x, y, z = (share * tolerance for tolerance in load.com_tolerance)
+            return load.model_copy(update={"mass_tolerance": share * load.mass_tolerance, "com_tolerance": (x, y, z)})
+
+        return _carrying(scenario, surer), 100 * share, "of the task's"
+
+    return _largest(search, with_loads, "mass_tolerance and com_tolerance of the loads", "%")
+
+
+def _carrying(scenario: Scenario, change: Callable[[Load], Load]) -> Scenario:
+    """Return the scenario with other loads, laid out."""
+    carried = tuple(
+        phase if phase.load is None else phase.model_copy(update={"load": change(phase.load)})
+        for phase in scenario.task.phases or ()
+    )
+    return lay_out(scenario.robot, scenario.task.model_copy(update={"phases": carried}))
 
 
 def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -335,25 +361,39 @@ def _largest(
     low, high = 0.0, most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if _has_tensions(make(middle)[0]) else (low, middle)
+        low, high = (middle, high) if _may_be_feasible(make(middle)[0]) else (low, middle)
     if low == 0.0:
         return []
-    for reserve in RESERVES:
+    for reserve in RESERVES[1:] if make(low)[0].carrier_free else RESERVES:
         varied, value, detail = make(reserve * low)
-        audit = search.audit_motion(varied, None, f"audit, other {name}")
+        deviation = None
+        if varied.carrier_free:
+            outcome = solved(search, varied, None, Mesh(varied.task.steps))
+            if not outcome.success:
+                continue
+            deviation = outcome.deviation
+        audit = search.audit_motion(varied, deviation, f"audit, other {name}")
         if audit.passed:
-            plan = Plan(varied, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0)
+            plan = Plan(varied, MotionStatus.FEASIBLE, deviation, audit, 0.0, 0.0)
             return [Relaxed(name, unit, make(1.0)[1], rounded(value, up), plan, detail)]
     return []
 
 
-def _has_tensions(scenario: Scenario) -> bool:
-    """Return whether tensions inside their limits exist at some instants of a fixed motion, off the ground."""
+def _may_be_feasible(scenario: Scenario) -> bool:
+    """Return whether tensions inside their limits exist at some instants of a fixed motion, off the ground.
+
+    If carriers are free, return whether nothing proves that they cannot hold the platform.
+    """
+    if scenario.carrier_free:
+        return infeasible_ends(scenario) is None
     times = np.linspace(0.0, scenario.duration, INSTANTS)
     times = times[~scenario.phases.resting(times)]
     platform, carriers = scenario.motion(times, None)
     mask = scenario.robot.dof_mask
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
-    w = scenario.required_wrench(times, platform, carriers, scenario.wind) * mask
     low, high = scenario.bounds_at(times)
-    return bool((solve_batch(A, w, low, high, length=scenario.robot.length).code == 0).all())
+    for extreme in (None, *range(scenario.phases.extremes)):
+        w = scenario.required_wrench(times, platform, carriers, scenario.wind, extreme) * mask
+        if (solve_batch(A, w, low, high, length=scenario.robot.length).code != 0).any():
+            return False
+    return True

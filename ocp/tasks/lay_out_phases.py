@@ -6,7 +6,7 @@ from ...base.errors import InputError
 from ...models import Robot
 from ...models.points import rotations
 from .paths import SequencePath
-from .phase import Ground
+from .phase import Ground, Load
 from .phases import LaidPhase, Phases
 from .resting import support_forces
 from .scenario import AUDIT_RATE, Scenario
@@ -46,17 +46,20 @@ def lay_out_phases(scenario: Scenario) -> Phases:
             if grounds[other] is None:
                 needed = _at_rest(scenario, poses[index], loads[index]) - _at_rest(scenario, poses[index], loads[other])
                 ends[side] = np.tile(_supported(scenario, columns[index], needed, named), (2, 1))
+                for own, its in _extreme_loads(phase.load, task.phases[other].load):
+                    needed = _at_rest(scenario, poses[index], own) - _at_rest(scenario, poses[index], its)
+                    _supported(scenario, columns[index], needed, named)
                 continue
             if not np.array_equal(columns[index], columns[other]):
                 raise InputError(f"{named[0]}.ground.support must be that of {named[1]}, which is on the ground too")
-            own, its = (
+            own, its, *_ = (
                 _supported(scenario, columns[index], _at_rest(scenario, poses[index], load), named)
-                for load in (loads[index], loads[other])
+                for load in (loads[index], loads[other], *([] if phase.load is None else phase.load.extremes))
             )
             ends[side] = np.stack([np.maximum(own - its, 0.0), free[1]])
         slack = phase.ground is not None and phase.ground.slack
         times = float(boundaries[index]), float(boundaries[index + 1])
-        extremes = np.zeros((0, 10)) if phase.load is None else phase.load.extremes
+        extremes = np.zeros((0, 10)) if phase.load is None or phase.ground is not None else phase.load.extremes
         laid.append(LaidPhase(phase.name, *times, loads[index], columns[index], slack, ends[0], ends[1], extremes))
     phases = Phases(tuple(laid))
     _check_program(scenario, phases, where)
@@ -75,19 +78,26 @@ def _check_ground(robot: Robot, task: Task, where: str) -> None:
 
 
 def _check_tolerances(task: Task, where: str) -> None:
-    """Refuse loads of unknown mass or CoM where one of several winds, robots or grounds would have to hold too."""
+    """Refuse loads of unknown mass or CoM where one of several winds or robots would have to hold too."""
     for index, phase in enumerate(task.phases or ()):
         if phase.load is None or not len(phase.load.extremes):
             continue
         key = "mass_tolerance" if phase.load.mass_tolerance else "com_tolerance"
-        ground = any(other.ground is not None for other in task.phases or ())
-        for other, what in (
-            (ground, "phases on the ground"),
-            (isinstance(task.wind, WindBox | WindDisc), "a range of winds"),
-            (task.robust, "robust"),
-        ):
+        for other, what in ((isinstance(task.wind, WindBox | WindDisc), "a range of winds"), (task.robust, "robust")):
             if other:
                 raise InputError(f"{where}: phases[{index}].load.{key} must be left out with {what}")
+
+
+def _extreme_loads(own: Load | None, its: Load | None) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return pairs of loads within the tolerances of two phases, one on the ground, whose difference it must bear.
+
+    If it bears these, tensions exist for every load throughout the phase on the ground: those in between the tensions
+    at its ends, with support forces in between, since the balance at rest is linear in both.
+    """
+    if own == its:
+        return []
+    extremes = [[np.zeros(10)] if load is None else [*load.extremes] or [load.numbers] for load in (own, its)]
+    return [(first, second) for first in extremes[0] for second in extremes[1]]
 
 
 def _columns(robot: Robot, ground: Ground | None, pose: np.ndarray) -> np.ndarray:

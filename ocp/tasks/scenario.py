@@ -137,6 +137,11 @@ class Scenario(Displayed):
         return self.count == 0 and self.duration_range is None
 
     @property
+    def longest(self) -> float:
+        """Return the longest duration of which all samples can be audited [s]."""
+        return MOST_SAMPLES / max(AUDIT_RATE, self.task.output_rate)
+
+    @property
     def output_samples(self) -> int:
         """Return how many intervals the saved trajectory has: `FEW` where its rate would leave both ends alone."""
         samples = round(self.duration * self.task.output_rate)

@@ -119,12 +119,7 @@ def _check_stops(robot: Robot, task: Task, where: str) -> None:
     if task.stop_within is None:
         return
     flying = [carrier.name for carrier in robot.carriers if carrier.efforts]
-    loads = [phase.name for phase in task.phases or () if phase.load or phase.ground]
-    for others, what in (
-        (flying, "flying carriers"),
-        (loads, "loads or phases on the ground"),
-        (task.robust, "robust"),
-    ):
+    for others, what in ((flying, "flying carriers"), (task.robust, "robust")):
         if others:
             raise InputError(f"{where}: stop_within must be left out with {what}, got {task.stop_within:g} s")
 

@@ -75,6 +75,13 @@ class FeedPath(PathBase):
                 raise ValueError(
                     f"points[{index + 1}] must have the attitude of points[0], which is constant on a path of kind feed"
                 )
+        length = float(np.linalg.norm(np.diff(np.array(self.points)[:, :3], axis=0), axis=1).sum())
+        least = sqrt(2 * self.acceleration * SHORTEST * length)
+        if float(self._feeds.min()) <= least:
+            key = "feed" if self.feeds is None else "feeds"
+            raise ValueError(
+                f"{key} must be more than {least:.3g} m/s on {length:.3g} m, got {self._feeds.min():g} m/s"
+            )
         return self
 
     @cached_property

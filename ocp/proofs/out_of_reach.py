@@ -1,0 +1,57 @@
+"""Prove that carriers with reach boxes cannot hold the platform in a given motion, wherever they are: `out_of_reach`.
+
+A cable pulls from its attachment towards an anchor in a box, so its force is a sum of pulls towards the corners of that
+box: these span the cone of all its directions. If the given wrench is no sum of such pulls, however strong, a direction
+proves it (Farkas) along which the wrench is positive and no pull is.
+"""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from ...models.part import Box
+from ...solvers import Certificate, certify, solve_batch
+from ...statics.distribution import wrench_problem
+from ..audits.tensions import UNDERACTUATED_TOLERANCE
+from ..tasks.paths import Motion
+from ..tasks.scenario import Scenario
+
+
+def out_of_reach(
+    scenario: Scenario, times: np.ndarray, platform: Motion, carriers: Motion, free: np.ndarray
+) -> Certificate | None:
+    """Return the certificate of the worst of some instants at which the platform is given; None if there is none.
+
+    - `times`: the instants, (n,) [s], none of them on the ground.
+    - `platform`, `carriers`: motions there in {G}, (n, 6) and (n, c, 6) each.
+    - `free`: whether each carrier may be elsewhere in its reach box, (n, c). If one has no such box, nothing is proven.
+    """
+    robot, corners = scenario.robot, []
+    boxes: list[tuple[int, Box | None]] = [
+        (int(index), robot.carriers[index].motion_limits.reach) for index in np.flatnonzero(free.any(axis=0))
+    ]
+    if not (len(times) and boxes) or robot.pulley_radii.any():
+        return None
+    for sides in product((False, True), repeat=3):
+        poses = carriers.pose.copy()
+        for index, box in boxes:
+            if box is None:
+                return None
+            corner = np.where(sides, box.max, box.min)
+            poses[:, index, :3] = np.where(free[:, index, None], corner, poses[:, index, :3])
+        corners.append(scenario.dynamics.wrench_matrix(platform.pose, poses) * robot.dof_mask[:, None])
+    A = np.concatenate(corners, axis=2)  # (n, 6, 8 m)
+    w = scenario.required_wrench(times, platform, carriers, scenario.wind) * robot.dof_mask
+    limits = np.zeros(A.shape[2]), np.full(A.shape[2], np.inf)
+    worst: Certificate | None = None
+    for row in np.flatnonzero(~solve_batch(A, w, *limits, length=robot.length).feasible):
+        found = certify(wrench_problem(robot, A[row], w[row], *limits))
+        least = UNDERACTUATED_TOLERANCE * robot.force_scale if worst is None else worst.shortfall
+        if found is not None and found.shortfall > least:
+            # Each corner's pull is a cable of the problem; a cable of the robot gives their sum.
+            pulls = (A[row, :3] * found.closest).reshape(3, 8, robot.m).sum(axis=1)
+            none = np.zeros(0, dtype=np.intp)
+            closest = np.linalg.norm(pulls, axis=0)
+            worst = replace(found, time=float(times[row]), at_max=none, at_min=none, closest=closest)
+    return worst
