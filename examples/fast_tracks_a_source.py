@@ -2,7 +2,7 @@
 
 The dish is a sphere with a radius of 300 m. Its focus is 160 m from the centre, opposite to the source; the cables hold
 the receiver there. To save computing time, four hours pass in one minute, 240 times too fast. The inertial forces are
-then half a percent of the weight, so the tensions are almost those of the real motion, which reaches 12 mm/s.
+then 0.4 percent of the weight, so the tensions are almost those of the real motion, which reaches 9 mm/s.
 
 With CASPR's lower tension limit of 120 kN the receiver could reach only a narrow column above 138 m, and could not
 track a source away from the zenith. Here the limit is 100 kN, and the planner chooses the attitude.
