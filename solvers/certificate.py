@@ -132,7 +132,7 @@ class Certificate(Displayed):
         Raises:
             InputError: If `up` is not three finite numbers.
         """
-        pull_only = " (the cables can pull only the other way)" if self.support < 0.0 else ""
+        pull_only = " (the cables can pull only the other way)" if self.support < 0.0 and not self.singular else ""
         limits = [
             f"{name} of cable{'s' if indices.size > 1 else ''} {', '.join(str(int(i) + 1) for i in indices)}"
             for name, indices in (("t_min", self.at_min), ("t_max", self.at_max))

@@ -414,3 +414,11 @@ def test_weights_fourteen_decades_apart():
         ours = solve_batch(*(getattr(problem, name) for name in ("A", "w", "t_min", "t_max", "t_ref", "weights")))
         assert ours.feasible
         np.testing.assert_allclose(solve(problem, "daqp").tensions, ours.tensions, rtol=0, atol=1e-6)
+
+
+def test_a_certificate_of_a_direction_along_which_no_cable_pulls_does_not_say_that_cables_pull_the_other_way():
+    rounded = TensionProblem([[1, -1], [-1e-17, -1e-17]], [0, 5], 1, 60)  # the support value is below zero by rounding
+    singular = solve(rounded).certificate.describe()
+    assert "no cable pulls along this direction" in singular
+    assert "the other way" not in singular
+    assert "the other way" in solve(TensionProblem([[1, 1]], [-5], 1, 60)).certificate.describe()
