@@ -190,6 +190,7 @@ class ComputedTorque(Controller):
         self._carried.reset()
         self._robot = record_of(self.robot)
         self._seen, self._sent_lately = 0.0, LateStates(rows * m)
+        self._late: np.ndarray | None = None  # motions when they were measured, if that is not now
         self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
         self._last = bytes(8 * rows * m)  # tensions that were commanded last
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
@@ -285,6 +286,7 @@ class ComputedTorque(Controller):
                 state, reference = self._as_floats(state, reference)
                 done = control_step(*fixed, state, reference, *own, None, *self._arrays)
             self._sent_lately.remember(self._last, dt)
+            self._late = None
         else:
             state, reference = self._as_floats(state, reference)
             control_step(0.0, 0.0, *scales, TAKE_ALONE, state, reference, *own, None, *self._arrays)
@@ -298,6 +300,7 @@ class ComputedTorque(Controller):
             seen_so = self._measured.copy() if late is None else late
             fixed = dt, since if observes else 0.0, *scales, solves
             done = control_step(*fixed, None, None, *own, late if observes else seen_so, *self._arrays)
+            self._late = seen_so
             if not observes:
                 self._carried.continue_observer(self._platform, float(self._settings["observer"]), seen_so[:, 0])
         missing, self._optimal, self._are_far = done

@@ -29,7 +29,7 @@ from .reference import Reference
 from .settings import reach_of, set_reach
 from .stability import grows
 from .state import State
-from .watch import BLIND, LATE, PAUSE, QUICK, UNSTABLE, HandOver, Watch
+from .watch import BLIND, KNOWN, LATE, PAUSE, QUICK, UNSTABLE, HandOver, Watch
 from .weights import ripple, stage_at_home, terminal, weights
 
 TOLERANCE = 1e-6  # of the residuals of a solution
@@ -234,6 +234,7 @@ class Predictive(ComputedTorque):
         self._beside.reset()
         self._watch.reset()
         self.handed_over = self._from_the_start
+        self._before = -1e300, np.zeros((1, 1, 12)), np.zeros((1, 6))  # time, motions and disturbance, last measured
         self._preview.reset()
         self._lay_out(self._stage)
 
@@ -268,7 +269,7 @@ class Predictive(ComputedTorque):
             if np.isfinite(self._problems.w).all():
                 self._watch.interrupt()
             else:
-                self._watch.skip(dt, tensions[0] - self._cables["last"][0] if self._has_winches else 0 * tensions[0])
+                self._watch.skip(dt)
             self._moved.rest(self._steps[0], self._carriers[0])
         elif beside.answered == SOFT and (self._is_missing or self._deviation.stays(self._horizon.states[:, :6])):
             answered, proof = instead
@@ -284,12 +285,20 @@ class Predictive(ComputedTorque):
         """Compare the motion with the prediction, and hand over if they differ."""
         if not np.isfinite(self._problems.w).all():
             return
+        # Compared when it was measured: observers and predictions learn of what happens no sooner.
+        motions, (before, start, known) = self._measured if self._late is None else self._late, self._before
+        if self._seen <= before:
+            return
         if not self._carried.is_later(self._seen):  # of tensions that bore another load
             self._watch.interrupt()
-        cables = self._cables[0]
-        otherwise = cables["known"] - cables["last"] if self._has_winches else np.zeros(self.robot.m)
-        self.handed_over = self._watch.compare(time, dt, self._measured[0, 0, 6:], otherwise)
-        if self.handed_over is not None and self._beside._settings["reacts"]:
+        end, otherwise = start.copy(), self._has_winches * KNOWN * (self._cables["known"] - self._cables["then"])
+        models = self._carried.records_between(before, self._seen)
+        self._sent_lately.move_on(time - before, models, end, otherwise, known, self._accelerations)
+        self._before = self._seen, motions.copy(), self._platform["disturbance"].copy()
+        given = motions[0, 0, 6:], (end - start)[0, 0, 6:]
+        found = self._watch.compare(self._seen, self._seen - before, *given)
+        self.handed_over = found and found._replace(time=time)
+        if found and self._beside._settings["reacts"]:
             self._moved.now(dt, self._measured[0], self._preview.moved_of(self._preview.rows([reference])))
             if (offsets := self._moved.offsets(np.stack(reference[3:6], axis=1))) is not None:
                 memory, (offset, rate) = self._beside._of_carriers[0], offsets
@@ -345,14 +354,11 @@ class Predictive(ComputedTorque):
         if worst <= GOOD:
             states, controls, self._solved = h.states + wanted, h.controls + planned[:-1], time
             self._guess = states, controls
+            self._watch.solved = self._seen
         elif not time - self._solved <= self._stages * self._stage + ROUNDING:  # no longer in slow loops
             return None
         pulls = np.minimum(np.maximum(controls[:1, :m], bounds[0]), bounds[1])
         acceleration = (states[1] - states[0] - ramps[0])[6:12] / self._steps[0]
-        gained = (wanted[1] - start - ramps[0] + h.c[0])[6:12] + h.A[0, 6:12] @ h.start
-        gained += h.B[0, 6:12, :m] @ (pulls[0] - planned[0, :m])
-        by_tensions = h.B[0, 6:12, :m] / self._steps[0]
-        self._watch.explain(time, gained / self._steps[0], by_tensions, self._solved == time)
         more = np.clip((controls - planned[:-1])[len(under_way), m:], -self._strongest, self._strongest)
         self._moved.order(planned[0, m:], more, acceleration, self._carriers[0])
         return pulls

@@ -32,11 +32,13 @@ class HandOver(NamedTuple):
 class Watch:
     """Compare measured velocities with the model's prediction for the commands that were sent.
 
-    Over the last `WINDOW` the velocity should change by the integral of the model's accelerations for the measured
-    state, estimated disturbance and command of each step. The mean difference over the window is the unexplained
-    acceleration. New plans and jumps of the reference do not contribute, because they act through the commands. Steps
-    that are further apart than `PAUSE` are not compared, nor those before and after more than `blind` without a state.
-    If nothing was compared for longer than `UNCHECKED`, a warning is given once.
+    Over the last `WINDOW` the velocity should change by the integral of the model's accelerations, from each measured
+    state to the next one, with the tensions sent and the disturbance estimated from the earlier state. The mean
+    difference over the window is the unexplained acceleration. States that are measured late are compared as those of
+    their time: a disturbance is unexplained until the observer knows it, whatever the delay. New plans and jumps of the
+    reference do not contribute, because they act through the commands. States that are further apart than `PAUSE` are
+    not compared, nor those before and after more than `blind` without a state. If nothing was compared for longer than
+    `UNCHECKED`, a warning is given once.
 
     - `scale`: factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for
       locked coordinates.
@@ -68,7 +70,7 @@ class Watch:
         """Forget all earlier steps."""
         self.unexplained = 0.0  # mean acceleration [m/s^2]
         self._noise = np.zeros(6)  # variance of the rates
-        self._solved = np.inf  # time of the last solution [s]
+        self.solved = np.inf  # when the state of the last solution was measured [s]
         self._checked: float | None = None  # time of the last comparison, or of the first step [s]; inf after a warning
         self._unseen = 0.0  # [s], without a measured state
         self.interrupt()
@@ -77,56 +79,41 @@ class Watch:
         """Forget all steps except the time without a solution: the robot was not controlled, or not measured."""
         self._left: deque[tuple[float, np.ndarray]] = deque()  # times, and velocities less what explains them
         self._explained, self._off = np.zeros(6), np.zeros(6)
-        self._acceleration: np.ndarray | None = None
         self._trend: np.ndarray | None = None
 
-    def explain(self, time: float, acceleration: np.ndarray, by_tensions: np.ndarray, solved: bool) -> None:
-        """Receive the model's acceleration of the pose, (6,), for the current command.
-
-        Its derivative with respect to the tensions is `by_tensions`, (6, m).
-        """
-        self._acceleration, self._by_tensions = acceleration, by_tensions
-        if solved:
-            self._solved = time
-
-    def skip(self, dt: float, change: np.ndarray) -> None:
-        """Continue without a measured state, `dt` [s] after the last step.
-
-        `change` is the difference of the current command from the last one, (m,) [N].
-        """
+    def skip(self, dt: float) -> None:
+        """Continue without a measured state, `dt` [s] after the last step."""
         self._unseen += dt
-        if self._acceleration is None or self._unseen > self._blind * (1 + EARLY):
+        if self._unseen > self._blind * (1 + EARLY):
             self.interrupt()
-        else:
-            self._explained += dt * self._acceleration
-            self._acceleration = self._acceleration + self._by_tensions @ change
 
-    def compare(self, time: float, dt: float, rate: np.ndarray, otherwise: np.ndarray) -> HandOver | None:
-        """Compare the current rate of the pose, (6,), and return the reason not to use predictions, or None.
+    def compare(self, time: float, since: float, rate: np.ndarray, change: np.ndarray) -> HandOver | None:
+        """Compare the rate of the pose, (6,), with its prediction; return the reason not to use predictions, or None.
 
-        `otherwise` are the measured differences from the commanded tensions since the last step, (m,) [N].
+        The rate was measured at a `time` [s], and the last one `since` [s] before, infinity at first. The model
+        predicts that it has changed by `change` since, (6,), nan if unknown.
         """
-        gap, self._unseen = self._unseen + dt, 0.0  # since the last state
-        self._solved = min(self._solved, time)  # at first there is none yet
-        if dt > WINDOW:
-            self._solved = max(self._solved, time)
-        if self._acceleration is None or dt > PAUSE:
-            self.interrupt()
+        self._unseen = 0.0
+        self.solved = min(self.solved, time)  # at first there is none yet
+        if since > WINDOW:
+            self.solved = max(self.solved, time)
+        if since <= PAUSE and np.isfinite(change).all():
+            self._explained += change
         else:
-            self._explained += dt * (self._acceleration + KNOWN * (self._by_tensions @ otherwise))
+            self.interrupt()
         left, steps = rate - self._explained, self._left
-        if self._ripple is not None and self._is_loud(self._ripple, gap, left):
+        if self._ripple is not None and self._is_loud(self._ripple, since, left):
             return HandOver(time, LOUD)
         left = self._scale * left
         steps.append((time, left))
         while time - steps[0][0] >= WINDOW * (1 - EARLY) and time - steps[1][0] >= WINDOW * (1 - EARLY):
             steps.popleft()
-        since = time - steps[0][0]
-        if time - self._solved > WINDOW:
-            self._add(dt, self._bound / BOUND)
-        elif since >= WINDOW * (1 - EARLY):
-            self._off += min(gap / SMOOTH, 1.0) * (left - steps[0][1] - self._off)
-            self._add(gap, sqrt(self._off @ self._off) / since)
+        window = time - steps[0][0]
+        if time - self.solved > WINDOW:
+            self._add(since, self._bound / BOUND)
+        elif window >= WINDOW * (1 - EARLY):
+            self._off += min(since / SMOOTH, 1.0) * (left - steps[0][1] - self._off)
+            self._add(since, sqrt(self._off @ self._off) / window)
             self._checked = time
         elif self._checked is None:
             self._checked = time
@@ -146,7 +133,7 @@ class Watch:
         if self._trend is None or dt > QUICK:
             self._trend, self._slope = left.copy(), np.zeros(6)
         share = min(dt / QUICK, 0.5)
-        self._trend += dt * self._slope
+        self._trend += min(dt, QUICK) * self._slope
         off = left - self._trend
         self._trend += 2 * share * off
         self._slope += share / QUICK * off

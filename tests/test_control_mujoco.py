@@ -310,8 +310,8 @@ def test_what_noise_does_not_explain_is_no_noise(factor, breaks):
     handed_over = None
     for k in range(1000):
         rate = noise[k] + dt * max(k - 500, 0) * more
-        handed_over = handed_over or watch.compare(dt * k, dt, rate, np.zeros(1))
-        watch.explain(dt * k, np.zeros(6), np.zeros((6, 1)), True)
+        watch.solved = dt * k
+        handed_over = handed_over or watch.compare(dt * k, dt, rate, np.zeros(6))
         assert k > 500 or handed_over is None
     assert (handed_over is not None) == breaks
 

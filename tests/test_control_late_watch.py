@@ -1,0 +1,46 @@
+"""The watch of `Predictive` with states that come late: a delay delays what it finds, and changes nothing else."""
+
+import numpy as np
+import pytest
+
+from towline import load, plan, simulate
+from towline.control import ComputedTorque, Predictive
+from towline.models import Robot
+
+LATE = {"delay": 0.02, "stamped": True}
+
+
+def test_a_push_is_as_unexplained_as_without_the_delay():
+    """For 20 ms more nobody knows of 1.4 m/s^2, which is more than is permitted in 50 ms: no fault of the model."""
+    robot, seen = load("cogiro"), {}
+    push = [{"kind": "push", "at": 0.1, "force": [1.4 * robot.platform.mass, 0, 0]}]
+    for delay, noise in ((0, None), (20, LATE)):
+        run = simulate(robot, robot.home, Predictive(robot), duration=0.25, events=push, noise=noise)
+        assert run.handed_over is None
+        seen[delay] = run.trajectory["unexplained"].values[100 + delay : 230 + delay]
+    assert seen[0].max() > 0.1 * 1.4  # it is watched
+    assert seen[20][:110] == pytest.approx(seen[0][:110], rel=0.02, abs=2e-3)
+
+
+@pytest.mark.parametrize("noise", [LATE, {"delay": 0.03, "rate": 50, "stamped": True}])
+def test_soft_cables_and_late_states_are_no_reason_to_give_predictions_up(noise):
+    """At a stop, which reverses the forces; computed torque, which needs no prediction, is less exact."""
+    soft = load("ipanema-2").model_dump(mode="json")
+    for cable in soft["cables"]:
+        cable |= {"stiffness": 25e3, "damping": 50.0}
+    robot = Robot.model_validate(soft)
+    ends = [(np.array(robot.home[:3]) + [x, 0, 0]).tolist() for x in (-0.2, 0.2)]
+    motion = plan(robot, {"path": {"kind": "line", "start": ends[0], "end": ends[1]}, "duration": 1.2})
+    ahead, usual = (
+        simulate(robot, motion, kind(robot), events=["stop at 0.6"], noise=noise, duration=0.8)
+        for kind in (Predictive, ComputedTorque)
+    )
+    assert ahead.handed_over is None
+    assert np.sqrt((ahead.error**2).mean()) < np.sqrt((usual.error**2).mean())
+
+
+def test_a_lost_rotor_is_noticed_within_fifty_milliseconds_and_the_delay():
+    robot = load("multi-quadrotor-4")
+    noise = LATE | {"delay": 0.01}
+    run = simulate(robot, robot.home, Predictive(robot), duration=0.2, events=["lose quad1 at 0.1"], noise=noise)
+    assert 0.11 < run.handed_over <= 0.16
