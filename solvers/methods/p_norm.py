@@ -45,7 +45,7 @@ class PNorm(Method):
         """Take Newton steps, each a quadratic program, from the least-squares solution."""
         p = number("p", options.get("p", 4), 2, 20)
         first = least_norm(form)
-        if first.s is None or not first.s.any() or p == 2:
+        if first.s is None or not first.s.any() or not len(form.N) or p == 2:
             return first
         s = np.minimum(np.maximum(first.s, form.lower), form.upper)
         for iteration in range(1, _STEPS + 1):
@@ -54,33 +54,29 @@ class PNorm(Method):
             # Cost sum (|s_i| / size)^p / (p (p - 1)), its gradient and curvature, for s / size.
             gradient = np.sign(s) * part ** (p - 1) / (p - 1)
             curvature = np.maximum(part ** (p - 2), _FLOOR)
-            step = _quadratic_step(form, s, gradient * size, curvature)
-            if step is None:
-                return Proposal(s, iteration)
-            slope = float(gradient @ step) / size
-            cost = float((part**p).sum()) / (p * (p - 1))
+            step = _newton_step(form, s, gradient * size, curvature)
+            if step.s is None:
+                return step
+            slope = float(gradient @ step.s) / size
+            cost = _cost(s, size, p)
             if slope >= -_CONVERGED * cost:
                 return Proposal(s, iteration)
             length = 1.0
-            while _cost(s + length * step, size, p) > cost + 1e-4 * length * slope and length > 1e-10:
+            while _cost(s + length * step.s, size, p) > cost + 1e-4 * length * slope and length > 1e-10:
                 length *= 0.5
-            s = s + length * step
-        return Proposal(s, _STEPS)
+            s = np.minimum(np.maximum(s + length * step.s, form.lower), form.upper)
+        return Proposal(None, _STEPS, f"not converged in {_STEPS} steps")
 
 
 def _cost(s: Array, size: float, p: float) -> float:
     return float(((np.abs(s) / size) ** p).sum()) / (p * (p - 1))
 
 
-def _quadratic_step(form: StandardForm, s: Array, gradient: Array, curvature: Array) -> Array | None:
-    """Minimise gradient . d + sum curvature_i d_i^2 / 2 with Q (s + d) = b inside the limits; None if that fails."""
-    root = np.sqrt(curvature)
-    # In y = root d + gradient / root the cost is |y|^2 / 2.
-    shift = gradient / root
-    rows = form.Q / root
-    norms = np.linalg.norm(rows, axis=1)
-    right = (form.b - form.Q @ s + rows @ shift) / norms
-    upper = np.concatenate([(form.upper - s) * root + shift, right])
-    lower = np.concatenate([(form.lower - s) * root + shift, right])
-    y = bounded_least_norm(upper, lower, rows / norms[:, None], equalities=right.size).s
-    return None if y is None else (y - shift) / root
+def _newton_step(form: StandardForm, s: Array, gradient: Array, curvature: Array) -> Proposal:
+    """Minimise gradient . d + sum curvature_i d_i^2 / 2 for d of the null space, s + d inside the limits."""
+    half = np.linalg.qr((form.N * np.sqrt(curvature)).T)[1]  # (m - rank, m - rank)
+    # In y = half z + shift with d = N^T z the cost is |y|^2 / 2.
+    rows = np.linalg.solve(half.T, form.N).T  # (k, m - rank)
+    at = rows @ (rows.T @ gradient)
+    program = bounded_least_norm(np.maximum(form.upper - s, 0.0) + at, np.minimum(form.lower - s, 0.0) + at, rows, 0)
+    return program if program.s is None else Proposal(rows @ program.s - at)
