@@ -17,6 +17,7 @@ from .status import Status
 _EXACT = "at the edge of what the cables can give, or of rounding: solved in exact arithmetic"
 _ON_FACE = "at the edge of what the cables can give: a choice among the tensions that give the wrench there"
 _UNPROVEN = "gives the wrench, but multipliers do not prove it optimal"
+_MISSES = "does not give the wrench to the tolerance"
 _NEAREST = "gives the wrench as near to t_ref as can be, which is not what the method looks for"
 
 
@@ -80,7 +81,9 @@ def verify(
         return Verdict(Status.SINGULAR if certificate.singular else Status.INFEASIBLE, certificate=certificate)
     if useful:
         return Verdict(Status.INACCURATE, tensions, _UNPROVEN)
-    return Verdict(Status.FAILED if tensions is None else Status.INACCURATE, tensions, proposal.detail)
+    if tensions is None:
+        return Verdict(Status.FAILED, None, proposal.detail)
+    return Verdict(Status.INACCURATE, tensions, proposal.detail or _MISSES)
 
 
 def _face(problem: TensionProblem, form: StandardForm, exact: Array) -> TensionProblem | None:

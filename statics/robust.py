@@ -148,8 +148,6 @@ def ellipsoid_factor(uncertainty: Uncertainty, share: float) -> float:
 
     Raises `InputError` if an argument is wrong.
     """
-    from ..models.uncertainty import Uncertainty
-
     return _chi(required("uncertainty", uncertainty, Uncertainty).factor.shape[1], _share("share", share))
 
 

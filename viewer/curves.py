@@ -25,7 +25,7 @@ class Curves(Displayed):
     @property
     def infeasible(self) -> np.ndarray:
         """Return which instants have no tensions, or tensions beyond their limits, (k,)."""
-        return ~(self.margins >= -1e-6 * max(float(np.nanmax(np.abs(self.tensions), initial=0.0)), 1.0))
+        return ~(self.margins >= -1e-6 * float(np.nanmax(np.abs(self.tensions), initial=0.0)))
 
     @property
     def infeasible_spans(self) -> list[tuple[float, float]]:

@@ -174,7 +174,8 @@ def _damped(form: StandardForm, square: float, mu: float, s: Array) -> tuple[Arr
 def _value(form: StandardForm, square: float, mu: float, s: Array) -> float:
     """Return the function that is minimised, but for a constant."""
     distances = np.concatenate([s - form.lower, form.upper - s])
-    return 0.5 * square * float(s @ s) - mu * float(np.log(distances[np.isfinite(distances)]).sum())
+    with np.errstate(divide="ignore"):  # infinite where rounding puts a point on a limit
+        return 0.5 * square * float(s @ s) - mu * float(np.log(distances[np.isfinite(distances)]).sum())
 
 
 def _way_to_zero(values: Array, change: Array) -> float:
