@@ -75,8 +75,9 @@ def nearest_points(
     b, c = _dot(along, across), _dot(along, between)
     tiny = np.finfo(float).tiny
     beside = a * e - b * b
+    crossing = beside > 1e-14 * a * e
     # On parallel lines every s serves, so 0 does.
-    s = np.where(beside > 1e-14 * a * e, np.clip((b * f - c * e) / np.maximum(beside, tiny), 0.0, 1.0), 0.0)
+    s = np.where(crossing, np.clip((b * f - c * e) / np.where(crossing, beside, 1.0), 0.0, 1.0), 0.0)
     t = np.clip((b * s + f) / np.maximum(e, tiny), 0.0, 1.0)
     s = np.clip((b * t - c) / np.maximum(a, tiny), 0.0, 1.0)
     return between + s[..., None] * along - t[..., None] * across, s, t
