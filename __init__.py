@@ -5,7 +5,7 @@ ground up: `towline.base` (what all others use), `towline.models` (robots and th
 (tension distribution on plain arrays), `towline.figures` (matplotlib), `towline.statics` (one instant of a robot),
 `towline.plant` (motion in time), `towline.workspace` (poses at which a condition holds), `towline.estimation` (the pose
 from lengths, the calibrated robot), `towline.control` (one step of a controller), `towline.ocp` (planning),
-`towline.simulation` (closed loops), `towline.layout` (where anchors should be), `towline.export` (a control step as C),
+`towline.simulation` (closed loops), `towline.layout` (where anchors should be), `towline.export` (C code, MuJoCo, FMU),
 `towline.studies` (the papers), `towline.benchmarks`, `towline.viewer`, `towline.cli`.
 """
 

@@ -30,5 +30,5 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path 
         target = check_writable(file)
         for other, place in taken:
             if target == place or (target.exists() and place.exists() and target.samefile(place)):
-                raise InputError(f"{what} must be another file than {other}, got {printable(str(file))}")
+                raise InputError(f"{what} must be a file other than {other}, got {printable(str(file))}")
         taken.append((what, target))

@@ -151,7 +151,7 @@ def _same(robot: Robot, one: PoseEstimate, other: PoseEstimate) -> bool:
 def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> None:
     import numpy as np
 
-    from ..base.text import any_of, quantity, quantity_row
+    from ..base.text import any_of, column, quantity, quantity_row
     from ..estimation.pose.wrong_lengths import can_explain, wrong_cables
 
     verdict = "a pose fits the lengths" if estimate.consistent else "NO POSE FITS THE LENGTHS; the closest one is shown"
@@ -159,10 +159,11 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         verdict = "NO EQUILIBRIUM WITH THESE LENGTHS; the closest pose is shown"
     typer.echo(f"{robot.name}: {verdict} (residuals {quantity(1e3 * estimate.residual, 'mm', 3)} rms)")
     rows = []
+    values = [*column(estimate.pose[:3].round(9), 7), *(f"{angle + 0.0:.6f}" for angle in estimate.pose[3:].round(6))]
     for i, name in enumerate(SIX.split()):
         unit, deviation = "m" if i < 3 else "rad", 1e3 * estimate.sigmas[i]
         spread = quantity(deviation, f"m{unit}", 3) if np.isfinite(deviation) else "undetermined"
-        rows.append((name, quantity(round(estimate.pose[i], 9), unit, 7), spread if robot.dof_mask[i] else "fixed"))
+        rows.append((name, f"{values[i]} {unit}", spread if robot.dof_mask[i] else "fixed"))
     print_table(["", "estimate", "sigma"], rows, "lrr")
     if robot.dof_mask[3:].any():
         typer.echo("The sigmas of the angles are those of small rotations about the axes of {G}.")

@@ -43,6 +43,7 @@ def reproduce(paper: str, out: Path | None = None, form: FormatOption = "png", a
 
 def _show(account: Account) -> None:
     from ..studies.accounts.claim import Verdict
+    from ..studies.accounts.errata import numbers_text
 
     typer.echo(f"{account.paper.source}\n  {account.summary()}; {account.seconds:.1f} s")
     for title, chapter in account.chapters.items():
@@ -50,6 +51,6 @@ def _show(account: Account) -> None:
         for claim in chapter.claims:
             typer.echo(f"    {claim.verdict.value:<15} {claim.id}")
             if claim.verdict is not Verdict.REPRODUCED:
-                typer.echo(f"      {claim.place}: {claim.why}")
+                typer.echo(f"      {claim.place}: {claim.why} {numbers_text(claim)}".rstrip())
     for title, why in account.broken.items():
         typer.echo(f"  {title}: not computed: {why}")

@@ -54,14 +54,14 @@ class ComputedTorque(Controller):
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
-        bandwidth: Bandwidth w of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = w^2.
+        bandwidth: Bandwidth b of the error's decay [rad/s], a number or one for each coordinate of the pose: Kp = b^2.
             Default: 10, but 1.5 with fewer cables than degrees of freedom, because the load swings with its carriers;
-            see `sensors`. If the first two steps, or three in a row, are more than 0.75 / w apart, the default is
-            lowered, because the loop is unstable from 1 / w on, and restored after two steps that are closer together.
+            see `sensors`. If the first two steps, or three in a row, are more than 0.75 / b apart, the default is
+            lowered, because the loop is unstable from 1 / b on, and restored after two steps that are closer together.
             A given bandwidth is kept, with a warning. If carriers fly, all bandwidths are lowered by the same factor,
-            because their attitude loops need the same: steps of at most 0.75 / `attitude`. Carriers that do not fly and
-            correct errors need 0.75 / `carrier_bandwidth`.
-        damping: Damping ratio z: Kd = 2 z w.
+            because their attitude loops need the same: steps of at most 0.75 / `attitude`. Carriers that
+            correct errors without flying need steps of at most 0.75 / `carrier_bandwidth`.
+        damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no
             estimates. Default: 10; see `sensors`.

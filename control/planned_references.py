@@ -51,7 +51,7 @@ def references(
 
 
 def planned(plan: "HasTrajectory | xr.Dataset | str | os.PathLike[str]") -> tuple[Robot, Trajectory]:
-    """Return the robot of a plan, and its trajectory. Raises `InputError` if it is none."""
+    """Return the robot of a plan, and its trajectory. Raises `InputError` if it is not a plan."""
     samples = samples_of("plan", plan)
     if samples is None or "robot" not in samples.attributes:
         raise InputError(f"plan must be a plan, its dataset or its NetCDF file, got {shown(plan)}")

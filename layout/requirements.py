@@ -96,7 +96,7 @@ class Requirement(Part):
     """Poses at which the cables must balance wrenches; every combination of the lists is required."""
 
     box: Box | None = optional("box of positions of the platform in {G} [m]")
-    grid: tuple[Count, Count, Count] = optional("with a box: positions along x, y and z", (7, 7, 5))
+    grid: tuple[Count, Count, Count] = optional("with a box: numbers of positions along x, y and z", (7, 7, 5))
     attitudes: Rows[Vector3] = optional(
         "with a box: roll, pitch, yaw of the platform [rad]; default: level", ((0.0, 0.0, 0.0),)
     )

@@ -49,8 +49,8 @@ def design(
       or "cost", the mean t_max or the cost is minimised instead, and the option `margin` is the smallest accepted one.
     - `requirements`: instead of all of these: `Requirements`, a mapping, or the path of a file.
     - `progress`: called with a description of the step, the elapsed share of the time, and the best margin so far [N].
-    - `options`: other keys of `Requirements`: name, minimise, prices, margin, clearance, cable_length, tasks, start,
-      time_limit, seed.
+    - `options`: all other keys of `Requirements`, such as minimise, prices, margin, clearance, natural_frequency, tasks
+      and time_limit.
 
     After an interrupt the result is the best so far; it has a certificate if the requirements are impossible.
 

@@ -132,7 +132,7 @@ class Dynamics(Displayed):
         """Return the required wrench w of a motion, with A t = w.
 
         It is force [N] and moment about the CoM [N m], in {G}, (..., 6): inertia and velocity terms minus gravity and
-        wind. The carrier motion does not enter w; the argument exists for symmetry with `relative`, where it causes the
+        wind. The carrier motion does not enter w; its arguments exist for symmetry with `relative`, where it causes the
         disturbance D_B.
 
         - `pose`, `velocity`, `acceleration`: (x, y, z, roll, pitch, yaw) of the platform frame in {G} and its time
@@ -211,10 +211,11 @@ class Dynamics(Displayed):
     def linearise(
         self, pose: Array, velocity: Array, tensions: Array, carrier_pose: Array | None = None
     ) -> tuple[Array, Array]:
-        """Linearise the dynamics, d(dx)/dt = A dx + B dt, about a state x = (pose, velocity) and tensions.
+        """Linearise the dynamics about a state (pose, velocity) and tensions.
 
-        Arguments as in `acceleration`. Returns A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2
-        per N]. The tensions are constant when the platform moves; for elastic cables see `stiffness`.
+        Deviations x of the state and u of the tensions obey dx/dt = A x + B u to first order. Arguments as in
+        `acceleration`. Returns A, (..., 12, 12) [1/s, 1/s^2], and B, (..., 12, m) [m/s^2 and rad/s^2 per N]. The
+        tensions are constant when the platform moves; for elastic cables see `stiffness`.
         """
         state = {"pose": pose, "velocity": velocity, "tensions": tensions, "carrier_pose": carrier_pose}
         result = self._call("linearisation", **state)

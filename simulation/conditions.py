@@ -30,8 +30,8 @@ class Conditions(Displayed):
             another plan becomes the reference; "push 20 0 0 at 1 for 0.5", a force on the platform in {G} [N]; a `Wall`
             that the platform meets.
         disturbance: Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
-        duration: Simulated time [s] (default: until every reference has ended). After that the robot holds its final
-            pose.
+        duration: Simulated time [s] (default: until every reference has ended). If it is longer, the robot holds the
+            final pose.
         period: Period of the controller [s].
         substeps: Runge-Kutta steps of the plant per period (default: chosen by the stiffness and damping of the cables,
             see `plant.steps.steps_in`).

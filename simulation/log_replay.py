@@ -273,7 +273,7 @@ class Replay(Drawn, Reported, Displayed):
             if one.name in FACTORS:
                 sigma = f"{max(100 * one.sigma, 0.001):.2g} %"
             else:
-                sigma = quantity(one.sigma, "s" if one.name == "delay" else "N", 2)
+                sigma = quantity(1e3 * one.sigma, "ms", 2) if one.name == "delay" else quantity(one.sigma, "N", 2)
             value = f"{_value(one.name, one.value)} +- {sigma}" if one.shown else "-"
             rows.append((one.name, _value(one.name, one.before), value, _share(one) if one.named else "-", remark))
         title, columns = "Parameters that may explain them, each fitted alone", ("", "model", "best", "explains", "")

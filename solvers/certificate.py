@@ -187,7 +187,7 @@ class Certificate(Displayed):
         return text
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain lists and numbers, ready for JSON; time, span and wind only if they are set."""
+        """Return plain lists and numbers, ready for JSON; time, span, wind and load only if they are set."""
         given = {field.name: getattr(self, field.name) for field in fields(self)} | {"binding": self.binding}
         return {
             name: np.asarray(value).tolist() if isinstance(value, np.ndarray | tuple) else value

@@ -14,7 +14,7 @@ the fraction P of the robots at all poses simultaneously:
   |g . dp| <= k sqrt(g^T Sigma g) for every g (Scheffe);
 - a motion (`motion_factor`): along it the row of each cable, scaled to variance 1, is a curve of length L_i on the unit
   sphere. Rice's formula bounds the probability that it exceeds k anywhere by 2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2).
-  The sum over the cables is 1 - P. The factor is usually half of the first one, and is taken to be at most that.
+  The sum over the cables is 1 - P. This factor is usually half of the first one, and never larger than the first one.
 
 Source: H. Scheffe, Biometrika 40, 1953; S. O. Rice, Bell System Technical Journal 24, 1945; D. Q. Naiman, Annals of
 Statistics 14, 1986.
@@ -44,7 +44,7 @@ ROUNDING = 1e-9  # of the force scale, in comparisons of tensions
 def check_share(robot: Robot, share: object) -> float:
     """Check and return the fraction of robots for which limits must hold.
 
-    Raises `InputError` if it is no number above 0 and below 1, or the robot has no uncertainty.
+    Raises `InputError` if it is not a number above 0 and below 1, or the robot has no uncertainty.
     """
     value = _share("robust", share)
     uncertainty_of(robot)

@@ -253,7 +253,7 @@ def test_the_command_names_what_is_open(built, tmp_path):
         (("--free", "anchor"), "free must be 'auto' or some of anchors"),
         (("--prior", "anchors:1"), "--prior must be NAME=NUMBER, separated by commas"),
         (("--sigma", "small"), "--sigma must be a number [m]"),
-        (("--out", "log.csv"), "--out must be another file than the log"),
+        (("--out", "log.csv"), "--out must be a file other than the log"),
         (("--free", "clock,offsets", "--prior", "anchors=1"), "prior must have keys among those of free"),
     ],
 )

@@ -95,7 +95,7 @@ def test_wrong_samples_are_named(robot, tmp_path):
         (("--lengths", "1 1 1 1 1 1 1 1", "--out", "x.csv"), "--out must be left out with --lengths, got x.csv"),
         (("--log", "none.csv"), "none.csv: no such file"),
         (("--log", "none.csv", "--out", "x.nc"), "--out must end in .csv"),
-        (("--log", "none.csv", "--out", "none.csv"), "--out must be another file than the log"),
+        (("--log", "none.csv", "--out", "none.csv"), "--out must be a file other than the log"),
     ],
 )
 def test_wrong_options(arguments, message, tmp_path):

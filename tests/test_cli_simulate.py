@@ -132,7 +132,7 @@ def test_many_flights_have_one_table(folder):
         ("wang-flying", "step.nc", ["--workers", "2"], "--workers must be left out without --runs"),
         ("wang-flying", "step.nc", ["--runs", "2", "--animate", "film.gif"], "--animate must be left out with --runs"),
         ("wang-flying", "step.nc", ["--animate", "film.txt"], "file must end in .gif or .mp4"),
-        ("wang-flying", "step.nc", ["--out", "step.nc"], "--out must be another file than the plan, got step.nc"),
+        ("wang-flying", "step.nc", ["--out", "step.nc"], "--out must be a file other than the plan, got step.nc"),
         ("wang-flying", "step.nc", ["--out", "/proc/nowhere/flight.nc"], "cannot be written"),
     ],
 )

@@ -72,5 +72,5 @@ def test_no_output_is_an_input(command, folder, monkeypatch):
     before = {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
     done = CliRunner().invoke(app, command.split())
     assert isinstance(done.exception, InputError), done.exception
-    assert "must be another file than" in str(done.exception)
+    assert "must be a file other than" in str(done.exception)
     assert {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()} == before

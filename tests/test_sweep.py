@@ -395,7 +395,7 @@ def test_the_command(folder, monkeypatch):
         (["--keep", "plans"], "--keep must be left out without --vary"),
         (["--vary", "margin=1", "--report", "x.html"], "--report must be left out with --vary"),
         (["--vary", "margin=1", "--out", "x.csv"], "--out must be a NetCDF file"),
-        (["--vary", "margin=1", "--out", "x.nc", "--resume", "x.nc"], "--out must be another file than the checkpoint"),
+        (["--vary", "margin=1", "--out", "x.nc", "--resume", "x.nc"], "--out must be a file other than the checkpoint"),
         (["--vary", "margin=1", "--checkpoint", "a", "--resume", "b"], "--checkpoint must not be given with --resume"),
     ],
 )

@@ -101,7 +101,7 @@ def _host_name(host: str) -> str | None:
     """Return the name in a header such as "localhost:8080", or None if it has none."""
     try:
         parts = urlsplit(f"//{host}")
-        port = parts.port  # raises for what is no number
+        port = parts.port  # raises for what is not a number
     except ValueError:
         return None
     plain = parts.netloc == host and "@" not in host and port != 0

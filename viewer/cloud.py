@@ -51,7 +51,7 @@ def cloud(dataset: xr.Dataset, where: str) -> Cloud:
 
 
 def _count(dataset: xr.Dataset, name: str) -> str:
-    """Return a count among the attributes of a file as text, "?" for anything that is no number."""
+    """Return a count among the attributes of a file as text, "?" for anything that is not a number."""
     value = dataset.attrs.get(name)
     return quantity(int(value)) if isinstance(value, int | np.integer) else "?"
 

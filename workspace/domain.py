@@ -189,10 +189,10 @@ def _box_of_lengths(robot: Robot, region: Region, carriers: list[Box]) -> tuple[
     assert region.lengths is not None
     if robot.m != 3 or (robot.dof_mask[:3] == 0).any():
         raise InputError(
-            f"region.lengths must be of a robot with three cables that moves in space, got one with {robot.m}"
+            f"region.lengths requires a robot with three cables that moves in space, got one with {robot.m}"
         )
     if robot.pulley_radii.any():
-        raise InputError(f"region.lengths must be of a robot whose anchors are points, got {robot.name!r} with pulleys")
+        raise InputError(f"region.lengths requires a robot whose anchors are points, got {robot.name!r} with pulleys")
     lows, highs = [], []
     for cable, owner in enumerate(robot.carrier_of_cable):
         own = robot.home_anchors[cable] - robot.carrier_home[owner, :3]

@@ -51,7 +51,7 @@ class Mistake(NamedTuple):
     Attributes:
         text: The error, in one line.
         corrected: Measurements without it, or None if several errors are equally probable.
-        severe: True if a calibration would be wrong, False if it would only mean another frame than the file's.
+        severe: True if a calibration would be wrong, False if it would only mean a frame other than the file's.
         factors: Factors of the readings in `corrected`, (m,) or one for all cables.
     """
 

@@ -63,7 +63,7 @@ class Fields(NamedTuple):
 class LogMap(Part):
     """Names of the fields of a log, each with a unit in brackets if it is not SI: `/winches/position[*] [mm]`.
 
-    The unit may have a factor: `/winches/angle[*] [0.05 m]` of a drum with a radius of 50 mm, whose angles are in rad.
+    The unit may have a factor: `/winches/angle[*] [0.05 m]` for a drum with a radius of 50 mm, whose angles are in rad.
     """
 
     lengths: str | list[str] = Key([], description="readings of the lengths, one name or one for each cable")
@@ -82,7 +82,7 @@ class LogMap(Part):
 
 
 def read_map(path: str | os.PathLike[str]) -> LogMap:
-    """Read the YAML file of a map; raise InputError if it is none."""
+    """Read the YAML file of a map; raise InputError if it is not valid."""
     return read_yaml(file_path("map", path), LogMap)
 
 
@@ -108,8 +108,8 @@ def fields_of(
         free: `free_axes` of the robot.
 
     Raises:
-        InputError: If a name of the map is not there, part of a position or an orientation is missing, or there are
-            several candidates.
+        InputError: If a field that the map names does not exist, part of a position or an orientation is missing, or
+            there are several candidates.
     """
     roles = ("lengths", "tensions", "position", "orientation", "directions")
     found = {name: _named(recordings, name, given, free) for name in roles} if given else {}

@@ -40,8 +40,8 @@ class Log(NamedTuple):
         notes: Remarks on files and clocks, one line each.
         begin: Reading of the lengths' clock at time 0 of the measurements [s].
         recordings: The files.
-        clock: Clock of the poses, if it is another one than that of the lengths.
-        ned: Axis of x of {G}, if poses in a frame of north, east, down were converted.
+        clock: Clock of the poses, if it differs from that of the lengths.
+        ned: Direction of the x axis of {G}, if poses were converted from a frame of north, east, down.
     """
 
     measurements: Measurements

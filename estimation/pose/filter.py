@@ -38,7 +38,7 @@ class MotionEstimate(NamedTuple):
     """Pose and velocity of the platform at a time.
 
     Attributes:
-        time: [s].
+        time: Time of the estimate [s].
         pose: (x, y, z, roll, pitch, yaw) of the platform frame in {G}, (6,) [m, rad].
         velocity: Its time derivative, (6,); rates of roll and yaw are nan at a pitch of 90 degrees.
         twist: Velocity of the platform frame and angular velocity, in {G}, (6,) [m/s, rad/s].

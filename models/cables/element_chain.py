@@ -66,7 +66,7 @@ class ElementChain(Displayed):
 
     @property
     def direction(self) -> np.ndarray:
-        """Return the unit vector c, (3,), from the anchor to the attachment, opposite to u."""
+        """Return the unit vector c, (3,), from the anchor to the attachment, opposite to the pull on the platform."""
         return (self.attachment - self.anchor) / self.length
 
     def displacements(self, end: Any) -> np.ndarray:

@@ -77,7 +77,7 @@ class State(Displayed):
 
     @cached_property
     def run(self) -> Exit:
-        """Return directions, leaving points and lengths of the cables."""
+        """Return directions, exit points and lengths of the cables."""
         axes = kinematics.axes(self.robot, self.carrier_poses)
         return kinematics.cables(self.robot, self.platform.pose, self.anchors, axes)
 

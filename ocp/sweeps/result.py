@@ -133,7 +133,7 @@ class Sweep(Displayed, Reported):
         """Save the table as NetCDF, and as CSV with the suffix .csv; return both paths.
 
         Raises:
-            InputError: If a file cannot be written, or `path` ends in .csv (reserved for the second file).
+            InputError: If a file cannot be written, or `file` ends in .csv (reserved for the second file).
         """
         path = file_path("file", file)
         beside = path.with_suffix(".csv")

@@ -169,8 +169,10 @@ class Task(Part):
         "motion of the carriers: hold (stay), given (follow paths) or free (the planner chooses)", HoldBase(kind="hold")
     )
     tube: Tube = Tube()
-    initial: Initial | None = optional("measured initial state of a moving robot; default: as `ends` require")
-    final: Final | None = optional("state in which the motion ends; default: as `ends` require")
+    initial: Initial | None = optional(
+        "measured initial state of a moving robot; default: as `tube.ends` and `base.ends` require"
+    )
+    final: Final | None = optional("state in which the motion ends; default: as `tube.ends` and `base.ends` require")
     margin: NonNegative = optional("smallest distance of every tension from its limits [N]", 0.0)
     robust: Share | None = optional(
         "fraction, such as 0.95: all tensions must keep the margin from their limits for this fraction of all robots "
@@ -190,8 +192,8 @@ class Task(Part):
     limits: TaskLimits = TaskLimits()
     steps: Whole = optional("number of intervals between the nodes of the planner", 100, ge=4, le=20_000)
     scheme: SchemeName | None = optional(
-        "acceleration within an interval: linear; hermite: quadratic, and tensions give the wrench in the middle too; "
-        "spline: a smooth cubic B-spline; default: linear, or hermite if the audit of a linear plan reports that "
+        "acceleration within an interval: linear; hermite: quadratic, and tensions give the required wrench halfway "
+        "too; spline: a smooth cubic B-spline; default: linear, or hermite if the audit of a linear plan reports that "
         "carriers cannot follow the motion between the nodes"
     )
     objective: Objective = Objective()

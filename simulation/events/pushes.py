@@ -41,7 +41,7 @@ class Push(Lasting):
     @override
     @classmethod
     def in_words(cls, words: list[str]) -> dict[str, Any]:
-        """Return the carrier, if the first word is no number, and force and moment from the numbers."""
+        """Return the carrier, if the first word is not a number, and force and moment from the numbers."""
         numbers = [number_in(word) for word in words]
         which = {"carrier": numbers.pop(0)} if numbers and isinstance(numbers[0], str) else {}
         return {**which, "force": numbers[:3]} | ({"moment": numbers[3:]} if len(numbers) > 3 else {})

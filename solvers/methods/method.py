@@ -1,4 +1,4 @@
-"""What a tension-distribution method is: a class with three sentences about itself and one function."""
+"""The base class of tension-distribution methods, and what a method returns."""
 
 from __future__ import annotations
 

@@ -34,16 +34,17 @@ def errata(account: Account) -> str:
     return "\n".join([*lines, ""])
 
 
+def numbers_text(claim: Claim) -> str:
+    """Return what the paper gives and what was computed, in a sentence each."""
+    numbers = ((BY_THE_PAPER, claim.printed), ("Computed", claim.computed))
+    return " ".join(f"{head}: {value_text(value, claim.unit)}." for head, value in numbers if value is not None)
+
+
 def _entry(claim: Claim) -> str:
     """Return the place and the name of a claim with what it states, the two numbers, and why: one paragraph each."""
     found = COMPARED.fullmatch(claim.statement)
     statement, quantity = (f"{found['statement']}.", found["quantity"]) if found else (claim.statement, "")
-    numbers = [
-        f"{head}: {value_text(value, claim.unit)}."
-        for head, value in ((BY_THE_PAPER, claim.printed), ("Computed", claim.computed))
-        if value is not None
-    ]
-    about = [f"*Compared: {quantity}.*"] if quantity else []
-    parts = [f"- **{claim.place}** (`{claim.id}`): {statement}", " ".join([*about, *numbers]), claim.why]
+    about = f"*Compared: {quantity}.* " if quantity else ""
+    parts = [f"- **{claim.place}** (`{claim.id}`): {statement}", f"{about}{numbers_text(claim)}".strip(), claim.why]
     safe = [part.replace("<", "&lt;").replace("\n", " ") for part in parts]
     return "\n" + "\n\n    ".join(safe)

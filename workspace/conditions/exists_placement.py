@@ -64,7 +64,7 @@ class ExistsPlacement(Condition):
         return self.model_copy(update={"condition": self.condition.for_robots(robust)})
 
     def why_nowhere(self, robot: Robot) -> str | None:
-        """Return the reason of the condition."""
+        """Return why the inner condition holds nowhere; None if it may hold."""
         return self.condition.why_nowhere(robot)
 
     def _search(self, robot: Robot, mobile: list[int], places: Places) -> np.ndarray:
