@@ -205,7 +205,7 @@ def test_a_cut_netcdf_file_is_refused(built, tmp_path):
         ({"sigma": 0}, "sigma must be a number from 1e-09 to 100, or a mapping of .*, got 0"),
         (
             {"sigma": {"length": 1}},
-            "sigma must have the keys lengths, position, rotation, tensions, directions, got 'length'",
+            "sigma must have only the keys lengths, position, rotation, tensions, directions, got 'length'",
         ),
         ({"sigma": {"position": -1}}, "sigma.position must be a number from 0 to 100, got -1"),
     ],

@@ -341,7 +341,7 @@ def _sigma(sigma: Any) -> Sigma:
     given = sigma if isinstance(sigma, Mapping) else {"lengths": sigma}
     for name in given:
         if name not in Sigma._fields:
-            raise InputError(f"sigma must have the keys {', '.join(Sigma._fields)}, got {shown(name)}")
+            raise InputError(f"sigma must have only the keys {', '.join(Sigma._fields)}, got {shown(name)}")
     values = {
         f"{name}": number(
             f"sigma.{name}" if isinstance(sigma, Mapping) else "sigma",

@@ -340,7 +340,7 @@ def _sigmas(sigma: Any) -> dict[str, float]:
         raise InputError(f"sigma must be a mapping of {', '.join(SIGMA)}, or None, got {shown(sigma)}")
     for name in sigma:
         if name not in SIGMA:
-            raise InputError(f"sigma must have the keys {', '.join(SIGMA)}, got {shown(name)}")
+            raise InputError(f"sigma must have only the keys {', '.join(SIGMA)}, got {shown(name)}")
     return {name: number(f"sigma.{name}", value, SMALLEST, MOST) for name, value in sigma.items()}
 
 

@@ -188,6 +188,8 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
 def _tensions(plan: PlanData) -> list[Fact]:
     robot, audit = plan.scenario.robot, plan.audit
     exist = np.isfinite(audit.tensions).all(axis=1)
+    if plan.scenario.wind_set is None and not plan.scenario.phases.extremes:
+        exist &= audit.violation <= audit.tolerance  # near singular poses the tensions are the closest ones
     facts: list[Fact] = []
     if not exist.all():
         without = audit.times[~exist]
