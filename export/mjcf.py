@@ -103,7 +103,8 @@ def _add_platform(robot: Robot, world: ET.Element) -> None:
                 axis[COORDINATES.index(name) % 3] = 1.0
                 kind = "slide" if name in COORDINATES[:3] else "hinge"
                 ET.SubElement(body, "joint", name=name, type=kind, axis=_text(axis))
-    inertia = robot.platform.inertia or (1e-6 * robot.platform.mass,) * 3 + (0.0,) * 3  # MuJoCo wants some
+    some = max(1e-6 * robot.platform.mass, SMALLEST_INERTIA)  # MuJoCo wants some
+    inertia = robot.platform.inertia or (some,) * 3 + (0.0,) * 3
     _add_inertia(body, robot.platform.com, robot.platform.mass, inertia)
     size = _text((robot.length, robot.length, 0.2 * robot.length))
     ET.SubElement(

@@ -199,3 +199,10 @@ def test_what_mujoco_would_refuse_is_refused_with_a_reason():
     platform = robot.platform.model_copy(update={"inertia": (1.0, 1.0, 3.0, 0.0, 0.0, 0.0)})
     with pytest.raises(InputError, match=r"platform\.inertia must have .* none above the sum of the others"):
         to_mjcf(robot.model_copy(update={"platform": platform}))
+
+
+def test_mujoco_takes_a_point_mass_of_a_microgram():
+    robot = load("point-mass-3")
+    light = robot.model_copy(update={"platform": robot.platform.model_copy(update={"mass": 1e-9})})
+    model = mujoco.MjModel.from_xml_string(to_mjcf(light))
+    assert model.body("platform").mass[0] == 1e-9

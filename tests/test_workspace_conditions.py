@@ -175,6 +175,13 @@ def test_the_wrench_error_is_the_least():
     np.testing.assert_array_equal(WrenchWithTolerance(tolerance=tolerance).holds(robot, places), found <= tolerance)
 
 
+def test_without_any_tolerance_the_platform_rests_in_equilibrium():
+    robot, places = some_places("ipanema-2", 300, turn=0.5)
+    rests = StaticEquilibrium().holds(robot, places)
+    np.testing.assert_array_equal(WrenchWithTolerance(tolerance=0.0).holds(robot, places), rests)
+    assert 20 < rests.sum() < 280
+
+
 def test_the_posture_found_is_where_the_load_comes_to_rest():
     """From lengths, energy and IPOPT (`equilibria`); from the position, Newton: the same attitude and tensions."""
     robot = load("wang-ctmrts")

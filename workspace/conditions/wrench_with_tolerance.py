@@ -32,11 +32,15 @@ class WrenchWithTolerance(Condition):
         return np.maximum(self.error(robot, places) - self.tolerance, 0.0)
 
     def error(self, robot: Robot, places: Places) -> np.ndarray:
-        """Return the smallest wrench error of tensions inside the limits, (n,) [N]; infinite if there are none."""
+        """Return the smallest wrench error of tensions inside the limits, (n,) [N]: 0 where the platform can rest.
+
+        It is infinite where a cable has no length.
+        """
         check_places(robot, places)
         rows = wrench_rows(robot)
         w = scaled(robot, rest_wrench(robot), rows)
-        error = np.empty(len(places))
+        error = np.zeros(len(places))
         for part, A in wrench_matrices(robot, places, rows):
-            error[part] = solve_batch(A, w, robot.t_min, robot.t_max, rho=_RHO, threads=1).residual
+            short = np.flatnonzero(~solve_batch(A, w, robot.t_min, robot.t_max, threads=1).feasible)
+            error[part.start + short] = solve_batch(A[short], w, robot.t_min, robot.t_max, rho=_RHO, threads=1).residual
         return np.nan_to_num(error, nan=np.inf)
