@@ -12,7 +12,7 @@ from .goal import Goal
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
 _PER_SIZE = 200.0  # force scales that a size of the robot costs by which a bound is missed
 _LARGEST = 1e7  # of the objective [N]
-_FOUND, _LITTLE = 1e-5, 0.01  # of the margin, or of a share of the force scale: less improvement ends the search
+_FOUND, LITTLE = 1e-5, 0.01  # of the margin, or of a share of the force scale: less improvement ends the search
 PROGRAMS = 60  # from one start, at most
 
 
@@ -91,7 +91,7 @@ def maximise(
     - `delta`: longest step of the first program, of the range of each variable.
     - `programs`: most linear programs.
     """
-    least, (value, every) = _LITTLE * evaluation.variables.robot.force_scale, merit(evaluation, goal, y)
+    least, (value, every) = LITTLE * evaluation.variables.robot.force_scale, merit(evaluation, goal, y)
     for _ in range(programs):
         if delta < 1e-6 or time.perf_counter() > until or not np.isfinite(value):
             break

@@ -7,10 +7,10 @@ import numpy as np
 from ..models import Robot
 from .evaluation import Evaluation
 from .goal import Goal
-from .linear_programs import multipliers
+from .linear_programs import LITTLE, multipliers
 from .variables import Variables
 
-_CONVERGED = 1e-3  # of the margin, or of 1 N: what the linear program still gains at a local optimum
+_CONVERGED = 1e-3  # of the margin, or of `LITTLE`: what the linear program still gains at a local optimum
 _SMALL = 1e-6
 
 
@@ -82,7 +82,7 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
         tuple(
             Advice(one.change, one.gain / goal.unit, one.unit.replace("N/", f"{goal.unit_text}/", 1)) for one in advice
         ),
-        bool(found.left <= _CONVERGED * max(1.0, abs(margin))),
+        bool(found.left <= _CONVERGED * max(LITTLE * robot.force_scale, abs(margin))),
         int(bound.sum()),
     )
 

@@ -8,6 +8,7 @@ from towline.layout import judgement
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import goal_of
 from towline.layout.linear_programs import maximise, merit
+from towline.layout.reasons import reasons
 from towline.layout.room import room_of
 from towline.layout.variables import variables_of
 from towline.solvers import certify
@@ -63,6 +64,15 @@ def test_a_search_finds_the_same_layout_at_any_scale():
     assert large[1] > large[0] + 1.0
     np.testing.assert_allclose(small, large, rtol=1e-4)
     np.testing.assert_allclose(other, layout, atol=1e-3)
+
+
+def test_a_random_layout_of_a_micro_robot_is_no_local_optimum():
+    robot, force = shrunk(load("ipanema-2"), SIZE, 1e-7), 1e-7
+    requirements = requirements_of(SIZE, force)
+    variables = variables_of(robot, requirements)
+    rows = rows_of(robot, requirements.require, [requirements.require[0].places()])
+    y = np.random.default_rng(3).uniform(variables.low, variables.high)
+    assert not reasons(Evaluation(variables, rows), goal_of(variables, requirements), y).local_optimum
 
 
 def test_the_least_accepted_margin_is_that_of_a_weak_robot():
