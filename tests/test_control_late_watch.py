@@ -29,7 +29,7 @@ def test_soft_cables_and_late_states_are_no_reason_to_give_predictions_up(noise)
     for cable in soft["cables"]:
         cable |= {"stiffness": 25e3, "damping": 50.0}
     robot = Robot.model_validate(soft)
-    ends = [(np.array(robot.home[:3]) + [x, 0, 0]).tolist() for x in (-0.2, 0.2)]
+    ends = [np.add(robot.home[:3], [x, 0, 0]).tolist() for x in (-0.2, 0.2)]
     motion = plan(robot, {"path": {"kind": "line", "start": ends[0], "end": ends[1]}, "duration": 1.2})
     ahead, usual = (
         simulate(robot, motion, kind(robot), events=["stop at 0.6"], noise=noise, duration=0.8)

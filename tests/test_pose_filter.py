@@ -178,7 +178,7 @@ LENGTHS = np.full(8, 8.0)
         (lambda follow: follow.update(0.0, LENGTHS, reference=[0, 0, 0]), "reference pose must be an array of shape"),
         (lambda follow: follow.update(0.0, LENGTHS, carrier_pose=[1]), "carrier_pose must be an array of shape"),
         (lambda follow: PoseFilter(follow.robot, 1e-3), "sigma must be a mapping of lengths, position"),
-        (lambda follow: PoseFilter(follow.robot, {"length": 1}), "sigma must have only the keys lengths, .*, got 'length'"),
+        (lambda follow: PoseFilter(follow.robot, {"length": 1}), "must have only the keys lengths, .*, got 'length'"),
         (lambda follow: PoseFilter(follow.robot, {"lengths": 0}), "sigma.lengths must be a number from 1e-09"),
         (lambda follow: PoseFilter(follow.robot, jerk=(-1, 1)), "jerk must be a number from 0"),
         (lambda follow: Filtered(None, follow), "controller must be"),
