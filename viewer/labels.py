@@ -138,7 +138,7 @@ def legend(subject: Subject, cell: float) -> str:
     marks += [("quadrotor (arms and rotors)", BLACK)] if any(c.drawing.rotors for c in robot.carriers) else []
     marks += [("path of the platform", style.colour(0))] if subject.replay else []
     marks += [("reference of the platform", GHOST)] if subject.kind == "simulation" else []
-    marks += [("platform, cables and path of the other", OTHER)] if subject.other else []
+    marks += [("platform, cables and path of the other motion", OTHER)] if subject.other else []
     marks += [("keep out", style.colour(5))] if subject.replay and subject.replay.obstacles else []
     marks += [("reach of a carrier", style.colour(3))] if any(c.drawing.boxes for c in robot.carriers) else []
     marks += [("missing wrench: the direction of its force", style.colour(1))]

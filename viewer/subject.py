@@ -99,7 +99,9 @@ def _compared(first: Subject, second: Subject, where: str) -> Subject:
         raise InputError(f"two files to compare must be plans or simulations, got the {wrong.kind} {wrong.title}")
     if (first.robot.name, first.robot.m) != (second.robot.name, second.robot.m):
         raise InputError(f"{where} must be of {first.robot.name} with {first.robot.m} cables, got {second.robot.name}")
-    title = f"{first.title}, compared with {second.kind} {second.title.partition(', ')[2]}"
+    name = second.title.partition(", ")[2]  # of a simulation "simulation: passed"
+    name = f"a {name}" if second.kind == "simulation" else f"{second.kind} {name}"
+    title = f"{first.title}, compared with {name}"
     return Subject(title, first.robot, replay=first.replay, other=second.replay)
 
 
