@@ -76,7 +76,7 @@ def _newton_step(form: StandardForm, s: Array, gradient: Array, curvature: Array
     """Minimise gradient . d + sum curvature_i d_i^2 / 2 for d of the null space, s + d inside the limits."""
     half = np.linalg.qr((form.N * np.sqrt(curvature)).T)[1]  # (m - rank, m - rank)
     # In y = half z + shift with d = N^T z the cost is |y|^2 / 2.
-    rows = np.linalg.solve(half.T, form.N).T  # (k, m - rank)
+    rows = np.asarray(np.linalg.solve(half.T, form.N).T, dtype=np.float64)  # (k, m - rank)
     at = rows @ (rows.T @ gradient)
     program = bounded_least_norm(np.maximum(form.upper - s, 0.0) + at, np.minimum(form.lower - s, 0.0) + at, rows, 0)
     return program if program.s is None else Proposal(rows @ program.s - at)
