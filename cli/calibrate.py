@@ -23,8 +23,8 @@ from .outputs import check_outputs
     --prior NAME=SIGMA,...: Standard deviations of the file's values, in their units, such as
         'anchors=0.02,offsets=0.05'; default: unobservable directions stay as close to the file as possible.
     --sigma SIGMA|NAME=SIGMA,...: Standard deviation of the lengths [m], or of lengths [m], position [m], rotation
-        [rad], tensions (relative) and directions [rad], such as 'lengths=0.001,tensions=0.05'; default: those in the
-        log; without them, lengths=0.001,tensions=0.02,directions=0.02 and exact poses.
+        [rad], tensions (relative), directions [rad] and clocks of carriers [s], such as 'lengths=0.001,tensions=0.05';
+        default: those in the log; without them, lengths=0.001,tensions=0.02,directions=0.02 and exact poses.
     --outliers/--no-outliers: Detect outliers and slipped winches.
     --fix: Correct probable input errors of the log first (order of cables, units, conventions, frames).
     --out FILE.yaml: Robot file to write; default: ROBOT-calibrated.yaml in this folder.
@@ -107,7 +107,7 @@ def _sigma(text: str) -> Any:
     except ValueError:
         raise InputError(
             f"--sigma must be a number [m], or NAME=NUMBER of lengths, position, rotation, tensions, directions, "
-            f"got {text!r}"
+            f"clocks, got {text!r}"
         ) from None
 
 

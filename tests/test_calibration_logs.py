@@ -45,7 +45,7 @@ def test_csv_has_units(built, tmp_path):
     np.testing.assert_allclose(log.lengths, built.readings, atol=1e-10)
     np.testing.assert_allclose(log.poses, built.poses, atol=1e-10)
     np.testing.assert_allclose(log.times, np.arange(60) / 2)
-    assert log.sigma == (1e-3, 0, 0, 0.02, 0.02)
+    assert log.sigma == (1e-3, 0, 0, 0.02, 0.02, 0)
     semicolons = (tmp_path / "log.csv").read_text().replace(",", ";")
     (tmp_path / "other.csv").write_text("\ufeff" + semicolons.replace("\n", "\r\n"))
     np.testing.assert_array_equal(read_measurements(tmp_path / "other.csv").lengths, log.lengths)
@@ -69,7 +69,7 @@ def test_quaternions_and_empty_fields(built, tmp_path):
 
 
 def test_netcdf_there_and_back(built, tmp_path):
-    sigma = {"lengths": 2e-3, "position": 1e-3, "rotation": 3e-3, "tensions": 0.05, "directions": 0.03}
+    sigma = {"lengths": 2e-3, "position": 1e-3, "rotation": 3e-3, "tensions": 0.05, "directions": 0.03, "clocks": 0.01}
     poses = built.poses.copy()
     poses[3] = np.nan
     tensions = np.full((60, 8), 300.0)
@@ -205,7 +205,7 @@ def test_a_cut_netcdf_file_is_refused(built, tmp_path):
         ({"sigma": 0}, "sigma must be a number from 1e-09 to 100, or a mapping of .*, got 0"),
         (
             {"sigma": {"length": 1}},
-            "sigma must have only the keys lengths, position, rotation, tensions, directions, got 'length'",
+            "sigma must have only the keys lengths, position, rotation, tensions, directions, clocks, got 'length'",
         ),
         ({"sigma": {"position": -1}}, "sigma.position must be a number from 0 to 100, got -1"),
     ],

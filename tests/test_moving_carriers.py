@@ -116,6 +116,29 @@ def test_poses_of_carriers_are_saved_and_checked(recording, tmp_path):
         Measurements(np.ones((2, 3)), carrier_poses=np.full((2, 3, 6), np.nan))
 
 
+@pytest.mark.parametrize(("poses", "apart"), [(6, 1), (3, 2)])
+def test_clocks_of_carriers_are_fitted_and_part_of_the_sigmas(recording, poses, apart):
+    """By computers of their own, also with positions of the load alone, whose attitude is then an unknown."""
+    log = read_measurements(recording[0], robot=NAME)
+    t, late, carriers, pulls = log.times, np.array([0.013, -0.021, 0.03]), log.carrier_poses.copy(), log.tensions.copy()
+    for i, by in enumerate(late):
+        carriers[:, i], pulls[:, i] = (CubicSpline(t, of[:, i])(t - by) for of in (carriers, pulls))
+    sigma = {"lengths": 1e-3, "position": 1e-3, "rotation": 1e-3, "clocks": 0.1}
+    given = {"tensions": pulls, "times": t, "carrier_poses": carriers, "sigma": sigma}
+    given = Measurements(log.lengths, log.poses[:, :poses], **given).only(slice(50, 350 - 100 * (apart > 1), apart))
+    result = calibrate(NAME, given, ("offsets", "mass"), outliers=False)
+    clocks = result.carrier_clocks
+    assert [one.name for one in clocks] == ["quad1.clock", "quad2.clock", "quad3.clock"]
+    found = np.array([[one.value, one.sigma] for one in clocks])
+    assert (np.abs(found[:, 0] - late) < 4 * found[:, 1]).all()
+    assert (found[:, 1] < (0.015 if poses == 3 else 1e-3)).all()
+    assert all(abs(one.correction - true) < 4 * one.sigma for one, true in zip(result.parameters, MORE, strict=False))
+    if poses == 6:  # an unknown attitude follows wrong clocks
+        known = calibrate(NAME, given.with_sigma({**sigma, "clocks": 0.0}), ("offsets", "mass"), outliers=False)
+        assert known.noise > 3 * result.noise
+        assert "quad2.clock" in str(result.report())
+
+
 def two_clocks(folder, offset):
     """A platform under six winches of a quadrotor, both in motion: readings, and poses of both by another clock.
 

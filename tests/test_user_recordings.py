@@ -265,6 +265,32 @@ def test_a_file_for_each_computer(offsets, tmp_path):
     assert "no pose fits" not in towline("pose", robot, *logs, cwd=tmp_path).stdout
 
 
+@pytest.mark.parametrize(("frame", "sign"), [("world", -1), ("carrier", 1)])
+def test_a_file_for_each_drone_without_the_load(frame, sign, tmp_path):
+    """Directions of its cable show where the load was by the clock of the first drone, in whichever frame they are."""
+    robot, draw, (t, _, drones) = user.team_robot(tmp_path), np.random.default_rng(3), user.team(8)
+    directions = user.directions_of(drones, frame, sign)
+    header = ["stamp", *"xyz", *(f"q{axis}" for axis in "xyzw"), *(f"dir_{axis}" for axis in "xyz")]
+    for i, (p, R, *_) in enumerate(drones):
+        seen, turned = p + draw.normal(0, 5e-4, p.shape), Rotation.from_matrix(R).as_quat()
+        table = np.column_stack([user.EPOCH + t + (0.0, 7200.35)[i], seen, turned, directions[:, i]])
+        user.write(tmp_path / f"cf{i + 1}.csv", header, table, form="%.14g")
+    read = read_log([tmp_path / "cf1.csv", tmp_path / "cf2.csv"], {"directions": 0.01}, robot=tmp_path / robot)
+    (said,) = [note for note in read.notes if "clock" in note]
+    assert float(re.search(r"clock of cf2 is ([\d.]+) s ahead of that of cf1", said)[1]) == pytest.approx(
+        7200.35, abs=6e-3
+    )
+    result = calibrate(tmp_path / robot, read.measurements, ["offsets"])
+    for one, true in zip(result.parameters, (0.02, -0.01), strict=True):
+        assert abs(one.correction - true) < 4 * one.sigma < 5e-3
+    for i in range(2):
+        path = tmp_path / f"cf{i + 1}.csv"
+        table = np.genfromtxt(path, delimiter=",", skip_header=1)[:, :8]
+        user.write(path, [*header[:8]], table, form="%.14g")
+    with pytest.raises(InputError, match="must have positions of the platform or directions of the cables"):
+        read_log([tmp_path / "cf1.csv", tmp_path / "cf2.csv"], robot=tmp_path / robot)
+
+
 @pytest.mark.parametrize("world", ["up", "down"])
 def test_clocks_of_drones_that_record_north_east_down(world, tmp_path):
     """A rigid load that turns under three drones: body axes that point down move the ends of its cables."""

@@ -127,13 +127,13 @@ def _of_parameters(result: CalibrationData) -> list[Part]:
     lines: list[Part] = []
     length = length_of(result.file)  # on which a scale acts
     by_size = sorted(result.parameters, key=lambda one: -abs(one.correction) * (length if one.unit == "1" else 1))
-    always = [one.name for one in result.parameters if "[" not in one.name]  # of the robot
+    always = [one.name for one in (*result.parameters, *result.carrier_clocks) if "[" not in one.name]  # of the robot
     shown = {one.name for one in by_size[:MOST_LISTED]} | set(always)
-    rows = [_one(one) for one in result.parameters if one.name in shown]
+    rows = [_one(one) for one in (*result.parameters, *result.carrier_clocks) if one.name in shown]
     columns = ("parameter", "value", "standard deviation", "change from the file")
     lines.append(Table("Parameters", columns, rows, (1, 2, 3)))
-    if len(result.parameters) > len(shown):
-        lines.append(f"and {len(result.parameters) - len(shown)} with smaller changes")
+    if more := sum(one.name not in shown for one in result.parameters):
+        lines.append(f"and {more} with smaller changes")
     if result.beyond_prior:
         named = ", ".join(
             f"{name} ({quantity(sigmas, digits=2)})" for name, sigmas in result.beyond_prior[:MOST_LISTED]

@@ -264,6 +264,18 @@ class CalibrationData(Displayed):
         """Return the time by which the poses' clock is ahead of the lengths' clock [s]; 0 if it is fixed."""
         return float(self._solved.fit.state.x[self._solved.model.parameters.clock])
 
+    @property
+    def carrier_clocks(self) -> tuple[Parameter, ...]:
+        """Return by how much the clock of each carrier is ahead of that of the poses [s], if that was estimated."""
+        clocks = self._solved.clocks
+        if clocks is None:
+            return ()
+        sigmas = np.sqrt(np.diag(clocks.covariance) * self._inflation)
+        return tuple(
+            Parameter(f"{self.file.carriers[i].name}.clock", float(ahead), float(sigma), float(ahead), "s")
+            for i, ahead, sigma in zip(clocks.carriers, clocks.ahead, sigmas, strict=True)
+        )
+
     @cached_property
     def held_out(self) -> HeldOut:
         """Return the cross-validation of these parameters and of smaller sets."""
@@ -297,6 +309,7 @@ class CalibrationData(Displayed):
             "noise": self.noise,
             "autocorrelation": self.autocorrelation,
             "clock": self.clock if "clock" in self.free else None,
+            "carrier_clocks": [one._asdict() for one in self.carrier_clocks],
             "parameters": [
                 {**parameter._asdict(), "sigma": parameter.sigma if np.isfinite(parameter.sigma) else None}
                 for parameter in self.parameters

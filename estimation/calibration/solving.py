@@ -11,6 +11,7 @@ from ..logs.cable_directions import placed
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .balance import Balance
+from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
 from .fit import Fit, fit
@@ -36,13 +37,14 @@ NOISE_OF_FORCES = 0.05, 1e4  # factors of the stated errors of forces
 
 
 class Solved(NamedTuple):
-    """A fit, with outliers, slips and observability."""
+    """A fit, with outliers, slips, observability, and clocks of carriers unless these are known."""
 
     model: Model
     fit: Fit
     outliers: tuple[Outlier, ...]
     slips: tuple[Slip, ...]
     observability: Observability
+    clocks: CarrierClocks | None = None
 
 
 def usual(robot: Robot, measurements: Measurements) -> tuple[str, ...]:
@@ -78,6 +80,9 @@ def solve(
     result, used = fit_from(model, state, length, outliers)
     model, fitted = replace(model, kept=used.kept), used.weights
     model, result = _weighed(model, result, length, False)
+    clocks: CarrierClocks | None = None
+    if has_carrier_clocks(robot, measurements):
+        model, result, clocks = with_carrier_clocks(model, result, measurements, None, length)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
     limit = LARGEST_SHARE * model.weights.size
@@ -107,8 +112,11 @@ def solve(
         model = replace(model, weights=weights)
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
+    if clocks is not None:
+        model, result, clocks = with_carrier_clocks(model, result, measurements, clocks, length)
     seen = observed(model, result.state, length)
-    return Solved(model, result, tuple(wrong.values()), tuple(slips), seen)
+    seen = seen if clocks is None else clocks.widened(seen)
+    return Solved(model, result, tuple(wrong.values()), tuple(slips), seen, clocks)
 
 
 def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Model, Fit, np.ndarray]:

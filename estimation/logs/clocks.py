@@ -11,11 +11,12 @@ from ...models import points
 from ...models.dynamics import Dynamics
 from ...models.robot import Robot
 from .alignment import Clock, align
+from .cable_directions import vectors
 from .carrier_poses import angles_at, carriers_at
 from .mapping import Field, LogMap, carrier_fields
 from .north_east_down import from_ned, ned_frame, platform_from_ned
 from .recording import Recording, Samples, check_rising
-from .streams import Reader
+from .streams import Reader, at_times
 
 MOST_ALIGNED = 200_000  # poses
 FAR_APART = 0.1  # [s] between clocks in one file; calibration and replay find smaller offsets themselves
@@ -25,7 +26,9 @@ STEP, FEWEST, MOST_COMPARED = (
     300,
 )  # [s] of a search, share of the samples that must overlap, and their number
 LONGEST = 1e4  # [s] before and after the middle of a log
-CLEARLY = 0.8  # of the spread of a cable's length, below which another clock is better
+MOST_TRIED, LONGEST_STEP = 8000, 0.2  # offsets, and [s] of a search in a long log
+# Share of the spread of a cable's length, below which another clock is better, and where the platform turns unseen.
+CLEARLY, VERY_CLEARLY = 0.8, 0.5
 SURELY, LIKE = 10.0, 0.8  # standard deviations of such an offset, and the correlation of speeds
 
 
@@ -119,16 +122,61 @@ class Seen(NamedTuple):
     lengths: np.ndarray
 
 
+class _Track(NamedTuple):
+    """What a file of its own has of a carrier: times (K,) [s] and poses (K, 6)."""
+
+    source: Recording
+    times: np.ndarray
+    poses: np.ndarray
+
+
 def set_clocks_of_carriers(
-    robot: Robot, of_poses: Sequence[Recording], all_: Sequence[Recording], given: LogMap | None, seen: Seen
-) -> list[str]:
-    """Set the clocks of carriers that were recorded in files of their own, and return a note on each.
+    robot: Robot, of_poses: Sequence[Recording], all_: Sequence[Recording], given: LogMap | None, seen: Seen | None
+) -> tuple[list[str], bool]:
+    """Set the clocks of carriers that were recorded in files of their own.
 
     The right offset is the one at which the distance from anchor to attachment changes as the length does: hardly, if
-    the lengths are constant. Clocks of one rate are assumed.
+    the lengths are constant. Clocks of one rate are assumed. Without poses of the platform, the directions of the
+    cables of the first such carrier show where the platform is. It returns notes, and if there are such carriers.
     """
-    tracks: dict[int, tuple[Recording, np.ndarray, np.ndarray]] = {}
-    middle = robot.carrier_home[None].copy()  # (1, c, 6)
+    tracks, whose = _tracks(robot, all_, given), "the poses"
+    first = next(iter(tracks), 0)
+    if seen is None:
+        of_poses, whose = [one.source for one in tracks.values()][:1], robot.carriers[first].name
+    of_others = {id(one.source) for one in tracks.values()} - {id(one) for one in of_poses}
+    others = [index for index, one in tracks.items() if id(one.source) in of_others]
+    if not others:
+        return [], False
+    if seen is None:
+        ways = _seen_from(robot, first, tracks[first], all_, given)
+        if not ways:
+            names = ", ".join(robot.carriers[index].name for index in others)
+            hint = f"relative to {whose}: neither poses of the load nor directions of its cable show them"
+            return [f"the clocks of {names} are not known {hint}"], True
+    else:
+        known = seen.poses[np.isfinite(seen.poses[:, :3]).all(axis=1)]
+        middle = robot.carrier_home[None].copy()  # (1, c, 6)
+        for index, track in tracks.items():
+            middle[0, index, :3] = np.median(track.poses[:, :3], axis=0)
+        # Bodies turn about other axes in a frame of north, east, down, which moves the ends of their cables.
+        axis = ned_frame(robot, np.median(known, axis=0, keepdims=True), middle) if len(known) else None
+        if axis is not None:
+            seen = seen._replace(poses=np.asarray(platform_from_ned(robot, seen.poses, axis)))
+            tracks = {index: one._replace(poses=from_ned(one.poses, axis)) for index, one in tracks.items()}
+        ways = [seen]
+    tried = [{index: _offset(robot, index, tracks[index], way) for index in others} for way in ways]
+    notes: list[str] = []
+    for index, (offset, _) in min(tried, key=lambda one: sum(left for _, left in one.values())).items():
+        tracks[index].source.ahead = offset
+        if offset:
+            where = f"{abs(offset):.4f} s {'ahead of' if offset > 0 else 'behind'} that of {whose}"
+            notes.append(f"the clock of {robot.carriers[index].name} is {where}")
+    return notes, True
+
+
+def _tracks(robot: Robot, all_: Sequence[Recording], given: LogMap | None) -> dict[int, _Track]:
+    """Return the recorded motions of moving carriers by their indices."""
+    tracks: dict[int, _Track] = {}
     for index, carrier in enumerate(robot.carriers):
         found = carrier_fields(all_, given, carrier.name)
         if not found.position or not carrier.moves:
@@ -141,24 +189,27 @@ def set_clocks_of_carriers(
         poses = np.hstack([position, np.where(np.isfinite(angles), angles, carrier.home[3:])])
         kept = np.isfinite(position).all(axis=1) & _lasting(own)
         if kept.sum() >= 4:
-            tracks[index] = found.position[0].recording, own[kept], poses[kept]
-            middle[0, index, :3] = np.median(position[kept], axis=0)
-    known = seen.poses[np.isfinite(seen.poses[:, :3]).all(axis=1)]
-    # Bodies turn about other axes in a frame of north, east, down, which moves the ends of their cables.
-    axis = ned_frame(robot, np.median(known, axis=0, keepdims=True), middle) if len(known) else None
-    if axis is not None:
-        seen = seen._replace(poses=np.asarray(platform_from_ned(robot, seen.poses, axis)))
-    notes: list[str] = []
-    for index, (source, own, poses) in tracks.items():
-        if source in of_poses:
-            continue
-        carrier = robot.carriers[index]
-        offset = _offset(robot, index, own, poses if axis is None else from_ned(poses, axis), seen)
-        if offset:
-            source.ahead = offset
-            where = "ahead of" if offset > 0 else "behind"
-            notes.append(f"the clock of {carrier.name} is {abs(offset):.4f} s {where} that of the poses")
-    return notes
+            tracks[index] = _Track(found.position[0].recording, own[kept], poses[kept])
+    return tracks
+
+
+def _seen_from(robot: Robot, index: int, track: _Track, all_: Sequence[Recording], given: LogMap | None) -> list[Seen]:
+    """Return where a carrier's first cable of constant length leads, for each way to read its recorded directions."""
+    found = carrier_fields(all_, given, robot.carriers[index].name)
+    if robot.fixed_lengths is None or not found.directions:
+        return []
+    cables = np.flatnonzero(np.asarray(robot.carrier_of_cable) == index)
+    samples = Reader(found).stream(found.directions)
+    R, lengths = points.rotations(track.poses[:, 3:]), np.tile(robot.fixed_lengths, (len(track.times), 1))
+    start, arm = track.poses[:, :3] + R @ robot.anchors[cables[0]], robot.home_attachments[cables[0]] - robot.home[:3]
+    ways: list[Seen] = []
+    for of in vectors(found.directions, samples.values, len(cables)).values():
+        own = at_times(track.times, Samples(samples.times, of[:, 0]), found.directions[0]).values
+        for d in (own, (R @ own[..., None])[..., 0]):
+            for sign in (1.0, -1.0):
+                at = start + sign * lengths[:, cables[:1]] * d - arm
+                ways.append(Seen(track.times, np.hstack([at, np.full_like(at, np.nan)]), lengths))
+    return [way for way in ways if np.isfinite(way.poses[:, :3]).all(axis=1).any()]
 
 
 def _lasting(times: np.ndarray) -> np.ndarray:
@@ -166,16 +217,19 @@ def _lasting(times: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(times - np.median(np.nan_to_num(times))) <= LONGEST)
 
 
-def _offset(robot: Robot, index: int, times: np.ndarray, poses: np.ndarray, seen: Seen) -> float:
-    """Return by how much the clock of a carrier's poses (K, 6) is ahead [s], 0 if that is not clear."""
+def _offset(robot: Robot, index: int, track: _Track, seen: Seen) -> tuple[float, float]:
+    """Return by how much the clock of a carrier is ahead [s], 0 if that is not clear, and what is left there [m]."""
     from scipy.optimize import minimize_scalar
 
+    times, poses = track.times, track.poses
     cables = np.flatnonzero(np.asarray(robot.carrier_of_cable) == index)
     rows = np.flatnonzero(np.isfinite(seen.poses[:, :3]).all(axis=1) & _lasting(seen.times))
     if not len(rows) or not len(cables):
-        return 0.0
+        return 0.0, 0.0
     rows = rows[np.unique(np.linspace(0, len(rows) - 1, MOST_COMPARED).astype(int))]
-    angles = np.where(np.isfinite(seen.poses[rows, 3:]), seen.poses[rows, 3:], robot.home[3:])
+    turned = np.isfinite(seen.poses[rows, 3:])
+    angles = np.where(turned, seen.poses[rows, 3:], robot.home[3:])
+    clearly = CLEARLY if turned.all() or not robot.dof_mask[3:].any() else VERY_CLEARLY
     ends = seen.poses[rows, None, :3] + robot.attachments[cables] @ np.swapaxes(points.rotations(angles), 1, 2)
     starts = poses[:, None, :3] + robot.anchors[cables] @ np.swapaxes(points.rotations(poses[:, 3:]), 1, 2)  # (K, c, 3)
     flat = starts.reshape(len(starts), -1).T
@@ -189,7 +243,10 @@ def _offset(robot: Robot, index: int, times: np.ndarray, poses: np.ndarray, seen
         apart = np.linalg.norm(moved.reshape(-1, len(cables), 3) - ends[inside], axis=2)
         return float((apart - seen.lengths[rows][inside][:, cables]).std(axis=0).mean())
 
-    tried = np.arange(times[0] - seen.times[rows[-1]], times[-1] - seen.times[rows[0]] + STEP, STEP)
+    low, high = times[0] - seen.times[rows[-1]], times[-1] - seen.times[rows[0]]
+    step = float(np.clip((high - low) / MOST_TRIED, STEP, LONGEST_STEP))
+    tried = np.arange(low, high + step, step)
     best = tried[int(np.argmin([spread(offset) for offset in tried]))]
-    found: Any = minimize_scalar(spread, bounds=(best - STEP, best + STEP), method="bounded", options={"xatol": 1e-5})
-    return float(found.x) if found.fun < CLEARLY * spread(0.0) else 0.0
+    found: Any = minimize_scalar(spread, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-5})
+    as_given = spread(0.0)
+    return (float(found.x), float(found.fun)) if found.fun < clearly * as_given else (0.0, as_given)

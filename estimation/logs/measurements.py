@@ -38,6 +38,7 @@ class Sigma(NamedTuple):
         rotation: Standard deviation of measured orientations, about each axis [rad]; 0: exact.
         tensions: Standard deviation of each tension, relative to it [-].
         directions: Standard deviation of cable directions, about each axis across the cable [rad].
+        clocks: Standard deviation of the carriers' clocks about that of the platform's poses [s]; 0: one clock.
     """
 
     lengths: float = SIGMA
@@ -45,6 +46,7 @@ class Sigma(NamedTuple):
     rotation: float = 0.0
     tensions: float = OF_TENSIONS
     directions: float = OF_DIRECTIONS
+    clocks: float = 0.0
 
 
 class Measurements(Displayed):
@@ -61,8 +63,8 @@ class Measurements(Displayed):
         times: Times of the samples [s], (N,), increasing; a clock offset requires them.
         carrier_poses: Measured poses of the carriers in {G}, (N, c, 6) [m, rad], exact. Default: at home.
         sigma: Standard deviation of the lengths [m], or a mapping with `lengths` [m], `position` [m], `rotation` [rad],
-            `tensions` (relative) and `directions` [rad]. Default: 1 mm, poses that are exact, 2 % of tensions, 0.02
-            rad.
+            `tensions` (relative), `directions` [rad] and `clocks` of carriers [s]. Default: 1 mm, poses that are exact,
+            2 % of tensions, 0.02 rad, one clock.
         directions: Unit vectors in {G} along the cables, from the anchor to the platform, (N, m, 3). Cables with nan
             were not measured; if only z is nan, x and y are the direction seen from above (a swivel angle). Default:
             not measured.
@@ -72,7 +74,7 @@ class Measurements(Displayed):
         poses: (N, 6) [m, rad], nan where not measured, or None.
         tensions, times, carrier_poses, directions: The given arrays, or None; directions have unit length, horizontal
             if azimuths were measured.
-        sigma: `Sigma`: of lengths, positions, rotations, tensions and directions.
+        sigma: `Sigma`: of lengths, positions, rotations, tensions, directions and clocks.
 
     Raises:
         InputError: If an argument has a wrong shape or value; nan in lengths, tensions or times is refused.

@@ -28,6 +28,7 @@ from .streams import Reader, at_times, interpolated, like_time
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
+UNSURE = 0.1  # [s] sigma of clocks of carriers, which a calibration finds more exactly
 AHRS = np.radians(0.5)  # sigma of orientations that no motion capture measured
 
 
@@ -103,13 +104,20 @@ def read_log(
     try:
         found = _fields([*first, *others] if given else first, others, given, known)
         everything = [*first, *others]
+        clocks, apart = list[str](), False
+        if known is not None and len(everything) > 1 and not found.position:
+            clocks, apart = set_clocks_of_carriers(known, [], everything, given, None)
         read = measurements_of(found, everything, sigma, known, given)._replace(recordings=everything)
         moving = [carrier.name for carrier in known.carriers if carrier.moves] if known else []
         of_carriers = [carrier_fields(everything, given, name) for name in moving]
         if not found.position and (unknown := listed(everything, [found, *of_carriers])):
             read.notes.append(f"no positions are read, and of unknown names are {unknown}")
-        if known is not None and len(everything) > 1:
-            _set_clocks(read, known, given)
+        if known is not None and len(everything) > 1 and found.position:
+            clocks, apart = _clocks(read, known, given)
+        read.notes.extend(clocks)
+        if apart and not (isinstance(sigma, Mapping) and "clocks" in sigma):
+            sigmas = {**read.measurements.sigma._asdict(), "clocks": UNSURE}
+            read = read._replace(measurements=read.measurements.with_sigma(sigmas))
         if not carriers:
             return read
         return _with_directions(read if known is None else _with_carriers(read, known, given), known, given)
@@ -125,14 +133,14 @@ def _times(read: Log) -> tuple[np.ndarray | None, np.ndarray | None]:
     return times, read.clock.offset + read.clock.rate * times
 
 
-def _set_clocks(read: Log, robot: Robot, given: LogMap | None) -> None:
-    """Set the clocks of carriers in files of their own, where poses of the platform show them."""
+def _clocks(read: Log, robot: Robot, given: LogMap | None) -> tuple[list[str], bool]:
+    """Set the clocks of carriers in files of their own by the poses of the platform, as `set_clocks_of_carriers`."""
     measured, seen = read.measurements, _times(read)[1]
     if seen is None or measured.poses is None or measured.m != robot.m:
-        return
+        return [], False
     of_platform = {id(one.recording): one.recording for one in (*read.fields.position, *read.fields.lengths)}
     along = Seen(seen, measured.poses, lengths_of(robot, measured.lengths))
-    read.notes.extend(set_clocks_of_carriers(robot, list(of_platform.values()), read.recordings, given, along))
+    return set_clocks_of_carriers(robot, list(of_platform.values()), read.recordings, given, along)
 
 
 def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
@@ -220,7 +228,10 @@ def _fields(
         times = found.time + of_poses.time
         found = found._replace(position=of_poses.position, orientation=of_poses.orientation, time=times)
     seen = found.position or found.directions
-    if not found.lengths and not (robot is not None and robot.fixed_lengths is not None and seen):
+    if not found.lengths and not seen and robot is not None and robot.fixed_lengths is not None:
+        wanted = "positions of the platform or directions of the cables, whose lengths are fixed"
+        raise InputError(f"must have {wanted}, got {listed(all_)}")
+    if not found.lengths and (robot is None or robot.fixed_lengths is None):
         raise InputError(f"must have columns l0, l1, ... of lengths, got {listed(all_)}")
     return found
 
@@ -243,6 +254,8 @@ def measurements_of(
     lengths = read.stream(main_fields)
     if not found.lengths and robot is not None:  # constant ones
         lengths = Samples(lengths.times, np.tile(np.asarray(robot.fixed_lengths), (len(lengths.values), 1)))
+    if not len(lengths.values):
+        raise InputError(f"{main.full} and fields like it must have samples at the same times, got none")
     tensions = read.stream(found.tensions) if found.tensions else None
     if tensions is not None and (np.nanmedian(tensions.values, axis=0) < 0).all():
         notes.append("all tensions are negative, so they are read with the other sign")
