@@ -259,8 +259,8 @@ def _show(result: xr.Dataset, summary: dict[str, Any], size: float | None, reaso
         more = f", not {size:g} m, which takes more samples" if larger else ""
         typer.echo(f"  edges of the smallest cells up to {quantity(longest, 'm', digits=3)}{more}")
     if accepted:
-        for name, (least, most) in summary["bounds"].items():
-            typer.echo(f"  {name} from {quantity(least)} to {quantity(most, 'm')}")
+        for name, ends in summary["bounds"].items():
+            typer.echo(f"  {name} {quantity_range(ends, 'm')}")
     for name, of in summary.get("metrics", {}).items():
         unit = of["unit"].replace("1", "")
         text = "no value" if of["min"] is None else quantity_range((of["min"], of["max"]), unit, digits=4)

@@ -9,7 +9,7 @@ import xarray as xr
 
 from towline import methods
 from towline.cli.tension import METHODS
-from towline.cli.workspace import CONDITIONS
+from towline.cli.workspace import CONDITIONS, _show
 from towline.workspace import Condition
 
 from .warm import towline
@@ -149,3 +149,12 @@ def test_a_picture_of_another_format_is_refused_before_any_work(folder):
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
     assert ".png, .pdf, .svg, got f.jpg" in done.stderr
+
+
+def test_both_ends_of_a_range_have_one_unit(capsys):
+    """Of a robot of a millimetre: no metres before millimetres."""
+    summary = {"robot": "micro", "accepted": 9, "samples": 10, "volume": 2e-6, "volume_unit": "m^2", "seconds": 1.0}
+    summary |= {"volume_interval": [np.nan, np.nan], "bounds": {"x": [-7.754e-4, 7.831e-4], "y": [0.0, 0.0]}}
+    _show(xr.Dataset(), summary, None, None)
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[2:4] == ["  x -0.78 to 0.78 mm", "  y 0 m"]
