@@ -86,7 +86,8 @@ void towline_computed_torque(const towline_gains *gains, const towline_reference
  * TOWLINE_OPTIMAL     they give the desired acceleration, as close to t_ref as possible.
  * TOWLINE_INFEASIBLE  none do: soft solution, the tensions with the smallest wrench error. `direction` is
  * TOWLINE_SINGULAR    the certificate: no tensions within the limits reach the required wrench along it, by `shortfall`
- *                     newtons. Its first three entries have no unit, the others 1/m. Singular: not even outside the limits.
+ *                     newtons. Its first three entries have no unit, the others 1/m. Singular: tensions outside the limits
+ *                     do not reach it either.
  * TOWLINE_INACCURATE  rounding prevents a proof of any of these: soft solution.
  * TOWLINE_INVALID     the input is invalid (NaN, infinite, a cable of zero length), or the last command is not finite, or
  *                     rate_max is NaN or negative: the last command, held.
