@@ -86,6 +86,15 @@ def test_lengths_and_mass_of_a_flown_load(recording, tmp_path):
     assert max(sigmas) < 3e-4
 
 
+@pytest.mark.parametrize("apart", [5, 8])
+def test_mass_from_slow_recordings(recording, apart):
+    """At 10 and 6.25 Hz a load is still in motion: taken as at rest, its mass was wrong by up to 40 %."""
+    log = read_measurements(recording[0], robot=NAME).only(slice(0, None, apart))
+    result = calibrate(NAME, log, ("offsets", "mass"))
+    mass = result.parameters[-1]
+    assert abs(mass.value - MASS) < 4 * mass.sigma < 0.1
+
+
 def test_what_a_log_of_carriers_can_be_used_for(recording, tmp_path):
     listed = run("log", recording[0], code=1)
     assert "or give the robot (--robot)" in listed.stdout

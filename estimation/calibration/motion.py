@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, measured_poses
-from ..logs.smoothing import FEWEST, SPAN, Parabolas, continuous, within
+from ..logs.smoothing import FEWEST, Parabolas, continuous, within
 from .parameters import Parameters
+
+SLOWEST = 0.2  # [s] between samples of a motion; platforms rest at poses that are farther apart
 
 
 class Motion(NamedTuple):
@@ -58,7 +60,7 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
     count, times = len(measurements), measurements.times
     gravity, zero = np.tile(robot.gravity, (count, 1)), np.zeros((count, 3))
     rest = Motion(np.zeros((count, robot.m)), gravity, zero, zero, zero, np.zeros(count))
-    if times is None or count < 2 * FEWEST + 1 or np.median(np.diff(times)) > SPAN / FEWEST:
+    if times is None or count < 2 * FEWEST + 1 or np.median(np.diff(times)) > SLOWEST:
         return rest
     from scipy.special import erf
 

@@ -25,7 +25,7 @@ from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
 from .attitudes import misread_attitudes
-from .frames import displaced_frames, fitted_frames
+from .frames import Frames, displaced_frames, fitted_frames
 from .geometry import length_of, runs
 from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
@@ -147,13 +147,19 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
         lengths, y = _parts(log._replace(position=moved[0][rows], rotation=moved[1][rows]), Interpretation(""))
         size = _rms(_medians(lengths - y[order, order], len(rows)))
         if VERY_CLEARLY * size < min(as_given, best.size) and size < EXPLAINED * change:
-            return Mistake(_better(str(frames), as_given, size), _corrected(given, *moved, None, order, 1.0))
+            return Mistake(_in_frame(frames._replace(size=size), as_given), _corrected(given, *moved, None, order, 1.0))
     if named:
         whole = log._replace(position=position, rotation=rotation, angles=angles, carriers=carriers)
         factors = best.signs * best.way.factor
         corrected = None if best.several else _corrected(given, *whole.at(best.way), best.columns, factors)
         return Mistake(_better(best.text, as_given, best.size), corrected, factors=factors)
     return None if far or not framed else _displaced(log, given, noise)
+
+
+def _in_frame(frames: Frames, before: float) -> str:
+    """Return the error of poses in another frame, with what it means for a calibration."""
+    text = _better(str(frames), before, frames.size)
+    return f"{text}; the file's anchors show where that frame is, so sigmas of anchors do not include its own error"
 
 
 def _better(text: str, before: float, after: float) -> str:
@@ -188,7 +194,7 @@ def _displaced(log: _Log, given: Measurements, noise: float) -> Mistake | None:
     frames, before = found
     position, rotation, _ = measured_poses(log.robot, given)
     corrected = _corrected(given, *frames.of(position, rotation), None, np.arange(log.robot.m), 1.0)
-    return Mistake(_better(str(frames), before, frames.size), corrected, severe=False)
+    return Mistake(_in_frame(frames, before), corrected, severe=False)
 
 
 def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], float]:
