@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
+from towline.ocp.proofs.infeasible_ends import infeasible_ends
 from towline.ocp.proofs.too_fast import too_fast
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
@@ -88,3 +89,22 @@ def test_cables_are_too_fast_where_their_lengths_change_too_much():
         plan(ROBOT, task | {"limits": {"cable_speed": 0.98 * change / 2}}).stages[0].message.startswith("cable_speed")
     )
     assert not plan(ROBOT, task | {"limits": {"cable_speed": 3 * change / 2}}).stages[0].message
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_duration_is_too_short_for_the_strength_of_all_cables(share):
+    """Bang-bang control with all of t_max and gravity along the line takes T = 2 sqrt(d / a), and no motion less."""
+    most = ROBOT.t_max.sum() / ROBOT.platform.mass + 9.81
+    line = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
+    seconds = share * 2 * np.sqrt(np.linalg.norm([0.5, 0.3, 0.2]) / most)
+    task = {"path": line, "duration": seconds, "tube": {"position": 0.05}, "steps": 20}
+    proof = infeasible_ends(lay_out(ROBOT, read_task(task)))
+    assert (proof is not None) == (share < 1)
+    if proof is not None:
+        (excess,) = proof.excess
+        assert (excess.limit, excess.bound) == ("duration", pytest.approx(seconds / share))
+        planned = plan(ROBOT, task)
+        assert planned.status is MotionStatus.INFEASIBLE
+        (offer,) = planned.relaxations
+        assert offer.name == "duration"
+        assert plan(ROBOT, task | {"duration": offer.possible}).feasible

@@ -10,12 +10,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...base.text import quantity
+from ...models.points import placed
 from ..audits.excess import Excess
 from ..limits import Limit
 from ..limits.cables import CableSpeed
 from ..limits.carriers import CarrierAcceleration, CarrierSpeed
 from ..limits.platform import PlatformAcceleration, PlatformSpeed
 from ..tasks.scenario import Scenario
+
+OF_DURATION = "duration"
+CERTAIN = 1e-6  # of the duration
 
 
 def too_fast(
@@ -29,6 +34,7 @@ def too_fast(
     - `spread`: how far each of them, and every point of the platform, may be from its place, (1 + c, n) [m].
     - `resting`: which of them are at rest at both ends, (1 + c,) of bool.
     """
+    yield from _too_short(scenario, times, places[0], spread[0], bool(resting[0]))
     lengths = None
     for limit in scenario.limits:
         if limit.soft is not None:
@@ -44,6 +50,26 @@ def too_fast(
             yield from _mean_rate(limit, times, lengths, (spread[0] + spread[1:][scenario.robot.carrier_of_cable]).T)
         elif isinstance(limit, PlatformAcceleration | CarrierAcceleration):
             yield from _acceleration(limit, times, x[:, 0], off[:, 0], bool(resting[body]))
+
+
+def _too_short(
+    scenario: Scenario, times: np.ndarray, poses: np.ndarray, off: np.ndarray, rests: bool
+) -> Iterator[Excess]:
+    """Yield a duration that is too short for all cables together to accelerate the platform's CoM and stop it again.
+
+    The acceleration at some time is at least four times the distance divided by the square of the duration. No cable
+    gives more than its largest tension, and the weight helps by at most itself.
+    """
+    robot = scenario.robot
+    if not rests or scenario.wind is not None or scenario.phases.all:
+        return
+    ends = placed(poses[[0, -1]], np.array([robot.platform.com]))[:, 0]
+    moved = float(np.linalg.norm(ends[1] - ends[0]) - off[-1] - off[0])
+    most = float(robot.t_max.sum()) / robot.platform.mass + float(np.linalg.norm(robot.gravity))
+    whole, least = float(times[-1] - times[0]), 2 * np.sqrt(max(moved, 0.0) / most)
+    if whole < (1 - CERTAIN) * least:
+        why = f"all cables together, each with t_max, and gravity accelerate it by at most {quantity(most, 'm/s^2')}"
+        yield Excess(OF_DURATION, "platform", 0.0, whole, float(least), "s", "at least", why)
 
 
 def _mean_rate(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray) -> Iterator[Excess]:

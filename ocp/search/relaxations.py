@@ -49,7 +49,7 @@ class Change(NamedTuple):
 def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return what would make a fixed motion feasible; `left` are the durations that the tensions allow."""
     chosen = _soft_limits(search, None) if other_tensions_may_pass(scenario, audit) else []
-    return _other_duration(search, scenario, left, audit) + (chosen or _other_limits(search, scenario, None, audit))
+    return other_duration(search, scenario, left, audit) + (chosen or _other_limits(search, scenario, None, audit))
 
 
 def near_motion(
@@ -60,7 +60,7 @@ def near_motion(
     return (_longer_duration(search) if slower_helps else []) + limits
 
 
-def _other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+def other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return the nearest duration at which a scenario's fixed motion is possible, if one is known.
 
     Speeds fall with the duration, accelerations with its square; `left` are the durations that the tensions allow.

@@ -2,20 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
 from ...base.text import quantity
 from ...models import Robot
-from ...solvers import solve_batch
 from ...solvers.margins import margins
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
 from ..audits.tensions import scaled
 from ..global_path.at_rest import AtRest
-from ..nlp.rows import Mesh
 from ..plan import Plan
+from ..proofs.durations import durations
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
@@ -25,21 +23,17 @@ from ..tasks.paths.shifted import shifted
 from ..tasks.phase import Load
 from ..tasks.scenario import POSITION, Scenario
 from ..tasks.status import MotionStatus
+from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
-from .relaxations import LONGER, near_motion, rounded, slower, solved
+from .largest_share import HALVINGS, RESERVES, Variation, largest_share
+from .relaxations import LONGER, near_motion, other_duration, rounded, slower
 from .search import Search
 
-INSTANTS = 120  # at which tensions are asked for before a motion is audited
-HALVINGS = 10
-RESERVES = 1.0, 0.98, 0.9  # of what has tensions at these instants, one after the other until the audit passes
 PLACES = 31  # of a path, at which a shifted one is compared
 SHIFT_STEP = 1.3  # of a shift to the next one that is tried
 SHIFTS = SHIFT_STEP ** np.arange(-36, 0)  # that are tried, in parts of the distance between the farthest anchors
 YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
-
-Variation: TypeAlias = tuple[Scenario, float, str]
-"""A varied task laid out, the value that it differs by, and what is said of it behind that."""
 
 
 def near_chosen_motion(
@@ -55,7 +49,10 @@ def near_chosen_motion(
     if scenario.carrier_free:  # only what is proven of it tells how near an end must be
         proof = infeasible_ends(scenario)
         return [] if proof is None or proof.certificate is None else _nearer_end(search, scenario)
-    return stronger_or_nearer(search, scenario, search.audit_motion(scenario, None, "audit of the path"))
+    along = search.audit_motion(scenario, None, "audit of the path")
+    exact = lay_out(scenario.robot, scenario.task.model_copy(update={"tube": Tube()}))
+    found = other_duration(search, scenario, durations(exact), along) if slower_helps else []
+    return found or stronger_or_nearer(search, scenario, along)
 
 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -113,7 +110,9 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
         return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place})"
 
     return (
-        _largest(search, to, "part of the rotation", "%") if turns else _largest(search, to, "length of the line", "m")
+        largest_share(search, to, "part of the rotation", "%")
+        if turns
+        else largest_share(search, to, "length of the line", "m")
     )
 
 
@@ -141,7 +140,7 @@ def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
         return _along(scenario, type(path).model_validate(data)), share * fastest, push.removeprefix(", ")
 
     name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
-    return _largest(search, at, name, unit, up=fastest < 0, most=1.0 / max(factors, default=1.0))
+    return largest_share(search, at, name, unit, up=fastest < 0, most=1.0 / max(factors, default=1.0))
 
 
 def _shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -221,7 +220,7 @@ def _other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
         detail = ", ".join([f"instead of {quantity(given[0], 'rad')}", *others])
         return _along(scenario, path_with_yaws), float(yaws[0]), detail
 
-    found = _largest(search, with_yaws, f"yaw at {names[wrong[0]]}", "rad", up=bool(back[0] > 0))
+    found = largest_share(search, with_yaws, f"yaw at {names[wrong[0]]}", "rad", up=bool(back[0] > 0))
     return [replace(each, requested=float(given[0])) for each in found]
 
 
@@ -264,7 +263,7 @@ def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
         task = scenario.task.model_copy(update={"wind": tuple((share * velocity).tolist())})
         return lay_out(scenario.robot, task), share * speed, f"instead of {quantity(speed, 'm/s')}"
 
-    return _largest(search, with_wind, "wind", "m/s")
+    return largest_share(search, with_wind, "wind", "m/s")
 
 
 def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -284,7 +283,7 @@ def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
 
         return _carrying(scenario, lighter), share * mass, f"instead of {quantity(mass, 'kg')}{every}"
 
-    return _largest(search, with_loads, f"phases[{masses.index(mass)}].load.mass", "kg")
+    return largest_share(search, with_loads, f"phases[{masses.index(mass)}].load.mass", "kg")
 
 
 def _surer_load(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -299,7 +298,7 @@ def _surer_load(search: Search, scenario: Scenario) -> list[Relaxed]:
 
         return _carrying(scenario, surer), 100 * share, "of the task's"
 
-    return _largest(search, with_loads, "mass_tolerance and com_tolerance of the loads", "%")
+    return largest_share(search, with_loads, "mass_tolerance and com_tolerance of the loads", "%")
 
 
 def _carrying(scenario: Scenario, change: Callable[[Load], Load]) -> Scenario:
@@ -322,7 +321,7 @@ def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
         lighter = Robot.model_validate(data | {"platform": platform})
         return lay_out(lighter, scenario.task), share * mass, f"instead of {quantity(mass, 'kg')}"
 
-    return _largest(search, with_mass, "platform.mass", "kg")
+    return largest_share(search, with_mass, "platform.mass", "kg")
 
 
 def _stronger_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -336,7 +335,7 @@ def _stronger_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
         stronger = Robot.model_validate(data | {"cables": cables})
         return lay_out(stronger, scenario.task), factor * largest, f"instead of {quantity(largest, 'N')}{others}"
 
-    return _largest(search, with_limits, "cables.t_max", "N", up=True)
+    return largest_share(search, with_limits, "cables.t_max", "N", up=True)
 
 
 def _slacker_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -351,49 +350,4 @@ def _slacker_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
         slacker = Robot.model_validate(data | {"cables": cables})
         return lay_out(slacker, scenario.task), share * largest, f"instead of {quantity(largest, 'N')}{others}"
 
-    return _largest(search, with_limits, "cables.t_min", "N")
-
-
-def _largest(
-    search: Search, make: Callable[[float], Variation], name: str, unit: str, up: bool = False, most: float = 1.0
-) -> list[Relaxed]:
-    """Return the variation with the largest share, from 0 to `most`, that passes its audit; [] if none is found."""
-    low, high = 0.0, most
-    for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if _may_be_feasible(make(middle)[0]) else (low, middle)
-    if low == 0.0:
-        return []
-    for reserve in RESERVES[1:] if make(low)[0].carrier_free else RESERVES:
-        varied, value, detail = make(reserve * low)
-        deviation = None
-        if varied.carrier_free:
-            outcome = solved(search, varied, None, Mesh(varied.task.steps))
-            if not outcome.success:
-                continue
-            deviation = outcome.deviation
-        audit = search.audit_motion(varied, deviation, f"audit, other {name}")
-        if audit.passed:
-            plan = Plan(varied, MotionStatus.FEASIBLE, deviation, audit, 0.0, 0.0)
-            return [Relaxed(name, unit, make(1.0)[1], rounded(value, up), plan, detail)]
-    return []
-
-
-def _may_be_feasible(scenario: Scenario) -> bool:
-    """Return whether tensions inside their limits exist at some instants of a fixed motion, off the ground.
-
-    If carriers are free, return whether nothing proves that they cannot hold the platform.
-    """
-    if scenario.carrier_free:
-        return infeasible_ends(scenario) is None
-    times = np.linspace(0.0, scenario.duration, INSTANTS)
-    times = times[~scenario.phases.resting(times)]
-    platform, carriers = scenario.motion(times, None)
-    mask = scenario.robot.dof_mask
-    A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
-    low, high = scenario.bounds_at(times)
-    for extreme in (None, *range(scenario.phases.extremes)):
-        w = scenario.required_wrench(times, platform, carriers, scenario.wind, extreme) * mask
-        if (solve_batch(A, w, low, high, length=scenario.robot.length).code != 0).any():
-            return False
-    return True
+    return largest_share(search, with_limits, "cables.t_min", "N")

@@ -1,0 +1,68 @@
+"""Find the largest variation of a task that is feasible: `largest_share`."""
+
+from collections.abc import Callable
+from typing import TypeAlias
+
+import numpy as np
+
+from ...solvers import solve_batch
+from ..nlp.rows import Mesh
+from ..plan import Plan
+from ..proofs.infeasible_ends import infeasible_ends
+from ..result import Relaxed
+from ..tasks.scenario import Scenario
+from ..tasks.status import MotionStatus
+from .relaxations import rounded, solved
+from .search import Search
+
+INSTANTS = 120  # at which tensions are asked for before a motion is audited
+HALVINGS = 10
+RESERVES = 1.0, 0.98, 0.9  # of what has tensions at these instants, one after the other until the audit passes
+
+Variation: TypeAlias = tuple[Scenario, float, str]
+"""A varied task laid out, the value that it differs by, and what is said of it behind that."""
+
+
+def largest_share(
+    search: Search, make: Callable[[float], Variation], name: str, unit: str, up: bool = False, most: float = 1.0
+) -> list[Relaxed]:
+    """Return the variation with the largest share, from 0 to `most`, that passes its audit; [] if none is found."""
+    low, high = 0.0, most
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _may_be_feasible(make(middle)[0]) else (low, middle)
+    if low == 0.0:
+        return []
+    for reserve in RESERVES[1:] if make(low)[0].carrier_free else RESERVES:
+        varied, value, detail = make(reserve * low)
+        deviation = None
+        if varied.carrier_free:
+            outcome = solved(search, varied, None, Mesh(varied.task.steps))
+            if not outcome.success:
+                continue
+            deviation = outcome.deviation
+        audit = search.audit_motion(varied, deviation, f"audit, other {name}")
+        if audit.passed:
+            plan = Plan(varied, MotionStatus.FEASIBLE, deviation, audit, 0.0, 0.0)
+            return [Relaxed(name, unit, make(1.0)[1], rounded(value, up), plan, detail)]
+    return []
+
+
+def _may_be_feasible(scenario: Scenario) -> bool:
+    """Return whether tensions inside their limits exist at some instants of a fixed motion, off the ground.
+
+    If carriers are free, return whether nothing proves that they cannot hold the platform.
+    """
+    if scenario.carrier_free:
+        return infeasible_ends(scenario) is None
+    times = np.linspace(0.0, scenario.duration, INSTANTS)
+    times = times[~scenario.phases.resting(times)]
+    platform, carriers = scenario.motion(times, None)
+    mask = scenario.robot.dof_mask
+    A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
+    low, high = scenario.bounds_at(times)
+    for extreme in (None, *range(scenario.phases.extremes)):
+        w = scenario.required_wrench(times, platform, carriers, scenario.wind, extreme) * mask
+        if (solve_batch(A, w, low, high, length=scenario.robot.length).code != 0).any():
+            return False
+    return True
