@@ -123,7 +123,7 @@ class Seen(NamedTuple):
 
 
 class _Track(NamedTuple):
-    """What a file of its own has of a carrier: times (K,) [s] and poses (K, 6)."""
+    """The recording of a carrier in a file of its own: times (K,) [s] and poses (K, 6) [m, rad]."""
 
     source: Recording
     times: np.ndarray
