@@ -16,7 +16,7 @@ from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 from ..solvers import solve_batch
-from ..statics.stops import SOFT
+from ..solvers.in_place import RHO
 from .reference import Reference
 from .trajectory import HasTrajectory, read_trajectory, samples_of
 
@@ -84,4 +84,4 @@ def _tensions_along(robot: Robot, platform: Motion, carriers: Motion, loads: Seq
         moving, bases = [part[rows] for part in platform], [part[rows] for part in carriers]
         A[rows] = dynamics.wrench_matrix(moving[0], bases[0]) * mask[:, None]
         w[rows] = dynamics.required_wrench(*moving, *bases) * mask
-    return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=SOFT).tensions
+    return solve_batch(A, w, robot.t_min, robot.t_max, length=robot.length, rho=RHO).tensions

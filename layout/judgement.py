@@ -11,11 +11,11 @@ from ..solvers import TensionProblem, capacity_margin, solve_batch
 from ..solvers.margins import margins
 from ..statics.stiffness import natural_frequencies
 from ..workspace.conditions.interference import least_distance, outside
+from ..workspace.feasibility import NEAREST
 from .evaluation import Rows
 from .room import Room
 
 _JUDGED = 100  # worst rows, by `capacity_margin`
-_RHO = 1e10  # weight of the wrench error: so large that the tensions do not change it
 
 
 class Judgement(NamedTuple):
@@ -70,7 +70,7 @@ def judged_margin(robot: Robot, length: float, rows: Rows) -> float:
     values = margins(A, w, robot.t_min, robot.t_max)
     outside = np.flatnonzero((values < 0.0) & np.isfinite(values))  # where the margins are bounds of the distances
     if outside.size:
-        values[outside] = -solve_batch(A[outside], w[outside], robot.t_min, robot.t_max, rho=_RHO).residual
+        values[outside] = -solve_batch(A[outside], w[outside], robot.t_min, robot.t_max, rho=NEAREST).residual
     worst = np.argsort(values)[:_JUDGED]
     return min(capacity_margin(TensionProblem(A[k], w[k], robot.t_min, robot.t_max)).value for k in worst)
 

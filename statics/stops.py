@@ -28,8 +28,9 @@ from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory, moved_on
 from ..solvers import Certificate, certify, solve_batch
 from ..solvers.available_wrench import facets
+from ..solvers.in_place import RHO
 from .distribution import wrench_problem
-from .team_stops import TeamStop, team_stop_along
+from .team_stops import RESTS, TeamStop, team_stop_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,9 +47,7 @@ LITTLE = 1e-3  # of the robot's forces: a wrench that is missed by less matters 
 ROOM = 1.0  # [1/s], between the least and the largest u
 LONGEST = 60.0  # [s]
 STILL = 1e-9  # of the rate
-RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
 FLAT = 1e-12  # of the robot's forces: a facet along which u changes less does not bound it
-SOFT = 1e8  # weight of the wrench where no tensions give it
 MISSING = 1e-7  # of the robot's forces: a wrench that is missed by less is given
 
 
@@ -356,7 +355,7 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[float, St
     w = dynamics.required_wrench(*slowed, wind=trajectory.wind)
     A, w = A * mask[:, None], w * mask
     near = None if trajectory.tensions is None else np.nan_to_num(trajectory.tensions(law.tau))
-    tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=SOFT).tensions
+    tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=RHO).tensions
     missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1)
     worst = int(np.argmax(missing))
     broken = missing[worst] > MISSING * robot.force_scale

@@ -17,6 +17,7 @@ from .robust_limits import Tightened
 
 PLACES_AT_ONCE = 8192
 ONLY_EXACT = 0.01  # of the force scale
+NEAREST = 1e10  # weight of the wrench error, so large that the tensions do not change the nearest wrench
 
 
 def rest_wrench(robot: Robot) -> np.ndarray:

@@ -9,10 +9,8 @@ from ...models import Robot
 from ...models.part import NonNegative
 from ...solvers import solve_batch
 from ..condition import Condition
-from ..feasibility import rest_wrench, scaled, wrench_matrices, wrench_rows
+from ..feasibility import NEAREST, rest_wrench, scaled, wrench_matrices, wrench_rows
 from ..places import Places, check_places
-
-_RHO = 1e10  # weight of the wrench error relative to the tensions: so large that these do not change it
 
 
 class WrenchWithTolerance(Condition):
@@ -39,8 +37,8 @@ class WrenchWithTolerance(Condition):
         check_places(robot, places)
         rows = wrench_rows(robot)
         w = scaled(robot, rest_wrench(robot), rows)
-        error = np.zeros(len(places))
+        error, limits = np.zeros(len(places)), (robot.t_min, robot.t_max)
         for part, A in wrench_matrices(robot, places, rows):
-            short = np.flatnonzero(~solve_batch(A, w, robot.t_min, robot.t_max, threads=1).feasible)
-            error[part.start + short] = solve_batch(A[short], w, robot.t_min, robot.t_max, rho=_RHO, threads=1).residual
+            short = np.flatnonzero(~solve_batch(A, w, *limits, threads=1).feasible)
+            error[part.start + short] = solve_batch(A[short], w, *limits, rho=NEAREST, threads=1).residual
         return np.nan_to_num(error, nan=np.inf)
