@@ -23,6 +23,7 @@ from .nlp.rows import Mesh
 from .plan import Plan
 from .proofs.durations import Durations, durations
 from .proofs.infeasible_ends import infeasible_ends
+from .proofs.too_little_power import too_little_power
 from .result import Relaxed
 from .search.homotopy import from_easier
 from .search.reference import about_better_reference
@@ -72,6 +73,11 @@ def _fixed_motion(search: Search) -> Plan:
     spent = time.perf_counter() - start
     status, reason = MotionStatus.FEASIBLE if audit.passed else MotionStatus.INFEASIBLE, ""
     if not audit.passed and other_tensions_may_pass(search.scenario, audit):
+        if proven := too_little_power(search.scenario):
+            audit = replace(audit, excess=proven)
+            left = _durations(search, search.scenario)
+            offers = partial(_offers, search, search.scenario, left, audit)
+            return Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, offers=offers)
         chosen = _free_motion(search, None)
         if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, audit):
             return chosen

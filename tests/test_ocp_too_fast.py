@@ -108,3 +108,26 @@ def test_a_duration_is_too_short_for_the_strength_of_all_cables(share):
         (offer,) = planned.relaxations
         assert offer.name == "duration"
         assert plan(ROBOT, task | {"duration": offer.possible}).feasible
+
+
+@pytest.mark.parametrize("name", ["ipanema-1", "cogiro", "planar-4"])
+def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
+    """Half a percent less is proven infeasible, and with a little more, for what happens between, a plan has it."""
+    robot = load(name)
+    start = np.array(robot.home[:3])
+    line = {"kind": "line", "start": start.tolist(), "end": (start + np.array([0.3, 0.0, 0.2])).tolist()}
+    task = {"path": line, "duration": 1.0}
+
+    def planned(power):
+        return plan(robot, task | {"limits": {"winch_power": power}})
+
+    (excess,) = planned(0.01).audit.excess
+    least = excess.value
+    rate, moment = 1e-4, excess.time
+    poses = lay_out(robot, read_task(task)).path.at(moment + rate * np.array([-1.0, 0.0, 1.0]), 1.0)
+    before, _, after = Dynamics(robot).cable_lengths(poses.pose)
+    assert planned(0.99 * least).status is MotionStatus.INFEASIBLE
+    enough = planned(1.03 * least)
+    assert enough.feasible
+    row = int(np.abs(enough.audit.times - moment).argmin())
+    assert (np.abs(after - before) / (2 * rate) * enough.audit.tensions[row]).max() <= 1.03 * least * (1 + 1e-3)

@@ -96,11 +96,11 @@ def other_duration(search: Search, scenario: Scenario, left: Durations | None, a
 
 
 def slower(excess: Excess) -> float:
-    """Return the factor of the duration that brings a speed or an acceleration to its bound; 1 for other limits."""
+    """Return the factor of the duration that brings a speed, power or acceleration to its bound; 1 for other limits."""
     if not excess.bound or not excess.value / excess.bound > 1:
         return 1.0
     ratio = excess.value / excess.bound
-    return ratio**0.5 if excess.unit.endswith("/s^2") else ratio if excess.unit.endswith("/s") else 1.0
+    return ratio**0.5 if excess.unit.endswith("/s^2") else ratio if excess.unit.endswith(("/s", "W")) else 1.0
 
 
 def _other_limits(

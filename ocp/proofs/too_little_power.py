@@ -1,0 +1,48 @@
+"""Prove that no tensions give a fixed motion with winches of so little power: `too_little_power`.
+
+The rates of the cables are given, so the power of a winch is proportional to its tension. At each instant a linear
+program finds the tensions whose largest power is least.
+"""
+
+import numpy as np
+
+from ..audits.excess import Excess
+from ..limits.cables import WinchPower
+from ..tasks.scenario import Scenario
+
+PLACES = 41
+STEP = 1e-5  # of the duration, over which lengths are compared
+CERTAIN = 1e-3  # of the power
+
+
+def too_little_power(scenario: Scenario) -> list[Excess]:
+    """Return the largest least power of a fixed motion if it is more than its winches may have, else nothing."""
+    from scipy.optimize import linprog
+
+    limits = [limit for limit in scenario.limits if isinstance(limit, WinchPower) and limit.soft is None]
+    times = np.linspace(0.0, scenario.duration, PLACES)[1:-1]
+    times = times[~scenario.phases.resting(times)]
+    if not limits or not len(times):
+        return []
+    (limit,), robot, step = limits, scenario.robot, STEP * scenario.duration
+    platform, carriers = scenario.motion(times, None)
+    later, sooner = (
+        scenario.dynamics.cable_lengths(*(part.pose for part in scenario.motion(times + shift, None)))
+        for shift in (step, -step)
+    )
+    rates = np.abs(later - sooner) / (2 * step)
+    scale = robot.wrench_scale * robot.dof_mask / robot.force_scale
+    A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * scale[:, None]
+    w = scenario.required_wrench(times, platform, carriers, scenario.wind) * scale
+    low, high = scenario.bounds_at(times)
+    cost, worst = np.append(np.zeros(robot.m), 1.0), list[Excess]()
+    for k, time in enumerate(times.tolist()):
+        rows = np.column_stack([np.diag(rates[k] / limit.high), np.full(robot.m, -1.0)])
+        bounds = [*zip(low[k], high[k], strict=True), (0.0, None)]
+        equal = np.column_stack([A[k], np.zeros(6)])
+        found = linprog(cost, A_ub=rows, b_ub=np.zeros(robot.m), A_eq=equal, b_eq=w[k], bounds=bounds, method="highs")
+        if found.success and found.fun > (worst[0].value / limit.high if worst else 1.0 + CERTAIN):
+            power, cable = limit.high * found.fun, int((rates[k] * found.x[:-1]).argmax())
+            why = "the least of all tensions"
+            worst = [Excess(limit.name, limit.labels[cable], time, power, limit.high, limit.unit, "at most", why)]
+    return worst
