@@ -3,8 +3,6 @@
 import importlib.util
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -65,9 +63,10 @@ def test_qpbenchmark_runs_it_from_its_own_command_line(tmp_path):
     (copy / "results").mkdir()
     (copy / "cdpr_qpbenchmark.py").write_bytes((FOLDER / "cdpr_qpbenchmark.py").read_bytes())
     (copy / "data" / "cdpr.parquet").write_bytes((FOLDER / "data" / "cdpr.parquet").read_bytes())
-    command = [sys.executable, "cdpr_qpbenchmark.py", "run", "--author", "test", "--problem", "STATIC000"]
+    options = ("--author", "test", "--problem", "STATIC000", "--solver")
     for solver in ("towline", "daqp"):
-        subprocess.run([*command, "--solver", solver], cwd=copy, check=True, capture_output=True, timeout=60)
+        done = warm.run(copy / "cdpr_qpbenchmark.py", "run", *options, solver, cwd=copy)
+        assert done.returncode == 0, done.stderr
     report = (copy / "results" / "cdpr_qpbenchmark.md").read_text()
     assert "## Results by settings" in report
     rows = (copy / "results" / "qpbenchmark_results.csv").read_text().splitlines()
