@@ -328,6 +328,21 @@ def test_carriers_that_the_task_holds_may_be_moved_where_tensions_are_missing():
     assert plan("wang-flying", {"path": circle, "base": {"kind": "free", "ends": "periodic"}}).feasible
 
 
+def test_a_level_beam_whose_cables_end_on_one_line_cannot_be_moved_across_it():
+    """No cables exert a moment about that line, which is h above the centre of mass: m a h is missing."""
+    robot, h = load("multi-quadrotor-3"), 0.05
+    cables = zip(robot.cables, (0.3, 0.0, -0.3), strict=True)
+    on_a_line = tuple(cable.model_copy(update={"attachment": (x, 0.0, h)}) for cable, x in cables)
+    beam = robot.model_copy(update={"cables": on_a_line})
+    task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0, 1, 0]}, "duration": 3, "base": {"kind": "free"}}
+    found = plan(beam, task)
+    assert found.status == "infeasible"
+    missing = beam.platform.mass * np.abs(found.audit.motion.acceleration[:, 1]).max() * h / np.hypot(h, beam.length)
+    assert found.certificate.shortfall == pytest.approx(missing, rel=0.01)
+    assert "`tube: {attitude: 0.2}`" in advice(found, "a tilting platform")
+    assert plan(beam, task | {"tube": {"attitude": 0.2}, "steps": 20}).feasible
+
+
 def test_carriers_on_the_ground_are_not_to_be_moved():
     task = {"path": {"kind": "line", "start": [0, 0, 2], "end": [9, 0, 2]}, "duration": 5}
     assert "moving carriers" not in plan("cogiro", task).report()

@@ -1,8 +1,9 @@
-"""Prove that carriers with reach boxes cannot hold the platform in a given motion, wherever they are: `out_of_reach`.
+"""Prove that carriers cannot hold the platform in a given motion, wherever they are: `out_of_reach`.
 
 A cable pulls from its attachment towards an anchor in a box, so its force is a sum of pulls towards the corners of that
 box: these span the cone of all its directions. If the given wrench is no sum of such pulls, however strong, a direction
-proves it (Farkas) along which the wrench is positive and no pull is.
+proves it (Farkas) along which the wrench is positive and no pull is. A carrier without a reach box may be anywhere
+around the platform. Still no cables exert a moment about a line through all attachments.
 """
 
 from dataclasses import replace
@@ -17,6 +18,8 @@ from ..audits.tensions import UNDERACTUATED_TOLERANCE
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
+AROUND = 10.0  # of the robot's length: a box around all attachments, towards whose corners pulls span all directions
+
 
 def out_of_reach(
     scenario: Scenario, times: np.ndarray, platform: Motion, carriers: Motion, free: np.ndarray
@@ -25,7 +28,7 @@ def out_of_reach(
 
     - `times`: the instants, (n,) [s], none of them on the ground.
     - `platform`, `carriers`: motions there in {G}, (n, 6) and (n, c, 6) each.
-    - `free`: whether each carrier may be elsewhere in its reach box, (n, c). If one has no such box, nothing is proven.
+    - `free`: whether each carrier may be elsewhere, in its reach box or, without one, anywhere, (n, c).
     """
     robot, corners = scenario.robot, []
     boxes: list[tuple[int, Box | None]] = [
@@ -37,13 +40,17 @@ def out_of_reach(
         poses = carriers.pose.copy()
         for index, box in boxes:
             if box is None:
-                return None
-            corner = np.where(sides, box.max, box.min)
+                corner = platform.pose[:, :3] + AROUND * robot.length * np.where(sides, 1.0, -1.0)
+            else:
+                corner = np.where(sides, box.max, box.min)
             poses[:, index, :3] = np.where(free[:, index, None], corner, poses[:, index, :3])
         corners.append(scenario.dynamics.wrench_matrix(platform.pose, poses) * robot.dof_mask[:, None])
     A = np.concatenate(corners, axis=2)  # (n, 6, 8 m)
     w = scenario.required_wrench(times, platform, carriers, scenario.wind) * robot.dof_mask
     limits = np.zeros(A.shape[2]), np.full(A.shape[2], np.inf)
+    scaled = A[0] / np.repeat([1.0, robot.length], 3)[:, None]
+    if free.all() and not any(box for _, box in boxes) and np.linalg.matrix_rank(scaled) == robot.dof_mask.sum():
+        return None  # pulls in all directions at these attachments exert all wrenches
     worst: Certificate | None = None
     for row in np.flatnonzero(~solve_batch(A, w, *limits, length=robot.length).feasible):
         found = certify(wrench_problem(robot, A[row], w[row], *limits))

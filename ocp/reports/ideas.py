@@ -136,12 +136,16 @@ def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, m
 
 
 def _carriers(plan: PlanData) -> list[Fact]:
-    """Return that the planner may move the carriers, where tensions are missing while the task holds them."""
-    robot, base = plan.scenario.robot, plan.scenario.task.base
-    held = base.kind == "hold" and any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers)
-    if plan.certificate is None or not held:
+    """Return that carriers may move, or else the platform tilt, where the task forbids it and tensions are missing."""
+    robot, task = plan.scenario.robot, plan.scenario.task
+    if plan.certificate is None:
         return []
-    return [("moving carriers", "`base: {kind: free}`: the planner then chooses how the carriers move")]
+    if task.base.kind == "hold" and any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers):
+        return [("moving carriers", "`base: {kind: free}`: the planner then chooses how the carriers move")]
+    if task.base.kind == "free" and not task.tube.turn:
+        tilts = "the platform may then tilt by 0.2 rad as it accelerates"
+        return [("a tilting platform", f"`tube: {{attitude: 0.2}}`: {tilts}")]
+    return []
 
 
 def _strength(plan: PlanData) -> list[Fact]:
