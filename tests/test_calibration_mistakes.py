@@ -131,6 +131,17 @@ def test_two_mistakes_at_once():
     np.testing.assert_allclose(measurements.lengths, y, atol=1e-9)
 
 
+@pytest.mark.parametrize("order", ["YXZ", "ZXY", "yzx"])
+def test_angles_in_the_order_of_their_axes(order):
+    """As many programs write them: the first column is the first angle, about whichever axis."""
+    robot, poses, y = a_log("cogiro")
+    turned = Rotation.from_matrix(points.rotations(poses[:, 3:]))
+    fixed, texts = corrected(robot, Measurements(y, np.hstack([poses[:, :3], turned.as_euler(order)])))
+    assert len(texts) == 1
+    assert texts[0].startswith("the angles look like")
+    np.testing.assert_allclose(points.rotations(fixed.poses[:, 3:]), turned.as_matrix(), atol=1e-9)
+
+
 def test_equally_probable_errors_are_not_mended():
     robot, poses, y = a_log("cogiro", turn=0.15)
     turned = Rotation.from_euler("xyz", poses[:, 3:])

@@ -36,6 +36,7 @@ BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed 
 LONG_TAIL = 4.0  # median sizes; differences beyond are wrong readings
 EXPLAINED = 0.1  # of the change of the readings, which differences are below if lengths and poses belong together
 MOST_SAMPLES = 400
+HOPELESS, STRIDE = 2.0, 5  # times larger differences, by every fifth sample, of a convention that cannot be right
 FEWEST = 12, 24  # samples of which anchors, and attachments, are taken into account
 LARGEST = 10.0  # times the cables' mean length, of a change of readings
 MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
@@ -205,8 +206,10 @@ def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], f
     ways: list[_Way] = []
     turns: list[tuple[np.ndarray, _Way]] = []
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
-    base = _parts(log, tried[0])
+    base, rough = _parts(log, tried[0]), HOPELESS * _roughness(log, tried[0])
     for way in tried:
+        if way.turned and _roughness(log, way) > rough:
+            continue
         lengths, y = _parts(log, way) if way.placed is not tried[0].placed or way.turned else base
         both = np.stack([lengths[:, None] - sign * way.factor * y for sign in (1, -1)]) / way.factor
         apart = _medians(both, len(log.y))  # (2, m, m): of both signs, of cable i and column j
@@ -340,6 +343,14 @@ def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
     left[..., :count] *= np.sqrt(count / (count - c))
     left[..., count:] /= np.sqrt(count)
     return left[:, 0], left[:, 1:]
+
+
+def _roughness(log: _Log, way: Interpretation) -> float:
+    """Return the median of what offsets alone do not explain, of a few samples [m]."""
+    few = log._replace(**{name: getattr(log, name)[::STRIDE] for name in ("position", "rotation", "angles", "y")})
+    few = few if log.carriers is None else few._replace(carriers=log.carriers[::STRIDE])
+    apart = runs(few.robot, few.table, *few.at(way)).lengths - way.factor * few.y.T
+    return float(np.median(np.abs(apart - np.median(apart, axis=1, keepdims=True))))
 
 
 def _medians(left: np.ndarray, count: int) -> np.ndarray:
