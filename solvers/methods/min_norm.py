@@ -15,7 +15,7 @@ from ...base.errors import InputError
 from ...base.inputs import real_array, shown
 from ...base.tolerances import DOUBTFUL
 from ..problem import TensionProblem
-from .method import Array, Method, Proposal, StandardForm
+from .method import Method, Proposal, StandardForm
 from .numerics.least_norm import least_norm_in_null_space
 
 _SLACK = 1e-12  # How far s, of order one, may pass a limit; `solve` moves it back.
@@ -26,7 +26,7 @@ class MinNorm(Method):
     """Pseudo-inverse solution, moved along the null space as little as the limits require, or by a given lambda."""
 
     name = "min-norm"
-    guarantee = "the unique optimum, in closed form up to m - rank = 1; no tensions and a certificate if there are none"
+    guarantee = "the unique optimum; no tensions and a certificate if there are none"
     source = "Wang, Zhao, Li, Ji, cable-driven multi-robot towing system, Eq. 16-17, corrected"
     exact = True
     continuous = True
@@ -48,14 +48,8 @@ class MinNorm(Method):
         low, high = form.lower - s, form.upper - s
         if low.max(initial=-np.inf) <= _SLACK and high.min(initial=np.inf) >= -_SLACK:
             return Proposal(s)
-        freedom = form.N.shape[0]
-        if freedom == 0:
+        if not len(form.N):
             return Proposal(None, detail="the only tensions that give w are outside the limits")
-        if freedom == 1:
-            shift = _shortest_shift(form.N[0], low, high)
-            if shift is None:
-                return Proposal(None, detail="no multiple of the null-space vector lies inside the limits")
-            return Proposal(s + shift * form.N[0])
         return least_norm_in_null_space(form)
 
 
@@ -91,17 +85,3 @@ class GivenLambda(Method):
         """Propose these tensions if they are inside the limits."""
         s = (self.tensions - form.origin)[form.moving] / form.unit
         return Proposal(None, detail=self.detail) if self.detail else Proposal(s)
-
-
-def _shortest_shift(null: Array, low: Array, high: Array) -> float | None:
-    """Return the lambda nearest to 0 with low <= lambda null <= high, or None; all of shape (k,)."""
-    moves = np.abs(null) > _SLACK
-    still = ~moves
-    if (low[still] > _SLACK).any() or (high[still] < -_SLACK).any():
-        return None
-    at_low, at_high = low[moves] / null[moves], high[moves] / null[moves]
-    first = float(np.minimum(at_low, at_high).max())
-    last = float(np.maximum(at_low, at_high).min())
-    if first > last + _SLACK:
-        return None
-    return min(max(0.0, first), last)
