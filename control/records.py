@@ -20,6 +20,7 @@ CONTROLLER = np.dtype(
         ("reach", "f8", (MOST_CARRIERS, 6)),
         *((name, "f8") for name in ("place", "attitude")),
         ("by_wrench", "f8", (MOST_CARRIERS, MOST_ACTUATORS, 6)),
+        ("lean", "f8", MOST_CARRIERS),
         ("limits", _LIMITS, MOST_CABLES),
     ]
 )

@@ -12,6 +12,8 @@ from .records import CONTROLLER
 
 SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from their commands, see core/control/heard.c
 
+LEAN, STEEPEST = 1.5, 1.5  # tangent of the tilt of carriers over the largest in plans, and that tilt at most [rad]
+
 
 class Limits(NamedTuple):
     """Limits of tensions and of their rates, each (m,)."""
@@ -57,9 +59,12 @@ def settings_of(
     settings["place"] = number("place", place, 0.1, 1e3)
     for name, values in limits._asdict().items():
         settings["limits"][name][: robot.m] = values
-    for by_wrench, carrier in zip(settings["by_wrench"], robot.carriers, strict=False):
+    for index, carrier in enumerate(robot.carriers):
         if own := carrier.actuators:
-            by_wrench[: len(own)] = np.linalg.pinv(np.array([each.wrench for each in own]).T)
+            roll, pitch = robot.carrier_home[index, 3:5]
+            most = carrier.motion_limits.tilt or STEEPEST, np.arccos(np.cos(roll) * np.cos(pitch))
+            settings["lean"][index] = LEAN * np.tan(min(max(most), STEEPEST))
+            settings["by_wrench"][index, : len(own)] = np.linalg.pinv(np.array([each.wrench for each in own]).T)
     return settings
 
 

@@ -30,6 +30,7 @@ typedef struct {
     double attitude;                                /* and with which they turn, unless that is too fast [rad/s] */
     double by_wrench[TOWLINE_MOST_CARRIERS][TOWLINE_MOST_ACTUATORS][6]; /* commands of actuators for units of force and
                                                                            moment in the carrier's axes */
+    double lean[TOWLINE_MOST_CARRIERS]; /* largest tangent of the angle between a carrier's thrust and the vertical */
     towline_limits limits[TOWLINE_MOST_CABLES];
 } towline_controller;
 

@@ -7,12 +7,12 @@
  *     d   = K (m v_q - m v_0 - integral of (T + m g - sum of t u + d))
  *
  * F is the wanted thrust in {G}, T the one given, d the estimate of all other forces (air, a mass that is not as in the
- * robot file), e the rotation from the thrust's axis to F and to the ordered yaw, M the moment of the cables about the
- * CoM, k and h the bandwidths of position and attitude; q marks what is measured. Only the part of F along the thrust's
- * axis is there at once; the rest comes when the carrier has turned, so it is lacking where it cannot turn as ordered:
- * where its actuators are at their limits most of the time. This is where an attitude loop that is unstable ends, for any
- * reason: oscillations grow until the limits stop them. Source: T. Lee, M. Leok and N. H. McClamroch, "Geometric tracking
- * control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
+ * robot file), e the rotation from the thrust's axis to F, inside a cone, and to the ordered yaw, M the moment of the
+ * cables about the CoM, k and h the bandwidths of position and attitude; q marks what is measured. Only the part of F
+ * along the thrust's axis is there at once; the rest comes when the carrier has turned, so it is lacking where it cannot
+ * turn as ordered: where F is outside the cone, or the actuators are at their limits most of the time. This is where an
+ * attitude loop that is unstable ends, for any reason: oscillations grow until the limits stop them. Source: T. Lee,
+ * M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
  */
 #include <string.h>
 
@@ -24,6 +24,7 @@ static const double NO_FORCE = 1e-9; /* [N], and of a rotation [rad] */
 static const double WINDOW = 0.1;    /* [s]: well-damped turns towards a new force stay at limits for less */
 static const double MOSTLY = 0.5;    /* of the window */
 static const double SLOWER = 4;      /* bandwidths of the attitude loop: what is quicker is noise */
+static const double UPRIGHT = 0.2;   /* of the weight: the least upward force for which a carrier turns */
 
 /* One carrier of a flight. */
 typedef struct {
@@ -84,6 +85,24 @@ static void needed_force(const flier *it, const double *tensions, double *force,
     for (int k = 0; k < 3; k++) { force[k] -= pull[k]; }
 }
 
+/*
+ * Write the force for which a carrier turns, F inside the cone of its largest tilt, and return what of F is outside.
+ *
+ * Where F points down or vanishes, its direction turns over at once, and a carrier that follows it tumbles.
+ */
+static double force_in_cone(const flier *it, const double *force, double *turning) {
+    const double *gravity = it->robot->gravity, size = sqrt(dot(gravity, gravity));
+    memcpy(turning, force, 3 * sizeof *turning);
+    if (size == 0) { return 0; }
+    const double up = -dot(force, gravity) / size;
+    double side[3];
+    for (int k = 0; k < 3; k++) { side[k] = force[k] + up * gravity[k] / size; }
+    const double kept = fmax(up, UPRIGHT * it->body->mass[0] * size), sideways = sqrt(dot(side, side));
+    const double most = it->controller->lean[it->index] * kept, share = sideways > most ? most / sideways : 1;
+    for (int k = 0; k < 3; k++) { turning[k] = share * side[k] - kept * gravity[k] / size; }
+    return (1 - share) * sideways;
+}
+
 /* Write e, in the carrier's axes: from the thrust's axis to F, beyond a right angle as far as at one, and to the yaw. */
 static void rotation_to(const flier *it, const double *force, double *e) {
     const double *R = it->at->carrier[it->index].R;
@@ -102,10 +121,11 @@ static void rotation_to(const flier *it, const double *force, double *e) {
 static double wrench_of_carrier(const flier *it, const double *tensions, double *wrench) {
     const attitude *at = &it->at->carrier[it->index];
     const double axis[3] = {at->R[2], at->R[5], at->R[8]}, h = it->attitude, *inertia = it->body->inertia;
-    double force[3], pulled[3], e[3], wanted[3], bent[3], moment[3], spin[3], gyroscopic[3], turned[3];
+    double force[3], turning[3], pulled[3], e[3], wanted[3], bent[3], moment[3], spin[3], gyroscopic[3], turned[3];
     double *ordered = it->memory->ordered, *rate = it->memory->turning;
     needed_force(it, tensions, force, pulled);
-    rotation_to(it, force, e);
+    it->memory->lacking = force_in_cone(it, force, turning);
+    rotation_to(it, turning, e);
     body_rate(at, it->order + 9, wanted);
     body_rate(at, it->order + 15, bent);
     body_rate(at, it->motion + 9, rate);
@@ -142,7 +162,8 @@ static void command(const flier *it, double dt, const double *wrench, double acr
         thrust += actuation[a] * limits->wrench[2];
     }
     it->memory->limited += fmin(dt / WINDOW, 1) * (limited - it->memory->limited);
-    it->memory->lacking = fmax(fabs(wrench[2] - thrust), it->memory->limited > MOSTLY ? across : 0);
+    const double missing = fmax(fabs(wrench[2] - thrust), it->memory->limited > MOSTLY ? across : 0);
+    it->memory->lacking = fmax(it->memory->lacking, missing);
     for (int k = 0; k < 3 && !followed; k++) { it->memory->ordered[k] = NAN; }
 }
 
