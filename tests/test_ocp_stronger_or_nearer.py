@@ -401,3 +401,11 @@ def test_lines_whose_ends_are_given_as_states_too_have_nearer_ends_and_other_yaw
         own = getattr(each.scenario.task, key)
         assert own.pose == pytest.approx(each.trajectory["pose"].values[row], abs=1e-9)
         assert own.velocity == pytest.approx(each.trajectory["velocity"].values[row], abs=1e-9)
+
+
+def test_the_largest_circle_that_is_feasible_is_offered():
+    """Its plan is feasible, and with a radius three percent larger there is none."""
+    circle = {"kind": "circle", "centre": [0, 0, 1], "radius": 8, "rate": 0.3}
+    (offer,) = [each for each in plan("cogiro", {"path": circle, "duration": 5}).relaxations if "radius" in each.name]
+    for radius, feasible in ((offer.possible, True), (1.03 * offer.possible, False)):
+        assert plan("cogiro", {"path": circle | {"radius": radius}, "duration": 5}).feasible == feasible

@@ -75,6 +75,7 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
     for make in (
         _nearer_end,
+        _smaller_circle,
         _other_yaws,
         _less_wind,
         _lighter_load,
@@ -114,6 +115,19 @@ def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
         if turns
         else largest_share(search, to, "length of the line", "m")
     )
+
+
+def _smaller_circle(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the largest radius of a circle, at its angular velocity, with which it is feasible."""
+    path = scenario.task.path
+    if not isinstance(path, CirclePath) or any(carrier.moves for carrier in scenario.robot.carriers):
+        return []  # carriers that move with the platform may make all of it feasible
+
+    def with_radius(share: float) -> Variation:
+        smaller = path.model_copy(update={"radius": share * path.radius})
+        return _along(scenario, smaller), share * path.radius, f"instead of {quantity(path.radius, 'm')}"
+
+    return largest_share(search, with_radius, "path.radius", "m")
 
 
 def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
