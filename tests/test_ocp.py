@@ -260,10 +260,17 @@ def test_tilting_base_in_the_carriers_frame_stays_inside_its_tilt():
     assert (np.cos(tilt).prod(axis=1) >= np.cos(0.1) - 1e-9).all()
 
 
-def test_no_plan_is_told_with_the_worst_time_of_the_closest_motion():
+@pytest.mark.parametrize(
+    ("base", "status"),
+    [
+        ({"ends": "exact"}, MotionStatus.INFEASIBLE),  # the quadrotor is given at the ends, 1 m beside the platform
+        ({"ends": "rest", "speed_max": 0.1, "acceleration_max": 0.1}, MotionStatus.NOT_FOUND),
+    ],
+)
+def test_no_plan_is_told_with_the_worst_time_of_the_closest_motion(base, status):
     robot = load("wang-flying")
-    found = plan(robot, {"path": CIRCLE, "base": {**FREE, "ends": "exact"}, "steps": 40})  # starts 1 m beside it
-    assert found.status is MotionStatus.NOT_FOUND
+    found = plan(robot, {"path": CIRCLE, "base": {**FREE, **base}, "steps": 40})
+    assert found.status is status
     motion, carriers = found.scenario.motion(np.array([found.certificate.time]), found.deviation)
     dynamics = Dynamics(robot)
     A = dynamics.wrench_matrix(motion.pose, carriers.pose)[0]

@@ -274,10 +274,13 @@ def _beyond_reach(
 def _without_tensions(
     scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
 ) -> Certificate | None:
-    """Return the certificate of an end at which the whole robot is given and no tensions exist; None if they do."""
+    """Return the certificate of an end without tensions, of the given motion there and the given poses of carriers.
+
+    None if tensions exist at both ends, or are not known to be missing.
+    """
     worst: Certificate | None = None
     for row in (0, 1):
-        if freedom[row].any():
+        if freedom[row][0].any() or freedom[row][1:, 0].any():
             continue
         one = slice(row, row + 1)
         A = scenario.dynamics.wrench_matrix(platform.pose[one], carriers.pose[one])
