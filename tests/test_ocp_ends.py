@@ -18,6 +18,7 @@ from towline.ocp.proofs.infeasible_ends import infeasible_ends
 from towline.ocp.search import relaxations
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
+from towline.ocp.tasks.task_limits import TaskLimits
 
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
 TUBE = {"position": 0.05, "attitude": 0.1}
@@ -323,6 +324,21 @@ def pulls_from_reach(robot, pose):
     return np.array(columns).T
 
 
+@pytest.mark.parametrize("height", [0.0, 8.0])
+def test_carriers_may_be_anywhere_around_a_platform_whose_frame_is_elsewhere(height):
+    """Frames of a platform far above its load change no physics: beside a ground anchor a team is feasible."""
+    data = load("multi-quadrotor-4").model_dump()
+    first, *others = data["carriers"]
+    data["carriers"] = [{"name": first["name"], "kind": "ground", "home": first["home"]}, *others]
+    platform, up = data["platform"], np.array([0, 0, height])
+    platform["home"] = (*(np.array(platform["home"][:3]) + up).tolist(), 0, 0, 0)
+    for part, key in ((platform, "com"), *((cable, "attachment") for cable in data["cables"])):
+        part[key] = (np.array(part[key]) - up).tolist()
+    path = {"kind": "rest", "pose": platform["home"]}
+    task = {"path": path, "duration": 2, "base": {"kind": "free", "ends": "rest"}, "steps": 12}
+    assert plan(Robot.model_validate(data), task).feasible
+
+
 @pytest.mark.parametrize("name", ["wang-ctmrts-4", "wang-ctmrts-5", "wang-ctmrts-6"])
 def test_ends_that_carriers_cannot_hold_from_within_their_reach_are_proven(name, monkeypatch):
     """By a linear program for the forces of cables towards all corners of the boxes; a nearer end is offered."""
@@ -344,6 +360,8 @@ def test_ends_that_carriers_cannot_hold_from_within_their_reach_are_proven(name,
             assert (direction @ pulls_from_reach(robot, at)).max() < 1e-9
             proofs.append(task)
     assert proofs
+    soft = proofs[0].model_copy(update={"limits": TaskLimits(soft={"carrier_reach": 0.1})})
+    assert infeasible_ends(lay_out(robot, soft)) is None  # carriers may then leave their boxes
     if name == "wang-ctmrts-5":
         (offer,) = plan(robot, proofs[0]).relaxations
         assert offer.plan.feasible

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
+from towline.ocp.limits.cables import WinchPower
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
 from towline.ocp.proofs.too_fast import too_fast
 from towline.ocp.tasks.lay_out import lay_out
@@ -29,7 +30,7 @@ def exceeded(limited, places, spread, rests):
     poses[0, :, :3] = places
     off = np.zeros(poses.shape[:2])
     off[0] = spread
-    return {excess.limit for excess in too_fast(limited, TIMES, poses, off, np.array([rests]))}
+    return {excess.limit for excess in too_fast(limited, TIMES, poses, off, *[np.array([rests])] * 2)}
 
 
 @settings(max_examples=200, deadline=None)
@@ -110,6 +111,23 @@ def test_a_duration_is_too_short_for_the_strength_of_all_cables(share):
         assert plan(ROBOT, task | {"duration": offer.possible}).feasible
 
 
+def test_a_short_turn_about_an_origin_is_feasible_though_the_centre_of_mass_is_elsewhere():
+    """It moves at both ends too, so no cables accelerate it from rest: 4.5 m/s^2 keep it on a circle."""
+    robot, arm, rate = load("cogiro"), 0.5, 3.0
+    robot = robot.model_copy(update={"platform": robot.platform.model_copy(update={"com": (arm, 0, 0)})})
+    turn = 2 * arm * rate**2 / (robot.t_max.sum() / robot.platform.mass + 9.81)  # half of what is proven from rest
+    home, turning = [*robot.home[:3], 0, 0, 0], [0, 0, 0, 0, 0, rate]
+    task = {
+        "path": {"kind": "rest", "pose": home},
+        "duration": turn / rate,
+        "tube": {"position": 0.01, "attitude": 0.1},
+        "steps": 8,
+        "initial": {"pose": home, "velocity": turning},
+        "final": {"pose": [*home[:5], turn], "velocity": turning},
+    }
+    assert plan(robot, task).feasible
+
+
 @pytest.mark.parametrize("name", ["ipanema-1", "cogiro", "planar-4"])
 def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
     """Half a percent less is proven infeasible, and with a little more, for what happens between, a plan has it."""
@@ -127,6 +145,8 @@ def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
     poses = lay_out(robot, read_task(task)).path.at(moment + rate * np.array([-1.0, 0.0, 1.0]), 1.0)
     before, _, after = Dynamics(robot).cable_lengths(poses.pose)
     assert planned(0.99 * least).status is MotionStatus.INFEASIBLE
+    both = {"winch_power": 0.99 * least, "own": (WinchPower(robot, 2 * least),)}
+    assert plan(robot, task | {"limits": both}).audit.excess[0].value == pytest.approx(least)
     enough = planned(1.03 * least)
     assert enough.feasible
     row = int(np.abs(enough.audit.times - moment).argmin())

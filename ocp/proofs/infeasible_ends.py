@@ -199,7 +199,7 @@ def _nearest_lengths(scenario: Scenario, platform: np.ndarray, carriers: np.ndar
     robot, attachments = scenario.robot, scenario.dynamics.points(platform, carriers)[1]
     nearest = np.full(attachments.shape[:2], -np.inf)
     for cable, owner in enumerate(robot.carrier_of_cable):
-        box, at = robot.carriers[owner].motion_limits.reach, attachments[:, cable]
+        box, at = scenario.reach(owner), attachments[:, cable]
         if box is not None:
             apart = np.maximum(np.maximum(np.subtract(box.min, at), np.subtract(at, box.max)), 0.0)
             nearest[:, cable] = np.linalg.norm(apart, axis=1) - np.linalg.norm(robot.anchors[cable])
@@ -217,8 +217,8 @@ def _hurried(
     for kind, its in enumerate(freedom):
         spread[:, kind] = np.where((its[:, 0] == FREE).any(axis=1), np.inf, 0.0)
         spread[0, kind] += _reach(scenario, its)
-    resting = np.all(_resting(freedom, platform, carriers, 3), axis=0)
-    return too_fast(scenario, times[order], poses, spread[:, which[order]], resting)
+    resting = [np.all(_resting(freedom, platform, carriers, count), axis=0) for count in (3, 6)]
+    return too_fast(scenario, times[order], poses, spread[:, which[order]], *resting)
 
 
 def _resting(freedom: list[np.ndarray], platform: Motion, carriers: Motion, count: int = 6) -> np.ndarray:

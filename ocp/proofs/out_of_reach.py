@@ -2,8 +2,8 @@
 
 A cable pulls from its attachment towards an anchor in a box, so its force is a sum of pulls towards the corners of that
 box: these span the cone of all its directions. If the given wrench is no sum of such pulls, however strong, a direction
-proves it (Farkas) along which the wrench is positive and no pull is. A carrier without a reach box may be anywhere
-around the platform. Still no cables exert a moment about a line through all attachments.
+proves it (Farkas) along which the wrench is positive and no pull is. A carrier whose reach is not a hard limit may be
+anywhere around the platform. Still no cables exert a moment about a line through all attachments.
 """
 
 from dataclasses import replace
@@ -11,14 +11,14 @@ from itertools import product
 
 import numpy as np
 
-from ...models.part import Box
+from ...models.points import placed
 from ...solvers import Certificate, certify, solve_batch
 from ...statics.distribution import wrench_problem
 from ..audits.tensions import UNDERACTUATED_TOLERANCE
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
-AROUND = 10.0  # of the robot's length: a box around all attachments, towards whose corners pulls span all directions
+AROUND = 10.0  # of the largest arms: a box around all attachments, towards whose corners pulls span all directions
 
 
 def out_of_reach(
@@ -31,18 +31,16 @@ def out_of_reach(
     - `free`: whether each carrier may be elsewhere, in its reach box or, without one, anywhere, (n, c).
     """
     robot, corners = scenario.robot, []
-    boxes: list[tuple[int, Box | None]] = [
-        (int(index), robot.carriers[index].motion_limits.reach) for index in np.flatnonzero(free.any(axis=0))
-    ]
+    boxes = [(index, scenario.reach(index)) for index in np.flatnonzero(free.any(axis=0)).tolist()]
     if not (len(times) and boxes) or robot.pulley_radii.any():
         return None
+    centre = placed(platform.pose, np.array([robot.platform.com]))[:, 0]
+    around = AROUND * (robot.length + np.linalg.norm(robot.anchors, axis=1).max())
     for sides in product((False, True), repeat=3):
         poses = carriers.pose.copy()
         for index, box in boxes:
-            if box is None:
-                corner = platform.pose[:, :3] + AROUND * robot.length * np.where(sides, 1.0, -1.0)
-            else:
-                corner = np.where(sides, box.max, box.min)
+            far = centre + around * np.where(sides, 1.0, -1.0)
+            corner = far if box is None else np.where(sides, box.max, box.min)
             poses[:, index, :3] = np.where(free[:, index, None], corner, poses[:, index, :3])
         corners.append(scenario.dynamics.wrench_matrix(platform.pose, poses) * robot.dof_mask[:, None])
     A = np.concatenate(corners, axis=2)  # (n, 6, 8 m)

@@ -24,7 +24,12 @@ CERTAIN = 1e-6  # of the duration
 
 
 def too_fast(
-    scenario: Scenario, times: np.ndarray, places: np.ndarray, spread: np.ndarray, resting: np.ndarray
+    scenario: Scenario,
+    times: np.ndarray,
+    places: np.ndarray,
+    spread: np.ndarray,
+    resting: np.ndarray,
+    still: np.ndarray,
 ) -> Iterator[Excess]:
     """Yield each limit that is exceeded, where it is exceeded by most.
 
@@ -32,9 +37,10 @@ def too_fast(
     - `places`: poses of the platform and of each carrier in {G}, without what the planner chooses, (1 + c, n, 6) [m,
       rad].
     - `spread`: how far each of them, and every point of the platform, may be from its place, (1 + c, n) [m].
-    - `resting`: which of them are at rest at both ends, (1 + c,) of bool.
+    - `resting`, `still`: of which of them the origin is at rest at both ends, and which do not turn there either,
+      (1 + c,) of bool.
     """
-    yield from _too_short(scenario, times, places[0], spread[0], bool(resting[0]))
+    yield from _too_short(scenario, times, places[0], spread[0], bool(still[0]))
     lengths = None
     for limit in scenario.limits:
         if limit.soft is not None:
@@ -53,7 +59,7 @@ def too_fast(
 
 
 def _too_short(
-    scenario: Scenario, times: np.ndarray, poses: np.ndarray, off: np.ndarray, rests: bool
+    scenario: Scenario, times: np.ndarray, poses: np.ndarray, off: np.ndarray, still: bool
 ) -> Iterator[Excess]:
     """Yield a duration that is too short for all cables together to accelerate the platform's CoM and stop it again.
 
@@ -61,7 +67,7 @@ def _too_short(
     gives more than its largest tension, and the weight helps by at most itself.
     """
     robot = scenario.robot
-    if not rests or scenario.wind is not None or scenario.phases.all:
+    if not still or scenario.wind is not None or scenario.phases.all:
         return
     ends = placed(poses[[0, -1]], np.array([robot.platform.com]))[:, 0]
     moved = float(np.linalg.norm(ends[1] - ends[0]) - off[-1] - off[0])

@@ -19,12 +19,13 @@ def too_little_power(scenario: Scenario) -> list[Excess]:
     """Return the largest least power of a fixed motion if it is more than its winches may have, else nothing."""
     from scipy.optimize import linprog
 
-    limits = [limit for limit in scenario.limits if isinstance(limit, WinchPower) and limit.soft is None]
+    hard = (limit for limit in scenario.limits if limit.soft is None and limit.phases is None)
+    limit = min((limit for limit in hard if type(limit) is WinchPower), key=lambda limit: limit.high, default=None)
     times = np.linspace(0.0, scenario.duration, PLACES)[1:-1]
     times = times[~scenario.phases.resting(times)]
-    if not limits or not len(times):
+    if limit is None or not len(times):
         return []
-    (limit,), robot, step = limits, scenario.robot, STEP * scenario.duration
+    robot, step = scenario.robot, STEP * scenario.duration
     platform, carriers = scenario.motion(times, None)
     later, sooner = (
         scenario.dynamics.cable_lengths(*(part.pose for part in scenario.motion(times + shift, None)))

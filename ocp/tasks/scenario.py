@@ -14,7 +14,7 @@ import numpy as np
 from ...base.display import Displayed
 from ...models import Dynamics, Robot, points
 from ...models.body import skeleton
-from ...models.part import PositiveRange, Vector3
+from ...models.part import Box, PositiveRange, Vector3
 from ..costs.cost import Cost
 from ..costs.costs import Costs
 from ..costs.terms import CarrierAcceleration, CarrierOffset, Jerk, Margin, PathDeviation, Tension, TensionRate, Time
@@ -273,6 +273,10 @@ class Scenario(Displayed):
         """Return the carriers that keep their distance from the platform rather than a position."""
         free = {owner for owner, coordinate in self.carrier_free if coordinate in POSITION}
         return [i for i in sorted(free) if not self.robot.carriers[i].confined]
+
+    def reach(self, carrier: int) -> Box | None:
+        """Return the box in {G} that a carrier never leaves [m]; None without one, or if that limit is soft."""
+        return None if "carrier_reach" in self.task.limits.soft else self.robot.carriers[carrier].motion_limits.reach
 
     def moves(self, hull: Hull) -> bool:
         """Return whether the planner chooses a coordinate that a convex limit is about."""
