@@ -12,7 +12,8 @@ from .records import CONTROLLER
 
 SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from their commands, see core/control/heard.c
 
-LEAN, STEEPEST = 1.5, 1.5  # tangent of the tilt of carriers over the largest in plans, and that tilt at most [rad]
+LEAN = 1.5  # tangent of the tilt of carriers over that of the largest in plans
+LEVEL, STEEPEST = 0.6, 1.5  # [rad], that tilt at least and at most: a push may need more than a gentle plan
 
 
 class Limits(NamedTuple):
@@ -62,8 +63,8 @@ def settings_of(
     for index, carrier in enumerate(robot.carriers):
         if own := carrier.actuators:
             roll, pitch = robot.carrier_home[index, 3:5]
-            most = carrier.motion_limits.tilt or STEEPEST, np.arccos(np.cos(roll) * np.cos(pitch))
-            settings["lean"][index] = LEAN * np.tan(min(max(most), STEEPEST))
+            most = max(LEVEL, carrier.motion_limits.tilt or STEEPEST, np.arccos(np.cos(roll) * np.cos(pitch)))
+            settings["lean"][index] = LEAN * np.tan(min(most, STEEPEST))
             settings["by_wrench"][index, : len(own)] = np.linalg.pinv(np.array([each.wrench for each in own]).T)
     return settings
 
