@@ -3,8 +3,8 @@
     python -m towline.benchmarks.planning [--steps 100] [--runs 5]
 
 Every solution is audited by towline's audit; one that does not pass ends the benchmark with code 1. "Again" is the same
-program solved once more, from its own solution. The contenders alternate; times are medians of the runs, and ratios, to
-towline, medians of those in one turn.
+program solved once more, from its own solution. The contenders alternate; times are medians of all runs. The ratio
+to towline is the median of the ratios of runs in the same turn.
 
 All have the same task: the platform on the circle and level, every tension inside its limits, the base's acceleration
 at most 3 m/s^2 and linear in each interval, the last state and the base's last acceleration equal to the first, and the

@@ -21,8 +21,8 @@ METHODS = (
 
 @parameters(f"""
     --pose 'x y z roll pitch yaw': Pose of the platform in the frame {{G}} [m, rad]; default: its home.
-    --velocity 'six numbers': Time derivative of the pose; default: zero.
-    --acceleration 'six numbers': Second time derivative of the pose; default: zero.
+    --velocity 'six numbers': Time derivative of the pose [m/s, rad/s]; default: zero.
+    --acceleration 'six numbers': Second time derivative of the pose [m/s^2, rad/s^2]; default: zero.
     --wind 'x y z': Velocity of the air in {{G}} [m/s]; default: no aerodynamic forces. '0 0 0' is still air, with drag
         on a moving platform.
     --method NAME: Method that determines the exit code: {METHODS}.

@@ -12,8 +12,8 @@ from .records import CONTROLLER
 
 SLOW = 20.0  # [rad/s], with which observers learn that tensions differ from their commands, see core/control/heard.c
 
-LEAN = 1.5  # tangent of the tilt of carriers over that of the largest in plans
-LEVEL, STEEPEST = 0.6, 1.5  # [rad], that tilt at least and at most: a push may need more than a gentle plan
+LEAN = 1.5  # forces are inside a cone whose tangent is this times that of the largest tilt in plans
+LEVEL, STEEPEST = 0.6, 1.5  # [rad]: at least and at most this tilt, since a push may need more than a gentle plan
 
 
 class Limits(NamedTuple):

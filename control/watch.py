@@ -34,11 +34,11 @@ class Watch:
 
     Over the last `WINDOW` the velocity should change by the integral of the model's accelerations, from each measured
     state to the next one, with the tensions sent and the disturbance estimated from the earlier state. The mean
-    difference over the window is the unexplained acceleration. States that are measured late are compared as those of
-    their time: a disturbance is unexplained until the observer knows it, whatever the delay. New plans and jumps of the
-    reference do not contribute, because they act through the commands. States that are further apart than `PAUSE` are
-    not compared, nor those before and after more than `blind` without a state. If nothing was compared for longer than
-    `UNCHECKED`, a warning is given once.
+    difference over the window is the unexplained acceleration. States that arrive late are compared with
+    the prediction for their time: a disturbance is unexplained until the observer knows it, whatever the delay. New
+    plans and jumps of the reference do not contribute, because they act through the commands. States that are further
+    apart than `PAUSE` are not compared, nor those before and after more than `blind` without a state. If nothing was
+    compared for longer than `UNCHECKED`, a warning is given once.
 
     - `scale`: factors that make velocities of all coordinates comparable, (6,): 1, and lengths [m] for angles; 0 for
       locked coordinates.
@@ -90,8 +90,8 @@ class Watch:
     def compare(self, time: float, since: float, rate: np.ndarray, change: np.ndarray) -> HandOver | None:
         """Compare the rate of the pose, (6,), with its prediction; return the reason not to use predictions, or None.
 
-        The rate was measured at a `time` [s], and the last one `since` [s] before, infinity at first. The model
-        predicts that it has changed by `change` since, (6,), nan if unknown.
+        The rate was measured at `time` [s], `since` [s] after the previous one (infinity if there is none). The model
+        predicts that it has changed by `change`, (6,), in between; nan if unknown.
         """
         self._unseen = 0.0
         self.solved = min(self.solved, time)  # at first there is none yet

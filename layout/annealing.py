@@ -21,7 +21,7 @@ _NEGATIVE = 0.05  # weight of the mean of negative margins
 _HOT = 0.1  # first temperature, of the force scale
 _AT_BOUND = 0.5  # probability that a redrawn coordinate is at one of its bounds
 _SMALL = 0.1  # standard deviation of a small move, of the range of a coordinate
-_MISSING_COSTS = 25.0  # force scales for each size of the robot by which a bound of the room is missed
+_MISSING_COSTS = 25.0  # cost, in force scales, of missing a bound of the room by the size of the robot
 
 
 def anneal(evaluation: Evaluation, goal: Goal, moves: Moves, rng: np.random.Generator, until: float) -> np.ndarray:

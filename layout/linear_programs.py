@@ -10,9 +10,9 @@ from .evaluation import Evaluation, Slopes
 from .goal import Goal
 
 MOST_RESERVES, MOST_DISTANCES = 150, 100  # smallest ones, which a linear program has
-_PER_SIZE = 200.0  # force scales that a size of the robot costs by which a bound is missed
+_PER_SIZE = 200.0  # cost, in force scales, of missing a bound by the size of the robot
 _LARGEST = 1e7  # of the objective [N]
-_FOUND, LITTLE = 1e-5, 0.01  # of the margin, or of a share of the force scale: less improvement ends the search
+_FOUND, LITTLE = 1e-5, 0.01  # the search ends when the gain is below _FOUND * max(LITTLE * force scale, margin)
 PROGRAMS = 60  # from one start, at most
 
 

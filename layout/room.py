@@ -20,7 +20,7 @@ from ..workspace.conditions.interference import segment_distance
 from .requirements import Requirements
 
 _SPARE = 1e-3  # of a length: how much stricter a search is
-_LEAST_SPARE = 0.02  # of the size, of which a share is spare at least, where a distance of zero is enough
+_LEAST_SPARE = 0.02  # of the size: a distance below this gets the spare of this
 
 
 class Region(NamedTuple):

@@ -1,10 +1,10 @@
-"""`with_carrier_clocks`: clock offsets of carriers whose motion another computer recorded, estimated along with a fit.
+"""Estimate, along with a fit, clock offsets of carriers that another computer recorded: `with_carrier_clocks`.
 
 `sigma.clocks` of the measurements is the standard deviation of these clocks about that of the platform's poses. All
 that a carrier recorded, which is its motion and the tensions and directions of its cables, is moved in time together.
 Derivatives of all residuals by the clocks are differences. From their normal equations poses and parameters are
-eliminated, as in `NormalEquations`, and a step of the clocks is taken before each further fit. The changes of the
-parameters with the clocks add to their covariance what the clocks leave uncertain.
+eliminated, as in `NormalEquations`, and a step of the clocks is taken before each further fit. The covariance of the
+parameters includes the uncertainty of the clocks.
 """
 
 from dataclasses import replace
@@ -26,16 +26,16 @@ from .normal_equations import NormalEquations, metric
 from .observability import Observability
 
 ROUNDS = 6
-ENOUGH = 1e-4  # of the sum of squares, of a step that a fit in the search need not take
-STEP = 2e-3  # [s] of differences
-SETTLED = 0.1  # standard deviations, of a step that needs no further one
-LONGEST, SHORTER = 0.05, 0.25  # [s] of a step, and its share after one that fitted worse
+ENOUGH = 1e-4  # a fit in the search ends if a step would reduce the sum of squares by less than this fraction
+STEP = 2e-3  # [s] of finite differences
+SETTLED = 0.1  # standard deviations; the last step is smaller than this
+LONGEST, SHORTER = 0.05, 0.25  # longest step [s], and the factor of a step after one that fitted worse
 SEARCHED, MOST_SAMPLES = 200, 4000  # samples
 FEWEST = 8  # samples
 
 
 class CarrierClocks(NamedTuple):
-    """Clocks of carriers, as far as a fit with unknown ones determines them.
+    """Clock offsets of carriers, as estimated along with a fit.
 
     Attributes:
         carriers: Indices of the carriers, (k,).
@@ -61,7 +61,7 @@ class CarrierClocks(NamedTuple):
 
 
 def has_carrier_clocks(robot: Robot, measurements: Measurements) -> bool:
-    """Return whether the measurements have motions of carriers by clocks that are not known exactly."""
+    """Return whether the measurements contain motions of carriers whose clocks are not known exactly."""
     moves = measurements.carrier_poses is not None and any(carrier.moves for carrier in robot.carriers)
     return bool(moves and measurements.times is not None and measurements.sigma.clocks and len(measurements) >= FEWEST)
 
@@ -108,7 +108,7 @@ def with_carrier_clocks(
 
 
 class _Recorded:
-    """Measurements as recorded, of which those of moving carriers are read at other times."""
+    """Measurements as recorded, from which those of moving carriers can be read at shifted times."""
 
     def __init__(self, robot: Robot, given: Measurements):
         times, poses = given.times, given.carrier_poses
@@ -128,17 +128,17 @@ class _Recorded:
 
     @property
     def _of(self) -> list[np.ndarray]:
-        """Return tensions and directions of the cables as far as they are complete, which move with the carriers."""
+        """Return the tensions and directions of the cables, if complete: they are shifted with the carriers."""
         both = (self._given.tensions, self._given.directions)
         return [part for part in both if part is not None and np.isfinite(part).all()]
 
     def at(self, ahead: np.ndarray) -> Measurements:
-        """Return measurements by one clock, of which those of the carriers are `ahead` (k,) [s]."""
+        """Return the measurements on one clock, if the clocks of the carriers are `ahead` of it, (k,) [s]."""
         given, new = self._given, [part.copy() for part in self._of]
         assert given.carrier_poses is not None
         poses = given.carrier_poses.copy()
         for index, by, (own, whole, smoothed, curve) in zip(self.carriers, ahead, self._parts, strict=True):
-            # Noise stays: that between samples is smaller, so clocks of half a sample would seem to fit better.
+            # The noise is not shifted: interpolated noise is smaller, so that shifts of half a sample would fit better.
             later = whole + curve(self._times + by) - smoothed
             poses[:, index, :3] = later[:, :3]
             poses[:, index, 3:] = points.angles(Rotation.from_quat(later[:, 3:7]).as_matrix())

@@ -61,7 +61,7 @@ def interpretations(turns: bool) -> list[Interpretation]:
         "the angles look like a rotation vector": lambda R, angles: Rotation.from_rotvec(angles).as_matrix(),
     }
     for axes in permutations("xyz"):
-        for columns in map(list, permutations(range(3))):  # of the log, of the angles about x, y, z
+        for columns in map(list, permutations(range(3))):  # the column of the log for each angle
             if axes == ("x", "y", "z") and columns == [0, 1, 2]:
                 continue  # as they are read
             text = ", ".join(ANGLES[i] for i in columns)

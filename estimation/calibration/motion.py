@@ -12,7 +12,7 @@ from ..logs.measurements import Measurements, measured_poses
 from ..logs.smoothing import FEWEST, Parabolas, continuous, within
 from .parameters import Parameters
 
-SLOWEST = 0.2  # [s] between samples of a motion; platforms rest at poses that are farther apart
+SLOWEST = 0.2  # [s] between samples of a motion; if they are farther apart, the platform is taken to be at rest
 
 
 class Motion(NamedTuple):

@@ -36,7 +36,7 @@ BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed 
 LONG_TAIL = 4.0  # median sizes; differences beyond are wrong readings
 EXPLAINED = 0.1  # of the change of the readings, which differences are below if lengths and poses belong together
 MOST_SAMPLES = 400
-HOPELESS, STRIDE = 2.0, 5  # times larger differences, by every fifth sample, of a convention that cannot be right
+HOPELESS, STRIDE = 2.0, 5  # a convention is rejected if every fifth sample shows differences so many times larger
 FEWEST = 12, 24  # samples of which anchors, and attachments, are taken into account
 LARGEST = 10.0  # times the cables' mean length, of a change of readings
 MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
@@ -160,7 +160,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
 def _in_frame(frames: Frames, before: float) -> str:
     """Return the error of poses in another frame, with what it means for a calibration."""
     text = _better(str(frames), before, frames.size)
-    return f"{text}; the file's anchors show where that frame is, so sigmas of anchors do not include its own error"
+    return f"{text}; the frame was found from the file's anchors, so their standard deviations do not include its error"
 
 
 def _better(text: str, before: float, after: float) -> str:
@@ -346,7 +346,7 @@ def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _roughness(log: _Log, way: Interpretation) -> float:
-    """Return the median of what offsets alone do not explain, of a few samples [m]."""
+    """Return the median difference between lengths and readings of a few samples that offsets do not explain [m]."""
     few = log._replace(**{name: getattr(log, name)[::STRIDE] for name in ("position", "rotation", "angles", "y")})
     few = few if log.carriers is None else few._replace(carriers=log.carriers[::STRIDE])
     apart = runs(few.robot, few.table, *few.at(way)).lengths - way.factor * few.y.T

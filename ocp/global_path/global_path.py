@@ -36,7 +36,7 @@ RESERVES = (0.02, 0.004)  # of the robot's size, in the order in which they are 
 MOST_RESERVE = 0.05  # [m]
 MOST, MOST_OF_TEAM = (20_000, 30_000), (5_000, 80_000)  # configurations that are evaluated with each reserve
 IN_ONE_FORMATION = 0.15  # of the configurations
-TREES_OF_TEAM = 20_000  # configurations for two trees, then two others grow
+TREES_OF_TEAM = 20_000  # configurations after which the search of a team restarts with two new trees
 AGAIN = 1.0  # of what the first path took: what is spent on a shorter one, past other sides of obstacles
 PEAK_SPEED, PEAK_ACCELERATION = 2.2, 7.6  # of the law from rest to rest over a unit of length in a unit of time
 ON_THE_WAY, IN_PLACE = 3_000, 2_000  # configurations for one formation's way, and for its change at an end
@@ -122,7 +122,7 @@ def _connected(clear: ClearSpace, rng: np.random.Generator, longest: float = np.
     path, (start, end) = None, clear.space.ends
     if clear.space.shaped:
         path = in_one_formation(clear, rng, IN_ONE_FORMATION * (clear.most - clear.evaluated))
-    # How long two trees take has a heavy tail: new ones find the way of a team sooner than those that have missed it.
+    # The search time of two trees has a heavy tail: new trees often find a path for a team before the old ones do.
     each, slides = (TREES_OF_TEAM, rng) if clear.space.shaped else (np.inf, None)
     while path is None and clear.evaluated < clear.most and clear.in_time:
         path = connect(clear, start, end, clear.targets(rng, longest), each, slides)

@@ -263,7 +263,7 @@ def _excess(
 def _beyond_reach(
     scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
 ) -> Certificate | None:
-    """Return the certificate of the worst place at which carriers cannot hold a given platform from within reach."""
+    """Return the certificate of the worst given pose at which carriers cannot hold the platform from their boxes."""
     of = np.array([0, 1] + [2] * (len(times) - 2))
     given = ~np.array([each[0].any() for each in freedom])[of] & ~scenario.phases.resting(times)
     free = np.array([each[1:, 0].any(axis=1) for each in freedom])[of[given]]
@@ -274,9 +274,9 @@ def _beyond_reach(
 def _without_tensions(
     scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
 ) -> Certificate | None:
-    """Return the certificate of an end without tensions, of the given motion there and the given poses of carriers.
+    """Return the certificate of the worst end at which the task gives all poses and no feasible tensions exist.
 
-    None if tensions exist at both ends, or are not known to be missing.
+    None if feasible tensions exist at both ends, or may exist.
     """
     worst: Certificate | None = None
     for row in (0, 1):

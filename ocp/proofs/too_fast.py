@@ -74,8 +74,8 @@ def _too_short(
     most = float(robot.t_max.sum()) / robot.platform.mass + float(np.linalg.norm(robot.gravity))
     whole, least = float(times[-1] - times[0]), 2 * np.sqrt(max(moved, 0.0) / most)
     if whole < (1 - CERTAIN) * least:
-        why = f"all cables together, each with t_max, and gravity accelerate it by at most {quantity(most, 'm/s^2')}"
-        yield Excess(OF_DURATION, "platform", 0.0, whole, float(least), "s", "at least", why)
+        why = f"all cables at t_max, and gravity, accelerate the platform by at most {quantity(most, 'm/s^2')}"
+        yield Excess(OF_DURATION, "motion", None, whole, float(least), "s", "at least", why)
 
 
 def _mean_rate(limit: Limit, times: np.ndarray, x: np.ndarray, off: np.ndarray) -> Iterator[Excess]:

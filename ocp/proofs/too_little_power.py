@@ -1,4 +1,4 @@
-"""Prove that no tensions give a fixed motion with winches of so little power: `too_little_power`.
+"""Prove that no tensions of a fixed motion keep the limit on the power of its winches: `too_little_power`.
 
 The rates of the cables are given, so the power of a winch is proportional to its tension. At each instant a linear
 program finds the tensions whose largest power is least.
@@ -16,7 +16,7 @@ CERTAIN = 1e-3  # of the power
 
 
 def too_little_power(scenario: Scenario) -> list[Excess]:
-    """Return the largest least power of a fixed motion if it is more than its winches may have, else nothing."""
+    """Return the excess at the instant of a fixed motion that requires the most power; [] if the limit can be kept."""
     from scipy.optimize import linprog
 
     hard = (limit for limit in scenario.limits if limit.soft is None and limit.phases is None)
@@ -44,6 +44,6 @@ def too_little_power(scenario: Scenario) -> list[Excess]:
         found = linprog(cost, A_ub=rows, b_ub=np.zeros(robot.m), A_eq=equal, b_eq=w[k], bounds=bounds, method="highs")
         if found.success and found.fun > (worst[0].value / limit.high if worst else 1.0 + CERTAIN):
             power, cable = limit.high * found.fun, int((rates[k] * found.x[:-1]).argmax())
-            why = "the least of all tensions"
+            why = "the least that any tensions permit"
             worst = [Excess(limit.name, limit.labels[cable], time, power, limit.high, limit.unit, "at most", why)]
     return worst

@@ -136,7 +136,7 @@ def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, m
 
 
 def _carriers(plan: PlanData) -> list[Fact]:
-    """Return that carriers may move, or else the platform tilt, where the task forbids it and tensions are missing."""
+    """Suggest moving carriers, or else a tilting platform, if the task forbids them and no tensions exist."""
     robot, task = plan.scenario.robot, plan.scenario.task
     if plan.certificate is None:
         return []

@@ -20,7 +20,8 @@ def motion_facts(plan: PlanData) -> list[Fact]:
     speed, acceleration = (
         np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
     )
-    kind = f"{len(plan.phases)} phases" if plan.phases else task.path.kind
+    count = len(plan.phases)
+    kind = f"{count} phase{'s' * (count > 1)}" if count else task.path.kind
     path, law = plan.scenario.path, ""
     if isinstance(task.path, TimedPath):
         kind, law = task.path.along.kind, ", with its own time law"
@@ -54,7 +55,7 @@ def _chosen(plan: PlanData) -> str:
     span, costs = plan.scenario.duration_range, plan.scenario.task.objective.time is not None
     if not plan.feasible or span is None or costs or plan.scenario.duration <= span.min * (1 + CLOSE):
         return ""
-    return ", of the lowest cost; time does not add to it without `objective: {time: 1}`"
+    return ", which has the lowest cost; to make time add to the cost, set `objective: {time: 1}`"
 
 
 def _accuracy(plan: PlanData) -> list[Fact]:

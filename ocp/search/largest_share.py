@@ -15,12 +15,12 @@ from ..tasks.status import MotionStatus
 from .relaxations import rounded, solved
 from .search import Search
 
-INSTANTS = 120  # at which tensions are asked for before a motion is audited
+INSTANTS = 120  # at which tensions must exist before a motion is audited
 HALVINGS = 10
-RESERVES = 1.0, 0.98, 0.9  # of what has tensions at these instants, one after the other until the audit passes
+RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
 
 Variation: TypeAlias = tuple[Scenario, float, str]
-"""A varied task laid out, the value that it differs by, and what is said of it behind that."""
+"""The scenario of a varied task, the value in which it differs, and a text that follows the value in reports."""
 
 
 def largest_share(

@@ -109,7 +109,7 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
         return plan
     begun = time.perf_counter()
     times = beginnings(_trajectory(plan), max(LEAST_PERIOD, plan.duration / INSTANTS))
-    times = times[~plan.scenario.phases.resting(times)]  # where the platform is on the ground, nothing has to stop
+    times = times[~plan.scenario.phases.resting(times)]  # on the ground the platform is at rest
     if not len(times):
         return plan
     stops = [
@@ -131,7 +131,7 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
 
 
 def _longer_stop(plan: Plan, seconds: float) -> list[Relaxed]:
-    """Return the time in which a plan's stops keep the tension limits, instead of so many seconds."""
+    """Return the shortest `stop_within` that the plan keeps, as an alternative to a limit of so many seconds."""
     assert plan.stop is not None
     enough = rounded(plan.stop.duration, up=True)
     task = plan.scenario.task.model_copy(update={"stop_within": enough})
@@ -140,7 +140,7 @@ def _longer_stop(plan: Plan, seconds: float) -> list[Relaxed]:
 
 
 def _trajectory(plan: Plan, extreme: int | None = None) -> Trajectory:
-    """Return the motion of a plan over time, with an extreme of its loads; after its end it is the last state."""
+    """Return the motion of a plan with one of its extreme loads; after the end of the plan the last state is held."""
     scenario, audit = plan.scenario, plan.audit
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:

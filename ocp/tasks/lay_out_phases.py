@@ -78,7 +78,7 @@ def _check_ground(robot: Robot, task: Task, where: str) -> None:
 
 
 def _check_tolerances(task: Task, where: str) -> None:
-    """Refuse loads of unknown mass or CoM where one of several winds or robots would have to hold too."""
+    """Refuse tolerances of loads together with a range of winds or with the key `robust`."""
     for index, phase in enumerate(task.phases or ()):
         if phase.load is None or not len(phase.load.extremes):
             continue
@@ -89,10 +89,10 @@ def _check_tolerances(task: Task, where: str) -> None:
 
 
 def _extreme_loads(own: Load | None, its: Load | None) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return pairs of loads within the tolerances of two phases, one on the ground, whose difference it must bear.
+    """Return pairs of extreme loads of a phase on the ground and its neighbour; the ground must bear their difference.
 
-    If it bears these, tensions exist for every load throughout the phase on the ground: those in between the tensions
-    at its ends, with support forces in between, since the balance at rest is linear in both.
+    If it does, tensions exist for every load throughout the phase on the ground: interpolated tensions with
+    interpolated support forces keep the balance, which is linear in both at rest.
     """
     if own == its:
         return []
