@@ -21,6 +21,7 @@ import numpy as np
 from ...core import columns_by_geometry, lines, wrench_by_axes
 from ...models import points
 from ...models.robot import Robot
+from ..logs.load_cells import unreadable
 from ..logs.measurements import Measurements, carriers_of, measured_poses
 from .geometry import record_with
 from .motion import Motion, cross, motion_of
@@ -28,7 +29,7 @@ from .parameters import Parameters
 
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
-UNMEASURED = 3.0  # times the weight: standard deviation of a tension that was not measured
+UNMEASURED = 3.0  # times the weight or the largest mean tension: standard deviation of one that was not measured
 MOST_CAPSTAN = 30.0  # of which exp is no overflow
 
 
@@ -99,8 +100,11 @@ class _Log:
         given, weight = self._measurements.tensions, self._robot.weight
         if given is None:
             return np.full((len(self._measurements), self._robot.m), (UNMEASURED * weight) ** 2)
-        size = np.maximum(np.abs(self.terms[1][2]), LEAST_TENSION * np.abs(given).mean(axis=0))
-        return (self._measurements.sigma.tensions * size) ** 2 + (1e-9 * max(weight, 1.0)) ** 2
+        usual = np.abs(given).mean(axis=0)
+        size = self._measurements.sigma.tensions * np.maximum(np.abs(self.terms[1][2]), LEAST_TENSION * usual)
+        lost = unreadable(given, self._measurements.lengths)
+        size = np.where(lost, UNMEASURED * max(weight, usual.max()), size)
+        return size**2 + (1e-9 * max(weight, 1.0)) ** 2
 
 
 class Balance:

@@ -18,6 +18,7 @@ from .carrier_poses import carriers_at, tensions_by_thrust
 from .clocks import Seen, clock_of_poses, set_clocks_of_carriers
 from .encoders import lengths_of
 from .frozen import seen
+from .load_cells import notes as unreadable_notes
 from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes, listed, read_map
 from .measurements import Measurements, changed
 from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, note_of, platform_from_ned
@@ -313,6 +314,8 @@ def measurements_of(
         known = sigmas.get("sigma", {})
         sigmas["sigma"] = {"rotation": AHRS, **(known if isinstance(known, Mapping) else {"lengths": known})}
     measured = Measurements(lengths.values[kept], **arguments, **sigmas)
+    if measured.tensions is not None:
+        notes += unreadable_notes(measured.tensions, measured.lengths)
     return Log(measured, found, [*notes, *read.notes], begin, clock=clock)
 
 

@@ -1,0 +1,77 @@
+"""Load cells that are dead or saturated, in recordings of a planar robot whose forces are balanced here."""
+
+import numpy as np
+import pytest
+
+from towline.estimation.calibration import calibrate
+from towline.estimation.logs import read_log
+from towline.estimation.logs.load_cells import unreadable
+
+from . import user_recordings as user
+
+ANCHORS = np.array([[-1.5, 0, 2.2], [1.5, 0, 2.2], [1.5, 0, 0], [-1.5, 0, 0]])
+ATTACHMENTS = np.array([[-0.15, 0, -0.08], [0.15, 0, -0.08], [0.15, 0, 0.08], [-0.15, 0, 0.08]])  # crossed cables
+
+
+def recording(count=800, mass=6.0):
+    """Rows of time, lengths, x, z, pitch, and tensions (N, 4) [N] of at least 20 N with 2 % of noise."""
+    draw, t = np.random.default_rng(3), 0.02 * np.arange(count)
+    x, z = 0.8 * np.sin(1.1 * t), 1.1 + 0.5 * np.sin(0.83 * t)
+    bends = np.column_stack([-(1.1**2) * x, -(0.83**2) * (z - 1.1)])
+    lines = ANCHORS - np.column_stack([x, 0 * x, z])[:, None] - ATTACHMENTS
+    lengths = np.linalg.norm(lines, axis=2)
+    u = lines / lengths[..., None]
+    moments = ATTACHMENTS[:, 2] * u[..., 0] - ATTACHMENTS[:, 0] * u[..., 2]
+    W = np.stack([u[..., 0], u[..., 2], moments], axis=1)
+    needed = np.column_stack([mass * (bends + np.array([0, 9.81])), 0 * x])
+    pull = (np.linalg.pinv(W) @ needed[..., None])[..., 0]
+    inner = np.linalg.svd(W)[2][:, 3]
+    inner *= np.sign(inner.sum(axis=1, keepdims=True))
+    pull += (((20 - pull) / inner).max(axis=1) + 30)[:, None] * inner
+    readings = lengths + draw.normal(0, 3e-4, lengths.shape)
+    rows = np.column_stack([t, readings, x, z, 0 * x]) + 0.0
+    rows[:, 5:7] += draw.normal(0, 3e-4, (count, 2))
+    return rows, pull * (1 + draw.normal(0, 0.02, pull.shape))
+
+
+def saved(folder, rows, tensions):
+    header = ["t", *(f"l{i}" for i in range(4)), "x", "z", "pitch [rad]", *(f"tension{i} [N]" for i in range(4))]
+    return user.write(folder / "log.csv", header, np.hstack([rows, tensions]))
+
+
+@pytest.mark.parametrize("fault", ["none", "dead", "saturated"])
+def test_the_mass_by_load_cells_of_which_some_measure_nothing(fault, tmp_path):
+    robot = user.robot_file(
+        tmp_path / "r.yaml", ANCHORS, ATTACHMENTS, [0, 0, 1.1, 0, 0, 0], 5.0, extra="  dof: [x, z, pitch]\n"
+    )
+    rows, tensions = recording()
+    if fault == "dead":
+        tensions[:, 2] = 0.0
+    top = np.quantile(tensions, 0.6)
+    tensions = np.minimum(tensions, top) if fault == "saturated" else tensions
+    log = read_log(saved(tmp_path, rows, tensions), robot=robot)
+    said = [note for note in log.notes if "not measured" in note]
+    if fault == "dead":
+        assert said == ["tensions of cables[2] never change, so they are treated as not measured"]
+    elif fault == "saturated":
+        assert len(said) == (tensions >= top).any(axis=0).sum()
+        assert f"the tension of cables[0] seems saturated at {top:.3g} N" in said[0]
+    else:
+        assert not said
+    found = calibrate(robot, log.measurements, free="mass")
+    sigma = float(np.sqrt(found.covariance[0, 0]))
+    assert abs(found.robot.platform.mass - 6.0) < 4 * sigma
+    assert sigma < 0.06
+
+
+def test_sound_sensors_are_not_saturated():
+    """Sensors with coarse steps, a platform that waits at its largest tension, and cables without any tension."""
+    rows, tensions = recording(400)
+    lengths = rows[:, 1:5]
+    for step in (0.1, 1.0, 5.0):
+        assert not unreadable(np.round(tensions / step) * step, lengths).any()
+    waits = np.argmax(tensions[:, 0])
+    still = np.r_[:waits, [waits] * 300, waits:400]
+    assert not unreadable(tensions[still], lengths[still]).any()
+    assert not unreadable(np.maximum(tensions - np.quantile(tensions, 0.4), 0.0), lengths).any()
+    assert not unreadable(np.ones((50, 4)), lengths[:50]).any()
