@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError, load
 from towline.estimation.calibration import Measurements, calibrate, corrected
+from towline.estimation.calibration.carrier_clocks import _Recorded
 from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.calibration.solving import usual
 from towline.estimation.logs import read_log, read_measurements
@@ -123,6 +124,22 @@ def test_poses_of_carriers_are_saved_and_checked(recording, tmp_path):
         calibrate(NAME, Measurements(np.ones((2, 3)), carrier_poses=np.zeros((2, 1, 6))), "offsets")
     with pytest.raises(InputError, match="carrier_poses must be finite"):
         Measurements(np.ones((2, 3)), carrier_poses=np.full((2, 3, 6), np.nan))
+
+
+def test_directions_of_some_cables_move_with_their_carriers_clocks(recording):
+    """Of one cable for a while, of one horizontally, of one never: the rest of them is where it was recorded."""
+    log = read_measurements(recording[0], robot=NAME)
+    t, late = log.times, np.array([0.05, -0.08, 0.06])
+    swing = 0.3 * np.sin(np.outer(t, [1.0, 1.3, 1.7]))
+    true = np.stack([np.cos(swing), np.sin(swing), 0 * swing], axis=2)
+    seen = np.stack([CubicSpline(t, true[:, i])(t - by) for i, by in enumerate(late)], axis=1)
+    for directions in (true, seen):
+        directions[200:240, 0], directions[:, 1, 2], directions[:, 2] = np.nan, np.nan, np.nan
+    there = _Recorded(load(NAME), log.with_directions(seen)).at(late).directions
+    expected = log.with_directions(true).directions
+    np.testing.assert_array_equal(np.isnan(there), np.isnan(expected))
+    inner = np.r_[20:190, 250:580]  # without ends and gaps, across which curves bend
+    np.testing.assert_allclose(there[inner], expected[inner], atol=1e-3)
 
 
 @pytest.mark.parametrize(("poses", "apart"), [(6, 1), (3, 2)])

@@ -123,14 +123,13 @@ class _Recorded:
             whole = np.hstack(
                 [poses[:, index, :3], turned, *(part[:, own].reshape(len(times), -1) for part in self._of)]
             )
-            curve = CubicSpline(times, smooth(times, whole, neighbours))
+            curve = CubicSpline(times, smooth(times, _bridged(times, whole), neighbours))
             self._parts.append((own, whole, curve(times), curve))
 
     @property
     def _of(self) -> list[np.ndarray]:
-        """Return the tensions and directions of the cables, if complete: they are shifted with the carriers."""
-        both = (self._given.tensions, self._given.directions)
-        return [part for part in both if part is not None and np.isfinite(part).all()]
+        """Return the tensions and directions of the cables, which are shifted with the carriers; nan if unknown."""
+        return [part for part in (self._given.tensions, self._given.directions) if part is not None]
 
     def at(self, ahead: np.ndarray) -> Measurements:
         """Return the measurements on one clock, if the clocks of the carriers are `ahead` of it, (k,) [s]."""
@@ -156,6 +155,16 @@ class _Recorded:
         motion = None if model.carriers is None else CarrierMotion(self._robot, measurements)
         forces = Balance(self._robot, measurements)
         return replace(model, measurements=measurements, forces=forces, carriers=motion)
+
+
+def _bridged(times: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Return columns (n, k) with linear interpolations in place of nan, and zeros in columns without a number."""
+    known = np.isfinite(columns)
+    bridged = [
+        np.interp(times, times[at], column[at]) if at.any() else np.zeros(len(times))
+        for column, at in zip(columns.T, known.T, strict=True)
+    ]
+    return np.stack(bridged, axis=1)
 
 
 def _derivatives(
