@@ -1,6 +1,6 @@
-"""Less work around the tests: for the garbage collector, which would take a tenth of the time of all, and for workers.
+"""Reduce the time that the garbage collector (a tenth of the whole run) and the start of workers take.
 
-What exists before the first test stays, so it is not searched. The rest is searched after more new objects than usual.
+Objects that exist before the first test remain, so they are not searched; all others are searched less often.
 """
 
 import gc
@@ -19,7 +19,7 @@ NEW_OBJECTS = 20_000
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
-    """Collect; of workers in a new installation one before the others, which find compiled what they import."""
+    """Let one worker collect the tests before the others, which then import modules that are already compiled."""
     gc.disable()
     if fcntl is None or "PYTEST_XDIST_WORKER" not in os.environ:
         return (yield)

@@ -88,6 +88,8 @@ def test_without_a_law_there_is_a_proof_and_no_file(folder):
         ("base: {kind: free}\n", "base.kind must be hold or given to time a path"),
         ("wind: {min: [0, 0, 0], max: [1, 0, 0]}\n", "wind must be [0, 0, 0], still air"),
         ("limits: {tension_rate: 3}\n", "limits.tension_rate must be left out to time a path"),
+        ("stop_within: 0.01\n", "stop_within must be left out to time a path"),
+        ("initial: {pose: [0, 0, 1], velocity: [0, 0, 1]}\n", "initial must be left out to time a path"),
     ],
 )
 def test_what_timing_cannot_do_is_told(folder, more, message):

@@ -11,7 +11,7 @@ LATE = {"delay": 0.02, "stamped": True}
 
 
 def test_a_push_is_as_unexplained_as_without_the_delay():
-    """For 20 ms more nobody knows of 1.4 m/s^2, which is more than is permitted in 50 ms: no fault of the model."""
+    """A push of 1.4 m/s^2 remains unknown for 20 ms more. This alone would exceed the bound, but the model is right."""
     robot, seen = load("cogiro"), {}
     push = [{"kind": "push", "at": 0.1, "force": [1.4 * robot.platform.mass, 0, 0]}]
     for delay, noise in ((0, None), (20, LATE)):

@@ -41,7 +41,7 @@ def test_teams_come_to_rest(name):
 
 
 def test_a_hand_over_in_a_push_is_no_worse_than_computed_torque_alone():
-    """Predictions order rear carriers to fall faster than gravity: they then turned over, 187 mm off."""
+    """Predictions order rear carriers to fall faster than gravity; without the cone they turned over (187 mm)."""
     robot = load("multi-quadrotor-4")
     push = [{"kind": "push", "at": 0.05, "force": [0.15 * robot.weight, 0, 0]}]
     ahead, usual = (
@@ -55,7 +55,7 @@ def test_a_hand_over_in_a_push_is_no_worse_than_computed_torque_alone():
 
 
 def test_carriers_that_tilt_little_in_plans_withstand_as_much():
-    """`tilt_max` is a limit of plans: as one of flights, too, it made the error in this push larger."""
+    """`tilt_max` is a limit of plans: as a limit of the cone too, it made the error in this push larger."""
     robot = load("multi-quadrotor-3")
     push = [{"kind": "push", "at": 0.1, "force": [-0.2 * robot.weight, 0, 0]}]
     gentle = tuple(carrier.model_copy(update={"tilt_max": 0.2}) for carrier in robot.carriers)

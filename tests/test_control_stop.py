@@ -159,7 +159,7 @@ def test_what_cannot_be_stopped_is_one_line(case):
 
 
 def test_stops_in_time_carry_the_loads_of_phases_within_their_tolerances():
-    """By stops with each load alone; on the ground nothing has to stop, and a longer time is offered."""
+    """Each load is judged by its own plan; phases on the ground are not checked; a sufficient time is offered."""
     bag = {"mass": 300, "com": [0.1, 0, -0.2]}
     fast = {"name": "carry", "duration": 0.8, "path": {"kind": "line", "start": [0, 0, 1], "end": [0.3, 0, 1.1]}}
     take = {"name": "take", "duration": 0.3, "ground": {}, "path": {"kind": "rest", "pose": [0, 0, 1]}}

@@ -46,7 +46,7 @@ def requirements_of(size, force, clearance=0.1):
 
 
 def searched(robot, size, force):
-    """What linear programs find from a random layout: the merit before and after, over the unit of force, and it."""
+    """Return the merits of a random layout and of that found from it by linear programs, in `force`, and the latter."""
     requirements = requirements_of(size, force)
     variables, room = variables_of(robot, requirements), room_of(robot, requirements).with_spare(0.01)
     rows = rows_of(robot, requirements.require, [requirements.require[0].places()])

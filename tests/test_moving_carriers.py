@@ -144,7 +144,7 @@ def test_directions_of_some_cables_move_with_their_carriers_clocks(recording):
 
 @pytest.mark.parametrize(("poses", "apart"), [(6, 1), (3, 2)])
 def test_clocks_of_carriers_are_fitted_and_part_of_the_sigmas(recording, poses, apart):
-    """By computers of their own, also with positions of the load alone, whose attitude is then an unknown."""
+    """Each carrier has a computer; of the load, poses or only positions are known, so its attitude may be unknown."""
     log = read_measurements(recording[0], robot=NAME)
     t, late, carriers, pulls = log.times, np.array([0.013, -0.021, 0.03]), log.carrier_poses.copy(), log.tensions.copy()
     for i, by in enumerate(late):

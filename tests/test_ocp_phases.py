@@ -518,7 +518,7 @@ def test_wrong_tolerances_are_one_line(load_keys, keys, message):
 
 
 def test_a_load_within_its_tolerances_is_picked_up_from_the_ground():
-    """The ground and the cables share the weight of any load by every ratio: from none to all of it on the ground."""
+    """Tensions exist for any load, whatever share of its weight the ground carries, from none to all of it."""
     support = [[x, y, -1] for x in (-1, 1) for y in (-1, 1)]
     pick_up = {"name": "pick-up", "duration": 0.5, "load": UNSURE, "ground": {"support": support}}
     phases = [line([0, 0, 3], HIGH, name="approach"), pick_up, line(HIGH, [0.5, 0, 2.5], name="lift", load=UNSURE)]
@@ -542,7 +542,7 @@ def test_a_load_within_its_tolerances_is_picked_up_from_the_ground():
 
 
 def test_tolerances_that_are_feasible_are_offered():
-    """Those of the planned pick-up, as a part of what is asked for: with a little more it is infeasible."""
+    """The offered share of the tolerances is feasible, and a slightly larger one is not."""
     fast = {"phases": [line([-2, -1, 1], [2, 1, 1.6], name="carry", load=UNSURE) | {"duration": 2.1}], "margin": 20}
     (offer,) = [each for each in plan(COGIRO, fast).relaxations if "com_tolerance" in each.name]
     for share, feasible in ((offer.possible / 100, True), (offer.possible / 100 + 0.03, False)):

@@ -150,7 +150,7 @@ def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relax
 
 @pytest.mark.parametrize("tube", [0, 0.02])
 def test_no_duration_is_offered_that_an_audit_cannot_sample(tube, monkeypatch):
-    """If 2.1 s were the longest: the speed needs more than 2.8 s."""
+    """The longest duration is set to 2.1 s, but the limit on the speed requires more than 2.8 s."""
     for module in (scenario, task_checks):
         monkeypatch.setattr(module, "MOST_SAMPLES", 2100)
     task = TASK | {"tube": {"position": tube}, "steps": 20, "limits": {"platform_speed": 0.4}}

@@ -112,7 +112,7 @@ def test_a_duration_is_too_short_for_the_strength_of_all_cables(share):
 
 
 def test_a_short_turn_about_an_origin_is_feasible_though_the_centre_of_mass_is_elsewhere():
-    """It moves at both ends too, so no cables accelerate it from rest: 4.5 m/s^2 keep it on a circle."""
+    """The centre of mass moves at both ends too: it is not accelerated from rest but kept on a circle by 4.5 m/s^2."""
     robot, arm, rate = load("cogiro"), 0.5, 3.0
     robot = robot.model_copy(update={"platform": robot.platform.model_copy(update={"com": (arm, 0, 0)})})
     turn = 2 * arm * rate**2 / (robot.t_max.sum() / robot.platform.mass + 9.81)  # half of what is proven from rest
@@ -130,7 +130,7 @@ def test_a_short_turn_about_an_origin_is_feasible_though_the_centre_of_mass_is_e
 
 @pytest.mark.parametrize("name", ["ipanema-1", "cogiro", "planar-4"])
 def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
-    """Half a percent less is proven infeasible, and with a little more, for what happens between, a plan has it."""
+    """Half a percent less is proven infeasible; a little more, for what happens between instants, has a plan."""
     robot = load(name)
     start = np.array(robot.home[:3])
     line = {"kind": "line", "start": start.tolist(), "end": (start + np.array([0.3, 0.0, 0.2])).tolist()}

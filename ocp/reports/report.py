@@ -11,6 +11,7 @@ from ...figures.report import Report, Section, Table
 from ...models.parsing import to_yaml
 from ..result import PlanData, Relaxed
 from ..tasks.phases import SAME_TIME
+from ..timing.timed_task import can_be_timed
 from .ideas import ideas, units
 from .motion_facts import motion_facts, wind
 from .reasons import exceeded, in_phase, reasons, up
@@ -178,7 +179,7 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
     if relaxed.name == "duration":
         longer = relaxed.possible > relaxed.requested
         side = "shortest" if longer else "longest"
-        timed = longer and not plan.scenario.platform_free and not plan.scenario.carrier_free
+        timed = longer and can_be_timed(plan.scenario.robot, plan.scenario.task)
         other = "; `towline time` computes the fastest time law" if timed else ""
         return "feasible duration", f"{fact}, close to the {side} feasible one for this time law{other}"
     others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]

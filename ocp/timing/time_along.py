@@ -26,17 +26,13 @@ from ..tasks.lay_out import lay_out
 from ..tasks.limit_list import limit_list
 from ..tasks.paths import CirclePath
 from ..tasks.status import MotionStatus
-from ..tasks.task import FreeBase, GivenBase, Task, read_task
-from ..tasks.task_checks import check_margin
-from ..tasks.wind_set import WindBox, WindDisc
+from ..tasks.task import GivenBase, Task, read_task
 from .fastest_law import FastestLaw
 from .geometry import geometry
 from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import PhasePlane, phase_plane, proofs
+from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, check_task
 
-SPEEDS = ("platform_speed", "zone_speed", "cable_speed", "carrier_speed")
-ACCELERATIONS = ("platform_acceleration", "platform_lateral_acceleration", "cable_acceleration", "carrier_acceleration")
-KNOWN_LIMITS = (*SPEEDS, *ACCELERATIONS)
 ATTEMPTS = 8
 MOST_INTERVALS = 6400
 FINER_TRIES = 2  # after a grid on which the search ended without a law
@@ -80,43 +76,13 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     """
     robot, task = as_robot(robot), read_task(task)
     grid = whole_number("grid", grid, 10, MOST_INTERVALS)
-    _check(robot, task)
+    check_task(robot, task)
     paths = carrier_paths(robot, task)
     moving = {index: geometry(its, alone=False) for index, its in paths.items()}
     until = task.duration if isinstance(task.path, CirclePath) and isinstance(task.duration, float) else None
     still_air = None if task.wind is None else np.zeros(3)
     parametrised = ParametrisedPath(robot, geometry(task.path, alone=not moving), moving, until, still_air)
     return _search(task, parametrised, _limits(robot, task, parametrised.moving), grid)
-
-
-def _check(robot: Robot, task: Task) -> None:
-    """Refuse a task that does not fit the robot, or that requires more than a time law along its path.
-
-    Raises `InputError` naming the field and what is accepted.
-    """
-    where = f"task {task.name!r}"
-    if task.phases is not None:
-        raise InputError(
-            f"{where}: phases must be left out to time a path, got {len(task.phases)} phases; plan the task instead"
-        )
-    if isinstance(task.base, FreeBase):
-        raise InputError(f"{where}: base.kind must be hold or given to time a path, got 'free'")
-    if task.tube.radius or task.tube.turn:
-        raise InputError(f"{where}: tube must be left out to time a path, which is then followed exactly")
-    for name in type(task.limits).model_fields:
-        if name not in (*KNOWN_LIMITS, "soft") and getattr(task.limits, name):
-            raise InputError(
-                f"{where}: limits.{name} must be left out to time a path; a time law keeps {', '.join(KNOWN_LIMITS)}"
-            )
-    if task.limits.soft:
-        raise InputError(f"{where}: limits.soft must be left out to time a path, whose limits are all hard")
-    if task.robust is not None:
-        raise InputError(f"{where}: robust must be left out to time a path, got {task.robust:g}; plan the task instead")
-    if isinstance(task.wind, WindBox | WindDisc) or (task.wind is not None and any(task.wind)):
-        raise InputError(f"{where}: wind must be [0, 0, 0], still air, or left out to time a path")
-    if task.wind is not None and robot.platform.aero is None:
-        raise InputError(f"{where}: wind must be left out, since robot {robot.name!r} has no platform.aero")
-    check_margin(robot, task)
 
 
 def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
