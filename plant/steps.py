@@ -1,4 +1,4 @@
-"""How a plant is driven and stepped by default: `default_drive`, and `steps_in`, Runge-Kutta steps per period."""
+"""How a plant is driven and stepped by default: `default_drive`, `steps_in` a period, and `windings_in` it."""
 
 import math
 
@@ -10,6 +10,7 @@ from ..models.robot import Robot
 from .plant import Plant
 
 ANGLE = 1.0  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
+TIED = 2.0  # what a winch with a constant rate may add to the mass that its cable moves, of that mass
 
 
 def default_drive(robot: Robot) -> str:
@@ -23,11 +24,29 @@ def default_drive(robot: Robot) -> str:
 
 def steps_in(period: float, plant: Plant) -> int:
     """Return the number of steps per period [s] that resolves the fastest motion of elastic cables."""
-    return max(1, math.ceil(period * fastest_motion(plant) / ANGLE))
+    return max(1, math.ceil(period * max(fastest_motion(plant)) / ANGLE))
 
 
-def fastest_motion(plant: Plant) -> float:
-    """Return the fastest motion of elastic cables at the robot's home [rad/s]; 0 if not all of them are elastic.
+def windings_in(period: float, plant: Plant) -> int:
+    """Return the number of parts of a period [s] that last about as long as the `winding_time`."""
+    return max(1, math.floor(period / winding_time(plant) + 0.5))
+
+
+def winding_time(plant: Plant) -> float:
+    """Return for how long winches without a model keep a rate towards commanded tensions [s]; infinite without them.
+
+    Winches measure tensions more often than a controller commands them. While a winch keeps its rate for a time h, its
+    cable ties the bodies at its ends to each other, as if they had h (C + h K) more mass along it
+    (core/plant/winch_lengths.c). In one long period, a light carrier would hardly move relative to its load.
+    """
+    if plant.drive != "lengths":
+        return math.inf
+    frequency, decay = fastest_motion(plant)
+    return 2 * TIED / (decay + math.sqrt(decay**2 + 4 * TIED * frequency**2)) if frequency else math.inf
+
+
+def fastest_motion(plant: Plant) -> tuple[float, float]:
+    """Return the highest frequency and decay of elastic cables at home [rad/s]; 0 if not all of them are elastic.
 
     With the elongations e of taut cables, d2e/dt2 = -G (K e + C de/dt), where G has the accelerations along the cables
     that unit tensions cause; the largest eigenvalues of G K and G C bound frequency and decay.
@@ -35,7 +54,7 @@ def fastest_motion(plant: Plant) -> float:
     cables = plant.record["cable"][: plant.robot.m]
     stiffness, damping = cables["stiffness"], cables["damping"]
     if plant.drive == "tensions" or not stiffness.all():
-        return 0.0
+        return 0.0, 0.0
     robot = plant.robot
     A, mask = dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home), robot.dof_mask
     inverse = np.zeros((6, 6))
@@ -54,4 +73,4 @@ def fastest_motion(plant: Plant) -> float:
     lengths = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
     frequency = math.sqrt(float(np.abs(np.linalg.eigvals(G * (stiffness / lengths))).max()))
     decay = float(np.abs(np.linalg.eigvals(G * damping)).max())
-    return max(frequency, decay)
+    return frequency, decay

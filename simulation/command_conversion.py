@@ -7,7 +7,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..control import Command
 from ..core import winch_lengths
-from ..models.trajectory import moved_on
+from ..models.trajectory import Motion, moved_on
 from ..plant import Plant, layout
 from .drives import Drives
 from .experiment import Experiment, Wind
@@ -19,8 +19,9 @@ class Orders:
     """Convert controller commands to plant commands for each drive type.
 
     Drives of tensions and of winches with forces receive the tensions themselves. Elastic cables without winches in
-    their file are assumed to have winches that measure their tension and reach it within the period:
-    core/plant/winch_lengths.c. Carriers are commanded for one instant and move like the reference until the next.
+    their file are assumed to have winches that measure their tension and reach it within the period, or within each
+    of its parts (`plant.steps.windings_in`): core/plant/winch_lengths.c. Carriers are commanded for one instant and
+    move like the reference until the next.
 
     - `plant`: the plant.
     - `conditions`: conditions of the runs.
@@ -30,7 +31,10 @@ class Orders:
 
     def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int], record: np.ndarray | None = None):
         robot, times = plant.robot, conditions.period * np.arange(len(conditions.references))
-        self._period, self._drive, self._fixed = conditions.period, plant.drive, robot.fixed_lengths
+        self._parts, self._drive, self._fixed = conditions.windings, plant.drive, robot.fixed_lengths
+        self._period = conditions.period / self._parts
+        commanded = layout.BODY * (1 + len(robot.carriers)) + layout.REFERENCE * robot.m
+        self._commanded = slice(commanded, commanded + robot.m)  # lengths commanded last, in a state
         self._record = plant.record if record is None else record
         self._last_rates = np.full((len(seeds), robot.m), np.nan)
         wind = conditions.wind
@@ -39,7 +43,7 @@ class Orders:
         row = plant.command(np.ones(robot.m), wind=calm, wrench=conditions.disturbance)
         differ, self._imperfect = conditions.mismatch, None
         if differ.of_drives:
-            self._imperfect = Drives([differ.drawn(robot, seed) for seed in seeds], conditions.period)
+            self._imperfect = Drives([differ.drawn(robot, seed) for seed in seeds], self._period)
         self._moves, count = any(carrier.moves for carrier in robot.carriers), len(robot.carriers)
         self._rows = np.tile(row, (len(seeds), 1 + self._moves, 1))  # a second, of the next period, has only carriers
         m, first = robot.m, layout.REFERENCE_POSE
@@ -49,28 +53,29 @@ class Orders:
         self._wrenches, self._constant = rows[:, layout.WRENCH : layout.COMMANDS], conditions.disturbance
         self._on_carriers = carriers[..., layout.CARRIER_WRENCH : first]
         self._cables = rows[:, layout.COMMANDS : layout.COMMANDS + m]
-        self._poses, self._velocities = carriers[..., first : first + 6], carriers[..., first + 6 : first + 12]
-        self._accelerations = carriers[..., first + 12 : first + 18]
         self._actuation = carriers[..., : max(len(carrier.actuators) for carrier in robot.carriers)]
         if self._moves:
             self._starts = carriers[..., first:].reshape(len(seeds), count, 3, 6)
             self._ends = blocks[:, 1, :, first:].reshape(len(seeds), count, 3, 6)
             # What a constant acceleration misses of the next reference: pose, velocity and acceleration, (K, 3, c, 6).
             motion = np.array([reference[3:6] for reference in conditions.references])
-            self._missed = np.zeros_like(motion)
+            missed = np.zeros_like(motion)
             pose, velocity, acceleration = np.moveaxis(motion[:-1], 1, 0)
-            ends = moved_on((pose, velocity, acceleration), self._period)
-            self._missed[:-1] = motion[1:] - np.stack(ends, axis=1)
+            ends = moved_on((pose, velocity, acceleration), conditions.period)
+            missed[:-1] = motion[1:] - np.stack(ends, axis=1)
+            shares = [_share(part / self._parts, conditions.period) for part in range(1, 1 + self._parts)]
+            self._missed = [(share @ missed.swapaxes(1, 2)).swapaxes(1, 2) for share in shares]  # at the end of parts
 
     def push(self, wrenches: np.ndarray) -> None:
         """Add wrenches on platform and carriers, (N, 1 + c, 6) [N, N m], to the constant one, until the next call."""
         np.add(self._constant, wrenches[:, 0], out=self._wrenches)
         self._on_carriers[:] = wrenches[:, 1:]
 
-    def rows(self, k: int, command: Command, lengths: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Return the rows of period `k`, (N, 1 or 2, k); lengths and rates are (N, 2, m), states (N, n), as it begins.
+    def rows(self, k: int, command: Command, lengths: np.ndarray, states: np.ndarray, part: int = 0) -> np.ndarray:
+        """Return the rows of a part of period `k`, (N, 1 or 2, k).
 
-        Where carriers move, the second has their references at the end. Each call overwrites the rows of the last.
+        Lengths and rates are (N, 2, m), states (N, n), as the part begins. If carriers move, the second row has their
+        references at its end. Each call overwrites the rows of the last.
         """
         rows, drives = self._rows[:, 0], self._imperfect
         if self.wind is not None:
@@ -79,6 +84,9 @@ class Orders:
             if self._drive != "lengths":
                 raise InputError(f"drive must be 'lengths' for a controller that commands lengths, got {self._drive!r}")
             self._cables[:] = command.lengths if drives is None else drives.lengths(command.lengths)
+            if part < self._parts - 1:
+                last = states[:, self._commanded]
+                self._cables[:] = last + (self._cables - last) / (self._parts - part)
         elif self._drive == "lengths" and self._fixed is not None:
             self._cables[:] = self._fixed
         else:
@@ -90,16 +98,33 @@ class Orders:
             else:
                 winch_lengths(self._record, states, lengths, tensions, self._last_rates, self._rows, self._period)
         if self._moves:
-            self._poses[:], self._velocities[:] = command.carrier_pose, command.carrier_velocity
-            self._accelerations[:] = command.carrier_acceleration
-            motion = self._poses, self._velocities, self._accelerations
-            for order, end in enumerate(moved_on(motion, self._period)):
-                np.add(end, self._missed[k, order], out=self._ends[:, :, order])
+            pose, velocity, acceleration = (np.asarray(ordered, dtype=float) for ordered in command[1:4])
+            begins: Motion = (pose, velocity, acceleration)
+            ends = moved_on(begins, (part + 1) * self._period)
+            if part:
+                pose, velocity, acceleration = moved_on(begins, part * self._period)
+                missed = self._missed[part - 1][k]
+                begins = pose + missed[0], velocity + missed[1], acceleration + missed[2]
+            for order, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+                self._starts[:, :, order] = begin
+                np.add(end, self._missed[part][k, order], out=self._ends[:, :, order])
             if drives is not None:
                 drives.follow(self._starts, self._ends)
         if command.actuation is not None:
             self._actuation[:] = command.actuation if drives is None else drives.actuation(command.actuation)
         return self._rows
+
+
+def _share(part: float, period: float) -> np.ndarray:
+    """Return what pose, velocity and acceleration, (3, 3), have after a part of a period of what they miss at its end.
+
+    A polynomial of fifth degree begins without any of it, as the path of a carrier (core/plant/carrier_paths.h).
+    """
+    powers = part ** np.arange(3.0, 6.0)
+    of_pose = np.array([[10, -4, 0.5], [-15, 7, -1], [6, -3, 0.5]])  # of the powers 3, 4 and 5, by what is missed
+    slopes = np.stack([powers, np.arange(3, 6) * powers / part, [6 * part, 12 * part**2, 20 * part**3]])
+    units = period ** np.arange(3.0)
+    return slopes @ of_pose * units / units[:, None]
 
 
 def _air(wind: Wind, times: np.ndarray, seed: int) -> np.ndarray:

@@ -27,6 +27,7 @@ class Experiment(NamedTuple):
     keep_out: Sequence[Sequence[np.ndarray]]  # outlines of the keep-out regions of the reference, see `Trajectory`
     doubt: str = ""  # row of the report that says that the reference is a plan with a broken limit, see `Trajectory`
     mismatch: Mismatch = Mismatch()  # as in `Conditions`
+    windings: int = 1  # parts of a period, see `plant.steps.windings_in`
 
     __repr__ = record
 

@@ -1,7 +1,7 @@
 """Close the loop of plant, sensors and controller, for one run or many in parallel: `fly`."""
 
 from collections.abc import Callable, Sequence
-from math import isfinite
+from math import ceil, isfinite
 from time import perf_counter
 from typing import Any
 
@@ -91,14 +91,15 @@ def fly(
     first = conditions.references[0]
     motion = (first.pose, first.velocity, first.carrier_pose, first.carrier_velocity)
     start = np.zeros(m) if first.tensions is None else np.maximum(first.tensions, 0.0)
-    periods = Periods(plant, period, conditions.substeps)
+    parts = conditions.windings
+    periods = Periods(plant, period / parts, ceil(conditions.substeps / parts))
     fixed = robot.fixed_lengths if plant.drive == "lengths" else None  # which plans meet to some nm
     state = plant.start(*motion, tensions=start if fixed is None else None, lengths=fixed)
     running = Running(plant, periods, np.tile(state, (flights, 1)))
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))
     history, tensions = np.zeros((flights, 2, plant.size)), np.zeros((flights, 2, m))
     end, numbers = history[:, 1], history.reshape(-1)
-    pulls = np.tile(start, (flights, 1))  # means of the last period
+    between, pulls = motions.copy(), np.tile(start, (flights, 1))  # pulls: means of the last period
     sensors, pilot = Sensors(conditions.noise, seeds, period, m), Pilot(controllers, flights, conditions)
     orders = Orders(plant, conditions, seeds, periods.record)
     lasted, alive, going = np.zeros(flights, dtype=int), np.ones(flights, dtype=bool), True
@@ -125,14 +126,21 @@ def fly(
             expected = shapes
         if command.released is not None:
             periods.release(states, command.released)
-        try:
-            row = orders.rows(k, command, lengths, states)
-        except (TypeError, ValueError):
-            check_command(command, robot, flights, time)
-            raise
-        periods.run(states, row, history, tensions)
-        pulls = np.add(tensions[:, 0], tensions[:, 1])
-        pulls *= 0.5
+        pulls = np.zeros((flights, m))
+        for part in range(parts):
+            if part:
+                alive &= (np.abs(end) < BEYOND).all(axis=1)
+                states[alive] = end[alive]
+                sense(periods.record, states, between, lengths)
+            try:
+                row = orders.rows(k, command, lengths, states, part)
+            except (TypeError, ValueError):
+                check_command(command, robot, flights, time)
+                raise
+            periods.run(states, row, history, tensions)
+            pulls += tensions[:, 0]
+            pulls += tensions[:, 1]
+        pulls *= 0.5 / parts
         if not isfinite(_square(numbers)):
             check_command(command, robot, flights, time)
             alive &= (np.abs(end) < BEYOND).all(axis=1)

@@ -26,7 +26,7 @@ from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from ..models.trajectory import ROUNDING, Trajectory
 from ..plant import Plant
-from ..plant.steps import default_drive, steps_in
+from ..plant.steps import default_drive, steps_in, windings_in
 from .command_conversion import Orders
 from .conditions import Conditions
 from .events import Carry, Event, Stick, read_events
@@ -213,10 +213,10 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
             _check_winches(robot, drive, where)
     mismatch = required("mismatch", meets.mismatch, Mismatch)
     mismatch.check(robot)
-    plant = Plant(robot, drive=drive)
+    plant, stiffest = Plant(robot, drive=drive), Plant(mismatch.stiffest.robot(robot, 0), drive=drive)
     return plant, Experiment(
         period=period,
-        substeps=meets.substeps or steps_in(period, Plant(mismatch.stiffest.robot(robot, 0), drive=drive)),
+        substeps=meets.substeps or steps_in(period, stiffest),
         references=_references(robot, parts, period * np.arange(periods)),
         wind=read_wind(robot, meets.wind, meets.gusts),
         disturbance=meets.disturbance,
@@ -225,6 +225,7 @@ def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> t
         keep_out=next((part.keep_out for _, part in parts if part.keep_out), ()),
         doubt="; ".join(dict.fromkeys(part.doubt for _, part in parts if part.doubt)),
         mismatch=mismatch,
+        windings=windings_in(period, stiffest),
     )
 
 

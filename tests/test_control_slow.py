@@ -87,6 +87,21 @@ def test_towing_robots_hold_their_load_in_slow_loops(kind, period):
     assert run.answered["as planned"] == len(run.error)
 
 
+@pytest.mark.parametrize("kind", [ComputedTorque, Predictive])
+def test_a_light_carrier_is_free_to_turn_during_slow_steps(kind):
+    """Winches that kept their rates for 10 ms tied a quadrotor to its platform, 13 times as heavy to turn: it tumbled.
+
+    A critically damped error of bandwidth b goes J / (m b e) after an impulse J, and less if it lasts for a while.
+    """
+    robot = load("wang-flying-quadrotor")
+    force, lasting = np.array([0.5, 0.3]), 0.1
+    events = [f"push {force[0]} {force[1]} 0 at 0.2 for {lasting}"]
+    run = simulate(robot, robot.home, kind(robot), duration=2.0, period=0.01, events=events, tolerance=0.1)
+    assert run.error.max() < np.linalg.norm(force) * lasting / (robot.platform.mass * 10.0 * np.e)
+    assert run.error[-20:].max() < 1e-5
+    assert run.answered["as planned"] == len(run.error)
+
+
 def test_all_bandwidths_of_a_team_are_lowered_by_the_same_factor_and_restored():
     robot = load("multi-quadrotor-3")
     controller = ComputedTorque(robot)

@@ -22,7 +22,7 @@ from towline.control.trajectory import read_trajectory
 from towline.core import sense
 from towline.export.fmu.export import unit_files
 from towline.plant import Plant
-from towline.plant.steps import default_drive, steps_in
+from towline.plant.steps import default_drive, steps_in, windings_in
 
 from .c_programs import require
 from .units import Unit, each, motion, written
@@ -145,22 +145,27 @@ def swing(robot, duration):
     return xr.Dataset(variables, attrs={"robot": f"name: {robot.name}"})
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_plant_and_controller_make_the_loop_of_simulate(name, unit):
-    """Coupled by names, and in one unit: the same motion to 1e-9 m, with the period of the controller as the step."""
-    robot, steps = load(name), 500
-    m, plan = robot.m, swing(robot, STEP * (steps + 10))
+@pytest.mark.parametrize(("name", "step"), [*((name, STEP) for name in ROBOTS), ("wang-flying", 0.01)])
+def test_plant_and_controller_make_the_loop_of_simulate(name, step, unit):
+    """Coupled by names, and in one unit: the same motion to 1e-9 m, with the period of the controller as the step.
+
+    In 10 ms the winches of wang-flying change their rates several times, while its carrier moves with a jerk.
+    """
+    robot, steps = load(name), round(0.5 / step)
+    m, plan = robot.m, swing(robot, step * (steps + 10))
     air = (0.0, 0.0, 0.0) if robot.platform.aero else None  # still air is that of a unit
-    run = simulate(robot, plan, duration=STEP * steps, wind=air)
-    references = references_at(robot, read_trajectory(robot, plan, None), STEP * np.arange(steps + 1))
+    run = simulate(robot, plan, duration=step * steps, wind=air, period=step)
+    assert (windings_in(step, Plant(robot, default_drive(robot))) > 1) == (step > STEP)
+    references = references_at(robot, read_trajectory(robot, plan, None), step * np.arange(steps + 1))
     plant, controller, both = (unit(name, part) for part in PARTS)
+    both.set(["controller.period"], [step])
     sensors = [name for name in controller.names("input") if not name.startswith("reference.")]
     orders = [name for name in plant.names("input") if name in controller.names("output")]
     found = np.zeros((2, steps, 6))
     for k, (now, after) in enumerate(pairwise(references)):
         values = dict(zip(motion("reference", *MOTION), np.concatenate(now[:3]), strict=True))
         values |= dict(zip(each("reference.tension[{}]", m), now.tensions, strict=True))
-        jerks = (after.carrier_acceleration - now.carrier_acceleration) / STEP
+        jerks = (after.carrier_acceleration - now.carrier_acceleration) / step
         for i, row in enumerate(np.stack([*now[3:6], jerks], axis=1)):
             names = motion(f"reference.carrier[{i + 1}]", *MOTION, "jerk")
             values |= dict(zip(names, row.ravel(), strict=True)) if robot.carriers[i].moves else {}
@@ -168,10 +173,10 @@ def test_plant_and_controller_make_the_loop_of_simulate(name, unit):
         controller.set(sensors, plant.get(sensors))
         for one in (controller, both):
             one.set(values, list(values.values()))
-        controller.step(k * STEP, STEP)
+        controller.step(k * step, step)
         plant.set(orders, controller.get(orders))
         for one in (plant, both):
-            one.step(k * STEP, STEP)
+            one.step(k * step, step)
     assert np.ptp(run.record.motions[:, 0, 0]) > 0.03
     assert np.abs(found - run.record.motions[:, 0, :6]).max() < 1e-9
 

@@ -12,9 +12,10 @@ from ...core import sense
 from ...models.record import record_of
 from ...models.robot import Robot
 from ...plant import Plant
-from ...plant.steps import ANGLE, fastest_motion
+from ...plant.steps import ANGLE, fastest_motion, winding_time
 
 PERIOD = 1e-3  # [s], of `simulate`
+LONGEST = 1e9  # [s]: what is as good as infinity
 
 
 class _Exported(ComputedTorque):
@@ -42,7 +43,7 @@ def data_at(robot: Robot, plant: Plant, reference: Reference) -> dict[str, Any]:
     """Return the members of `towline_unit` at a reference, on which the robot is, with its tensions."""
     pulls = np.zeros(robot.m) if reference.tensions is None else np.maximum(reference.tensions, 0.0)
     motion = (reference.pose, reference.velocity, reference.carrier_pose, reference.carrier_velocity)
-    fixed, fastest = robot.fixed_lengths, fastest_motion(plant)
+    fixed, fastest = robot.fixed_lengths, max(fastest_motion(plant))
     state = plant.start(*motion, tensions=pulls if fixed is None else None, lengths=fixed)
     motions, lengths = np.zeros((1, 1 + len(robot.carriers), 12)), np.zeros((1, 2, robot.m))
     sense(plant.record, state[None], motions, lengths)
@@ -56,6 +57,7 @@ def data_at(robot: Robot, plant: Plant, reference: Reference) -> dict[str, Any]:
         "robot": plant.record,
         "plant": plant.settings,
         "longest_step": ANGLE / fastest if fastest else PERIOD,
+        "winding_time": min(winding_time(plant), LONGEST),
         "mass": robot.platform.mass,
         "state": state,
         "last_rates": np.full(robot.m, np.nan),

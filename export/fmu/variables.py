@@ -21,6 +21,7 @@ _SIMULATES, _CONTROLS = ("plant", "both"), ("controller", "both")
 _PARAMETERS = (
     (_SIMULATES, "plant.mass", "kg", "mass", 1e-9, "mass of the platform"),
     (_SIMULATES, "plant.longest_step", "s", "longest_step", 1e-9, "longest Runge-Kutta step"),
+    (_SIMULATES, "plant.winding_time", "s", "winding_time", 1e-9, "time for which winches keep their rates"),
     (_SIMULATES, "plant.tension_lag", "s", "plant.tension_lag", 0.0, "lag of commanded tensions"),
     (_SIMULATES, "plant.winch_bandwidth", "rad/s", "plant.winch_bandwidth", 1e-3, "bandwidth of winches"),
     (_SIMULATES, "plant.carrier_bandwidth", "rad/s", "plant.carrier_bandwidth", 1e-3, "bandwidth of mobile carriers"),

@@ -125,51 +125,74 @@ static void control(towline_unit *unit, double dt) {
 
 /* ---- The plant. ---- */
 
-/* Write the reference of a carrier at the beginning of a step, and at its end; return whether it has a jerk. */
-static int order_carrier(const towline_unit *unit, int carrier, double step, double *begin, double *end) {
+/* Write a reference a time after it was ordered. */
+static void move_order(const double *order, const double *jerk, double time, double *to) {
+    for (int k = 0; k < 6; k++) {
+        const double v = order[6 + k], a = order[12 + k], j = jerk[k];
+        to[k] = order[k] + time * (v + 0.5 * time * a) + time * time * time * j / 6;
+        to[6 + k] = v + time * a + 0.5 * time * time * j;
+        to[12 + k] = a + time * j;
+    }
+}
+
+/* Write the reference of a carrier at the beginning of a step and at its end, times after the order; return whether it
+ * has a jerk. */
+static int order_carrier(const towline_unit *unit, int carrier, const double *times, double *begin, double *end) {
     const int most = towline_most_actuators(&unit->robot);
     const double *order = unit->ordered + 18 * carrier, *jerk = unit->ordered_jerks + 6 * carrier;
     memcpy(begin, unit->actuation + most * carrier, (size_t)most * sizeof *begin);
     begin += TOWLINE_CARRIER_REFERENCE, end += TOWLINE_CARRIER_REFERENCE;
     memcpy(begin, order, 18 * sizeof *begin);
-    for (int k = 0; k < 6; k++) {
-        const double v = order[6 + k], a = order[12 + k], j = jerk[k];
-        end[k] = order[k] + step * (v + 0.5 * step * a) + step * step * step * j / 6;
-        end[6 + k] = v + step * a + 0.5 * step * step * j;
-        end[12 + k] = a + step * j;
-    }
+    if (times[0] > 0) { move_order(order, jerk, times[0], begin); }
+    move_order(order, jerk, times[1], end);
     return !are_finite(jerk, 6) || memcmp(jerk, (const double[6]){0}, 6 * sizeof *jerk) != 0;
 }
 
-/* Move the plant by a step [s]; return 0, and leave its state, if the motion diverges. */
-static int simulate(towline_unit *unit, double step) {
+/* Move a state by a step between two times after the order [s]; return 0 if the motion diverges. */
+static int move_state(towline_unit *unit, const double *times, int32_t substeps, double *state, double *tensions) {
     const towline_robot *robot = &unit->robot;
     const ptrdiff_t m = robot->cables, size = towline_plant_state_size(robot);
     const ptrdiff_t width = towline_plant_command_size(robot);
-    const double substeps = ceil(step / unit->longest_step - ROUNDING);
-    double commands[2 * UNIT_COMMAND] = {0}, history[2 * UNIT_STATE], tensions[2 * UNIT_CABLES];
+    const double step = times[1] - times[0];
+    double commands[2 * UNIT_COMMAND] = {0}, history[2 * UNIT_STATE], motions[UNIT_MOTIONS], lengths[2 * UNIT_CABLES];
     int leads = 0;
-    if (!(substeps <= MOST_STEPS)) { return 0; }
     commands[0] = robot->has_aero;
     memcpy(commands + 1, unit->wind, sizeof unit->wind);
     memcpy(commands + 4, unit->wrench, sizeof unit->wrench);
     double *cables = commands + TOWLINE_PLATFORM_COMMANDS, *carriers = cables + m;
     memcpy(cables, unit->cables == UNIT_WINCHES ? unit->winches : unit->tensions, (size_t)m * sizeof *cables);
     if (unit->cables == UNIT_BY_LENGTHS) {
-        towline_plant_winch_lengths(robot, 1, step, unit->state, unit->lengths, unit->tensions, unit->last_rates,
-                                    commands, width);
+        towline_plant_sense(robot, 1, state, motions, lengths);
+        towline_plant_winch_lengths(robot, 1, step, state, lengths, unit->tensions, unit->last_rates, commands, width);
     }
     for (int c = 0; c < robot->carriers; c++) {
         double *begin = carriers + TOWLINE_CARRIER_COMMANDS * c;
-        leads |= order_carrier(unit, c, step, begin, begin + width);
+        leads |= order_carrier(unit, c, times, begin, begin + width);
     }
-    const towline_run run = {1, 1 + leads, 1, 1, substeps < 1 ? 1 : (int32_t)substeps, step};
-    towline_plant_run(robot, &unit->plant, &run, unit->state, commands, history, tensions);
+    const towline_run run = {1, 1 + leads, 1, 1, substeps, step};
+    towline_plant_run(robot, &unit->plant, &run, state, commands, history, tensions);
     if (!are_finite(history, 2 * size) || !are_finite(tensions, 2 * m)) { return 0; }
-    memcpy(unit->state, history + size, (size_t)size * sizeof *history);
+    memcpy(state, history + size, (size_t)size * sizeof *history);
+    return 1;
+}
+
+/* Move the plant by a step [s], in parts if winches wind; return 0, and leave its state, if the motion diverges. */
+static int simulate(towline_unit *unit, double step) {
+    const ptrdiff_t m = unit->robot.cables;
+    const double all = fmax(ceil(step / unit->longest_step - ROUNDING), 1);
+    const double parts = unit->cables == UNIT_BY_LENGTHS ? fmax(floor(step / unit->winding_time + 0.5), 1) : 1;
+    double state[UNIT_STATE], tensions[2 * UNIT_CABLES], sums[UNIT_CABLES] = {0};
+    if (!(all <= MOST_STEPS && parts <= MOST_STEPS)) { return 0; }
+    memcpy(state, unit->state, sizeof state);
+    for (double part = 0; part < parts; part++) {
+        const double times[2] = {part * step / parts, (part + 1) * step / parts};
+        if (!move_state(unit, times, (int32_t)ceil(all / parts), state, tensions)) { return 0; }
+        for (ptrdiff_t i = 0; i < m; i++) { sums[i] += tensions[i] + tensions[m + i]; }
+    }
+    memcpy(unit->state, state, sizeof state);
     for (ptrdiff_t i = 0; i < m; i++) {
         unit->tension[i] = tensions[m + i];
-        unit->mean_tension[i] = 0.5 * (tensions[i] + tensions[m + i]);
+        unit->mean_tension[i] = 0.5 * sums[i] / parts;
     }
     towline_unit_sense(unit);
     return 1;

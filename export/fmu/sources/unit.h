@@ -31,6 +31,7 @@ typedef struct {
     towline_robot robot;
     towline_plant plant;
     double longest_step; /* of Runge-Kutta [s] */
+    double winding_time; /* for which winches that reach tensions by lengths keep their rates [s] */
     double mass;         /* of the platform [kg] */
     double state[UNIT_STATE], last_rates[UNIT_CABLES];
     /* The controller, and what it knows of the robot. */
