@@ -18,7 +18,6 @@ MOST_NAMED = 4
 LACKS = 3.0  # times the stated standard deviation, of residuals that noise alone does not cause
 LOOSE = 0.1  # [m] of standard deviation, which files of robots are usually better than
 SMALLEST = 1e-6  # [m]: a smaller residual or change of a length means nothing
-HELPS = 1.05  # by which errors left out must be larger before a smaller set is worth a remark
 
 
 def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = tuple) -> Report:

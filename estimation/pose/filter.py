@@ -31,7 +31,6 @@ BEGIN = 0.02, 0.1  # factors of the first standard deviations of velocities and 
 WALK = 1e-4, 1e-3  # of biases: [rad/s^1.5], [m/s^2.5]
 LARGEST_ERROR = 5.0  # standard deviations of a length; larger ones are wrong readings
 SHIFT, TURN, SPEED, SPIN, PUSH, TWIRL = (slice(3 * k, 3 * k + 3) for k in range(6))
-BIASES = slice(18, 24)
 
 
 class MotionEstimate(NamedTuple):
