@@ -39,7 +39,7 @@ def results_alone() -> Iterator[None]:
 @parameters("""
     --count: Random problems per task.
     --repeats: Runs of each solver on each task.
-    --m: How many cables the problems have, separated by commas.
+    --m: Numbers of cables of the problems, separated by commas.
     --limit: Longest time for one solver on one task [s].
     --out: Folder for tension.md and tension.png.
 """)

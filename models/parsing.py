@@ -288,7 +288,7 @@ def _close(text: str, known: list[str]) -> str:
 
 
 def _elsewhere(key: str, place: tuple[int | str, ...], schema: dict[str, Any]) -> str:
-    """Return a hint to the mapping that a key belongs in: one below the one that has it, or the whole file."""
+    """Return a hint at the mapping in which a key belongs: one inside that which contains it, or the whole file."""
     nodes = [("", _walk(place, schema)[1])]
     for name, node in nodes:  # grows while it is walked: nearer mappings first
         variants = node.get("discriminator", {}).get("mapping", {})

@@ -17,7 +17,7 @@ from .status import Status
 _EXACT = "at the edge of what the cables can give, or of rounding: solved in exact arithmetic"
 _ON_FACE = "at the edge of what the cables can give: a choice among the tensions that give the wrench there"
 _UNPROVEN = "gives the wrench, but multipliers do not prove it optimal"
-_MISSES = "does not give the wrench to the tolerance"
+_MISSES = "does not give the wrench to within the tolerance"
 _NEAREST = "gives the wrench as near to t_ref as can be, which is not what the method looks for"
 
 

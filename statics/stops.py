@@ -159,13 +159,13 @@ def _of_team(robot: Robot, found: TeamStop) -> Stop:
 
 
 def beginnings(trajectory: Trajectory, period: float) -> np.ndarray:
-    """Return instants of a trajectory with a duration, from one stop to the next at most a `period` apart, (n,) [s]."""
+    """Return the times, at most `period` apart, at which stops of a trajectory with a duration begin, (n,) [s]."""
     end = trajectory.duration or 0.0
     return np.linspace(0.0, end, int(np.ceil(end / period - 1e-9)) + 1)
 
 
 def longest_stop_along(robot: Robot, trajectory: Trajectory, times: np.ndarray) -> Stop:
-    """Return the longest of the stops that begin at some times, or the first infeasible one, as `control` does."""
+    """Return the longest of the stops that begin at some times, or the first infeasible one."""
     stops = (stop_along(robot, trajectory, time) for time in times.tolist())
     return max(stops, key=lambda its: (not its.feasible, its.duration))
 

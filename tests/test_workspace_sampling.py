@@ -274,5 +274,5 @@ def test_a_robot_is_given_by_its_name_as_everywhere():
 
 
 def test_many_cables_have_no_place_by_lengths():
-    with pytest.raises(InputError, match="three cables that moves in space, got one with 8"):
+    with pytest.raises(InputError, match="three cables and the coordinates x, y and z, got 8 cables and x, y, z, roll"):
         sample(load("ipanema-1"), REST, {"lengths": {"min": 1, "max": 2}})

@@ -189,7 +189,8 @@ def _box_of_lengths(robot: Robot, region: Region, carriers: list[Box]) -> tuple[
     assert region.lengths is not None
     if robot.m != 3 or (robot.dof_mask[:3] == 0).any():
         raise InputError(
-            f"region.lengths requires a robot with three cables that moves in space, got one with {robot.m}"
+            "region.lengths requires a robot with three cables and the coordinates x, y and z, "
+            f"got {robot.m} cables and {', '.join(robot.platform.dof)}"
         )
     if robot.pulley_radii.any():
         raise InputError(f"region.lengths requires a robot whose anchors are points, got {robot.name!r} with pulleys")

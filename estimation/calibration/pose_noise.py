@@ -23,7 +23,7 @@ from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .observability import Observability, observability
 
-MANY = 2000  # samples; pairs of opposite random points do for them, because what these add averages out
+MANY = 2000  # samples; with more, pairs of opposite random points suffice, because their errors average out
 PAIRS = 2
 
 

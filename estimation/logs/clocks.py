@@ -27,7 +27,7 @@ STEP, FEWEST, MOST_COMPARED = (
 )  # [s] of a search, share of the samples that must overlap, and their number
 LONGEST = 1e4  # [s] before and after the middle of a log
 MOST_TRIED, LONGEST_STEP = 8000, 0.2  # offsets, and [s] of a search in a long log
-# Share of the spread of a cable's length, below which another clock is better, and where the platform turns unseen.
+# Another clock is better if the spread of lengths falls below this fraction; second: if orientations are not recorded.
 CLEARLY, VERY_CLEARLY = 0.8, 0.5
 SURELY, LIKE = 10.0, 0.8  # standard deviations of such an offset, and the correlation of speeds
 
@@ -137,7 +137,7 @@ def set_clocks_of_carriers(
 
     The right offset is the one at which the distance from anchor to attachment changes as the length does: hardly, if
     the lengths are constant. Clocks of one rate are assumed. Without poses of the platform, the directions of the
-    cables of the first such carrier show where the platform is. It returns notes, and if there are such carriers.
+    cables of the first such carrier show where the platform is. Returns notes, and whether there are such carriers.
     """
     tracks, whose = _tracks(robot, all_, given), "the poses"
     first = next(iter(tracks), 0)
@@ -218,7 +218,7 @@ def _lasting(times: np.ndarray) -> np.ndarray:
 
 
 def _offset(robot: Robot, index: int, track: _Track, seen: Seen) -> tuple[float, float]:
-    """Return by how much the clock of a carrier is ahead [s], 0 if that is not clear, and what is left there [m]."""
+    """Return by how much the clock of a carrier is ahead [s], 0 if that is not clear, and the spread of lengths [m]."""
     from scipy.optimize import minimize_scalar
 
     times, poses = track.times, track.poses

@@ -6,17 +6,17 @@ import numpy as np
 
 from ...base.text import quantity
 
-FEWEST = 6  # samples with one value, which chance does not repeat
-LEVELS, RARE = 3, 5.0  # values below the largest of a sound sensor, and how much rarer they are than it if saturated
+FEWEST = 6  # equal samples that are not due to chance
+LEVELS, RARE = 3, 5.0  # values compared with the largest one, and how many times rarer they are if it is a saturation
 MOVES = 0.2  # of the usual change of the lengths from sample to sample, below which the platform rests
 SAME = 1e-9  # of the largest tension, by which equal ones differ after interpolation
 
 
 def unreadable(tensions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return which tensions (N, m) [N] are no measurements, while lengths (N, m) [m] change, (N, m) of bool.
+    """Return which tensions (N, m) [N] are not measurements, (N, m) of bool, for lengths (N, m) [m].
 
-    Those of a dead sensor all have one value. Those of a saturated one have its largest value much more often than the
-    values just below, which a quantised sensor has too.
+    All tensions of a dead sensor are equal. While lengths change, a saturated sensor has its largest value much more
+    often than the values just below it; a sensor that is only quantised has all of these about equally often.
     """
     result = np.zeros(tensions.shape, dtype=bool)
     if len(tensions) < FEWEST:
