@@ -36,6 +36,8 @@ class Orders:
         commanded = layout.BODY * (1 + len(robot.carriers)) + layout.REFERENCE * robot.m
         self._commanded = slice(commanded, commanded + robot.m)  # lengths commanded last, in a state
         self._record = plant.record if record is None else record
+        rigid = np.flatnonzero(plant.record["cable"]["stiffness"][: robot.m] == 0)
+        self._rigid = int(rigid[0]) if rigid.size else None  # a cable with tensions that no length determines
         self._last_rates = np.full((len(seeds), robot.m), np.nan)
         wind = conditions.wind
         self.wind = None if wind is None else np.stack([_air(wind, times, seed) for seed in seeds], axis=1)
@@ -95,6 +97,11 @@ class Orders:
                 tensions = drives.tensions(tensions, lengths[:, 1])
             if self._drive != "lengths":
                 self._cables[:] = tensions
+            elif self._rigid is not None:
+                raise InputError(
+                    f"drive must not be 'lengths' for commanded tensions if cables do not stretch, got no stiffness of "
+                    f"cables[{self._rigid}]"
+                )
             else:
                 winch_lengths(self._record, states, lengths, tensions, self._last_rates, self._rows, self._period)
         if self._moves:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from towline import load, simulate
+from towline.base.errors import InputError
 from towline.control import ComputedTorque, Predictive, State
 
 PERIODS = [0.05, 0.1, 0.15]
@@ -100,6 +101,12 @@ def test_a_light_carrier_is_free_to_turn_during_slow_steps(kind):
     assert run.error.max() < np.linalg.norm(force) * lasting / (robot.platform.mass * 10.0 * np.e)
     assert run.error[-20:].max() < 1e-5
     assert run.answered["as planned"] == len(run.error)
+
+
+def test_tensions_cannot_be_commanded_to_winches_of_cables_that_do_not_stretch():
+    """No length belongs to a tension. Before, the report raised a ValueError of NumPy."""
+    with pytest.raises(InputError, match=r"drive must not be 'lengths' for commanded tensions .* of cables\[0\]"):
+        simulate("wang-ctmrts-4", load("wang-ctmrts-4").home, duration=0.01, drive="lengths")
 
 
 def test_all_bandwidths_of_a_team_are_lowered_by_the_same_factor_and_restored():
