@@ -9,9 +9,12 @@ from ...base.text import quantity
 from ...models import points
 from ...models.robot import Robot
 from .mapping import Field, Fields, LogMap, carrier_fields, command_fields
+from .measurements import Measurements
 from .recording import Recording, Samples
 from .smoothing import FEWEST, Parabolas, continuous, within
 from .streams import Reader, at_times
+from .thrust_gains import notes as notes_of_gains
+from .thrust_gains import thrust_gains
 
 LEAST_THRUST, MOST_THRUST = 0.6, 3.0  # times the weight, of thrusts in newtons
 
@@ -52,19 +55,26 @@ def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarra
 
 
 def tensions_by_thrust(
-    robot: Robot, poses: np.ndarray, thrusts: np.ndarray, times: np.ndarray | None
+    robot: Robot, measured: Measurements, poses: np.ndarray, thrusts: np.ndarray, notes: list[str]
 ) -> np.ndarray | None:
     """Return the tension of each cable, (N, m) [N], if each is the only one of a carrier with recorded thrust.
 
-    It is what remains of thrust, weight and inertia of the carrier.
+    It is what remains of thrust (corrected by its gain), weight and inertia of the carrier, whose poses are (N, c, 6).
     """
-    owner, known = robot.carrier_of_cable, np.asarray(np.isfinite(thrusts).all(axis=0))
+    times, owner = measured.times, robot.carrier_of_cable
+    known = np.asarray(np.isfinite(thrusts).all(axis=0))
     if times is None or len(times) <= 2 * FEWEST or len(set(owner)) < len(owner) or not known[owner].all():
         return None
-    parabolas = Parabolas(times, within(times))
+    gains, parabolas = thrust_gains(robot, measured, poses, thrusts), Parabolas(times, within(times))
+    notes += [
+        *notes_of_gains(robot, gains),
+        "tensions are computed from thrusts, weights and accelerations of the carriers",
+    ]
+    thrust_per_newton = {one.index: one.of(times) for one in gains}
     pulls = np.empty((len(times), len(owner)))
     for cable, index in enumerate(owner):
-        along = points.rotations(poses[:, index, 3:])[:, :, 2]
+        turn = points.rotations(poses[:, index, 3:])
+        along = np.einsum("nij,nj->ni", turn, thrust_per_newton.get(int(index), np.eye(3)[[2]]))
         acceleration = parabolas.fitted(poses[:, index, :3]).bends
         mass = robot.carriers[index].mass
         force = thrusts[:, index, None] * along + mass * (np.array(robot.gravity) - acceleration)

@@ -150,8 +150,7 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
     measured = read.measurements
     if not moving:
         return read
-    times, seen = _times(read)
-    poses, thrusts = carriers_at(robot, read.recordings, given, seen, len(measured), read.notes)
+    poses, thrusts = carriers_at(robot, read.recordings, given, _times(read)[1], len(measured), read.notes)
     there = np.asarray(np.isfinite(poses[..., :3]).any(axis=(0, 2)))
     lost = ", ".join(robot.carriers[i].name for i in moving if not there[i])
     if lost:
@@ -176,9 +175,7 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
         read.notes.append(note_of(axis, measured.poses))
         measured = changed(measured, poses=platform_from_ned(robot, measured.poses, axis))
     if measured.tensions is None:
-        tensions = tensions_by_thrust(robot, poses[kept], thrusts[kept], times if times is None else times[kept])
-    if tensions is not None:
-        read.notes.append("tensions are computed from thrusts, weights and accelerations of the carriers")
+        tensions = tensions_by_thrust(robot, measured.only(kept), poses[kept], thrusts[kept], read.notes)
     return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions), ned=axis)
 
 
