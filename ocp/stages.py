@@ -26,6 +26,7 @@ from .proofs.infeasible_ends import infeasible_ends
 from .proofs.too_little_power import too_little_power
 from .result import Relaxed
 from .search.homotopy import from_easier
+from .search.longer_phases import longer_phases
 from .search.reference import about_better_reference
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion
@@ -98,7 +99,8 @@ def _fixed_motion(search: Search) -> Plan:
 def _offers(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of a task that fixes the motion, or else of where it ends and of the robot."""
     near = near_fixed_motion(search, scenario, left, audit)
-    return slower_path(search, scenario, audit) + near if near else stronger_or_nearer(search, scenario, audit)
+    others = slower_path(search, scenario, audit) + near if near else stronger_or_nearer(search, scenario, audit)
+    return longer_phases(search, scenario, audit) + others
 
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:
@@ -122,7 +124,7 @@ def _blocked(search: Search) -> Plan | None:
     motion = between_fixed_values(slowest)
     audited = audit(slowest, motion, to_show=True)
     seconds = time.perf_counter() - start
-    near = partial(near_chosen_motion, search, slowest, motion, audited, slower_helps=proof.by_rates)
+    near = partial(near_chosen_motion, search, slowest, motion, audited, proven=proof)
     offers = partial(stronger_or_nearer, search, slowest, audited) if proof.by_weight else near
     return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)
 

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from towline.models import load
+from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
 from towline.ocp.search import relaxations
@@ -188,3 +188,66 @@ def test_the_closest_motion_of_a_tube_offers_what_it_keeps():
         assert plan(ROBOT, with_change(task, relaxed)).feasible
     away = np.linalg.norm(np.array(BALL["centre"]) - [0.25, 0.15, 1.1])
     assert all(relaxed.possible < away - 0.2 + 0.01 for relaxed in planned.relaxations)
+
+
+def given_again(relaxed):
+    """The plan of the robot and the task that are offered."""
+    return plan(relaxed.plan.scenario.robot, relaxed.plan.scenario.task)
+
+
+@pytest.mark.parametrize("tube", [0, 0.05])
+def test_a_duration_in_another_unit_is_offered_the_one_that_tensions_permit(tube):
+    """A line takes the same time however much too short a duration is."""
+    task = {"path": LINE, "steps": 15, "tube": {"position": tube}}
+    (of_micro, of_tenth) = (plan(ROBOT, task | {"duration": seconds}).relaxations[0] for seconds in (1e-6, 0.2))
+    assert of_micro.name == of_tenth.name == "duration"
+    assert of_micro.possible == pytest.approx(of_tenth.possible, rel=0.05)  # that in a tube is rounded generously
+    assert given_again(of_micro).feasible
+
+
+@pytest.mark.parametrize(
+    ("limits", "most"), [({}, np.inf), ({"cable_speed": 0.4}, 0.4)], ids=["tensions", "cable_speed"]
+)
+def test_a_phase_that_is_too_short_is_offered_the_duration_that_it_needs(limits, most):
+    rest = {"name": "before", "path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": 1}
+    phases = [rest, {"name": "go", "path": LINE, "duration": 0.2}, {"name": "after", "duration": 1}]
+    offer = plan(ROBOT, {"phases": phases, "limits": limits}).relaxations[0]
+    assert (offer.name, offer.requested) == ("phases[1].duration", 0.2)
+    found = given_again(offer)
+    assert found.feasible
+    assert found.duration == pytest.approx(2 + offer.possible)
+    phases[1] |= {"duration": 0.98 * offer.possible}
+    assert not plan(ROBOT, {"phases": phases, "limits": limits}).feasible
+    if limits:  # the rates of the lengths of cables, by differences
+        lengths = Dynamics(ROBOT).cable_lengths(found.audit.motion.pose)
+        fastest = np.abs(np.diff(lengths, axis=0) / np.diff(found.audit.times)[:, None]).max()
+        assert 0.97 * most < fastest <= 1.001 * most
+
+
+def test_a_state_outside_the_tube_is_offered_a_wider_one():
+    task = TASK | {"tube": {"position": 0.05}, "steps": 15, "final": {"pose": [0.5, 0.5, 1.2, 0, 0, 0]}}
+    (offer,) = plan(ROBOT, task).relaxations
+    assert offer.name == "tube.position"
+    assert 0.2 < offer.possible < 0.22  # the end of the line is 0.2 m away
+    assert given_again(offer).feasible
+
+
+def test_a_start_too_fast_to_stop_is_offered_a_slower_one():
+    """To stop within x from v takes at least v^2 / 2 x, and all cables together give less than their t_max."""
+    task = TASK | {"tube": {"position": 0.05}, "steps": 10, "final": {"velocity": 0}}
+    task |= {"initial": {"pose": [0, 0, 1, 0, 0, 0], "velocity": [0, 9, 0, 0, 0, 0]}}
+    (offer,) = plan(ROBOT, task).relaxations
+    assert (offer.name, offer.requested) == ("initial.velocity", 9.0)
+    assert offer.possible**2 / (2 * 0.05) < ROBOT.t_max.sum() / ROBOT.platform.mass
+    found = given_again(offer)
+    assert found.feasible
+    assert np.linalg.norm(found.audit.motion.velocity[0, :3]) == pytest.approx(offer.possible)
+
+
+def test_the_jerk_of_cables_is_kept_by_a_longer_duration():
+    """It falls with the cube of the duration."""
+    found = plan(ROBOT, TASK | {"limits": {"cable_jerk": 0.1}})
+    longer, limit = found.relaxations
+    assert longer.name == "duration"
+    assert (longer.possible / 2) ** 3 == pytest.approx(limit.possible / 0.1, rel=0.02)
+    assert given_again(longer).feasible

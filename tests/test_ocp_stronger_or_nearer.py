@@ -343,6 +343,23 @@ def test_a_level_beam_whose_cables_end_on_one_line_cannot_be_moved_across_it():
     assert plan(beam, task | {"tube": {"attitude": 0.2}, "steps": 20}).feasible
 
 
+def test_a_way_round_to_an_end_without_tensions_has_another_end():
+    post = {"kind": "sphere", "name": "post", "centre": [0, 0, 1.4], "radius": 0.1, "cables": None}
+    line = {"kind": "line", "start": [-0.8, -0.5, 1], "end": [0.8, 0.5, 1.8]}
+    task = {"path": line, "duration": 4, "steps": 30, "limits": {"keep_out": [post]}}
+    found = plan("ipanema-1", task)
+    assert advice(found, "a way round")
+    end = [float(value) for value in advice(found, "another end").partition(")")[0].strip("(").split(", ")]
+    assert not tensions(load("ipanema-1"), [*line["end"], 0, 0, 0]).feasible
+    assert tensions(load("ipanema-1"), [*end, 0, 0, 0]).feasible
+    assert plan("ipanema-1", task | {"path": line | {"end": end}, "tube": {"position": "free"}}).feasible
+
+
+def test_a_path_outside_the_degrees_of_freedom_has_the_coordinates_that_must_not_change():
+    task = {"path": {"kind": "line", "start": [0, 0, 0.6], "end": [0.1, 0.3, 0.7]}, "duration": 2}
+    assert " y " in advice(plan("planar-4", task), "another path")
+
+
 def test_carriers_on_the_ground_are_not_to_be_moved():
     task = {"path": {"kind": "line", "start": [0, 0, 2], "end": [9, 0, 2]}, "duration": 5}
     assert "moving carriers" not in plan("cogiro", task).report()

@@ -4,7 +4,7 @@ If all paths stretch, velocities go with 1/T and accelerations with 1/T^2, so at
 
     w(T) = c + d X,    X = (T_0 / T)^2,
 
-with c that of rest and c + d that of the duration T_0: the dynamics are linear in accelerations and quadratic in
+with c that of rest and c + d that of some duration T_0: the dynamics are linear in accelerations and quadratic in
 velocities. The X for which tensions inside their limits exist are then an interval, whose ends two linear programs in
 (t, X) give; a duration must lie in the intervals of all points. Most points do not restrict the interval of those
 before, which tensions at its ends show.
@@ -20,7 +20,7 @@ from ..audits.tensions import INDEPENDENT
 from ..tasks.scenario import Scenario
 
 PLACES = 41
-FASTEST = 1e4  # of X: a hundredth of the duration
+FASTEST = 1e4  # of X: a hundredth of T_0
 SLACK = 1e-6  # relative: by so much the linear programs may be off
 
 
@@ -72,7 +72,12 @@ def durations(scenario: Scenario) -> Durations | None:
     still = np.zeros_like(platform.pose)
     at_rest = dynamics.required_wrench(platform.pose, still, still)
     c = at_rest[:, rows] * scale / robot.force_scale
-    d = dynamics.required_wrench(*platform, *carriers)[:, rows] * scale / robot.force_scale - c
+    # T_0 is the duration with wrenches of the size of the robot's forces: others lose the digits of X or of d.
+    d, whole = np.zeros_like(c), scenario.duration
+    for _ in range(2):
+        whole *= np.sqrt(float(np.abs(d).max()) or 1.0)
+        moving = scenario.lasting(whole).motion(shares * whole, None)
+        d = dynamics.required_wrench(*moving[0], *moving[1])[:, rows] * scale / robot.force_scale - c
     bounds = [bound / robot.force_scale for bound in scenario.bounds()]
     least, most, decisive, k = 0.0, FASTEST, 0, 0
     while True:
@@ -89,8 +94,8 @@ def durations(scenario: Scenario) -> Durations | None:
         decisive = k if interval[1] < most else decisive
         least, most = interval
         k += 1
-    shortest = scenario.duration / np.sqrt(most)
-    longest = np.inf if least <= SLACK else scenario.duration / np.sqrt(least)
+    shortest = whole / np.sqrt(most)
+    longest = np.inf if least <= SLACK else whole / np.sqrt(least)
     return Durations(float(shortest), float(longest), float(shares[decisive]))
 
 

@@ -48,10 +48,8 @@ class InfeasibleEnds(NamedTuple):
 
     @property
     def by_rates(self) -> bool:
-        """Return whether only speeds and accelerations are exceeded, which fall with a longer duration."""
-        return self.certificate is None and all(
-            "/s" in excess.unit or excess.limit == OF_DURATION for excess in self.excess
-        )
+        """Return whether speeds and accelerations are exceeded, which fall with a longer duration, and no others."""
+        return bool(self.excess) and all("/s" in excess.unit or excess.limit == OF_DURATION for excess in self.excess)
 
     @property
     def by_weight(self) -> bool:

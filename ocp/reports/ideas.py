@@ -29,7 +29,7 @@ def ideas(plan: PlanData) -> list[Fact]:
     """Return what may help, the most likely first; empty for a feasible plan, or if nothing is known to."""
     if plan.feasible:
         return []
-    found = [*_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
+    found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"makes it feasible, as far as was tried: no duration, limit, {tried}")]
     return found or (nothing if plan.certificate is not None and not units(plan) else [])
@@ -42,55 +42,65 @@ def units(plan: PlanData) -> list[Fact]:
     return [("other units", sentence) for sentence in plan.warnings if TOO_LARGE in sentence]
 
 
+def _directions(plan: PlanData) -> list[Fact]:
+    """Return which coordinates of the path must not change, for a path outside the robot's degrees of freedom."""
+    names = [excess.about.removeprefix("platform ") for excess in plan.audit.excess if excess.limit == "dof"]
+    return [("another path", f"one that keeps {', '.join(names)} as at home, outside `platform.dof`")] if names else []
+
+
 def _obstacles(plan: PlanData) -> list[Fact]:
     """Return other ends where an end of the path is inside a region, else a way round."""
     scenario = plan.scenario
     if not {excess.limit for excess in plan.audit.excess} & IN_THE_WAY:
         return []
-    if moved := _clear_ends(scenario):
+    moved, inside = _clear_ends(scenario)
+    if inside or (width := scenario.task.tube.position) == "free":
         return moved
-    if (width := scenario.task.tube.position) == "free":
-        return []
     now = f" instead of {quantity(width, 'm')}" if width else ""
     robot = scenario.robot
     leaves = all(robot.carriers[index].confined for index in robot.carrier_of_cable) and robot.workspace_box is None
     leaves &= robot.floor is None and scenario.task.limits.platform_box is None
     kept = "; `limits.platform_box` keeps it above the floor and in the frame of the robot" if leaves else ""
     return [
+        *moved,
         (
             "a way round",
             f"`tube: {{position: free}}`{now}: the planner then searches for a path round the obstacle{kept}",
-        )
+        ),
     ]
 
 
-def _clear_ends(scenario: Scenario) -> list[Fact]:
-    """Return, for each end of the path at which the robot is in the way of something, a near one at which not.
+def _clear_ends(scenario: Scenario) -> tuple[list[Fact], bool]:
+    """Return, for each end of the path at which the robot cannot rest, a near one at which it can.
 
-    If there is none, as where cables cross a wall through the robot, no path leads from there either.
+    If there is none, as where cables cross a wall through the robot, no path leads from there either. Also return
+    whether something is in the way of the robot at an end; if not, only tensions are missing there.
     """
     space = Space(scenario)
     platform, carriers = space.references
     kept = AtRest(scenario, space.size, spare=0.0)
     limits_alone = AtRest(scenario, space.size, balance=False)(platform, carriers)
-    facts, blocked = [], []
+    facts, blocked, inside = [], [], False
+    held = kept(platform, carriers).slack >= 0
     for end, (slack, worst) in enumerate(zip(limits_alone.slack, limits_alone.worst, strict=True)):
         limit = scenario.limits.all[worst]
-        if slack >= 0 or limit.name not in IN_THE_WAY:
+        in_the_way = slack < 0 and limit.name in IN_THE_WAY
+        if not in_the_way and (slack < 0 or held[end]):
             continue
+        inside |= in_the_way
         place, straight = _nearest(scenario, kept, space, end)
         # A place beside an obstacle that only cables cross helps if the line from there is clear of it.
-        if place is not None and (straight or not limit.labels[0].startswith("cable ")):
+        if place is not None and (straight or not in_the_way or not limit.labels[0].startswith("cable ")):
             away = quantity(float(np.linalg.norm(place - platform[end, :3])), "m")
             where = f"({quantity_row(place + 0.0)}) m, {away} away, is clear of everything (checked at rest)"
             facts.append((f"another {ENDS[end]}", where))
-        elif limit.name == "keep_out":
+        elif in_the_way and limit.name == "keep_out":
             blocked.append(ENDS[end])
     if blocked:
         where = f"at the {' and at the '.join(blocked)} the robot is inside a region"
         why = "no position along x, y or z was found at which it is not"
         facts.append(("other regions", f"or other anchors: {where}, and {why}"))
-    return facts
+    return facts, inside
 
 
 def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> tuple[np.ndarray | None, bool]:

@@ -12,28 +12,38 @@ from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
-from .relaxations import rounded, solved
+from .relaxations import ORDERS, rounded, solved
 from .search import Search
 
 INSTANTS = 120  # at which tensions must exist before a motion is audited
 HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
+OF_PROGRAMS = *RESERVES[1:], 0.5, 0.25  # likewise, of what is only not proven infeasible
 
 Variation: TypeAlias = tuple[Scenario, float, str]
 """The scenario of a varied task, the value in which it differs, and a text that follows the value in reports."""
 
 
 def largest_share(
-    search: Search, make: Callable[[float], Variation], name: str, unit: str, up: bool = False, most: float = 1.0
+    search: Search,
+    make: Callable[[float], Variation],
+    name: str,
+    unit: str,
+    up: bool = False,
+    most: float = 1.0,
+    rates: bool = False,
 ) -> list[Relaxed]:
-    """Return the variation with the largest share, from 0 to `most`, that passes its audit; [] if none is found."""
+    """Return the variation with the largest share, from 0 to `most`, that passes its audit; [] if none is found.
+
+    With `rates` the share decides about speeds and accelerations too, as that of a duration does.
+    """
     low, high = 0.0, most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if _may_be_feasible(make(middle)[0]) else (low, middle)
+        low, high = (middle, high) if _may_be_feasible(make(middle)[0], rates) else (low, middle)
     if low == 0.0:
         return []
-    for reserve in RESERVES[1:] if make(low)[0].carrier_free else RESERVES:
+    for reserve in OF_PROGRAMS if make(low)[0].carrier_free else RESERVES:
         varied, value, detail = make(reserve * low)
         deviation = None
         if varied.carrier_free:
@@ -48,14 +58,16 @@ def largest_share(
     return []
 
 
-def _may_be_feasible(scenario: Scenario) -> bool:
-    """Return whether tensions inside their limits exist at some instants of a fixed motion, off the ground.
+def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
+    """Return whether limits and tensions permit some instants of a fixed motion, tensions only off the ground.
 
     If carriers are free, return whether nothing proves that they cannot hold the platform.
     """
     if scenario.carrier_free:
         return infeasible_ends(scenario) is None
     times = np.linspace(0.0, scenario.duration, INSTANTS)
+    if _exceeds(scenario, times, rates):
+        return False
     times = times[~scenario.phases.resting(times)]
     platform, carriers = scenario.motion(times, None)
     mask = scenario.robot.dof_mask
@@ -66,3 +78,19 @@ def _may_be_feasible(scenario: Scenario) -> bool:
         if (solve_batch(A, w, low, high, length=scenario.robot.length).code != 0).any():
             return False
     return True
+
+
+def _exceeds(scenario: Scenario, times: np.ndarray, rates: bool) -> bool:
+    """Return whether a fixed motion exceeds a hard limit that does not depend on tensions at some of `times`.
+
+    Without `rates`, speeds and accelerations are left out.
+    """
+    limits, motion = scenario.limits, scenario.motion(times, None)
+    for limit, values in zip(limits, limits.along(*motion), strict=True):
+        counts = rates or not limit.unit.endswith(tuple(ORDERS))
+        if counts and limit.soft is None and limit.name not in limits.of_tensions:
+            values = np.where(scenario.in_force(limit, times)[:, None], values, np.nan)
+            over = limit.over(times, values)
+            if (over > limit.high + limit.tolerance).any() or (over < limit.low - limit.tolerance).any():
+                return True
+    return False

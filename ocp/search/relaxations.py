@@ -15,6 +15,7 @@ from ..nlp.rows import Mesh
 from ..nlp.solver import Outcome
 from ..plan import Plan
 from ..proofs.durations import Durations
+from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
@@ -24,12 +25,13 @@ from ..tasks.task import Task
 from .search import Search
 
 LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
-LONGEST = 100.0  # times the requested duration: a longer one does not help
+LONGEST = 100.0  # times the duration that is requested, or else needed by tensions: a longer one does not help
 TRIES = 3  # of a duration: not all that is exceeded falls as speeds and accelerations do
 DIGITS = 4  # of what is offered: reports print no more
 HALVINGS = 12  # of a margin
 PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter
 TIME_COUNTS = 1e-2  # of the requested duration: it adds one to the objective, so that other costs hardly matter
+ORDERS = {"/s": 1, "W": 1, "/s^2": 2, "/s^3": 3}  # of the rates with such units, which fall with 1/T to that power
 LONGEST_CHOSEN = 20.0  # times the requested duration: the program starts at its geometric mean with the requested one
 LONGER_CHOSEN = 1.05  # than the shortest duration, at which almost nothing is left to choose
 BEYOND = 0.05  # of the change of a limit, more than the least, at which almost nothing is left to choose
@@ -53,7 +55,7 @@ def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None
 
 
 def near_motion(
-    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, slower_helps: bool = True
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, slower_helps: bool
 ) -> list[Relaxed]:
     """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one."""
     limits = _soft_limits(search, deviation) or _other_limits(search, scenario, deviation, audit)
@@ -81,8 +83,9 @@ def other_duration(search: Search, scenario: Scenario, left: Durations | None, a
         if near == lasts:  # no duration changes what is exceeded, and this one is audited
             return []
         lasts = near = rounded(near, up=near >= requested)
+        shortest = requested if left is None else max(requested, left.shortest)
         if (left is not None and not left.shortest <= near <= left.longest) or near > min(
-            LONGEST * requested, scenario.longest
+            LONGEST * shortest, scenario.longest
         ):
             return []
         longer = replace(scenario, task=scenario.task.model_copy(update={"duration": near}), duration=near)
@@ -96,11 +99,11 @@ def other_duration(search: Search, scenario: Scenario, left: Durations | None, a
 
 
 def slower(excess: Excess) -> float:
-    """Return the factor of the duration that brings a speed, power or acceleration to its bound; 1 for other limits."""
+    """Return the factor of the duration that brings a power, speed or its derivative to its bound, or 1 for others."""
     if not excess.bound or not excess.value / excess.bound > 1:
         return 1.0
-    ratio = excess.value / excess.bound
-    return ratio**0.5 if excess.unit.endswith("/s^2") else ratio if excess.unit.endswith(("/s", "W")) else 1.0
+    order = next((order for end, order in ORDERS.items() if excess.unit.endswith(end)), np.inf)
+    return (excess.value / excess.bound) ** (1 / order)
 
 
 def _other_limits(
@@ -175,12 +178,12 @@ def _longer_duration(search: Search) -> list[Relaxed]:
     if not scenario.stretches:
         return []
     requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
-    longest = min(LONGEST_CHOSEN * requested, scenario.longest)
-    if LONGER_CHOSEN * requested > longest:
+    shortest, longest = longer_durations(scenario)
+    if LONGER_CHOSEN * shortest > longest:
         return []
     open_task = task.model_copy(
         update={
-            "duration": PositiveRange(min=requested, max=longest),
+            "duration": PositiveRange(min=shortest, max=longest),
             "objective": task.objective.model_copy(update={"time": TIME_COUNTS * requested}),
         }
     )
@@ -197,6 +200,21 @@ def _longer_duration(search: Search) -> list[Relaxed]:
             plan = Plan(longer, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0)
             return [Relaxed("duration", "s", requested, near, plan)]
     return []
+
+
+def longer_durations(scenario: Scenario) -> tuple[float, float]:
+    """Return the range of durations in which a feasible one is searched for; its ends are equal if none can be.
+
+    It is longer than what is requested, and than any duration that is proven to be too short.
+    """
+    span = scenario.duration_range
+    shortest = scenario.duration if span is None else span.max
+    longest = min(LONGEST_CHOSEN * shortest, scenario.longest)
+    while (proof := infeasible_ends(scenario.lasting(longest))) is not None:
+        if not proof.by_rates or longest == scenario.longest:
+            return longest, longest
+        shortest, longest = longest, min(LONGEST_CHOSEN * longest, scenario.longest)
+    return shortest, longest
 
 
 def solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:

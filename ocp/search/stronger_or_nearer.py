@@ -14,9 +14,10 @@ from ..audits.tensions import scaled
 from ..global_path.at_rest import AtRest
 from ..plan import Plan
 from ..proofs.durations import durations
-from ..proofs.infeasible_ends import infeasible_ends
+from ..proofs.infeasible_ends import InfeasibleEnds, infeasible_ends
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
+from ..tasks.ends import fixed_values
 from ..tasks.lay_out import lay_out
 from ..tasks.paths import AnyPath, CirclePath, FeedPath, LinePath, WaypointPath
 from ..tasks.paths.shifted import shifted
@@ -25,8 +26,10 @@ from ..tasks.scenario import POSITION, Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
+from .given_states import near_given_states
 from .largest_share import HALVINGS, RESERVES, Variation, largest_share
-from .relaxations import LONGER, near_motion, other_duration, rounded, slower
+from .longer_phases import longer_phases
+from .relaxations import LONGER, longer_durations, near_motion, other_duration, rounded, slower
 from .search import Search
 
 PLACES = 31  # of a path, at which a shifted one is compared
@@ -37,22 +40,32 @@ STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stron
 
 
 def near_chosen_motion(
-    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, slower_helps: bool = True
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, proven: InfeasibleEnds | None = None
 ) -> list[Relaxed]:
     """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one.
 
-    If no duration and no limit of the task does, it is what the platform could do exactly on its path.
+    If no duration and no limit of the task does, it is what the platform could do exactly on its path. If the task is
+    `proven` infeasible, a longer duration is only tried if that is not, and for flying carriers, whose programs take
+    long, only if tensions exist at both ends.
     """
-    found = near_motion(search, scenario, deviation, audit, slower_helps)
-    if found or audit.violation.max() <= audit.tolerance:
-        return found
+    slower_helps = True
+    if proven is not None and scenario.stretches:
+        flying = any(carrier.efforts for carrier in scenario.robot.carriers)
+        shortest, longest = longer_durations(scenario)
+        slower_helps = shortest < longest and not (flying and proven.certificate is not None)
+    longer = longer_phases(search, scenario, audit) if slower_helps else []
+    found = near_motion(search, scenario, deviation, audit, slower_helps) or near_given_states(search, scenario, audit)
+    if found:
+        return longer + found
     if scenario.carrier_free:  # only what is proven of it tells how near an end must be
         proof = infeasible_ends(scenario)
         return [] if proof is None or proof.certificate is None else _nearer_end(search, scenario)
+    if np.abs([fixed.value for fixed in fixed_values(scenario)]).max(initial=0.0) > 0:
+        return []  # no motion is exactly on the path
     along = search.audit_motion(scenario, None, "audit of the path")
     exact = lay_out(scenario.robot, scenario.task.model_copy(update={"tube": Tube()}))
     found = other_duration(search, scenario, durations(exact), along) if slower_helps else []
-    return found or stronger_or_nearer(search, scenario, along)
+    return longer + (found or stronger_or_nearer(search, scenario, along))
 
 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -63,15 +76,18 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     exceeds other limits, or for boxes of winds and uncertain robots.
     """
     task = scenario.task
-    if isinstance(task.wind, WindBox | WindDisc) or task.robust is not None or scenario.carrier_free:
+    if isinstance(task.wind, WindBox | WindDisc) or task.robust is not None:
         return []
+    if scenario.carrier_free:  # all others would solve many programs
+        return _lighter_load(search, scenario)
     others = [excess for excess in audit.excess if excess.limit != TENSIONS]
     if others and task.phases is not None:
         return []
     factors = [slower(excess) for excess in others]
     found = slower_path(search, scenario, audit)
     if min(factors, default=2.0) <= 1.0 or (others and not scenario.stretches):
-        return found + _shifted_path(search, scenario, audit)
+        blocked = any(excess.limit == "keep_out" for excess in others)  # ideas name other ends and ways round
+        return found + ([] if blocked else _shifted_path(search, scenario, audit) or _nearer_end(search, scenario))
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
     for make in (
         _nearer_end,
@@ -160,13 +176,12 @@ def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
 def _shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return the smallest shift of the whole path along an axis of {G} with which it is feasible.
 
-    Shifts are compared at rest, at some positions of the path; the audit decides. The list is empty where a way round
-    an obstacle, or other positions of the carriers, are better advice.
+    Shifts are compared at rest, at some positions of the path; the audit decides. The list is empty where other
+    positions of the carriers are better advice.
     """
     task, path, robot = scenario.task, scenario.task.path, scenario.robot
-    blocked = any(excess.limit == "keep_out" for excess in audit.excess)
     movable = any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers)
-    if blocked or movable or scenario.relative or task.phases is not None or task.initial is not None:
+    if movable or scenario.relative or task.phases is not None or task.initial is not None:
         return []
     times = np.linspace(0.0, scenario.duration, PLACES)
     platform, carriers = scenario.motion(times, None)
