@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from towline import load
 from towline.estimation.calibration import calibrate
 from towline.estimation.logs import read_log
 from towline.estimation.logs.load_cells import unreadable
@@ -75,3 +76,20 @@ def test_sound_sensors_are_not_saturated():
     assert not unreadable(tensions[still], lengths[still]).any()
     assert not unreadable(np.maximum(tensions - np.quantile(tensions, 0.4), 0.0), lengths).any()
     assert not unreadable(np.ones((50, 4)), lengths[:50]).any()
+
+
+def test_offsets_without_a_camera_by_load_cells_that_are_saturated(tmp_path):
+    """Standard deviations grow with the number of tensions that are lost; they shrank because residuals did."""
+    robot, offsets = load(user.hanging_robot(tmp_path)), np.array([0.06, 0.006, -0.02, -0.01])
+    user.statics(tmp_path, offsets, 24)
+    head, *rows = (tmp_path / "statics.csv").read_text().splitlines()
+    values = np.array([row.split(",") for row in rows], dtype=float)
+    sigmas = []
+    for share in (1.0, 0.4):
+        values[:, 7:] = np.minimum(values[:, 7:], np.quantile(values[:, 7:], share))
+        log = read_log(user.write(tmp_path / "some.csv", head.split(","), values), robot=robot)
+        found = calibrate(robot, log.measurements, free="offsets", outliers=False)
+        sigmas.append(np.sqrt(np.diag(found.covariance)))
+        moved = [cable.encoder.offset for cable in found.robot.cables]
+        assert (np.abs(moved - offsets) < 4 * sigmas[-1]).all()
+    assert (sigmas[1] > 1.3 * sigmas[0]).all()

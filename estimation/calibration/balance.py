@@ -95,6 +95,14 @@ class _Log:
         return terms, terms if motion.smooth is None else motion.smooth.values(terms)
 
     @cached_property
+    def lost(self) -> np.ndarray:
+        """Return which tensions were not measured, (N, m) of bool."""
+        given = self._measurements
+        if given.tensions is None:
+            return np.ones((len(given), self._robot.m), dtype=bool)
+        return unreadable(given.tensions, given.lengths)
+
+    @cached_property
     def variances(self) -> np.ndarray:
         """Return the variances of the felt tensions over the mean gain, (N, m) [N^2], which no parameter changes."""
         given, weight = self._measurements.tensions, self._robot.weight
@@ -102,8 +110,7 @@ class _Log:
             return np.full((len(self._measurements), self._robot.m), (UNMEASURED * weight) ** 2)
         usual = np.abs(given).mean(axis=0)
         size = self._measurements.sigma.tensions * np.maximum(np.abs(self.terms[1][2]), LEAST_TENSION * usual)
-        lost = unreadable(given, self._measurements.lengths)
-        size = np.where(lost, UNMEASURED * max(weight, usual.max()), size)
+        size = np.where(self.lost, UNMEASURED * max(weight, usual.max()), size)
         return size**2 + (1e-9 * max(weight, 1.0)) ** 2
 
 
@@ -129,10 +136,9 @@ class Balance:
         return poses if poses.ndim == 2 else np.ascontiguousarray(poses[self._chosen])
 
     @property
-    def freedoms(self) -> int:
-        """Return the number of equations for each sample beside unknown tensions."""
-        few = 0 if self._measurements.tensions is not None else self._robot.m
-        return max(len(self._rows) - few, 0)
+    def equations(self) -> np.ndarray:
+        """Return the number of equations of each sample beside those that tensions without measurement take, (N,)."""
+        return np.maximum(len(self._rows) - self._log.lost[self._chosen].sum(axis=1), 0)
 
     def tensions(self, table: np.ndarray, smooth: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return the tensions that the platform feels [N], and their derivatives by capstan, friction, gain, (N, m, 3).

@@ -248,7 +248,7 @@ def _unbalanced(model: Model, state: State) -> float:
     used = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
     if model.balanced is None or not used.any():
         return np.nan
-    return float((model.residuals(state).balance ** 2).sum() / (model.balanced.freedoms * used.sum()))
+    return float((model.residuals(state).balance ** 2).sum() / max(int(model.balanced.equations[used].sum()), 1))
 
 
 def _mean_square(model: Model, state: State) -> float:

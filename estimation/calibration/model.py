@@ -180,7 +180,7 @@ class Model(Displayed):
         """Return the balance of forces if it is part of the fit, or None."""
         wanted = self.weighs or not set(IN_BALANCE).isdisjoint(self.parameters.groups)
         wanted = wanted or needs_balance(self.robot, self.measurements)
-        return self._forces if wanted and self._forces.freedoms else None
+        return self._forces if wanted and self._forces.equations.any() else None
 
     def only(self, rows: np.ndarray | slice) -> Model:
         """Return the model of some samples (k,) that rise, whose motion is that of all."""

@@ -163,7 +163,7 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
     if forces is None:
         return None
     equations = NormalEquations.at(model, state, metric(model))
-    spare, squares = np.full(len(state.shift), float(forces.freedoms)), np.zeros(len(state.shift))
+    spare, squares = forces.equations.astype(float), np.zeros(len(state.shift))
     for rows, part, own in model.parts(state):
         balance = part.linearised(own)[1].balance
         assert balance is not None

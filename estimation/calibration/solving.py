@@ -226,7 +226,7 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
         needed = "gravity" if robot.weight == 0.0 else "fewer cables than coordinates, or tensions"
         raise InputError(f"free must not have {', '.join(of_forces)} without {needed}, got robot {robot.name}")
     unknown = np.isinf(model.pose_sigmas)
-    spare = robot.m + (model.balanced.freedoms if model.balanced else 0) + sighted(measurements) - unknown.sum(axis=1)
+    spare = robot.m + (model.balanced.equations if model.balanced else 0) + sighted(measurements) - unknown.sum(axis=1)
     equations = int(np.maximum(spare, 0).sum())
     wanted = int((parameters.varies & np.isinf(model.prior_sigmas)).sum())
     if equations < wanted or equations == 0:
@@ -250,7 +250,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     found = solved.observability.rank
     if model.balanced:
         rests = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
-        used += model.balanced.freedoms * int(rests.sum())
+        used += int(model.balanced.equations[rests].sum())
     used += int(sighted(model.measurements)[model.inside(state)].sum())
     redundancy = used + int(np.isfinite(sigmas).sum()) - sigmas.size + int(priors.sum()) - found
     if redundancy <= 0:
