@@ -7,6 +7,7 @@ from towline import load
 from towline.estimation.calibration import calibrate
 from towline.estimation.logs import read_log
 from towline.estimation.logs.load_cells import unreadable
+from towline.estimation.logs.recorded import read_recorded
 
 from . import user_recordings as user
 
@@ -59,6 +60,8 @@ def test_the_mass_by_load_cells_of_which_some_measure_nothing(fault, tmp_path):
         assert f"the tension of cables[0] seems saturated at {top:.3g} N" in said[0]
     else:
         assert not said
+    replayed = read_recorded(robot, tmp_path / "log.csv")
+    assert (replayed.tensions is None) == (fault != "none")  # a plant driven by them would fall
     found = calibrate(robot, log.measurements, free="mass")
     sigma = float(np.sqrt(found.covariance[0, 0]))
     assert abs(found.robot.platform.mass - 6.0) < 4 * sigma

@@ -15,6 +15,7 @@ from ..calibration.plausibility import mistake
 from ..pose.from_log import poses_from_log
 from .carrier_poses import carriers_at, filled
 from .encoders import lengths_of
+from .load_cells import unreadable
 from .mapping import Field, command_fields, read_map
 from .north_east_down import carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .reading import Log, Paths, read_log
@@ -90,6 +91,9 @@ def read_recorded(
         tensions = measured.tensions if efforts is None else efforts
         if found.commands and found.commands == read.fields.tensions:
             tensions = None
+        if tensions is not None and lengths is not None and unreadable(tensions, measured.lengths).any():
+            tensions = None
+            notes.append("tensions are left out of the replay, because some were not measured")
         pose, known_part = _poses(known, read, notes)
         doubt = None
         if lengths is not None and not any(carrier.moves for carrier in known.carriers):
