@@ -10,6 +10,8 @@ from ..base.inputs import number, repeated, required, shown
 from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
 from ..models.trajectory import moved_on
+from ..plant import Plant
+from ..plant.steps import winding_time
 from .as_floats import as_floats, is_time, measured_at, rows_of
 from .command import HOLD, OFF, PLANNED, Command
 from .controller import Controller
@@ -20,6 +22,7 @@ from .state import State
 
 SHARE = 0.05  # of the robot's length: the default of `most`
 CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]
+NEVER = -1.0  # [s]: shorter than any step
 
 
 class LengthControl(Controller):
@@ -40,9 +43,10 @@ class LengthControl(Controller):
         lag: Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time,
             and their corrections with as much lead.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default depends on the age
-            of the measured pose: 4 and 10 if it is current, 0.3 and 2 if it is at most 20 ms old, less beyond. For a
-            late pose without its `time` of measurement, give the gains for its age: with larger ones, oscillations of
-            the platform on its cables grow.
+            of the measured pose: 4 and 10 if it is current, 0.3 and 2 if it is at most 20 ms old, less beyond. It is
+            also 0.3 and 2, or less, if cables do not stretch or are too stiff for steps so far apart. For a late pose
+            without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the
+            platform on its cables grow.
         most: Largest correction of a length [m]; default: 5 % of the robot's length. At this value the integral stops,
             and the status is "hold".
 
@@ -77,6 +81,12 @@ class LengthControl(Controller):
         self._damping = np.array([cable.damping or 0.0 for cable in self.robot.cables])
         if not (self._EA > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
+        elastic = bool(np.isfinite(self._EA).all())
+        self._yields, self._settling = NEVER, np.inf
+        if elastic:
+            lengths = np.linalg.norm(self.robot.home_anchors - self.robot.home_attachments, axis=1)
+            self._yields = winding_time(Plant(self.robot, stiffness=self._EA)) / 2
+            self._settling = float((self._damping * lengths / self._EA).min()) or np.inf  # unknown
         self._lag = number("lag", lag, 0.0, 1.0)
         self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
         self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
@@ -155,7 +165,8 @@ class LengthControl(Controller):
         error, drift = (np.where(known[..., None], one, 0.0) * self.robot.dof_mask for one in (error, drift))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
         J = self._dynamics.length_jacobian(reference.pose, reference.carrier_pose)  # (..., m, 6)
-        proportional, integral = _gains(age)
+        proportional, integral = _gains(age, yields := dt <= min(self._yields, self._settling))
+        proportional = proportional if yields else min(proportional, self._settling / (2 * max(dt, 1e-9)))
         proportional = proportional if self._proportional is None else self._proportional
         integral = integral if self._integral is None else self._integral
         total = before + dt * error
@@ -167,13 +178,15 @@ class LengthControl(Controller):
         return np.clip(np.nan_to_num(wanted), -self._most, self._most), beyond | ~known
 
 
-def _gains(age: float) -> tuple[float, float]:
-    """Return the default gains, P and I [1/s], for a pose of an age [s].
+def _gains(age: float, yields: bool) -> tuple[float, float]:
+    """Return the default gains, P and I [1/s], for a pose of an age [s], on cables that yield to a step or not.
 
     An oscillation of the platform with the frequency w and the damping d is stable for I < 2 d w (1 + P) without
-    delay, which wants a large P; with one, P and the growth of the delayed phase limit both.
+    delay, which wants a large P; with one, P and the growth of the delayed phase limit both. Cables that do not yield,
+    since they do not stretch or their dampers tie them, have moved the platform by the next step, x = -P x: P < 1.
+    With lengths that follow h late, the damping is 2 d w (1 + P) - P w^2 h, positive for h up to C L0 / EA = 2 d / w.
     """
-    if age <= CURRENT:
+    if age <= CURRENT and yields:
         return 4.0, 10.0
-    share = min(1.0, LATE / age)
+    share = min(1.0, LATE / max(age, CURRENT))
     return 0.3 * share, 2.0 * share

@@ -208,3 +208,23 @@ def test_a_step_with_huge_numbers_leaves_no_trace(model, huge):
 def test_other_controllers_keep_their_drive(model):
     run = simulate(model, model.home, ComputedTorque(model), duration=0.01)
     assert run.passed
+
+
+@pytest.mark.parametrize(
+    ("name", "stiffness", "damping", "period"),
+    [
+        ("wang-ctmrts-4", None, None, 1e-3),  # rigid
+        ("wang-flying", 13e3, 200.0, 5e-3),  # whose dampers tie it for a step
+        ("wang-flying", 325e3, 20.0, 1e-3),  # with too little damping for a large P
+    ],
+)
+def test_cables_that_do_not_yield_are_corrected_by_less_than_the_error(name, stiffness, damping, period):
+    """With P = 4 each step made an error four times as large: up to 1.7 m. The push alone would move a mass by 4 mm."""
+    data = load(name).model_dump(mode="json", exclude_none=True)
+    for cable in data["cables"]:
+        cable |= {} if stiffness is None else {"stiffness": stiffness, "damping": damping}
+    robot = Robot(**data)
+    events = [f"push {0.02 * robot.force_scale} 0 0 at 0.2 for 0.2"]
+    run = simulate(robot, robot.home, LengthControl(robot), duration=1.0, period=period, events=events)
+    assert run.error.max() < 0.02 * 9.81 * 0.2**2 / 2
+    assert run.answered["as planned"] == len(run.error)
