@@ -39,8 +39,10 @@ def _lower_speeds(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the highest given speed with which the motion is feasible; others change by the same factor."""
     task = scenario.task
     moving = [name for name in STATES if any(getattr(getattr(task, name), "velocity", None) or ())]
-    if not moving:
-        return []
+    given = [getattr(getattr(task, name), key, None) for name in STATES for key in ("velocity", "acceleration")]
+    changed = np.any([np.abs(rates) > 0 for rates in given if rates is not None], axis=0)
+    if not moving or not set(np.flatnonzero(changed)) <= set(scenario.platform_free):
+        return []  # what the path prescribes there cannot change
     velocity = np.array(getattr(task, moving[0]).velocity)
     part, unit = (velocity[:3], "m/s") if velocity[:3].any() else (velocity[3:], "rad/s")
     speed = float(np.linalg.norm(part))
