@@ -21,7 +21,7 @@ from .smoothing import FEWEST, Parabolas, within
 
 BLOCKS = 25  # of the record; the scatter of their sums gives the standard deviations, also of autocorrelated residuals
 CLEAR = 5.0  # standard deviations
-LEAST, SURE = 0.02, 0.01  # from a gain of 1 and from no tilt, of what is named, and the largest standard deviation
+LEAST, SURE = 0.005, 0.01  # from a gain of 1 and from no tilt, of what is named, and the largest standard deviation
 FAR = 0.5  # from 1, of a gain that other errors explain better
 
 
