@@ -58,6 +58,7 @@ class Orders:
         self._actuation = carriers[..., : max(len(carrier.actuators) for carrier in robot.carriers)]
         if self._moves:
             self._starts = carriers[..., first:].reshape(len(seeds), count, 3, 6)
+            self._begins: Motion = (self._starts[:, :, 0], self._starts[:, :, 1], self._starts[:, :, 2])
             self._ends = blocks[:, 1, :, first:].reshape(len(seeds), count, 3, 6)
             # What a constant acceleration misses of the next reference: pose, velocity and acceleration, (K, 3, c, 6).
             motion = np.array([reference[3:6] for reference in conditions.references])
@@ -105,16 +106,14 @@ class Orders:
             else:
                 winch_lengths(self._record, states, lengths, tensions, self._last_rates, self._rows, self._period)
         if self._moves:
-            pose, velocity, acceleration = (np.asarray(ordered, dtype=float) for ordered in command[1:4])
-            begins: Motion = (pose, velocity, acceleration)
-            ends = moved_on(begins, (part + 1) * self._period)
-            if part:
-                pose, velocity, acceleration = moved_on(begins, part * self._period)
-                missed = self._missed[part - 1][k]
-                begins = pose + missed[0], velocity + missed[1], acceleration + missed[2]
-            for order, (begin, end) in enumerate(zip(begins, ends, strict=True)):
-                self._starts[:, :, order] = begin
+            begins = self._begins
+            for begin, ordered in zip(begins, command[1:4], strict=True):
+                begin[:] = ordered
+            for order, end in enumerate(moved_on(begins, (part + 1) * self._period)):
                 np.add(end, self._missed[part][k, order], out=self._ends[:, :, order])
+            if part:
+                for order, begin in enumerate(moved_on(begins, part * self._period)):
+                    np.add(begin, self._missed[part - 1][k, order], out=self._starts[:, :, order])
             if drives is not None:
                 drives.follow(self._starts, self._ends)
         if command.actuation is not None:

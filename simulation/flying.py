@@ -126,7 +126,6 @@ def fly(
             expected = shapes
         if command.released is not None:
             periods.release(states, command.released)
-        pulls = np.zeros((flights, m))
         for part in range(parts):
             if part:
                 alive &= (np.abs(end) < BEYOND).all(axis=1)
@@ -138,8 +137,8 @@ def fly(
                 check_command(command, robot, flights, time)
                 raise
             periods.run(states, row, history, tensions)
-            pulls += tensions[:, 0]
-            pulls += tensions[:, 1]
+            own = np.add(tensions[:, 0], tensions[:, 1])
+            pulls = pulls + own if part else own
         pulls *= 0.5 / parts
         if not isfinite(_square(numbers)):
             check_command(command, robot, flights, time)
