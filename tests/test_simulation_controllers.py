@@ -76,12 +76,20 @@ def test_many_runs_leave_the_controller_as_it_is():
 
 
 SCRIPT = """\
+import time
+
 from towline import load, simulate
+
+
+def progress(*done):
+    print(*done, flush=True)
+    time.sleep(600)  # until it is killed, however late that is
+
 
 if __name__ == "__main__":
     robot = load("wang-flying")
     simulate(robot, robot.home, wind=(3, 2, 0.5), gusts=1.0, duration=2, runs=40, workers={workers}, checkpoint="runs",
-             progress=lambda *done: print(*done, flush=True))
+             progress=progress)
 """
 
 
