@@ -119,5 +119,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """List the public names, loaded or not."""
-    return sorted({*globals(), *_HOME, *_PACKAGES})
+    """List the public names and the packages, loaded or not: what an editor offers after `towline.`."""
+    return sorted({*__all__, *_PACKAGES, "__version__"})
