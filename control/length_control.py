@@ -50,6 +50,9 @@ class LengthControl(Controller):
         most: Largest correction of a length [m]; default: 5 % of the robot's length. At this value the integral stops,
             and the status is "hold".
 
+    Attributes:
+        stiffness: E A that it takes for each cable, (m,) [N]; infinity for one that does not stretch.
+
     Raises:
         InputError: If an argument has a wrong value, the robot has flying carriers, or its cables have fixed lengths.
     """
@@ -77,16 +80,16 @@ class LengthControl(Controller):
                 "stiffness must be given, here or in the robot's file, for a robot with more cables than degrees of "
                 f"freedom, because its tensions depend on it, got none for {self.robot.name!r}"
             )
-        self._EA = repeated("stiffness", given, self.robot.m)
+        self.stiffness = repeated("stiffness", given, self.robot.m)
         self._damping = np.array([cable.damping or 0.0 for cable in self.robot.cables])
-        if not (self._EA > 0).all():
+        if not (self.stiffness > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
-        elastic = bool(np.isfinite(self._EA).all())
+        elastic = bool(np.isfinite(self.stiffness).all())
         self._yields, self._settling = NEVER, np.inf
         if elastic:
             lengths = np.linalg.norm(self.robot.home_anchors - self.robot.home_attachments, axis=1)
-            self._yields = winding_time(Plant(self.robot, stiffness=self._EA)) / 2
-            self._settling = float((self._damping * lengths / self._EA).min()) or np.inf  # unknown
+            self._yields = winding_time(Plant(self.robot, stiffness=self.stiffness)) / 2
+            self._settling = float((self._damping * lengths / self.stiffness).min()) or np.inf  # unknown
         self._lag = number("lag", lag, 0.0, 1.0)
         self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
         self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
@@ -139,7 +142,7 @@ class LengthControl(Controller):
         lag, tensions = self._lag, reference.tensions
         (pose, *_), (carriers, *_) = moved_on(reference[:3], lag), moved_on(reference[3:6], lag)
         if tensions is None or not np.isfinite(tensions).all():
-            if np.isfinite(self._EA).any():
+            if np.isfinite(self.stiffness).any():
                 raise InputError(
                     f"reference.tensions must be planned for cables that stretch, got {shown(reference.tensions)}"
                 )
@@ -150,7 +153,7 @@ class LengthControl(Controller):
 
     def _strained(self, dt: float, tensions: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """Return the strains s at which damped cables have these tensions, t = EA s + C L0 ds/dt, (..., m)."""
-        strain, settling = tensions / self._EA, self._damping * lengths / self._EA  # [s]
+        strain, settling = tensions / self.stiffness, self._damping * lengths / self.stiffness  # [s]
         if self._strain is not None and self._strain.shape == strain.shape:
             strain = strain + np.exp(-dt / np.maximum(settling, 1e-9)) * (self._strain - strain)
         return strain

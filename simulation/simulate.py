@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 from warnings import warn
@@ -15,7 +16,7 @@ from typing_extensions import Unpack
 from ..base.errors import InputError
 from ..base.execution import Execution, ExecutionOptions
 from ..base.inputs import required, shown, whole_number, with_fields
-from ..control import ComputedTorque, Controller, Reference
+from ..control import ComputedTorque, Controller, LengthControl, Reference
 from ..control.noise import Noise
 from ..control.planned_references import references_at
 from ..control.trajectory import read_trajectory
@@ -158,7 +159,7 @@ def simulate(
     if controller is not None and not isinstance(controller, Controller):
         raise InputError(f"controller must be a Controller, got {shown(controller)}")
     pilot = ComputedTorque(the_robot) if controller is None else controller
-    _check_shape(the_robot, pilot)
+    _check_model(the_robot, pilot)
     meets = replace(meets, drive=meets.drive or pilot.drive or default_drive(the_robot))
     plant, experiment = _laid_out(the_robot, reference, meets, "events" if former is None else "faults")
     first, error = whole_number("seed", seed, 0, 2**63 - 1), tolerance_of(the_robot, meets.tolerance)
@@ -175,9 +176,13 @@ def simulate(
     return table
 
 
-def _check_shape(robot: Robot, controller: Controller) -> None:
-    """Check that a controller is for a robot with as many cables, carriers and actuators; its numbers may differ."""
-    model = getattr(getattr(controller, "controller", controller), "robot", None)
+def _check_model(robot: Robot, controller: Controller) -> None:
+    """Check that a controller is for as many cables, carriers and actuators, and for lengths that cables can have.
+
+    Its numbers may differ, but commands for cables that stretch are no lengths of cables that do not.
+    """
+    inner = getattr(controller, "controller", controller)
+    model = getattr(inner, "robot", None)
     if not isinstance(model, Robot):
         return
     has, wants = ((one.m, [len(carrier.actuators) for carrier in one.carriers]) for one in (model, robot))
@@ -185,6 +190,13 @@ def _check_shape(robot: Robot, controller: Controller) -> None:
         raise InputError(
             f"controller must be for robot {robot.name!r}, got {type(controller).__name__} for {model.name!r}"
         )
+    if isinstance(inner, LengthControl):
+        for i, (cable, taken) in enumerate(zip(robot.cables, inner.stiffness.tolist(), strict=True)):
+            if not cable.stiffness and isfinite(taken):
+                raise InputError(
+                    f"cables[{i}].stiffness must be in the robot file of {robot.name!r}, because LengthControl takes "
+                    f"it to be {taken:g} N, got none, so that the cable does not stretch"
+                )
 
 
 def _laid_out(robot: Robot, reference: Any, meets: Conditions, events: str) -> tuple[Plant, Experiment]:

@@ -176,6 +176,10 @@ def test_wrong_calls_are_one_line(model):
     with pytest.raises(InputError, match="stiffness must be given, here or in the robot's file"):
         LengthControl("cogiro")
     assert LengthControl("cogiro", stiffness=EA).robot.m == 8
+    # Its gains are for cables that yield: corrections of the others would grow from step to step.
+    for name in ("cogiro", "fast"):
+        with pytest.raises(InputError, match=r"cables\[0\]\.stiffness must be in the robot file of .* got none"):
+            simulate(name, load(name).home, LengthControl(name, stiffness=EA), duration=0.01)
     with pytest.raises(InputError, match="stiffness"):
         LengthControl(model, stiffness=-1)
     with pytest.raises(InputError, match="lag"):
