@@ -6,7 +6,7 @@ R = Rz(yaw) Ry(pitch) Rx(roll).
 
 import re
 from collections.abc import Iterable
-from typing import Annotated, Any, Literal, Self, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
@@ -103,14 +103,17 @@ class Part(Displayed, BaseModel):
 class Box(Part):
     """A box along the axes of {G}, from its lowest to its highest corner [m]."""
 
+    sides: ClassVar[tuple[str, ...]] = ("along x", "along y", "along z")
+    unit: ClassVar[str] = "m"  # boxes of other quantities are subclasses
+
     min: Vector3 = Field(description="lowest corner [m]")
     max: Vector3 = Field(description="highest corner [m]")
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
+        for side, low, high in zip(self.sides, self.min, self.max, strict=True):
             if low > high:
-                raise ValueError(f"min must not exceed max, {high:g} m along {axis}, got {low:g} m")
+                raise ValueError(f"min must not exceed max, {high:g} {self.unit} {side}, got {low:g} {self.unit}")
         return self
 
 

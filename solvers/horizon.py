@@ -85,6 +85,8 @@ class Horizon(Displayed):
         multipliers: See `Multipliers`. `solve(warm=True)` starts from these, and from states and controls.
         tolerance, iterations_max: Largest residual of a converged solution, and largest number of iterations. Default:
             1e-8 and 50.
+        converged, iterations: Success of the last solution, and its number of Newton matrices without that of a cold
+            start.
 
     Raises:
         InputError: If a size is not a whole number in its range.
@@ -117,12 +119,12 @@ class Horizon(Displayed):
         z, y = part("z", N + 1, m + n), part("y", N + 1, m + n)
         self.controls, self.states = z[:N, :m], z[:, m:]
         self.multipliers = Multipliers(y[1:, m:], part("lower", N, m), part("upper", N, m), part("force", N, rows))
-        self._residuals, self._count, self._converged = np.zeros(4), 0, False
+        self._residuals, self.iterations, self.converged = np.zeros(4), 0, False
         self.tolerance, self.iterations_max = 1e-8, 50
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy or a pickle holds: of the arrays the memory alone, whose parts they are."""
-        names = ("_sizes", "_memory", "_residuals", "_count", "_converged", "tolerance", "iterations_max")
+        names = ("_sizes", "_memory", "_residuals", "iterations", "converged", "tolerance", "iterations_max")
         return {name: getattr(self, name) for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -165,20 +167,10 @@ class Horizon(Displayed):
         """
         shifted, warm = flag("shifted", shifted), flag("warm", warm)
         beginning = SHIFTED if shifted else WARM if warm else COLD
-        self._count, self._converged = horizon_solve(
+        self.iterations, self.converged = horizon_solve(
             *self._sizes, PROCESSOR, beginning, int(self.iterations_max), self.tolerance, self._memory, self._residuals
         )
-        return self._converged
-
-    @property
-    def converged(self) -> bool:
-        """Return whether the last solution converged."""
-        return self._converged
-
-    @property
-    def iterations(self) -> int:
-        """Return the number of Newton matrices of the last solution, not counting that of a cold start."""
-        return self._count
+        return self.converged
 
     @property
     def residuals(self) -> Residuals:

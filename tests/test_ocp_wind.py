@@ -277,7 +277,7 @@ def test_margins_count_in_every_wind():
 @pytest.mark.parametrize(
     ("wind", "message"),
     [
-        ({"min": [1, 0, 0], "max": [0, 0, 0]}, "wind.min must be at most max (0 m/s) along x, got 1 m/s"),
+        ({"min": [1, 0, 0], "max": [0, 0, 0]}, "wind.min must not exceed max, 0 m/s along x, got 1 m/s"),
         ({"min": [1, 0, 0]}, "wind.max is missing"),
         ({"min": [1, 0, 0], "max": [1, 0, 0], "mx": [1, 0, 0]}, "is not a known key, did you mean 'max'"),
         ({"speed": 0}, "wind.speed must be greater than 0, got 0"),

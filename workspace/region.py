@@ -9,18 +9,13 @@ from ..models import Robot
 from ..models.part import Box, Name, Part, PositiveRange, Vector3, optional
 
 
-class AngleBox(Part):
+class AngleBox(Box):
     """A box of attitudes (roll, pitch, yaw) [rad]."""
+
+    sides, unit = ("for roll", "for pitch", "for yaw"), "rad"
 
     min: Vector3
     max: Vector3
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        for angle, low, high in zip(("roll", "pitch", "yaw"), self.min, self.max, strict=True):
-            if low > high:
-                raise ValueError(f"min must not exceed max, {high:g} rad for {angle}, got {low:g} rad")
-        return self
 
 
 class Region(Part):

@@ -25,14 +25,14 @@ itself, `WindDisc.possible`, have to prove it.
 """
 
 from itertools import product
-from typing import Any, Self, TypeAlias
+from typing import Any, TypeAlias
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...models import Robot
-from ...models.part import Part, Positive, Vector3
+from ...models.part import Box, Part, Positive, Vector3
 from ...models.platform import Aero
 from ...models.rigid_body import com_velocity
 
@@ -47,18 +47,13 @@ RING = 16  # winds on the edge of a disc
 _STEPS = 1.0 / 1.2207440846057596 ** np.arange(1, 4)
 
 
-class WindBox(Part):
+class WindBox(Box):
     """All winds from min to max, constant or not: tensions exist in every one of them."""
+
+    unit = "m/s"
 
     min: Vector3 = Field(description="corner in {G} [m/s]")
     max: Vector3 = Field(description="corner in {G} [m/s]")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
-            if low > high:
-                raise ValueError(f"min must be at most max ({high:g} m/s) along {axis}, got {low:g} m/s")
-        return self
 
     @property
     def middle(self) -> Vector3:
