@@ -9,11 +9,12 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.inputs import finite_array, shown
 
 
 def constant(times: np.ndarray, velocity: Sequence[float]) -> np.ndarray:
     """Return the same wind at all times, (n, 3) [m/s]."""
-    return np.tile(_numbers("velocity", velocity, 3), (len(_numbers("times", times, None)), 1))
+    return np.tile(_numbers("velocity", velocity, 3), (len(_numbers("times", times)), 1))
 
 
 def trapezoid(
@@ -31,7 +32,7 @@ def trapezoid(
       zero. They are assumed: the paper does not give them.
     - `noise`: half-width of the noise [m/s]; its standard deviation is a third of it, so that few samples are cut.
     """
-    times, places = _numbers("times", times, None), _numbers("corners", corners, 4, 0.0)
+    times, places = _numbers("times", times), _numbers("corners", corners, 4, 0.0)
     if (np.diff(places) < 0).any() or places[-1] > 1:
         raise InputError(f"corners must be four rising numbers from 0 to 1, got {corners!r}")
     if (np.diff(times) < 0).any():
@@ -65,7 +66,7 @@ def dryden(
 
     Raises `InputError` if the mean wind has no horizontal part, or the times do not rise in equal steps.
     """
-    times, mean_wind = _numbers("times", times, None), _numbers("mean", mean, 3)
+    times, mean_wind = _numbers("times", times), _numbers("mean", mean, 3)
     sigmas, lengths = _numbers("intensity", intensity, 3, 0.0), _numbers("scale", scale, 3, 1e-9)
     speed = float(np.linalg.norm(mean_wind))
     if not np.linalg.norm(mean_wind[:2]) > 0:
@@ -126,14 +127,9 @@ def _decaying(keep: float, kicks: np.ndarray) -> np.ndarray:
     return x
 
 
-def _numbers(name: str, value: Sequence[float] | np.ndarray, count: int | None, least: float = -np.inf) -> np.ndarray:
-    """Return `count` finite numbers (None for any number), each at least `least`, or raise InputError."""
-    try:
-        array = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        array = np.zeros((0, 0))
-    if array.ndim != 1 or not len(array) or (count and len(array) != count) or not np.isfinite(array).all():
-        raise InputError(f"{name} must be {count or 'a row of'} finite numbers, got {value!r}")
-    if (array < least).any():
-        raise InputError(f"{name} must be numbers >= {least:g}, got {value!r}")
+def _numbers(name: str, value: Sequence[float] | np.ndarray, count: int = -1, least: float = -np.inf) -> np.ndarray:
+    """Return `count` finite numbers (-1 for any number but none), each at least `least`, or raise InputError."""
+    array = finite_array(name, value, (count,))
+    if not len(array) or (array < least).any():
+        raise InputError(f"{name} must be numbers{f' >= {least:g}' * bool(np.isfinite(least))}, got {shown(value)}")
     return array

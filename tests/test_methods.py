@@ -404,7 +404,7 @@ def test_rate_limits_hold_for_every_method():
         ("p-norm", {"p": 1}, "p must be a number from 2 to 20, got 1"),
         ("dykstra", {"max_iter": 0}, "max_iter must be a whole number from 1 .*, got 0"),
         ("log-barrier", {"barrier": "big"}, "barrier must be a number .*, got 'big'"),
-        ("log-barrier", {"start": [1, 2]}, r"start must be 8 finite tensions .*, got \[1, 2\]"),
+        ("log-barrier", {"start": [1, 2]}, r"start must be .* of shape \(8,\) of finite numbers, got .* \(2,\)"),
         ("soft-wrench", {"rho": -1}, "rho must be a number .*, got -1"),
         ("centroid", {"p": 4}, "options must be empty for method centroid, got 'p'"),
     ],

@@ -5,9 +5,10 @@ requires to those that the cables can give inside their limits less the task's m
 largest such distance of the winds that decide (`wind_set`), and if that is none, of winds inside their set too.
 """
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -67,7 +68,7 @@ class Distribution:
         self.scenario, self.A = scenario, A
         self._bounds = scenario.bounds() if bounds is None else bounds
         self._scaled_A = scaled(scenario, A)
-        self.few, self._inverse = _few_and_inverse(self._scaled_A, dof)  # (n, m, 6)
+        self.few, self._inverse = few_and_inverse(self._scaled_A, dof)  # (n, m, 6)
         underactuated = self.few and scenario.count
         self.tolerance = UNDERACTUATED_TOLERANCE * robot.force_scale if underactuated else tolerance_of(robot)
 
@@ -134,7 +135,7 @@ class Distribution:
         return closest, violation, inside
 
 
-def _few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
+def few_and_inverse(A: np.ndarray, dof: int) -> tuple[bool, np.ndarray]:
     """Return whether some matrix of A (n, 6, m) has fewer than `dof` independent columns, and the inverses (n, m, 6).
 
     Nothing else in an audit takes as long as a decomposition of each matrix. Those that are far from losing a row by
@@ -173,12 +174,8 @@ def in_all_winds(
         nonlocal worst
         push = scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, winds)
         result = distribute(without_air - push, planned)
-        found = result.certificate if proves else None
-        if found is not None and result.row is not None and found.shortfall > _shortfall(worst):
-            proof = replace(found, wind=as_wind(winds[result.row]))
-            worst = worst._replace(certificate=proof, row=result.row)
-        violation, beyond = np.maximum(worst.violation, result.violation), max(worst.beyond, result.beyond)
-        worst = worst._replace(violation=violation, beyond=beyond)
+        result = result if proves else result._replace(certificate=None)
+        worst = _worse(worst, result, lambda row: {"wind": as_wind(winds[row])})
 
     exact = isinstance(every, WindBox)
     for winds in decisive_winds_at(every, scenario.robot, motion.pose, motion.velocity):
@@ -204,12 +201,18 @@ def with_all_loads(
     for extreme in range(scenario.phases.extremes):
         w = scenario.required_wrench(times, motion, carriers, scenario.wind, extreme)
         result = distribute(w, np.nan_to_num(given.tensions))
-        if result.certificate is not None and result.row is not None and _shortfall(result) > _shortfall(worst):
-            load = scenario.load_of(float(times[result.row]), extreme)
-            worst = worst._replace(certificate=replace(result.certificate, load=load), row=result.row)
-        violation, beyond = np.maximum(worst.violation, result.violation), max(worst.beyond, result.beyond)
-        worst = worst._replace(violation=violation, beyond=beyond)
+        worst = _worse(worst, result, lambda row, k=extreme: {"load": scenario.load_of(float(times[row]), k)})
     return worst
+
+
+def _worse(some: AuditedTensions, other: AuditedTensions, about: Callable[[int], dict[str, Any]]) -> AuditedTensions:
+    """Return the worse of two results at each instant; a certificate of the other is `about` something at its row."""
+    worst, proof = some, other.certificate
+    least = 0.0 if some.certificate is None else some.certificate.shortfall
+    if proof is not None and other.row is not None and proof.shortfall > least:
+        worst = some._replace(certificate=replace(proof, **about(other.row)), row=other.row)
+    violation, beyond = np.maximum(some.violation, other.violation), max(some.beyond, other.beyond)
+    return worst._replace(violation=violation, beyond=beyond)
 
 
 def _nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -230,7 +233,3 @@ def _in_span(A: np.ndarray, w: np.ndarray) -> np.ndarray:
     U, values, _ = np.linalg.svd(A, full_matrices=False)
     U = np.where(values[:, None] > INDEPENDENT * values[:, None, :1], U, 0.0)
     return (U @ (U.swapaxes(1, 2) @ w[..., None]))[..., 0]
-
-
-def _shortfall(result: AuditedTensions) -> float:
-    return 0.0 if result.certificate is None else result.certificate.shortfall

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...models.points import placed
 from ...solvers import solve_batch
-from ..audits.tensions import INDEPENDENT, scaled
+from ..audits.tensions import few_and_inverse, scaled
 from ..limits import Limit, Rate
 from ..nlp.guess import with_tilts
 from ..tasks.scenario import Scenario
@@ -107,14 +107,10 @@ class AtRest:
         else:
             still = np.zeros_like(platform)
             w = scaled(scenario, scenario.dynamics.required_wrench(platform, still, still, wind=scenario.wind))
-        U, values, Vt = np.linalg.svd(A, full_matrices=False)
-        kept = values > INDEPENDENT * values[:, :1]
-        part = np.divide((U.swapaxes(1, 2) @ w[..., None])[..., 0], values, out=np.zeros_like(values), where=kept)
-        tensions = np.clip((Vt.swapaxes(1, 2) @ part[..., None])[..., 0], *self._bounds)
+        few, inverse = few_and_inverse(A, len(robot.platform.dof))
+        tensions = np.clip((inverse @ w[..., None])[..., 0], *self._bounds)
         missed = np.linalg.norm((A @ tensions[..., None])[..., 0] - w, axis=1)
-        dof = len(robot.platform.dof)
-        spans = robot.m >= dof and bool(kept[:, dof - 1].all())
-        return A, w, tensions, missed <= (BALANCED if spans else MISSED) * robot.force_scale, spans
+        return A, w, tensions, missed <= (MISSED if few else BALANCED) * robot.force_scale, not few
 
     def _slack(
         self, platform: np.ndarray, carriers: np.ndarray, tensions: np.ndarray, off_path: np.ndarray | None

@@ -1,7 +1,7 @@
 """Set up the remainder of a planned motion for a robot with a tracking error: `remainder`."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -15,14 +15,6 @@ from ..tasks.paths import AnyPath, Motion, RestPath, ReturnPath
 from ..tasks.paths.returning import decay
 from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.task import FreeBase, GivenBase
-
-
-class Remainder(NamedTuple):
-    """The remainder of a motion."""
-
-    scenario: Scenario  # it starts as measured
-    # The last plan, with what the carriers are off it decaying; None if the task fixes the motion.
-    guess: Deviation | None
 
 
 def _open(ends: Word) -> Word:
@@ -49,11 +41,12 @@ def final_of(plan: Plan) -> Final | None:
 
 def remainder(
     whole: Scenario, final: Final | None, last: Plan, begun: float, time: float, initial: Initial, settle: float
-) -> Remainder:
+) -> tuple[Scenario, Deviation | None]:
     """Lay out what is left of the motion of `whole` at `time` [s] for a robot in the state `initial`.
 
     `final` is how it ends, beside what its task requires, and `last` the plan that the robot followed, which `begun` at
-    that time [s]. The way back to the path takes `settle` [s] at most.
+    that time [s]. The way back to the path takes `settle` [s] at most. The second result is the last plan, with what
+    the carriers are off it decaying; None if the task fixes the motion.
     """
     left = whole.duration - time
     at = np.array([time - begun])
@@ -80,7 +73,7 @@ def remainder(
         }
     )
     scenario = replace(whole, task=task, path=path, carrier_paths=carrier_paths(whole.robot, task), duration=left)
-    return Remainder(scenario, _guess(scenario, last, at, carriers, min(settle, left)))
+    return scenario, _guess(scenario, last, at, carriers, min(settle, left))
 
 
 def _completed(initial: Initial, last: Plan, at: np.ndarray, carriers: Motion) -> Initial:

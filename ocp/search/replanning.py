@@ -47,8 +47,8 @@ class Replanner:
         return_s = number("settle", settle, LEAST, 1e6)
         initial = initial_of(self._whole, state, at, "state")
         check_ends(self._whole.robot, initial, None, "world", "replan")
-        left = remainder(self._whole, self._final, self._last, self._begun, at, initial, return_s)
-        return Search(left.scenario, self._solvers, progress), left.guess
+        left, guess = remainder(self._whole, self._final, self._last, self._begun, at, initial, return_s)
+        return Search(left, self._solvers, progress), guess
 
     def plan(self, search: Search, guess: Deviation | None, time: float) -> Plan:
         """Return the plan of a search; the next rest is that of this plan if it is feasible."""

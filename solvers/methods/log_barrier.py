@@ -11,8 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...base.inputs import number, shown
+from ...base.inputs import finite_array, number
 from .method import Method, Proposal, StandardForm
 from .numerics.barrier_newton import barrier_point
 
@@ -56,10 +55,5 @@ def start_in_form(form: StandardForm, start: Any) -> Any:
     """Return the tensions to start from as a point s, shape (k,), or None if there are none."""
     if start is None:
         return None
-    try:
-        t = np.asarray(start)
-    except (ValueError, TypeError, OverflowError):
-        t = np.zeros(0, dtype=object)
-    if t.shape != form.origin.shape or t.dtype.kind not in "fiu" or not np.isfinite(t).all():
-        raise InputError(f"start must be {form.origin.size} finite tensions [N], one per cable, got {shown(start)}")
+    t = finite_array("start", start, form.origin.shape)
     return (t[form.moving] - form.origin[form.moving]) / form.unit
