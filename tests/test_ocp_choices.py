@@ -54,6 +54,16 @@ def test_durations_stay_in_their_range():
     assert "which has the lowest cost; to make time add to the cost" in slow.report()
 
 
+def test_a_report_says_if_time_is_not_all_that_costs():
+    task = {**LIFT, "steps": 40, "duration": {"min": 0.2, "max": 5.0}}
+    weighed, fast = (plan(hoist(), {**task, "objective": {"time": time, "jerk": 4.0}}) for time in (1.0, 0.01))
+    share = weighed.scenario.duration / weighed.objective
+    assert share < 0.9
+    assert f"which has the lowest cost: {100 * share:.0f} % of it is time; for a shorter one, lower" in weighed.report()
+    assert fast.scenario.duration < 0.9 * weighed.scenario.duration  # as the sentence promises
+    assert "of it is time" not in fast.report()
+
+
 def test_exact_waypoints_are_passed_though_the_tube_is_used():
     path = {"kind": "waypoints", "points": [[0, 0, -1], [0.25, 0, -1.1], [0, 0.2, -1.2], [0, 0, -1]]}
     tube = {"position": 0.1, "ends": "exact", "waypoints": "exact"}

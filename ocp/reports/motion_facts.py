@@ -11,6 +11,7 @@ from ..tasks.task import Task
 from ..tasks.wind_set import WindBox, WindDisc
 
 CLOSE = 1e-3  # relative difference of a duration from the shortest allowed
+NEARLY_ALL = 0.9  # of the cost of a plan: from here on a minimum of the cost is one of the time
 LOADS = "any within their tolerances; the tensions shown are those with the loads as given"
 
 
@@ -51,11 +52,17 @@ def motion_facts(plan: PlanData) -> list[Fact]:
 
 
 def _chosen(plan: PlanData) -> str:
-    """Return why a duration that the planner chose is not the shortest, where time costs nothing."""
-    span, costs = plan.scenario.duration_range, plan.scenario.task.objective.time is not None
-    if not plan.feasible or span is None or costs or plan.scenario.duration <= span.min * (1 + CLOSE):
+    """Return why a duration that the planner chose is not the shortest: time costs nothing, or is not all that costs."""
+    span, amount, seconds = plan.scenario.duration_range, plan.scenario.task.objective.time, plan.scenario.duration
+    if not plan.feasible or span is None or seconds <= span.min * (1 + CLOSE):
         return ""
-    return ", which has the lowest cost; to make time add to the cost, set `objective: {time: 1}`"
+    if amount is None:
+        return ", which has the lowest cost; to make time add to the cost, set `objective: {time: 1}`"
+    share = seconds / amount / plan.objective if plan.objective else 1.0
+    if not 0 < share < NEARLY_ALL:  # a reward for margin makes the whole less than its parts
+        return ""
+    its = quantity(100 * share, "%", 2)
+    return f", which has the lowest cost: {its} of it is time; for a shorter one, lower `objective.time`"
 
 
 def _accuracy(plan: PlanData) -> list[Fact]:
