@@ -52,7 +52,7 @@ def motion_facts(plan: PlanData) -> list[Fact]:
 
 
 def _chosen(plan: PlanData) -> str:
-    """Return why a duration that the planner chose is not the shortest: time costs nothing, or is not all that costs."""
+    """Return why a duration that the planner chose is not the shortest: time costs nothing, or not all."""
     span, amount, seconds = plan.scenario.duration_range, plan.scenario.task.objective.time, plan.scenario.duration
     if not plan.feasible or span is None or seconds <= span.min * (1 + CLOSE):
         return ""
