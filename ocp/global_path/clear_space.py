@@ -48,9 +48,12 @@ class ClearSpace:
         """Return by how much configurations (n, count) keep more than the reserve [m], and their points."""
         self.evaluated += len(configurations)
         kept = self.rest(*self.space.poses(configurations))
-        away = np.linalg.norm((configurations[:, None] - self.space.ends) * self.space.scale, axis=2)
-        needed = np.minimum(self.reserve, (self._at_ends + RISE * away).min(axis=1))
+        needed = np.minimum(self.reserve, (self._at_ends + RISE * self._from_ends(configurations)).min(axis=1))
         return kept.slack - needed, kept.points
+
+    def _from_ends(self, configurations: np.ndarray) -> np.ndarray:
+        """Return how far configurations (n, count) are from start and end, (n, 2) [m]."""
+        return np.linalg.norm((configurations[:, None] - self.space.ends) * self.space.scale, axis=2)
 
     def targets(self, rng: Generator, longest: float = np.inf) -> Iterator[np.ndarray]:
         """Yield random configurations that are clear, those that are barely so first of all: they lie in gaps.
@@ -59,8 +62,7 @@ class ClearSpace:
         """
         while True:
             tried = np.array([self.space.sample(rng) for _ in range(TRIED)])
-            away = np.linalg.norm((tried[:, None] - self.space.ends) * self.space.scale, axis=2)
-            tried = tried[away.sum(axis=1) < longest]
+            tried = tried[self._from_ends(tried).sum(axis=1) < longest]
             if not len(tried):
                 yield self.space.ends.mean(axis=0)
                 continue

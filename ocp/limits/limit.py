@@ -16,9 +16,10 @@ from typing_extensions import override
 
 from .state import State
 
-TOLERANCE = 1e-6  # of the scale: what the audit accepts beyond a bound
+# Of the scale: what the audit accepts beyond a bound. Of an angle it is 1e-6 rad: programs bound the cosine, which
+# resolves a small angle to no better than this.
+TOLERANCE = 1e-6
 EQUATION_TOLERANCE = 1e-3  # of the scale: equations hold at the nodes, and between them nearly
-ANGLE_TOLERANCE = 1e-6  # [rad]: programs bound the cosine, which resolves a small angle to no better than this
 RATE_TOLERANCE = 1e-3  # of the scale: the audited tensions are the planned ones but for the wrench's rest
 LEAST_COSINE = 1e-4  # less of a cosine is no scale: of angles below a hundredth of a radian
 ROUNDING = 1e-3  # of a bound: a norm is rounded by so much at zero, where it has a corner
@@ -231,11 +232,6 @@ class Angle(Limit):
     @override
     def share_beyond(self, value: float) -> float:
         return max(self._least - float(np.cos(value)), 0.0) / self._change
-
-    @property
-    @override
-    def tolerance(self) -> float:
-        return ANGLE_TOLERANCE
 
     @property
     @override
