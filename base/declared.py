@@ -132,9 +132,11 @@ def _check_dataset(name: str, dataset: Any, account: _Account) -> None:
         values, shape = h5py.Dataset(dataset), dataset.shape
         account.block(name, math.prod(shape[1:]) * account.size)
         step = max(1, account.accepted // max(1, math.prod(shape[1:]) * account.size))
-        starts = range(0, shape[0] if shape else 1, step)
-        longest = max((_longest(values[at : at + step] if shape else values[()]) for at in starts), default=0)
-        account.memory(name, math.prod(shape) * longest)
+        longest = 0
+        for at in range(0, shape[0] if shape else 1, step):  # the first piece that is too long ends it
+            longer = max(longest, _longest(values[at : at + step] if shape else values[()]))
+            account.memory(name, math.prod(shape) * (longer - longest))
+            longest = longer
 
 
 def _as_read(dataset: Any) -> tuple[int, ...]:
