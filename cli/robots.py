@@ -171,6 +171,8 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
     from ..base.text import quantity, quantity_range, quantity_row
 
     attitude = "in its home attitude"
+    if box is None and robot.fixed_lengths is not None:
+        return ["  no box of positions is known at which it can rest"]
     if box is None:
         movable = any(carrier.moves for carrier in robot.carriers)
         hint = ["    (in a plan with `base: {kind: free}` the carriers can move too)"] if movable else []

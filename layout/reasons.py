@@ -44,6 +44,7 @@ class Reasons(NamedTuple):
     advice: tuple[Advice, ...]
     local_optimum: bool
     at_bounds: int
+    of_margin: bool  # whether the gains are of margin, which is maximised or still less than required
 
 
 def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
@@ -70,20 +71,21 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     margin = float(evaluation.margins(y).min())
     span = variables.high - variables.low
     bound = (span > 0.0) & (np.minimum(y - variables.low, variables.high - y) <= 1e-9 * np.maximum(span, 1.0))
-    wants_margin = np.isfinite(goal.wanted)  # so much, of which the rest is for t_max or the frequency
+    # Otherwise the margin is as required, and the program improves t_max, cost or frequency.
+    of_margin = bool(np.isinf(goal.wanted) or total > 1.0 - _SMALL)
     advice = _advice(robot, found.weights, found.pull, direction, rows.accelerations[found.rows])
-    if wants_margin:
+    if not of_margin:
         advice[:1] = [Advice("margin lower by 1 N", total, "N/N")]
     if goal.per_hertz or evaluation.room.frequency:
         del advice[1:]  # t_min and mass change the frequencies, too
     advice += _of_boxes(variables, found.by_high, found.by_low)
+    unit, name = (1.0, "N/") if of_margin else (goal.unit, f"{goal.unit_text}/")
     return Reasons(
         tuple(binding),
-        tuple(
-            Advice(one.change, one.gain / goal.unit, one.unit.replace("N/", f"{goal.unit_text}/", 1)) for one in advice
-        ),
+        tuple(Advice(one.change, one.gain / unit, one.unit.replace("N/", name, 1)) for one in advice),
         bool(found.left <= _CONVERGED * max(LITTLE * robot.force_scale, abs(margin))),
         int(bound.sum()),
+        of_margin,
     )
 
 

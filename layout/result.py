@@ -39,10 +39,10 @@ class Design(Drawn, Reported, Displayed):
 
     - `robot`: the best robot found; that of the file if the requirements are impossible. `before`: the initial robot.
     - `requirements`: those of the design.
-    - `status`: feasible if its margin, by `capacity_margin` at the worst poses of the grid and of an audit, the
-      distances and lengths of its cables, its lowest natural frequency and the plans of its tasks are as required;
-      infeasible if no layout inside the boxes meets the requirements, by `impossibility`; otherwise not-found, which
-      proves nothing.
+    - `status`: feasible if `robot` has the required margin (by `capacity_margin`, at the worst poses of the grid and of
+      an audit), distances and lengths of cables, lowest natural frequency and plans of tasks; infeasible if
+      `impossibility` proves that no layout inside the boxes meets the requirements; otherwise not-found, which proves
+      nothing.
     - `margin`, `margin_before`: smallest capacity margin of both robots at the same poses, with moments divided by
       `before.length` [N].
     - `clearance`: smallest distance between two cables [m]; infinite for one cable.
@@ -52,7 +52,7 @@ class Design(Drawn, Reported, Displayed):
     - `poses`, `audited`: number of pairs of pose and wrench in the requirements, and of random ones in the last audit.
     - `starts`: number of initial layouts, or of compared pairings. `stopped`: whether the search was interrupted.
     - `plans`: a plan of each task of the requirements; empty if the margin or the clearance is not as required.
-    - `size`, `size_before`: with maximise: volume, the factor by which all edges of the given boxes can be multiplied
+    - `size`, `size_before`: with `maximise: volume`, the factor by which all edges of the given boxes can be multiplied
       so that `robot`, or `before`, still meets the requirements: 2 is 8 times the volume. `requirements` then has the
       larger boxes.
     """
@@ -167,8 +167,8 @@ class Design(Drawn, Reported, Displayed):
             wanted = [f"margin of {quantity(self.requirements.margin, 'N')}"]
             wanted += room_of(self.before, self.requirements).describe()
             wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
-            listed = ", ".join(f"a {each}" for each in wanted)
-            facts.append(("wanted", f"{listed}; the search does not prove that no layout has all of these"))
+            listed, them = ", ".join(f"a {each}" for each in wanted), "it" if len(wanted) == 1 else "all of these"
+            facts.append(("wanted", f"{listed}; the search does not prove that no layout has {them}"))
         why = [] if self.reasons is None else self._why(self.reasons)
         files = [("The robot's file", to_yaml(self.robot))]
         if (found := self.reasons) is not None:  # whether the layout can be improved
@@ -233,7 +233,7 @@ class Design(Drawn, Reported, Displayed):
     def _why(self, found: Reasons) -> list[Part]:
         falls = {"t_max": "mean t_max -", "cost": "cost -"}
         grows = "natural frequency +" if self.requirements.maximise == "natural_frequency" else "margin +"
-        gain = falls.get(str(self.requirements.minimise), grows)
+        gain = "margin +" if found.of_margin else falls.get(str(self.requirements.minimise), grows)
         gains = [
             (one.change, f"{gain}{quantity(one.gain, one.unit, digits=3)}" if one.gain > 1e-6 else "no effect")
             for one in found.advice
@@ -243,7 +243,7 @@ class Design(Drawn, Reported, Displayed):
         more = len(found.binding) - len(rows)
         table = Table("What binds", columns, rows, (0,))
         changes = Table("What a change would gain", ("change", "gain"), gains)
-        return [changes, table, *([f"and {more} more"] if more > 0 else [])]
+        return [changes, *[table] * bool(rows), *([f"and {more} more"] if more > 0 else [])]
 
     def _binding_row(self, one: Binding) -> list[str]:
         limits = [

@@ -142,6 +142,11 @@ class Carrier(Part):
         """Return the actuators that move its body."""
         return ()
 
+    @property
+    def force_max(self) -> float:
+        """Return the largest force that its actuators give together [N]."""
+        return float(sum(max(-one.low, one.high) * np.linalg.norm(one.wrench[:3]) for one in self.actuators))
+
     def imposed(self) -> "Carrier":
         """Return a carrier in its place whose motion is imposed, or itself if it never moves."""
         return PrescribedCarrier(name=self.name, home=self.home, kind="prescribed") if self.moves else self

@@ -55,7 +55,7 @@ def diagnose(robot: AnyRobot) -> Diagnosis:
         singular_values=singular_values,
         lengths=lengths,
         reason=_why(robot, A, rank, lengths) if rank < len(robot.platform.dof) else "",
-        warnings=_implausible(robot),
+        warnings=[*too_weak(robot), *_implausible(robot)],
     )
 
 
@@ -95,6 +95,35 @@ def _motion(twist: np.ndarray, robot: Robot) -> str:
 
 def _vector(vector: np.ndarray) -> str:
     return f"({quantity_row(np.round(vector, 9))})"
+
+
+def too_weak(robot: Robot) -> list[str]:
+    """Return a sentence for each carrier, and for all, that cannot give the force along gravity that rest needs.
+
+    A carrier holds its weight and the pull of its cables at home, with the tensions inside their limits for which that
+    is least; all of them hold their weight and the platform's.
+    """
+    gravity = float(np.linalg.norm(robot.gravity))
+    bodies = [carrier.body for carrier in robot.carriers]
+    if not gravity or not all(bodies):
+        return []
+    down = np.array(robot.gravity) / gravity
+    pull = -down @ Dynamics(robot).wrench_matrix(robot.home)[:3]  # on the carriers [N per N]
+    least = np.bincount(robot.carrier_of_cable, np.minimum(robot.t_min * pull, robot.t_max * pull), len(bodies))
+    needs = [gravity * body.mass + extra for body, extra in zip(bodies, least.tolist(), strict=True) if body]
+    weak = [
+        f"{carrier.name} cannot hover at home: its thrust_max is {quantity(carrier.force_max, 'N')}, and its weight "
+        f"and its cables need at least {quantity(need, 'N')}"
+        for carrier, need in zip(robot.carriers, needs, strict=True)
+        if carrier.force_max < need
+    ]
+    weight = robot.weight + gravity * sum(body.mass for body in bodies if body)
+    if (most := sum(carrier.force_max for carrier in robot.carriers)) < weight:
+        weak.append(
+            f"the carriers cannot hold the platform: together they give at most {quantity(most, 'N')}, but platform "
+            f"and carriers weigh {quantity(weight, 'N')}"
+        )
+    return weak
 
 
 def _implausible(robot: Robot) -> list[str]:

@@ -526,6 +526,23 @@ def test_the_weakest_winches_are_those_of_a_bisection(name, margin):
     assert first.gain == pytest.approx(1.0 / slope, rel=1e-3)
 
 
+def test_where_the_margin_is_not_reached_the_gains_are_those_of_the_margin():
+    """Its slope with t_max is that of the capacity margins of robots with slightly other winches."""
+    robot = load("ipanema-2")
+    strongest = {"part": "t_max", "range": {"min": 20, "max": 200}, "equal": True}
+    options = {"minimise": "t_max", "margin": 120.0, "start": "robot", "time_limit": 0.2}
+    found = design(robot, [strongest], [{"poses": [robot.home.tolist()]}], **options)
+    assert found.status == "not-found"
+    assert "t_max of every cable higher by 1 N  margin +" in found.report()
+    A = Dynamics(robot).wrench_matrix(robot.home)
+    w = Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6))
+    low, high = (
+        capacity_margin(TensionProblem(A, w, robot.t_min, 200.0 + change, length=robot.length)).value
+        for change in (-0.01, 0.01)
+    )
+    assert found.reasons.advice[0].gain == pytest.approx((high - low) / 0.02, rel=1e-6)
+
+
 def test_weaker_winches_are_enough_for_a_better_layout(tmp_path):
     robot = load("ipanema-2")
     requirements = wanted(robot, minimise="t_max", margin=12.0, clearance=0.03, time_limit=4.0)

@@ -344,7 +344,7 @@ def test_carriers_limits_count_whatever_the_base_does():
     assert "carrier_attitude" in names(found.audit)
     fast = {"kind": "line", "start": [2.1, 0.45, 1.2], "end": [2.3, 0.45, 1.2], "timing": "uniform"}
     found = plan(robot, {"path": rest, "duration": 0.1, "base": {"kind": "given", "paths": {"robot1": fast}}})
-    told = "carrier_speed of robot1 must be at most 1 m/s, is 2 m/s at t = 0.000 s"
+    told = "carrier_speed of robot1 must be at most 1 m/s but is 2 m/s at t = 0.000 s"
     assert told in [str(excess) for excess in found.audit.excess]
 
 

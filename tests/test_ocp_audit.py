@@ -221,7 +221,7 @@ def test_soft_limits_are_told_apart():
 
 def test_an_excess_is_a_sentence_and_data():
     excess = Excess("cable_speed", "cable 3", 0.25, 1.5, 1.0, "m/s")
-    assert str(excess) == "cable_speed of cable 3 must be at most 1 m/s, is 1.5 m/s at t = 0.250 s"
+    assert str(excess) == "cable_speed of cable 3 must be at most 1 m/s but is 1.5 m/s at t = 0.250 s"
     told = json.loads(json.dumps(excess.to_dict()))
     assert told["text"] == str(excess)
     assert (told["limit"], told["about"], told["time"], told["value"], told["bound"], told["unit"]) == (
@@ -233,7 +233,7 @@ def test_an_excess_is_a_sentence_and_data():
         "m/s",
     )
     nowhere = Excess("duration", "motion", None, np.nan, 1.0, "s", "at least", "why")
-    assert str(nowhere) == "duration of motion must be at least 1 s, is undefined (why)"
+    assert str(nowhere) == "duration of motion must be at least 1 s but is undefined (why)"
     assert nowhere.to_dict()["value"] is None
     scenario, _ = on_the_path({"path": RIGHT, "limits": {"cable_speed": 0.01}})
     summary = json.loads(json.dumps(audit(scenario, None).to_dict()))

@@ -60,7 +60,7 @@ def test_one_vertical_cable_carries_its_largest_tension_and_no_more(share):
     task = {"path": path, "duration": 8, "tube": {"position": 0.01}, "steps": 20}
     lifted = plan(robot, task)
     assert lifted.status is (MotionStatus.FEASIBLE if share < 1 else MotionStatus.INFEASIBLE)
-    assert share < 1 or "t_max of all cables together must be at least 102 N, is 100 N" in lifted.report()
+    assert share < 1 or "t_max of all cables together must be at least 102 N but is 100 N" in lifted.report()
     offers = {offer.name: offer for offer in lifted.relaxations}
     assert set(offers) == (set() if share < 1 else {"platform.mass", "cables.t_max"})
     assert share < 1 or 0.98 * 100 / G < offers["platform.mass"].possible < 100 / G

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from towline.models import Dynamics, Robot, load
+from towline.models.diagnosis import diagnose
 from towline.solvers import solve
 from towline.statics.distribution import pose_problem
 from towline.workspace.resting_box import largest_box, resting_box
@@ -91,6 +92,24 @@ def test_a_team_with_cables_of_fixed_length_moves_along():
     box = resting_box(Robot.model_validate(data))
     assert box.low == pytest.approx([-0.3] * 3)
     assert box.high == pytest.approx([0.3] * 3)
+
+
+@pytest.mark.parametrize(
+    ("weight", "who"), [(2.4 + 3 * 1.5, "the carriers cannot hold the platform"), (1.5, "quad1 cannot hover at home")]
+)
+def test_a_team_with_too_little_thrust_rests_nowhere(weight, who):
+    """Three equal thrusts carry the whole weight, or each its own quadrotor with cables of no tension."""
+    data = load("multi-quadrotor-3").model_dump(mode="json")
+    for cable in data["cables"]:
+        cable["t_min"] = 0
+    share = 1 if weight == 1.5 else 3
+    for factor, strong in ((1.001, True), (0.999, False)):
+        for carrier in data["carriers"]:
+            carrier["thrust_max"] = factor * 9.81 * weight / share
+        robot = Robot.model_validate(data)
+        told = [warning for warning in diagnose(robot).warnings if warning.startswith(who)]
+        assert bool(told) is not strong
+        assert (resting_box(robot) is not None) is (strong and share == 3)
 
 
 def test_no_position_no_box():

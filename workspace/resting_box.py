@@ -6,6 +6,7 @@ import numpy as np
 
 from ..models import Robot
 from ..models.body import skeleton
+from ..models.diagnosis import too_weak
 from ..models.points import rotations
 from .feasibility import feasible, rest_wrench
 from .places import Places
@@ -94,7 +95,8 @@ def largest_box(
 def _moved_along(robot: Robot) -> RestingBox | None:
     """Return where the platform can rest with its carriers moved along, if it can rest at home."""
     here = Places.at_home(robot, robot.home)
-    if not all(carrier.moves for carrier in robot.carriers) or not feasible(robot, here, rest_wrench(robot)[None])[0]:
+    held = all(carrier.moves for carrier in robot.carriers) and not too_weak(robot)
+    if not held or not feasible(robot, here, rest_wrench(robot)[None])[0]:
         return None
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     for carrier in robot.carriers:

@@ -41,7 +41,7 @@ class Excess(Displayed):
         return cls(limit.name, limit.about(which), float(time), float(value), bound, limit.unit, side, why)
 
     def __str__(self) -> str:
-        """Return "carrier_speed of quad1 must be at most 2 m/s, is 2.5 m/s at t = 1.250 s"."""
+        """Return "carrier_speed of quad1 must be at most 2 m/s but is 2.5 m/s at t = 1.250 s"."""
         at = "" if self.time is None else f" at t = {self.time:.3f} s"
         why = f" ({self.why})" if self.why else ""
         body, _, region = self.about.partition(" outside ")
@@ -60,7 +60,7 @@ class Excess(Displayed):
             if value == bound:
                 value, bound = (quantity(number, self.unit, digits=digits) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value
-        return f"{self.limit} of {self.about} must be {side}{bound}, is {value}{at}{why}"
+        return f"{self.limit} of {self.about} must be {side}{bound} but is {value}{at}{why}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields for JSON, with the sentence as "text"; numbers that do not exist are None."""

@@ -42,12 +42,8 @@ def too_heavy(scenario: Scenario, rests: np.ndarray) -> Iterator[Excess]:
     held = [span for span in spans if span.carriers_rest]
     if held and robot.dof_mask[:3].all() and all(body is not None for body in bodies):
         weight = platform + gravity * sum(body.mass for body in bodies if body is not None)
-        pushes = [
-            max(abs(one.low), abs(one.high)) * float(np.linalg.norm(one.wrench[:3]))
-            for carrier in robot.carriers
-            for one in carrier.actuators
-        ]
-        yield from _unless(weight, sum(pushes), "thrust_max", "carriers", "platform, load and carriers", gravity, held)
+        most = sum(carrier.force_max for carrier in robot.carriers)
+        yield from _unless(weight, most, "thrust_max", "carriers", "platform, load and carriers", gravity, held)
 
 
 def _unless(
@@ -57,7 +53,7 @@ def _unless(
     span = max(spans, key=lambda span: span.load)
     needed = weight + gravity * span.load
     if most < needed * (1 - CERTAIN):
-        why = f"the weight of {of}"
+        why = f"the bound is the weight of {of}"
         yield Excess(limit, f"all {what} together", span.start, most, needed, "N", "at least", why)
 
 
