@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import InputError
+from .text import quantity
 
 Kind = TypeVar("Kind")
 
@@ -57,7 +58,7 @@ def with_fields(function: str, given: dict[str, Any], *objects: Any) -> list[Any
 def required(name: str, value: object, kind: type[Kind]) -> Kind:
     """Return `value`, or raise InputError unless it is a `kind`."""
     if not isinstance(value, kind):
-        raise InputError(f"{name} must be a {kind.__name__}, got {shown(value)}, a {type(value).__name__}")
+        raise InputError(f"{name} must be a {kind.__name__}, got {shown(value)} of type {type(value).__name__}")
     return value
 
 
@@ -75,7 +76,7 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     """Return a whole number from `least` to `most`, or raise InputError."""
     if isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64) and least <= value <= most:
         return int(value)
-    raise InputError(f"{name} must be a whole number from {least} to {most}, got {shown(value)}")
+    raise InputError(f"{name} must be a whole number from {quantity(least)} to {quantity(most)}, got {shown(value)}")
 
 
 def flag(name: str, value: object) -> bool:

@@ -212,7 +212,10 @@ def _ends(option: str, text: str, names: str) -> dict[str, list[float]]:
     parts = text.split(";")
     if len(parts) != 2:
         raise InputError(f"{option} must be '{names}; {names}', got {text!r}")
-    return {end: numbers(option, part, 3).tolist() for end, part in zip(("min", "max"), parts, strict=True)}
+    return {
+        end: numbers(f"each half of {option}", part.strip(), 3).tolist()
+        for end, part in zip(("min", "max"), parts, strict=True)
+    }
 
 
 def _summary(result: xr.Dataset, metrics: list[str]) -> dict[str, Any]:

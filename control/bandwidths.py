@@ -97,8 +97,8 @@ def bandwidths_for(
     part, reason = errors.permit(usual.bandwidth, usual.observer)
     if w is None and K is None and part < LEAST:
         raise InputError(
-            f"sensors must permit {quantity(100 * LEAST, '%')} of the default bandwidths, {usual.bandwidth:g} and "
-            f"{usual.observer:g} rad/s, got {reason}, which permits {quantity(100 * part, '%', 2)}"
+            f"sensors must permit at least {quantity(100 * LEAST, '%')} of the default bandwidths, {usual.bandwidth:g} "
+            f"and {usual.observer:g} rad/s, got {reason}, which permits {quantity(100 * part, '%', 2)}"
         )
     part = min(part, usual.most)
     given = np.full(6, part * usual.bandwidth) if w is None else w, part * usual.observer if K is None else K

@@ -19,11 +19,11 @@ class Command(NamedTuple):
         tensions: (..., m) [N], inside their limits and rate limits; small for a cable that is treated as cut.
         carrier_pose, carrier_velocity, carrier_acceleration: Commanded motion of the carriers, (..., c, 6). Flying
             carriers follow `actuation` instead.
-        answered: (...), status of the step, an index of `ANSWERS`: tensions give the required wrench ("as planned"); an
-            earlier solution is used ("shifted plan"); tensions with the closest wrench ("soft wrench"); the last
-            command is held ("hold"); computed torque, because the robot does not move as predicted ("not as modelled");
-            or tensions as planned, but the platform is more than a tenth of the cables' length, 0.5 m or 0.5 rad off
-            ("off the reference").
+        answered: (...), status of the step, an index of `ANSWERS`. "as planned": the tensions give the required wrench;
+            "shifted plan": they are from an earlier solution; "soft wrench": they have the closest wrench; "hold": the
+            last command is held; "not as modelled": computed torque took over, because the robot does not move as
+            predicted; "off the reference": the tensions give the required wrench, but the platform is more than a tenth
+            of the mean cable length, 0.5 m or 0.5 rad away from its reference.
         direction, shortfall: If no tensions inside the limits and rates give the required wrench: the direction of the
             missing wrench, (..., 6), and its size [N], (...); otherwise nan (default). If tensions exist but a flying
             carrier has too little thrust for them, or does not turn as commanded because its actuators were at their

@@ -36,7 +36,7 @@ class Filtered(Controller):
     Args:
         controller: Controller that receives the estimated states.
         filter: `estimation.PoseFilter` of the platform's poses, with their standard deviations, or a filter with its
-            methods. It receives the reference, so that it filters the error to it.
+            methods. It receives the reference, so that it filters deviations from it.
 
     Raises:
         InputError: If an argument has a wrong type.

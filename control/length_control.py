@@ -30,10 +30,11 @@ class LengthControl(Controller):
 
         L0 = l(x) / (1 + s) + J (P e + I * integral of e)
 
-    with the strains s at which cables with the stiffness EA and the file's damping have the planned tensions, the
-    planned pose x and tensions at the time when the winches will have followed, the Jacobian J of the lengths, and the
-    error e of the measured pose. The tensions of a robot with more cables than degrees of freedom follow from the
-    lengths; they are not controlled. With a lag, e and its integral are extrapolated to that time, to first order.
+    where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
+    the planned pose, J the Jacobian of the lengths, and e the error of the measured pose. x and the tensions are those
+    planned for the time at which the winches will have followed. The tensions of a robot with more cables than degrees
+    of freedom follow from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to that
+    time, to first order.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
@@ -44,8 +45,8 @@ class LengthControl(Controller):
             and their corrections with as much lead.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default depends on the age
             of the measured pose: 4 and 10 if it is current, 0.3 and 2 if it is at most 20 ms old, less beyond. It is
-            also 0.3 and 2, or less, if cables do not stretch or are too stiff for steps so far apart. For a late pose
-            without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the
+            also 0.3 and 2, or less, if cables do not stretch or are too stiff for the period of the steps. For a late
+            pose without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the
             platform on its cables grow.
         most: Largest correction of a length [m]; default: 5 % of the robot's length. At this value the integral stops,
             and the status is "hold".
@@ -77,8 +78,8 @@ class LengthControl(Controller):
         given = [cable.stiffness or np.inf for cable in self.robot.cables] if stiffness is None else stiffness
         if stiffness is None and np.isinf(given).any() and self.robot.m > self.robot.dof_mask.sum():
             raise InputError(
-                "stiffness must be given, here or in the robot's file, for a robot with more cables than degrees of "
-                f"freedom, because its tensions depend on it, got none for {self.robot.name!r}"
+                "stiffness must be given, as an argument or in the robot's file, for a robot with more cables than "
+                f"degrees of freedom, because its tensions depend on it, got none for {self.robot.name!r}"
             )
         self.stiffness = repeated("stiffness", given, self.robot.m)
         self._damping = np.array([cable.damping or 0.0 for cable in self.robot.cables])

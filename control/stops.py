@@ -25,15 +25,15 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     the result is the stop with the smallest missing wrench, with its certificate. The time to compute it depends on
     how long the robot takes to stop, not on the plan.
 
-    Carriers that fly, each with one cable of fixed length, leave their path: each moves to where the force of its
-    cable points, and that force changes as little as possible (`statics.team_stops`). If each flying carrier has
-    several cables of fixed length that begin at one point of it, and all cables together give every wrench, that point
-    stays on its path.
+    Carriers that fly, each with one cable of fixed length, leave their path: each moves so that its cable has the
+    direction of the required force, which changes as little as possible (`statics.team_stops`). If each flying carrier
+    has several cables of fixed length that begin at one point of it, and all cables together give every wrench, that
+    point stays on its path.
 
     Args:
         plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
-        time: Time in the plan at which the stop begins [s], at most its end. A plan that ends while the robot moves is
-            continued with its last acceleration.
+        time: Time in the plan at which the stop begins [s]; a time after the plan's end stands for the end. A plan that
+            ends while the robot moves is continued with its last acceleration.
 
     Returns:
         Stop: `simulate` and `references` take it as they take a plan.

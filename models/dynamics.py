@@ -241,7 +241,7 @@ class Dynamics(Displayed):
                 if cable.stiffness is None:
                     raise InputError(
                         f"cables[{index}].stiffness must be E A > 0 [N] for every cable, got none in robot "
-                        f"{self.robot.name!r}; elastic=False needs no stiffness"
+                        f"{self.robot.name!r}"
                     )
         if numeric := self._numeric(pose, tensions, carrier_pose):
             return numeric.stiffness(pose, tensions, carrier_pose, elastic)

@@ -85,7 +85,8 @@ def parse_yaml(text: str, model: type[Model], where: str, folder: Path | None = 
     except (YAMLError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise InputError(f"{where}: text is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
     if not isinstance(data, dict):
-        raise InputError(f"{where}: must hold a mapping with {_keys(json_schema(model))}, got {shown(data)}")
+        got = "nothing" if data is None else shown(data)
+        raise InputError(f"{where}: must hold a mapping with {_keys(json_schema(model))}, got {got}")
     return validate(data, model, where, folder)
 
 

@@ -46,7 +46,7 @@ class RelativeDynamics(Displayed):
     def __init__(self, robot: AnyRobot):
         self.robot = as_robot(robot)
         if (count := len(self.robot.carriers)) != 1:
-            raise InputError(f"relative must have a robot with one carrier, got {self.robot.name!r} with {count}")
+            raise InputError(f"relative requires a robot with one carrier, got {self.robot.name!r} with {count}")
         self.functions: dict[str, ca.Function] = _relative_functions(self.robot)
 
     @one_array

@@ -99,7 +99,7 @@ class PlanData(Displayed):
 
     @property
     def duration(self) -> float:
-        """Return the duration of the motion [s]; without a time law, of a motion that only shows the path."""
+        """Return the duration of the motion [s]; if no time law exists, the motion only shows the path."""
         return self.scenario.duration
 
     @property

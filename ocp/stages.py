@@ -180,7 +180,7 @@ def _free_motion(search: Search, start: Deviation | None) -> Plan:
         closest = search.solve("elastic program", Mesh(mesh.steps, elastic=True), start)
         if closest.slack > NO_SLACK * scenario.robot.force_scale:
             search.audit(closest)
-            return _closest(search, "the search ended at a motion without feasible tensions")
+            return _closest(search, "no motion with feasible tensions was found that keeps every other limit")
         outcome = search.solve("nonlinear program", mesh, closest.deviation)
     return _closest(search, refine(search, outcome))
 

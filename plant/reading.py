@@ -106,7 +106,7 @@ class Reading:
 
     @property
     def velocity(self) -> np.ndarray:
-        """Return its time derivative, (..., 6) [m/s, rad/s]; undefined for the angles at a pitch of 90 degrees."""
+        """Return the time derivative of `pose`, (..., 6) [m/s, rad/s]; undefined for angles at 90 degrees of pitch."""
         return self._platform.velocity
 
     @property
@@ -126,7 +126,7 @@ class Reading:
 
     @property
     def carrier_velocity(self) -> np.ndarray:
-        """Return their time derivatives, (..., c, 6) [m/s, rad/s]."""
+        """Return the time derivatives of `carrier_pose`, (..., c, 6) [m/s, rad/s]."""
         return self._carriers.velocity
 
     @property

@@ -48,7 +48,7 @@ class Replay(Drawn, Reported, Displayed):
     Attributes:
         matching: The recording, compared with its plant.
         found (tuple[Explanation, ...]): Share of the residuals that each parameter alone explains, largest first.
-        explained: Residuals with the first one fitted; None if it does not reduce them.
+        explained: Residuals with the first of these parameters fitted; None if it does not reduce them.
         fitted: Parameters after a fit, or None.
         validation: Root mean square of the residuals of validation windows over their noise, before and after a fit, or
             None.
@@ -108,7 +108,7 @@ class Replay(Drawn, Reported, Displayed):
 
     @property
     def notes(self) -> list[str]:
-        """Return remarks, one line each; one of them if a delay may be that of commands held between samples."""
+        """Return remarks, one line each, for example that a delay may be due to commands held between samples."""
         windows = self.windows
         step = float(np.median(np.diff(windows.recorded.times)))
         late = [one.value for one in self.found if one.name in self.named and one.name == "delay"]

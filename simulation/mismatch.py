@@ -125,9 +125,10 @@ class Drawn(NamedTuple):
     def describe(self, of: Mismatch) -> str:
         """Return what differs from the file, in words."""
         units = {"com": "m", "friction": "N"} | dict.fromkeys(("winch_lag", "rotor_lag", "carrier_lag"), "s")
+        units |= dict.fromkeys(("mass", "stiffness"), "times the file's")
         parts = ["geometry drawn from the uncertainty"] if of.geometry else []
         for name in of.model_dump(exclude_defaults=True, exclude={"geometry"}):
             values, write = getattr(self, name), quantity_row if name == "com" else quantity_range
             word = "CoM off by" if name == "com" else name.replace("_", " ")
-            parts.append(f"{word} {write(values, units.get(name, 'times'), digits=3)}")
+            parts.append(f"{word} {write(values, units.get(name, ''), digits=3)}")
         return "; ".join(parts)

@@ -119,7 +119,7 @@ class Certificate(Displayed):
         )
 
     def text(self, up: ArrayLike | None = None) -> CertificateText:
-        """Return direction, needed, available, short by and limits as text; cables are counted from 1.
+        """Return the parts of the certificate as text, such as the direction; cables are counted from 1.
 
         With six wrench rows the direction is a force and a moment, together of length one: "force (0.84, 0.49,
         0.23)". A force or a moment below 0.05 is omitted. Moments are divided by `length`, which the text gives if the
@@ -147,7 +147,7 @@ class Certificate(Displayed):
         )
 
     def describe(self, up: ArrayLike | None = None) -> str:
-        """Describe the certificate in two lines: direction, needed, available, short by, and limits.
+        """Describe the certificate in two lines: first the direction, then wrenches along it and limits.
 
         For a motion, time, span, wind and load come first. `up` is as in `text`.
         """

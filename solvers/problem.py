@@ -40,7 +40,7 @@ class TensionProblem(Displayed):
             be -inf and t_max +inf.
         t_ref: Preferred tensions [N], shape (m,) or one number, inside or outside the limits. Default: 0, for the least
             norm.
-        weights: Weights omega of the cables in the cost, from 1e-20 to 1e20 and at most 1e14 apart, shape (m,) or one
+        weights: Weights omega of the cables in the cost, from 1e-20 to 1e20, with ratios up to 1e14, shape (m,) or one
             number. None = 1.
         length: Characteristic length [m], from 1e-20 to 1e20, by which moment rows (3 to 5, when n = 6) are divided
             wherever newtons and newton metres are compared: in residuals, tolerances and certificates. It never changes

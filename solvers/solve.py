@@ -69,7 +69,7 @@ def solve(
             spent = perf_counter() - start
             return TensionSolution(problem, None, STATUSES[code], "active-set", "c", spent, None, "", _PROOFS[code])
     if not isinstance(problem, TensionProblem):
-        raise InputError(f"problem must be a TensionProblem, got {shown(problem)}, a {type(problem).__name__}")
+        raise InputError(f"problem must be a TensionProblem, got {shown(problem)} of type {type(problem).__name__}")
     chosen, backend = _look_up(method, backend, options)
     chosen = chosen.for_options(problem, options)
     used = "daqp" if isinstance(chosen, ActiveSet) else backend  # the core does not take this size, or was not sure
@@ -132,8 +132,8 @@ def _look_up(name: str | Method, backend: str | None, options: dict[str, Any]) -
     if backend is None:
         backend = next(iter(available), None)
     elif not isinstance(backend, str) or backend not in available:
-        accepted = f"one of {', '.join(available)}" if available else f"None, as method {method.name} has no back ends"
-        raise InputError(f"backend must be {accepted}, got {shown(backend)}")
+        accepted = f"be one of {', '.join(available)}" if available else f"be left out: {method.name} has no back ends"
+        raise InputError(f"backend must {accepted}, got {shown(backend)}")
     if "solver" in options and "solver" not in (method.options or ()):
         raise InputError(
             "solver must be left out, as a QP solver is chosen by method='qp' with backend=..., "

@@ -173,7 +173,7 @@ def test_wrong_calls_are_one_line(model):
         simulate(model, model.home, LengthControl(model), duration=0.01, drive="tensions")
     with pytest.raises(InputError, match="flying carrier 'quad1'"):
         LengthControl("multi-quadrotor-3")
-    with pytest.raises(InputError, match="stiffness must be given, here or in the robot's file"):
+    with pytest.raises(InputError, match="stiffness must be given, as an argument or in the robot's file"):
         LengthControl("cogiro")
     assert LengthControl("cogiro", stiffness=EA).robot.m == 8
     # Its gains are for cables that yield: corrections of the others would grow from step to step.

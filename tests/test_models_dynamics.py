@@ -326,7 +326,7 @@ def test_wrong_arguments_are_named(arguments, message):
 
 
 def test_relative_form_needs_one_carrier():
-    with pytest.raises(InputError, match=r"must have a robot with one carrier, got .* with 3"):
+    with pytest.raises(InputError, match=r"requires a robot with one carrier, got .* with 3"):
         _ = Dynamics(load("wang-ctmrts")).relative
 
 

@@ -146,7 +146,7 @@ def test_wrong_file_gives_one_line_with_file_field_and_value(case, tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "must hold a mapping with .*, got None"),
+        (b"", "must hold a mapping with .*, got nothing"),
         (b"just words", "must hold a mapping with name, source.*, got 'just words'"),
         (b"- 1\n- 2\n", r"got \[1, 2\]"),
         (b"\xff\xfe\x00", r"must be a YAML file in UTF-8, got another text \(byte 0\)"),

@@ -164,7 +164,7 @@ def test_a_given_motion_without_tensions_that_rise_slowly_enough_has_a_reason():
     path = {"kind": "line", "start": [0, 0, 2], "end": [0.5, 0, 2.4]}
     failed = plan("cogiro", {"path": path, "duration": 1, "steps": 8, "limits": {"tension_rate": 5}})
     assert failed.status is MotionStatus.NOT_FOUND
-    assert failed.reason == "the search ended at a motion without feasible tensions"
+    assert failed.reason == "no motion with feasible tensions was found that keeps every other limit"
     assert failed.reason in failed.report().splitlines()[0]
 
 

@@ -90,7 +90,7 @@ def test_a_heavier_robot_is_that_of_another_file_with_the_same_controller():
     other = simulate(true, found, ComputedTorque(model), substeps=4)
     np.testing.assert_array_equal(run.record.motions, other.record.motions)
     np.testing.assert_array_equal(run.record.tensions, other.record.tensions)
-    assert "mass 1.2 times; CoM off by 0.01, 0.01, 0.01 m; stiffness 0.8 times" in run.report()
+    assert "mass 1.2 times the file's; CoM off by 0.01, 0.01, 0.01 m; stiffness 0.8 times the file's" in run.report()
 
 
 def test_runs_draw_robots_by_their_seeds(crane):

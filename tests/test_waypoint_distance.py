@@ -52,13 +52,13 @@ def test_the_distance_of_legs_is_that_of_the_motion_not_the_option(points, more)
 
 def test_all_reports_name_the_waypoint(tmp_path):
     found = plan(COGIRO, {"path": path(), "duration": 8})
-    cut = f"passed within {1e3 * found.waypoint_distance.position.distance:.4g} mm (most at points["
+    cut = f"passed within {1e3 * found.waypoint_distance.position.distance:.4g} mm (farthest from points["
     page = found.save_report(tmp_path / "report.html").read_text()
     assert cut in found.report()
     assert typeset(cut) in page
     assert re.search(r"tracking error +0 mm from the path", found.report())
     timing = time_along(COGIRO, {"path": path()})
-    cut = f"passed within {1e3 * timing.waypoint_distance.position.distance:.4g} mm (most at points["
+    cut = f"passed within {1e3 * timing.waypoint_distance.position.distance:.4g} mm (farthest from points["
     assert cut in timing.report()
     audited = plan(COGIRO, timing.scenario.task)
     assert audited.waypoint_distance.position.distance == pytest.approx(

@@ -117,7 +117,7 @@ def _volume(counts: Counts, domain: Domain, method: str, refinement: Refinement 
     if refinement is not None:
         ends = refinement.inside, refinement.inside + refinement.mixed
         value = refinement.estimate
-        about = "lower and upper bound, if the first cells miss nothing"
+        about = "lower and upper bound, if the first, coarse grid misses no part of the workspace"
     elif domain.position_from_lengths:
         value = np.count_nonzero(counts.cells[1]) / counts.cells[1].size
         about = "no interval: positions are not uniform; this is the volume of the cells reached"

@@ -87,7 +87,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         )
     if set(held_out.best) < set(result.free):
         lines.append(
-            f"with {', '.join(held_out.best)} alone, validation samples are predicted equally well: the other "
+            f"validation samples are predicted equally well with only {', '.join(held_out.best)}: the other "
             "parameters do not help"
         )
     elif held_out.after > 1.5 * fitted:

@@ -100,7 +100,7 @@ class CalibrationData(Displayed):
 
     @cached_property
     def undetermined(self) -> str | None:
-        """Return which end of a cable would move farther than any real one, in one line, or None."""
+        """Return which end of a cable would move too far to be real, in one line, or None."""
         ends = (one for one in self.parameters if ".a" in one.name)
         far, length = max(ends, key=lambda one: abs(one.correction), default=None), length_of(self.file)
         if far is None or abs(far.correction) <= FARTHEST * length:

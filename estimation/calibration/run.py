@@ -33,8 +33,8 @@ def calibrate(
             ahead of the clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan
             (friction as the logarithm of a ratio of tensions), friction (as a force) and gains (newtons per unit of the
             tensions, if these are motor currents). Default: anchors and offsets, and the clock if times and poses of a
-            motion were measured. Or "auto": the smallest set whose cross-validation error is close to the best
-            (`select`), which may be empty.
+            motion were measured. Or "auto": the smallest set whose cross-validation error is close to the
+            smallest one; this set may be empty.
         prior: Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
             {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
         outliers: True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after

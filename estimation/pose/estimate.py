@@ -136,7 +136,7 @@ class PoseEstimate(Displayed):
 
     @property
     def taut(self) -> Any:
-        """Return whether tensions of at least zero can hold the weight at rest there, (...)."""
+        """Return whether tensions of at least zero can hold the weight at rest at the pose, (...)."""
         from .taut import taut
 
         held = taut(self.robot, self.pose.reshape(-1, 6), self._carriers())

@@ -64,8 +64,8 @@ class PoseFilter(Displayed):
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
         sigma: Standard deviations of errors: `lengths` [m], `position` [m], `rotation` [rad], `rate` [rad/s],
             `acceleration` [m/s^2], `tensions` (relative), unmodelled `forces` (relative to the weight), and of the
-            constant biases `rate_bias` [rad/s] and `acceleration_bias` [m/s^2]. Default: 1 mm, 1 mrad, 0.01 rad/s, 0.1
-            m/s^2, 2 %, 2 %, 0.02 rad/s, 0.2 m/s^2.
+            constant biases `rate_bias` [rad/s] and `acceleration_bias` [m/s^2]. Default: 1 mm, 1 mm, 1 mrad,
+            0.01 rad/s, 0.1 m/s^2, 2 %, 2 %, 0.02 rad/s, 0.2 m/s^2.
         jerk: Densities of the white jerk [m/s^2.5] and [rad/s^2.5]: standard deviations of the change of acceleration
             in a second, relative to a reference if there is one. Default: 10 m/s^2.5, and that over the robot's
             `length`. With less jerk the filter is slower, and its estimates less noisy. The filter must be several

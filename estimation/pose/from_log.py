@@ -85,13 +85,16 @@ class LogPoses(Displayed):
 
     @property
     def largest(self) -> float:
-        """Return the sum of squares that one sound log in a hundred exceeds; nan without redundant cables."""
+        """Return the largest `cost` of a sample that a pose fits; nan without redundant cables.
+
+        In a log without wrong readings, the probability that any sample exceeds it is 1 %.
+        """
         redundancy = self.estimate.robot.m - int(self.estimate.robot.dof_mask.sum()) + self.more
         return largest_cost(redundancy, FALSE_ALARM / len(self.estimate.pose)) if redundancy > 0 else np.nan
 
     @property
     def fits(self) -> np.ndarray:
-        """Return which samples a pose fits, (N,) of bool; without redundant cables, which searches converged."""
+        """Return which samples are fitted by a pose, (N,) of bool; without redundant cables, all that converged."""
         return np.asarray(self.estimate.converged & (~(self.cost > self.largest) | self.estimate.by_gravity))
 
     @cached_property
@@ -113,7 +116,7 @@ class LogPoses(Displayed):
 
     @cached_property
     def swing(self) -> float:
-        """Estimate how far (rms) accelerations move a platform that is posed by gravity [m]; 0 without such samples."""
+        """Estimate how far (rms) accelerations move a platform off its poses at rest [m]; 0 without such poses."""
         estimate, rows = self.estimate, np.asarray(self.estimate.by_gravity)
         if self.times is None or len(self.times) <= 2 * FEWEST or not rows.any():
             return 0.0
@@ -122,7 +125,7 @@ class LogPoses(Displayed):
         return float(np.sqrt((bends[rows] ** 2).sum(axis=1).mean()) / gravity * length_of(estimate.robot))
 
     def lines(self) -> Iterator[str]:
-        """Yield input errors, wrong samples, one line for each run of them, and how far the platform may swing."""
+        """Yield lines about input errors, how far the platform may swing, and each run of wrong samples."""
         if self.mistake:
             yield self.doubt or self.mistake.text
         if self.misread:

@@ -23,7 +23,7 @@ class Nearest(NamedTuple):
 
     def describe(self, unit: str) -> str:
         """Return the distance in a thousandth of [m] or [rad], with the waypoint and the time."""
-        return f"{quantity(1e3 * self.distance, unit)} (most at {self.point}, t = {self.time:.3f} s)"
+        return f"{quantity(1e3 * self.distance, unit)} (farthest from {self.point}, at t = {self.time:.3f} s)"
 
 
 class WaypointDistance(NamedTuple):

@@ -174,7 +174,7 @@ class Search:
         It results from passes with linear distances, each about the motion of the one before. The motion is one of
         `scenario`; default: of the search's own.
         """
-        slower = "" if scenario is None else f", in {quantity(scenario.duration, 's')}"
+        slower = "" if scenario is None else f", motion of {quantity(scenario.duration, 's')}"
         scenario = scenario or self.scenario
         if not has_places(scenario) or self.seconds_left <= 0:
             return None
@@ -272,7 +272,7 @@ class Search:
         for seconds in (scenario.duration, *([] if span is None else [span.max])):
             lasting = scenario.lasting(seconds)
             guess = usual_guess(lasting, Grid.of(lasting, scenario.task.steps).shares * seconds)
-            audited = self.audit_motion(lasting, guess, f"audit of the direct motion in {quantity(seconds, 's')}")
+            audited = self.audit_motion(lasting, guess, f"audit of the direct motion of {quantity(seconds, 's')}")
             if audited.passed:
                 return Plan(lasting, MotionStatus.FEASIBLE, guess, audited, self.build_s, self.solve_s)
         return None

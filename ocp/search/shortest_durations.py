@@ -104,7 +104,7 @@ def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
             seconds = _shortest(span, lasts)
         phases[index] = phases[index].model_copy(update={"duration": seconds})
     chosen = lay_out(scenario.robot, task.model_copy(update={"phases": tuple(phases)}))
-    message = ", ".join(filter(None, [message, f"{quantity(chosen.duration, 's')} in all"]))
+    message = ", ".join(filter(None, [message, f"motion of {quantity(chosen.duration, 's')}"]))
     return chosen, Chosen(PlannerStep("durations of phases", message, time.perf_counter() - start))
 
 

@@ -14,10 +14,10 @@ from ..places import Places
 
 
 class Dynamic(TensionCondition):
-    """Tensions inside the limits give a platform at rest each of some accelerations.
+    """Tensions inside the limits can give the platform, which is at rest, every acceleration of a list.
 
-    At a given pose the required wrench is linear in the acceleration, so tensions give every acceleration of their
-    convex hull too.
+    At a given pose the required wrench is linear in the acceleration, so the tensions can give every acceleration in
+    the convex hull of the list too.
     """
 
     takes_every_row: ClassVar[bool] = True

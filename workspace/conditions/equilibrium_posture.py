@@ -30,8 +30,8 @@ class EquilibriumPosture(Condition):
     """At the given position, tensions inside the limits hold the platform at rest in some attitude.
 
     The attitude of the configuration is ignored. Newton's method searches for one attitude, starting from level. If the
-    search fails, the condition is false, which proves nothing. With the drive fixed-length the position is
-    unknown too, and starts from the given one: `postures` returns the resulting pose.
+    search fails, the condition is false, which proves nothing. If the robot's drive is fixed-length, the position is
+    unknown too, and its search starts from the given one: `postures` returns the resulting pose.
     """
 
     kind: Literal["equilibrium-posture"] = "equilibrium-posture"
