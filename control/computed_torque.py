@@ -47,10 +47,11 @@ class ComputedTorque(Controller):
     with d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state gets a
     command: these tensions if they exist (status "as planned"), otherwise those with the closest wrench ("soft
     wrench"). For a state with nan it is the last command, which moves to the planned tensions as fast as the rate
-    permits ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted; with fewer cables than degrees of
-    freedom, 0.1 % along each cable and 10 % in all. Carriers follow the reference, or deviate from it within their
-    `reach` to help the tensions. This damps the swing of loads of towing robots and of teams of quadrotors, with fewer
-    cables than degrees of freedom. Quadrotors have separate loops for position and attitude (core/control/thrusts.c).
+    permits, while quadrotors finish their turn ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted;
+    with fewer cables than degrees of freedom, 0.1 % along each cable and 10 % in all. Carriers follow the reference, or
+    deviate from it within their `reach` to help the tensions. This damps the swing of loads of towing robots and of
+    teams of quadrotors, with fewer cables than degrees of freedom. Quadrotors have separate loops for position and
+    attitude (core/control/thrusts.c).
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.

@@ -38,6 +38,7 @@ PLATFORM = np.dtype(
         ("silent", "i8"),
     ]
 )
+_TURN = np.dtype([("steady", "f8", 6), ("away", "f8", 3), ("rate", "f8", 3)])
 CARRIER = np.dtype(
     [
         *((name, "f8", 6) for name in ("offset", "offset_rate")),
@@ -45,6 +46,7 @@ CARRIER = np.dtype(
         ("lacking", "f8"),
         ("wanted", "f8", MOST_ACTUATORS),
         ("limited", "f8"),
+        ("turn", _TURN),
     ]
 )
 _AXIS = np.dtype([(name, "f8") for name in ("usual", "order", "late_order", "late_rate")])

@@ -208,6 +208,34 @@ def test_an_attitude_loop_is_slowed_down_before_late_rotors_make_it_unstable():
     assert controller._platform["attitude"][0] == 40
 
 
+@pytest.mark.parametrize("name", ["multi-quadrotor-3", "wang-flying-quadrotor"])
+def test_quadrotors_without_a_state_turn_as_they_were_about_to_and_stop(name):
+    """0.3 s without a state, 20 ms after a turn of 0.1 rad is ordered; measured rates have a noise of 0.02 rad/s.
+
+    Angular accelerations that stay are 2 x 40 x 0.02 rad/s^2 by the noise alone, 4 degrees after 0.3 s, and 17 rad/s^2,
+    43 degrees, by the turn. An attitude that is predicted with the noise of the last rate is 0.3 degrees off.
+    """
+    pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
+    robot, rng, found = load(name), np.random.default_rng(2), []
+    still, turned = np.zeros_like(robot.carrier_home), robot.carrier_home + 0.1 * np.eye(6)[5]
+    pulls = tensions(robot, robot.home, method="soft-wrench").tensions
+    rest = Reference(robot.home, *np.zeros((2, 6)), robot.carrier_home, still, still, pulls)
+
+    class Blind(ComputedTorque):
+        def step(self, time, state, reference):
+            noise = np.pad(0.02 * rng.normal(size=(len(still), 3)), ((0, 0), (3, 0)))
+            seen = state._replace(carrier_velocity=state.carrier_velocity + noise)
+            found.append(state.carrier_pose[:, 3:])
+            if time > 0.0695:
+                seen = State(*(np.full_like(part, np.nan) for part in seen[:4]))
+            return super().step(time, seen, reference)
+
+    references = [rest] * 50 + [rest._replace(carrier_pose=turned)] * 320
+    fly(Task(robot, references, None, Hardware(stiffness=2e4, damping=50.0), (1, 0, 0), 0.0, 0.0), Blind(robot))
+    assert np.abs(found[70] - turned[:, 3:]).max() > 0.07
+    assert np.abs(found[-1] - turned[:, 3:]).max() < 0.04
+
+
 @pytest.mark.parametrize(("told", "kind", "most"), [(0.06, ComputedTorque, 0.045), (0.08, Predictive, 0.01)])
 def test_a_known_lag_of_rotors_is_made_up_for(load_on_three, told, kind, most):
     """60 ms, at which both leave the plan otherwise, also where the lag is told wrong by a third."""

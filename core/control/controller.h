@@ -56,6 +56,13 @@ typedef struct {
     int64_t silent;        /* steps in which tensions were commanded and no sensor reported one; from 2 on it matters */
 } towline_platform_memory;
 
+/* How a carrier turns, in its own axes: measured, and predicted while no state is. */
+typedef struct {
+    double steady[6]; /* force [N], and moment [N m] with which it turns as its reference does */
+    double away[3];   /* e of thrusts.c [rad] */
+    double rate[3];   /* with which e changes [rad/s] */
+} towline_turn;
+
 /* What is remembered of a carrier. */
 typedef struct {
     double offset[6], offset_rate[6]; /* off its reference, to help the tensions; small rotations in level axes */
@@ -66,6 +73,7 @@ typedef struct {
     double lacking;                   /* thrust that its actuators do not give, or give too much, by their limits [N] */
     double wanted[TOWLINE_MOST_ACTUATORS]; /* commands before limits, without noise */
     double limited;                        /* share of the last time in which one of these was beyond a limit */
+    towline_turn turn;
 } towline_carrier_memory;
 
 /* How an axis of a carrier turns: what is ordered, and what is measured; see turning.c. */

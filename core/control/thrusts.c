@@ -13,6 +13,10 @@
  * turn as ordered: where F is outside the cone, or the actuators are at their limits most of the time. This is where an
  * attitude loop that is unstable ends, for any reason: oscillations grow until the limits stop them. Source: T. Lee,
  * M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
+ *
+ * While a state is missing, e is predicted from the commands, so that the carrier turns as it was about to and stops; F
+ * and M stay. The last command instead would keep its angular acceleration, which noise makes so large that a carrier
+ * turns over in 0.3 s.
  */
 #include <string.h>
 
@@ -117,29 +121,70 @@ static void rotation_to(const flier *it, const double *force, double *e) {
     e[2] += axis[2] * turn_between(it->motion[5], it->order[5]);
 }
 
-/* Write force and moment, in its own axes, that a carrier needs of its actuators; return F across the thrust [N]. */
-static double wrench_of_carrier(const flier *it, const double *tensions, double *wrench) {
+/* Write how a carrier turns by what is measured, and return F across the thrust [N]. */
+static double turn_measured(const flier *it, const double *tensions, towline_turn *now) {
     const attitude *at = &it->at->carrier[it->index];
-    const double axis[3] = {at->R[2], at->R[5], at->R[8]}, h = it->attitude, *inertia = it->body->inertia;
-    double force[3], turning[3], pulled[3], e[3], wanted[3], bent[3], moment[3], spin[3], gyroscopic[3], turned[3];
-    double *ordered = it->memory->ordered, *rate = it->memory->turning;
+    const double axis[3] = {at->R[2], at->R[5], at->R[8]}, *inertia = it->body->inertia;
+    double force[3], turning[3], pulled[3], wanted[3], bent[3], moment[3], spin[3], gyroscopic[3], turned[3];
+    double *rate = it->memory->turning;
     needed_force(it, tensions, force, pulled);
     it->memory->lacking = force_in_cone(it, force, turning);
-    rotation_to(it, turning, e);
+    rotation_to(it, turning, now->away);
     body_rate(at, it->order + 9, wanted);
     body_rate(at, it->order + 15, bent);
     body_rate(at, it->motion + 9, rate);
-    for (int k = 0; k < 3; k++) { ordered[k] = h * (h * e[k] + 2 * (wanted[k] - rate[k])) + bent[k]; }
-    constant_times(inertia, ordered, moment);
+    constant_times(inertia, bent, moment);
     constant_times(inertia, rate, spin);
     cross(rate, spin, gyroscopic);
     turn_back(at->R, pulled, turned);
     for (int k = 0; k < 3; k++) {
-        wrench[k] = 0;
-        wrench[3 + k] = moment[k] + gyroscopic[k] - turned[k];
+        now->rate[k] = wanted[k] - rate[k];
+        now->steady[k] = 0;
+        now->steady[3 + k] = moment[k] + gyroscopic[k] - turned[k];
+        it->memory->ordered[k] = bent[k];
     }
-    wrench[2] = dot(force, axis);
-    return sqrt(fmax(dot(force, force) - wrench[2] * wrench[2], 0));
+    now->steady[2] = dot(force, axis);
+    return sqrt(fmax(dot(force, force) - now->steady[2] * now->steady[2], 0));
+}
+
+/* Predict how a carrier turns under what it was commanded last, after `dt` [s]. */
+static void turn_on(const towline_body *body, double dt, const double *given, towline_turn *it) {
+    double moment[3], faster[3];
+    for (int k = 0; k < 3; k++) {
+        moment[k] = -it->steady[3 + k];
+        for (int a = 0; a < body->actuators; a++) { moment[k] += given[a] * body->actuator[a].wrench[3 + k]; }
+    }
+    constant_times(body->inverse_inertia, moment, faster);
+    for (int k = 0; k < 3; k++) {
+        it->away[k] += dt * (it->rate[k] - dt / 2 * faster[k]);
+        it->rate[k] -= dt * faster[k];
+    }
+}
+
+/* Write force and moment, in its own axes, that a carrier needs of its actuators; return F across the thrust [N]. */
+static double wrench_of_carrier(const flier *it, double dt, const double *tensions, const double *given,
+                                double *wrench) {
+    const double h = it->attitude;
+    towline_turn now, *turn = &it->memory->turn;
+    double faster[3], moment[3];
+    const double across = turn_measured(it, tensions, &now);
+    const int measured = are_numbers(now.steady, 6) && are_numbers(now.away, 3) && are_numbers(now.rate, 3);
+    if (measured) {
+        *turn = now;
+    } else {
+        turn_on(it->body, dt, given, turn);
+        it->memory->lacking = 0;
+    }
+    for (int k = 0; k < 3; k++) {
+        faster[k] = h * (h * turn->away[k] + 2 * turn->rate[k]);
+        it->memory->ordered[k] = measured ? it->memory->ordered[k] + faster[k] : NAN;
+    }
+    constant_times(it->body->inertia, faster, moment);
+    for (int k = 0; k < 3; k++) {
+        wrench[k] = turn->steady[k];
+        wrench[3 + k] = turn->steady[3 + k] + moment[k];
+    }
+    return measured ? across : 0;
 }
 
 /* Write commands inside their limits, where they are numbers, and remember what they lack of F, `across` or along. */
@@ -185,7 +230,7 @@ double towline_write_thrusts(const towline_robot *robot, const towline_controlle
         memcpy(ordered[c], it.memory->ordered, sizeof ordered[c]);
         if (body->actuators > 0) {
             if (measured) { observe_carrier(&it, dt, flight.cables, actuation); }
-            const double across = wrench_of_carrier(&it, flight.tensions, wrench);
+            const double across = wrench_of_carrier(&it, dt, flight.tensions, actuation, wrench);
             command(&it, dt, wrench, across, actuation);
             lacking = fmax(lacking, it.memory->lacking); /* not a number that is none */
         }
