@@ -362,9 +362,11 @@ The ratio is relative to {STANDARD}.
 
 ## Quadratic programs of predictive control
 
-The ratios are relative to `{REFERENCE}` and to `{TOWLINE}`, as medians over turns of {BLOCK}. The error is that of \
-the first stage's controls, divided by their range. The residual is that of the optimality conditions of all stages, \
-in the same units. A failure is a missing result, or an error of more than {FAILED:g}.
+The ratios are relative to `{REFERENCE}` and to `{TOWLINE}`, as medians over blocks of {BLOCK} programs, which the \
+solvers solve in turn. "required" gives the tolerance of each solver, and "its own" that it applies its own criterion; \
+speed_abs is a mode of HPIPM. The error is that of the first stage's controls, divided by their range. The residual is \
+that of the optimality conditions of all stages, in the same units. A failure is a missing result, or an error of more \
+than {FAILED:g}.
 
 {programs_table}
 

@@ -226,8 +226,8 @@ def markdown(report: Report) -> str:
         'A solver is marked "out" if it exceeds the time limit.',
         f"The ratio is the time of a solver divided by that of `{REFERENCE}` in the same round. The error is the "
         "largest error of a tension, divided by the largest tension, or a dash if there is nothing to compare.",
-        "The contender with `rho` solves the soft problems with this option of `solve_batch`, the weight of the wrench "
-        "error, instead of as problems with additional variables. "
+        "On the soft problems, the contender with `rho` uses this option of `solve_batch`, the weight of the wrench "
+        "error; all others solve problems with additional variables. "
         '"core alone" calls the C code of the active-set method directly, without `solve`.',
         f"A failure is a missing result, an error above {FAILED:g}, or a result for an infeasible problem.",
     ]

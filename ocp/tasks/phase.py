@@ -18,7 +18,10 @@ class Load(RigidLoad):
 
     mass: Positive = Field(description="mass [kg]")
     mass_tolerance: float = optional(
-        "relative tolerance of the mass, such as 0.1: tensions exist for every mass in between", 0.0, ge=0, lt=1
+        "relative tolerance of the mass; 0.1: tensions exist for every mass from 0.9 to 1.1 times this one",
+        0.0,
+        ge=0,
+        lt=1,
     )
     com_tolerance: tuple[NonNegative, NonNegative, NonNegative] = optional(
         "distance by which the CoM may differ along each axis of the platform [m]: tensions exist for "

@@ -24,8 +24,9 @@ SHORTEST = 1e-12  # of the length: a shorter piece has no nodes
 class FeedPath(PathBase):
     """Lines through given positions at a steady speed, the feed; corners are rounded within a tolerance.
 
-    The speed is the feed wherever the acceleration permits: it is lower at sharp corners, and where it rises or falls.
-    At points with a dwell, and where the path turns back, the motion stops. The attitude is the same everywhere.
+    The speed is the feed, except where the limited acceleration requires less: at sharp corners, and while starting and
+    stopping. At points with a dwell, and where the path turns back, the motion stops. The attitude is the same
+    everywhere.
     """
 
     kind: Literal["feed"]
