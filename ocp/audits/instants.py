@@ -17,7 +17,7 @@ from ..tasks.scenario import Scenario
 from .by_phase import distribution, taken_up
 from .tensions import in_all_winds, scaled, with_all_loads
 
-OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "violation", "supports")
+OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "gains", "violation", "supports")
 MOTIONS = ("motion", "carriers")
 
 
@@ -37,6 +37,7 @@ class Instants(Displayed):
     A: np.ndarray  # wrench matrices with moments over `Robot.length`, (n, 6, m)
     w: np.ndarray  # required wrenches, with the same moments, (n, 6) [N]
     tensions_unlimited: np.ndarray  # of least norm without limits, (n, m) [N]
+    gains: np.ndarray  # by how much tensions of least norm change at most for a wrench of 1 N, (n, m)
     violation: np.ndarray  # distance of the required wrench from the available ones, (n,) [N]
     supports: np.ndarray  # forces of the ground, (n, s) [N]; s = 0 for a task without ground
     values: list[np.ndarray]  # what each limit bounds, (n, k) each
@@ -83,6 +84,7 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         A=scaled(scenario, A),
         w=scaled(scenario, w),
         tensions_unlimited=distribute.unlimited(w),
+        gains=distribute.gains,
         violation=result.violation,
         supports=result.supports,
         values=[

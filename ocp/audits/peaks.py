@@ -121,8 +121,9 @@ def _may_be_short(seen: Instants, jumps: np.ndarray) -> np.ndarray:
     low, high = scenario.bounds_at(times)
     resting = scenario.phases.resting(times)
     rows = np.arange(1, len(times) - 1)
-    missing, reached = _missing_and_reached(seen, jumps, low, high, seen.tensions, rows)
-    spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & ~(resting[1:] & resting[:-1]) & ~jumps)
+    hanging = ~(resting[1:] & resting[:-1]) & ~jumps
+    missing, reached = _missing_and_reached(seen, jumps, low, high, seen.tensions, rows, hanging)
+    spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & hanging)
     if spans.size:
         rows = np.unique(np.concatenate([spans, spans + 1]))
         middle = low[rows] + np.minimum((high - low)[rows] / 2, scenario.robot.force_scale)
@@ -130,17 +131,26 @@ def _may_be_short(seen: Instants, jumps: np.ndarray) -> np.ndarray:
         tensions = seen.tensions.copy()
         tensions[rows[solved.feasible]] = solved.tensions[solved.feasible]
         rows = rows[(rows > 0) & (rows < len(times) - 1)]
-        missing, reached = _missing_and_reached(seen, jumps, low, high, tensions, rows)
+        doubtful = np.zeros(len(times) - 1, bool)
+        doubtful[spans] = True
+        missing, reached = _missing_and_reached(seen, jumps, low, high, tensions, rows, doubtful)
         open_spans[spans] = (missing > np.maximum(seen.tolerance, reached))[spans]
     return open_spans
 
 
 def _missing_and_reached(
-    seen: Instants, jumps: np.ndarray, low: np.ndarray, high: np.ndarray, t: np.ndarray, rows: np.ndarray
+    seen: Instants,
+    jumps: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    t: np.ndarray,
+    rows: np.ndarray,
+    doubtful: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return what tensions between t (n, m) of two instants miss at most, and what cables make up for, (n - 1,) [N].
 
-    The second derivatives are those at `rows`. The second value is known where the first is more than is tolerated.
+    The second derivatives are those at `rows`. The second value is known between the instants that are `doubtful`,
+    where the first is more than is tolerated.
     """
     times, A, w, robot = seen.times, seen.A, seen.w, seen.scenario.robot
     h, dA, dw, product = np.diff(times), np.diff(A, axis=0), np.diff(w, axis=0), "nij,nj->ni"
@@ -152,15 +162,18 @@ def _missing_and_reached(
     bent[1:-1][jumps[1:] | jumps[:-1]] = 0.0
     missing = between(times, bent)
     missing += np.linalg.norm(np.einsum(product, dA, np.diff(t, axis=0)), axis=1) / 4
-    reached = np.zeros(len(missing))
-    spans = np.flatnonzero((missing > seen.tolerance) & ~jumps)
     room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * robot.force_scale)
-    room = np.minimum(room[spans], room[spans + 1])
+    room, gains = np.minimum(room[:-1], room[1:]), np.maximum(seen.gains[:-1], seen.gains[1:])
+    reached = np.divide(room, gains, out=np.full_like(room, np.inf), where=gains > 0).min(axis=1)
+    # Where a cable has no room the others have to make up for it, by changes in proportion to the room of each.
+    spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & doubtful)
+    room = room[spans]
     moving = np.flatnonzero(robot.dof_mask)
     weighted = (A[spans] + A[spans + 1])[:, moving] / 2 * room[:, None, :]
     square = weighted @ weighted.swapaxes(1, 2)
     size = np.einsum("nii->n", square)
     square += (SINGULAR * size + (size == 0))[:, None, None] * np.eye(len(moving))
     parts = np.linalg.norm(weighted.swapaxes(1, 2) @ np.linalg.inv(square), axis=2).max(axis=1)  # of a cable's room
-    reached[spans] = np.divide(1.0, parts, out=np.zeros_like(parts), where=parts > 0)
+    weighted_reach = np.divide(1.0, parts, out=np.zeros_like(parts), where=parts > 0)
+    reached[spans] = np.maximum(reached[spans], weighted_reach)
     return missing, reached

@@ -76,6 +76,11 @@ class Distribution:
         """Return the tensions of least norm for the wrenches w (n, 6), whatever the limits, (n, m) [N]."""
         return (self._inverse @ scaled(self.scenario, w)[..., None])[..., 0]
 
+    @property
+    def gains(self) -> np.ndarray:
+        """Return by how much tensions of least norm change at most for a wrench of 1 N, (n, m)."""
+        return np.sqrt(np.einsum("nij,nij->ni", self._inverse, self._inverse))
+
     def __call__(self, w: np.ndarray, preferred: np.ndarray | None) -> AuditedTensions:
         """Return the tensions for the required wrenches w (n, 6), near the preferred ones (n, m) or near zero."""
         scenario, A, few, tolerance = self.scenario, self.A, self.few, self.tolerance
