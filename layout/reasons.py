@@ -10,7 +10,7 @@ from .goal import Goal
 from .linear_programs import LITTLE, multipliers
 from .variables import Variables
 
-_CONVERGED = 1e-3  # of the margin, or of `LITTLE`: what the linear program still gains at a local optimum
+_CONVERGED = 1e-3  # of the margin that is maximised, or of `LITTLE`: what a program still gains at a local optimum
 _SMALL = 1e-6
 
 
@@ -73,6 +73,9 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     bound = (span > 0.0) & (np.minimum(y - variables.low, variables.high - y) <= 1e-9 * np.maximum(span, 1.0))
     # Otherwise the margin is as required, and the program improves t_max, cost or frequency.
     of_margin = bool(np.isinf(goal.wanted) or total > 1.0 - _SMALL)
+    scale = LITTLE * robot.force_scale
+    if of_margin:
+        scale = max(scale, abs(margin))
     advice = _advice(robot, found.weights, found.pull, direction, rows.accelerations[found.rows])
     if not of_margin:
         advice[:1] = [Advice("margin lower by 1 N", total, "N/N")]
@@ -83,7 +86,7 @@ def reasons(evaluation: Evaluation, goal: Goal, y: np.ndarray) -> Reasons:
     return Reasons(
         tuple(binding),
         tuple(Advice(one.change, one.gain / unit, one.unit.replace("N/", name, 1)) for one in advice),
-        bool(found.left <= _CONVERGED * max(LITTLE * robot.force_scale, abs(margin))),
+        bool(found.left <= _CONVERGED * scale),
         int(bound.sum()),
         of_margin,
     )

@@ -75,6 +75,18 @@ def test_a_random_layout_of_a_micro_robot_is_no_local_optimum():
     assert not reasons(Evaluation(variables, rows), goal_of(variables, requirements), y).local_optimum
 
 
+def test_winches_that_may_be_weaker_are_no_local_optimum():
+    """The margin is four times as large as wanted, so that a lower t_max of all cables still keeps it."""
+    robot, require = load("ipanema-2"), [{"box": {"min": [-1, -1, 2], "max": [1, 1, 3]}, "grid": [3, 3, 2]}]
+    free = [{"part": "t_max", "range": {"min": 20, "max": 3000}}]
+    requirements = read_requirements({"free": free, "require": require, "minimise": "t_max", "margin": 10})
+    variables = variables_of(robot, requirements)
+    evaluation = Evaluation(variables, rows_of(robot, requirements.require, [requirements.require[0].places()]))
+    y = variables.of_robot()
+    assert evaluation.margins(0.9 * y).min() > requirements.margin
+    assert not reasons(evaluation, goal_of(variables, requirements), y).local_optimum
+
+
 def test_the_least_accepted_margin_is_that_of_a_weak_robot():
     robot = shrunk(load("ipanema-2"), SIZE, 1e-3)  # 10 g
     variables_of(robot, requirements_of(SIZE, 1e-4))  # 4 mN, of 98 mN
