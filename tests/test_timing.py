@@ -353,6 +353,8 @@ def test_corners_and_dwells_are_rests_of_the_fastest_law():
         assert len(near) * times[1] == pytest.approx(seconds, abs=3e-3)
     again = Task.model_validate(timing.scenario.task.model_dump(mode="json"))
     assert again == timing.scenario.task
+    dwells = [each.seconds for each in timing.law.bottlenecks if each.limit == "dwell"]
+    assert dwells == pytest.approx([seconds for seconds in dwell if seconds], abs=1e-6)
     assert "dwell" in timing.report()
 
 

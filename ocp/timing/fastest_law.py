@@ -18,7 +18,7 @@ from ...statics.distribution import wrench_problem
 from ..tasks.paths import AnyPath, Curve, PathBase, TimedPath
 from .parametrised_path import ParametrisedPath, PathLimits, relative
 
-LOOKS = 120  # instants, at equal times
+LOOKS = 120  # intervals of equal duration, divided where the motion dwells
 REACHED = 0.995  # of a limit of speed or acceleration
 PULLS = 1e-6  # of the largest pull along a facet's normal: less lies in the facet
 SHOWN = 10.0  # [s], of a path without a time law: how long the motion lasts that shows it
@@ -43,7 +43,11 @@ class Bottleneck(NamedTuple):
 
 def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: float, path: TimedPath) -> list[Bottleneck]:
     """Return the stretches of a time law along a path, with tensions `margin` [N] inside their limits."""
-    edges = np.linspace(0.0, path.natural_duration or 0.0, LOOKS + 1)
+    duration, dwell = path.natural_duration or 0.0, np.array(path.dwell or ())
+    at_rest = np.flatnonzero(dwell)
+    begins = path.times[at_rest]
+    edges = np.concatenate([np.linspace(0.0, duration, LOOKS + 1), begins, begins + dwell[at_rest]])
+    edges = np.unique(np.clip(edges.round(9), 0.0, duration))
     s, sd, sdd = path.law((edges[1:] + edges[:-1]) / 2)
     platform, carriers = (motion.timed(sd, sdd) for motion in parametrised.at(s))
     names, shares = [], []
@@ -57,7 +61,7 @@ def bottlenecks(parametrised: ParametrisedPath, limits: PathLimits, margin: floa
     w = parametrised.dynamics.required_wrench(*platform, wind=parametrised.wind)
     low, high = parametrised.robot.t_min + margin, parametrised.robot.t_max - margin
     reached_limits = []
-    for k in range(LOOKS):
+    for k in range(s.size):
         if sd[k] == sdd[k] == 0:
             reached_limits.append("dwell")
         elif reached[k].max(initial=0.0) >= REACHED:

@@ -47,9 +47,10 @@ COARSE_EXCESS = 1e-4  # of a limit: if it is exceeded by more it takes a finer g
 def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[str], *, grid: int = 200) -> Plan:
     """Find the fastest motion along a task's path, from standstill to standstill, with every tension inside its limits.
 
-    Only the geometry of the path matters, not its own time law. Straight legs stop at corners (`blend: 0`), reversals
-    and dwells; the dwell times are part of the duration. Circles end after the task's duration at their own rate, or
-    after one turn; any other duration is ignored. Carriers rest or follow given paths with the same parameter s.
+    Only the geometry of the path matters, not its own time law. Straight legs round their corners by up to `blend`. The
+    motion stops at reversals, at dwells and, with `blend: 0`, at corners; the dwell times are part of the duration.
+    Circles end after the task's duration at their own rate, or after one turn; any other duration is ignored. Carriers
+    rest or follow given paths with the same parameter s.
 
     The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
     limits of mobile carriers that move. The tension limits, reduced by the task's margin, enter as the facets of the
