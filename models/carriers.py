@@ -200,7 +200,7 @@ class GroundCarrier(Carrier):
 
 
 class PrescribedCarrier(Carrier):
-    """A carrier with imposed motion that disturbs the platform, such as a quadrotor."""
+    """A carrier that follows a given or planned motion exactly, however hard its cables pull."""
 
     coordinates: ClassVar[tuple[int, ...]] = (*POSITION, *TILT, *YAW)
 

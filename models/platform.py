@@ -19,7 +19,7 @@ TURNING_DOF: tuple[tuple[Coordinate, ...], ...] = (
 
 
 class Aero(Part):
-    """The force of the air on the platform (Eq. 25 of paper F, which docs/theory.md names).
+    """The force of the air on the platform: Eq. 25 of paper F (see docs/theory.md).
 
     The force acts at the CoM along the axes of {G}: along x and y with the drag coefficient, along z with the lift
     coefficient; V is the air's velocity relative to the platform.

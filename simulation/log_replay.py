@@ -360,4 +360,4 @@ def _value(name: str, value: float) -> str:
 
 
 def _share(one: Explanation) -> str:
-    return f"{100 * min(one.explained, 1.0):.0f} %"
+    return "over 99 %" if one.explained > 0.99 else f"{100 * one.explained:.0f} %"

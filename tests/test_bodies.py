@@ -310,7 +310,7 @@ def test_floor_and_room_bound_the_lowest_and_outermost_places(with_radius):
         found = [str(each) for each in audit(Planner(robot, task).scenario, None).excess]
         assert len(found) == (7 if exceeded else 0)
         if exceeded:
-            assert "platform's body is 10 um beyond the floor at t = 3.000 s" in found
+            assert "platform's body is 10 um below the floor at t = 3.000 s" in found
             assert any(text.startswith("platform's body is 10 um beyond the largest x of the room") for text in found)
     # Without a body its centre of mass and its attachments count.
     lowest = placed(poses, scenario.robot.attachments)[..., 2].min()

@@ -406,7 +406,7 @@ def test_the_report_lists_the_largest_changes_of_lengths():
     result = calibrate("cogiro", Measurements(readings, built.poses), ("anchors", "scales"), outliers=False)
     report = result.report()
     assert "cables[4].scale" in report
-    assert "with smaller changes" in report
+    assert "with no larger changes" in report
     changes = {one.name: abs(one.correction) for one in result.parameters if one.unit == "m"}
     listed = [name in report for name in changes]
     assert min(np.array(list(changes.values()))[listed]) > max(np.array(list(changes.values()))[np.invert(listed)])

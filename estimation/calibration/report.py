@@ -31,8 +31,8 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
         *([f"CHECK THE LOG: {result.mistake.text}"] if result.mistake and not result.mistake.severe else []),
         *(_of_held_out(result) if result.means_something else []),
         *(_of_noise(result) if result.doubt is None else []),
-        *(_of_parameters(result) if result.means_something else []),
-        *([*_of_exceptions(result), *_of_open(result)] if result.doubt is None else []),
+        *(_of_parameters(result) if result.free and result.means_something else []),
+        *([*_of_exceptions(result), *_of_open(result)] if result.free and result.doubt is None else []),
     ]
     return Report(
         about,
@@ -46,9 +46,10 @@ def report(result: CalibrationData, drawings: Callable[[], Iterable[Drawing]] = 
 
 def headline(result: CalibrationData) -> str:
     """Return in one line what was calibrated, from how many samples, and whether the result can be used."""
-    free = ", ".join(result.free) or "the file as it is"
+    free = ", ".join(result.free) or "the file as it is, checked"
     state = "" if result.converged else ", NOT CONVERGED"
-    return f"{result.file.name}: {free} from {len(result.residuals)} samples{state}"
+    source = "from" if result.free else "with"
+    return f"{result.file.name}: {free} {source} {len(result.residuals)} samples{state}"
 
 
 def facts(result: CalibrationData) -> list[Fact]:
@@ -82,9 +83,8 @@ def _of_held_out(result: CalibrationData) -> list[str]:
     lines = [f"residual on validation samples {_mm(held_out.before)} before, {_mm(held_out.after)} after (rms)"]
     fitted = held_out.sets[-1].fitted
     if not held_out.best:
-        return (
-            lines if held_out.after > held_out.before else [*lines, "the file predicts validation samples equally well"]
-        )
+        equal = result.free and held_out.after <= held_out.before
+        return [*lines, "the file predicts validation samples equally well"] if equal else lines
     if set(held_out.best) < set(result.free):
         lines.append(
             f"validation samples are predicted equally well with only {', '.join(held_out.best)}: the other "
@@ -92,7 +92,7 @@ def _of_held_out(result: CalibrationData) -> list[str]:
         )
     elif held_out.after > 1.5 * fitted:
         lines.append(
-            f"the residual on training samples is smaller, {_mm(fitted)}: so many parameters need more samples"
+            f"the residual on training samples is only {_mm(fitted)}: to determine this many parameters, add samples"
         )
     return lines
 
@@ -132,7 +132,7 @@ def _of_parameters(result: CalibrationData) -> list[Part]:
     columns = ("parameter", "value", "standard deviation", "change from the file")
     lines.append(Table("Parameters", columns, rows, (1, 2, 3)))
     if more := sum(one.name not in shown for one in result.parameters):
-        lines.append(f"and {more} with smaller changes")
+        lines.append(f"and {more} more, with no larger changes")
     if result.beyond_prior:
         named = ", ".join(
             f"{name} ({quantity(sigmas, digits=2)})" for name, sigmas in result.beyond_prior[:MOST_LISTED]

@@ -17,6 +17,7 @@ from ...base.inputs import check_ending, file_path
 from ...base.text import any_of, quantity
 from ...base.writing import whole_file
 from ...models import points
+from ...models.files import AnyRobot, as_robot
 from ...models.part import COORDINATES
 from ...models.robot import Robot
 from ..calibration.geometry import length_of
@@ -196,11 +197,13 @@ class LogPoses(Displayed):
         }
 
 
-def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = SIGMA, begin: float = 0.0) -> LogPoses:
+def poses_from_log(
+    robot: AnyRobot, measurements: Measurements, sigma: ArrayLike = SIGMA, begin: float = 0.0
+) -> LogPoses:
     """Estimate the pose of the platform at each sample of a log; the file's encoders convert readings to lengths.
 
     Args:
-        robot: The robot.
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
         measurements: Readings; measured tensions stretch cables with a stiffness, and measured poses of carriers move
             their anchors. Directions of cables and orientations of the platform are used, and tensions with these.
             Positions only serve to detect input errors of the log (`mistake`).
@@ -210,6 +213,7 @@ def poses_from_log(robot: Robot, measurements: Measurements, sigma: ArrayLike = 
     Raises:
         InputError: If an argument has a wrong value, or a length is not above zero.
     """
+    robot = as_robot(robot)
     given, deviations = check_measurements(robot, measurements), checked_sigma(sigma, robot.m)
     few = robot.m < robot.dof_mask.sum()  # more cables need no orientations
     alone = few and given.poses is not None and not np.isfinite(given.poses[:, :3]).any()  # as of an AHRS

@@ -18,6 +18,7 @@ from .excess import Excess
 from .instants import Instants
 
 START_TENSIONS = "initial.tensions"
+UNITS = "m", "m/s", "m/s^2"  # of a motion and its derivatives
 
 PATH_TOLERANCE = 1e-7  # [m, rad], of ends and waypoints
 END_TOLERANCE = 1e-6  # [m, m/s, m/s^2], of where carriers and platform start and end
@@ -228,18 +229,19 @@ def _base_ends(audited: Instants) -> list[Excess]:
         off = [audited.carriers.velocity[:, moving]]
         if at_rest_without_acceleration(scenario.robot, moving[0], 0):
             off.append(audited.carriers.acceleration[:, moving, :3])
-        unit, why = "m/s, m/s^2", "they must be at rest there"
+        units, why = UNITS[1:], "they must be at rest there"
     elif word == "periodic":
         off, ends = [part[:, moving] - part[0, moving] for part in audited.carriers], [-1]
-        unit, why = "m, m/s, m/s^2", "difference from the start"
+        units, why = UNITS, "difference from the start"
     else:
         references = scenario.references(audited.times)[1]
         off = [audited.carriers[k][:, i] - references[i][k] for i in moving for k in range(2)]
-        unit, why = "m, m/s", "distance from `around`"
+        units, why = UNITS[:2] * len(moving), "distance from `around`"
     exceeded = []
     for end in ends:
-        worst = np.max([np.abs(part[end]).max() for part in off])  # nan if one is
-        exceeded += _missed("base.ends", "carriers", audited.times[end], worst, END_TOLERANCE, unit, why)
+        sizes = [np.abs(part[end]).max() for part in off]
+        worst = int(np.argmax(sizes))  # one that is nan, if there is any
+        exceeded += _missed("base.ends", "carriers", audited.times[end], sizes[worst], END_TOLERANCE, units[worst], why)
     return exceeded
 
 
@@ -248,10 +250,11 @@ def _grounded(audited: Instants) -> list[Excess]:
     resting = audited.scenario.phases.resting(audited.times)
     if not resting.any():
         return []
-    values = np.hstack([audited.off_path, audited.motion.velocity, audited.motion.acceleration])
-    off = np.where(resting, np.abs(values).max(axis=1), 0.0)
+    values = np.stack([audited.off_path, audited.motion.velocity, audited.motion.acceleration])
+    off = np.where(resting[:, None], np.abs(values).max(axis=2).T, 0.0)  # (n, 3)
+    worst = int(np.argmax(off.max(axis=0)))  # one that is nan, if there is any
     why = "on the ground it must rest on its path"
-    return _above(audited, "phases.ground", "platform", off, END_TOLERANCE, "m, m/s, m/s^2", why)
+    return _above(audited, "phases.ground", "platform", off[:, worst], END_TOLERANCE, UNITS[worst], why)
 
 
 def _locked(audited: Instants) -> list[Excess]:

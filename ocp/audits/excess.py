@@ -51,7 +51,8 @@ class Excess(Displayed):
             return f"{body} is {depth} inside the keep-out region {region!r}{at}{required}{why}"
         body, _, room = self.about.partition(WITHIN)
         if room and self.value < 0:
-            return f"{body} is {quantity(-self.value, self.unit)} beyond {room}{at}{why}"
+            side = "below" if room == "the floor" else "beyond"
+            return f"{body} is {quantity(-self.value, self.unit)} {side} {room}{at}{why}"
         if self.limit == TENSIONS:
             return f"with tensions inside their limits the wrench is off by {quantity(self.value, self.unit)}{at}{why}"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "

@@ -33,7 +33,7 @@ def motion_past(search: Search, balance: bool) -> tuple[Deviation | None, bool]:
             # A formation keeps more distance, but not between the places at which it was chosen.
             return None if formation is None else (formation if clear else usual)(nodes), False
         if formation is not None and clear:
-            stage.message = f"the direct motion exceeds {exceeded}: a shifted formation keeps all limits"
+            stage.message = f"the direct motion exceeds {exceeded}: a shifted or turned one keeps all limits"
             return formation(nodes), True
         seconds = min(GLOBAL_SHARE * scenario.task.time_limit, search.seconds_left)
         path, message = find_global_path(scenario, seconds)

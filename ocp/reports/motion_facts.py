@@ -88,7 +88,9 @@ def wind(velocity: Vector3) -> str:
 def _task_wind(task: Task) -> str:
     """Return the task's wind, or its set of winds and the wind of the planned tensions."""
     if isinstance(task.wind, WindDisc):
-        return f"any horizontal one up to {quantity(task.wind.speed, 'm/s')}; the tensions shown are those in still air"
+        most = quantity(task.wind.speed, "m/s")
+        winds = f"any horizontal one up to {most}, to which the audit adds the speed of the platform"
+        return f"{winds}; the tensions shown are those in still air"
     if isinstance(task.wind, WindBox):
         box = task.wind
         return f"any from {wind(box.min)} to {wind(box.max)}; the tensions shown are those in {wind(box.middle)}"
