@@ -188,13 +188,15 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
 
 def _tensions(plan: PlanData) -> list[Fact]:
     robot, audit = plan.scenario.robot, plan.audit
+    relaxed = bool(robot.t_min.any()) and any(phase.slack for phase in plan.scenario.phases.all)
     exist = np.isfinite(audit.tensions).all(axis=1)
     if plan.scenario.wind_set is None and not plan.scenario.phases.extremes:
         exist &= audit.violation <= audit.tolerance  # near singular poses the tensions are the closest ones
     facts: list[Fact] = []
     if not exist.all():
         without = audit.times[~exist]
-        share = f"for {quantity(100 * (~exist).mean(), digits=3)} % of the motion"
+        most = 100.0 * (~exist).mean()
+        share = f"for {quantity(min(most, 99.9) if exist.any() else most, digits=3)} % of the motion"
         facts.append(("no feasible tensions", f"{share}, first at {without[0]:.3f} s, last at {without[-1]:.3f} s"))
     if exist.any():
         times, values = audit.times[exist], audit.tensions[exist]
@@ -210,7 +212,7 @@ def _tensions(plan: PlanData) -> list[Fact]:
         side = " above t_min" if above else " below t_max"
         required = plan.scenario.task.margin
         part = "" if exist.all() else " elsewhere"
-        also = f" ({quantity(required, 'N')} required)" * (required > 0)
+        also = f" ({quantity(required, 'N')} required{' where no cable may be slack' * relaxed})" * (required > 0)
         facts += [
             (f"smallest{part}", located(int(values.argmin()), values)),
             (f"largest{part}", located(int(values.argmax()), values)),
@@ -218,7 +220,6 @@ def _tensions(plan: PlanData) -> list[Fact]:
         ]
     limits = zip(robot.t_min, robot.t_max, strict=True)
     pairs = list(dict.fromkeys(f"{quantity(low, 'N')} to {quantity(high, 'N')}" for low, high in limits))
-    relaxed = robot.t_min.any() and any(phase.slack for phase in plan.scenario.phases.all)
     slack = "; at least 0 N where cables may be slack" if relaxed else ""
     more = f", and {len(pairs) - FEW} more" * (len(pairs) > FEW) + " (by cable)" * (len(pairs) > 1)
     return [*facts, ("limits", f"{', '.join(pairs[:FEW])}{more}{slack}"), *_jumps(plan)]
