@@ -103,13 +103,16 @@ class Report(Displayed):
         return {"about": self.about, "status": self.status, "summary": self.summary, "parts": parts}
 
 
-class Reported:
-    """The base of results that have a report."""
+class Reported(Displayed):
+    """The base of results that have a report, whose headline is theirs."""
 
     __slots__ = ()
 
     def _report(self) -> Report:
         raise NotImplementedError
+
+    def _headline(self) -> str:
+        return self._report().headline
 
     def report(self) -> str:
         """Return the report as text: the result in the first line, then the facts behind it."""

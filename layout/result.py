@@ -135,9 +135,6 @@ class Design(Drawn, Reported, Displayed):
                 text += f", no cable below z = {quantity(self.judgement.height, 'm')}"
         return text
 
-    def _headline(self) -> str:
-        return self._report().headline
-
     def _facts(self) -> list[Fact]:
         return [("poses", quantity(self.poses)), ("audited", quantity(self.audited)), ("starts", str(self.starts))]
 

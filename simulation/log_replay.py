@@ -193,9 +193,6 @@ class Replay(Drawn, Reported, Displayed):
         by = self.found[0].name if after else ""
         return {"replay": draw(self._times, self.residuals, after, self.matching.noise, self._summary(), by)}
 
-    def _headline(self) -> str:
-        return self._report().headline
-
     def _report(self) -> Report:
         robot, times = self.windows.recorded.robot, self.windows.recorded.times
         explanations = [] if self.windows.recorded.doubt else [self._explanation_table()]

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,26 +14,23 @@ from ..base.netcdf import Contents, Variable
 from ..base.text import at_most, quantity
 from ..control import ANSWERS
 from ..control.command import SOFT
-from ..figures.drawn import Filmed
 from ..figures.outlines import outline_variables
 from ..figures.report import Report, Reported, Section
-from ..models.motion_file import dimensions, motion_variables, over, save_motion
+from ..models.motion_file import dimensions, motion_variables, over
 from ..models.parsing import to_yaml
+from ..models.robot import Robot
+from ..statics.motion_result import MotionResult
 from .data import SimulationData
 from .room import LEAST, room_of
 
 if TYPE_CHECKING:
-    import xarray as xr
     from matplotlib.figure import Figure
-
-    from ..figures.scene import Scene
-from typing import NamedTuple
 
 RESOLVED = 0.01  # [mm]: the digits of a smaller position error mean nothing
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation(SimulationData, Filmed, Reported):
+class Simulation(SimulationData, MotionResult, Reported):
     """A simulated motion: `SimulationData`, which can also be saved, drawn and reported."""
 
     def figures_of_merit(self) -> dict[str, Any]:
@@ -67,14 +62,6 @@ class Simulation(SimulationData, Filmed, Reported):
         times = {"median": np.median(micro), "p99": np.percentile(micro, 99), "max": micro.max()}
         step = {name: float(value) for name, value in times.items()}
         return merit | {"step_us": step, "real_time_factor": self.lasted * self.period / self.wall}
-
-    @cached_property
-    def trajectory(self) -> xr.Dataset:
-        """Return the motion over time: the variables of a plan and more, with units as attributes.
-
-        Dimensions: time, coordinate (x, y, z, roll, pitch, yaw), carrier, cable (from 1).
-        """
-        return self._contents.dataset()
 
     @cached_property
     def _contents(self) -> Contents:
@@ -133,13 +120,6 @@ class Simulation(SimulationData, Filmed, Reported):
             coordinates["actuator"] = Variable(("actuator",), np.array(actuators))
         return Contents(variables, coordinates, attributes)
 
-    def save(self, file: str | os.PathLike[str]) -> Path:
-        """Save the motion atomically, as NetCDF (.nc) or MCAP (.mcap); the same seed gives the same bytes.
-
-        Raises `InputError` if the file cannot be written.
-        """
-        return save_motion(self.robot, self._contents, file)
-
     def figures(self) -> dict[str, Figure]:
         """Draw "simulation" (error, controller status, wind and carriers over time) and "tensions", by file names."""
         from ..figures import flight
@@ -147,13 +127,8 @@ class Simulation(SimulationData, Filmed, Reported):
         return {"simulation": flight.flight(self.trajectory), "tensions": flight.tensions(self.trajectory)}
 
     @property
-    def _film_duration(self) -> float:
-        return self.times[-1]
-
-    def _scene(self, times: np.ndarray) -> Scene:
-        from ..statics.scene import scene
-
-        return scene(self.robot, self.trajectory, times)
+    def _of_robot(self) -> Robot:
+        return self.robot
 
     def _report(self) -> Report:
         largest = f"position error {at_most(1e3 * self.error.max(), 'mm', RESOLVED)}"
@@ -165,9 +140,6 @@ class Simulation(SimulationData, Filmed, Reported):
             drawings=self._drawings,
             files=[("The robot's file", to_yaml(self.robot))],
         )
-
-    def _headline(self) -> str:
-        return self._report().headline
 
     def _facts(self) -> list[Fact]:
         merit, happened = self.figures_of_merit(), occurrences(self)

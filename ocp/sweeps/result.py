@@ -56,7 +56,7 @@ _NUMBERS = ("cost", "duration", "margin", "tension_max")  # what a report shows 
 
 
 @dataclass(frozen=True)
-class Sweep(Displayed, Reported):
+class Sweep(Reported, Displayed):
     """The plans of one task for all combinations of some values of its fields.
 
     Attributes:
