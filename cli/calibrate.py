@@ -8,8 +8,8 @@ import typer
 from ..base.errors import InputError
 from ..base.inputs import check_ending
 from .log import FieldsOption
-from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters, print_result
-from .outputs import check_outputs
+from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters
+from .outputs import Outputs, check_outputs
 
 
 @parameters("""
@@ -64,10 +64,9 @@ def calibrate(
     known = None if prior is None else by_name("--prior", prior)
     loaded = given = load(robot)
     target = out if out is not None else Path(f"{loaded.name}-calibrated.yaml")
-    check_outputs(
-        {"--out": target, "--report": report, "--figures": figures and figures / f"residuals.{form}"},
-        {**{f"the log {log}": log for log in logs}, "--poses": poses},
-    )
+    outputs = Outputs(as_json, figures, form, report)
+    files = {"--out": target, "--report": report, "--figures": outputs.picture("residuals")}
+    check_outputs(files, {**{f"the log {log}": log for log in logs}, "--poses": poses})
     check_ending("--out", target, ".yaml", ".yml")
     read = read_log(logs, stated, poses, loaded, fields)
     measurements, notes = read.measurements, read.notes
@@ -81,16 +80,12 @@ def calibrate(
         for note in notes:
             typer.echo(f"  {note}")
     result = find(loaded, measurements, "auto" if names == ["auto"] else names, known, outliers)
-    text = result.report()  # before anything is written
+    result.report()  # computes what it needs, before anything is written
     # The encoders of the corrected robot are right, whether or not other parameters improve it.
     kept = bool(result.refused) and result.means_something and loaded.cables != given.cables
     refused = None if kept else result.refused
     written = {} if refused else {"file": loaded.save(target) if kept else result.save(target)}
-    if report is not None:
-        written["report"] = result.save_report(report)
-    pictures = [] if figures is None else result.plot(figures, form)
-    data = {**result.to_dict(), "notes": notes, "file": None, **written, "figures": pictures}
-    print_result(as_json, data, lambda: text, [*written.values(), *pictures])
+    outputs.show(result, written, outputs.write(result, written), notes=notes, file=None)
     if kept:
         typer.echo("towline: the file has corrected encoders alone, which other parameters do not improve", err=True)
     if refused:
@@ -118,13 +113,12 @@ def by_name(option: str, text: str) -> dict[str, float]:
     """
     result: dict[str, float] = {}
     for part in text.split(","):
-        name, equals, value = part.partition("=")
+        name, _, value = part.partition("=")
+        if name.strip() in result:
+            value = ""
         try:
-            number = float(value)
+            result[name.strip()] = float(value)
         except ValueError:
-            equals = ""
-            number = 0.0
-        if not equals or name.strip() in result:
-            raise InputError(f"{option} must be NAME=NUMBER, separated by commas, each name once, got {text!r}")
-        result[name.strip()] = number
+            accepted = "NAME=NUMBER, separated by commas, each name once"
+            raise InputError(f"{option} must be {accepted}, got {text!r}") from None
     return result

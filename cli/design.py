@@ -7,17 +7,8 @@ import typer
 
 from ..base.errors import InputError
 from ..base.inputs import check_ending
-from .options import (
-    FormatOption,
-    JsonOption,
-    ReportOption,
-    RobotArgument,
-    parameters,
-    print_result,
-    schema_option,
-    usual_file,
-)
-from .outputs import check_outputs
+from .options import FormatOption, JsonOption, ReportOption, RobotArgument, parameters, schema_option, usual_file
+from .outputs import Outputs, check_outputs
 from .stopping import requested, unlisten
 from .watching import progress_bar
 
@@ -62,7 +53,8 @@ def design(
         read = validate(read.model_dump() | changed, Requirements, "--seconds or --seed")
     target = out if out is not None else usual_file(loaded.name, f"{read.name}.yaml")
     check_ending("--out", target, ".yaml", ".yml")
-    check_outputs({"--out": target, "--report": report, "--figures": figures and figures / f"before.{form}"})
+    outputs = Outputs(as_json, figures, form, report)
+    check_outputs({"--out": target, "--report": report, "--figures": outputs.picture("before")})
     unlisten()  # an interrupt ends the search, not the command
     with progress_bar(f"design of {read.name}", quiet=as_json) as move:
 
@@ -77,10 +69,6 @@ def design(
     if requested():  # SIGTERM, which ends the command
         raise KeyboardInterrupt
     written = {"file": found.robot.save(target)} if found.feasible else {}
-    if report is not None:
-        written["report"] = found.save_report(report)
-    pictures = [] if figures is None else found.plot(figures, form)
-    data = {**found.to_dict(), "file": None, **written, "figures": pictures}
-    print_result(as_json, data, found.report, [*written.values(), *pictures])
+    outputs.show(found, written, outputs.write(found, written), file=None)
     if not found.feasible:
         raise typer.Exit(1)

@@ -2,8 +2,39 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from ..base.errors import InputError
+from .options import FPS, SPEED, print_result
+
+
+class Outputs(NamedTuple):
+    """What a command writes besides the file of its result, and how it prints the result."""
+
+    as_json: bool
+    figures: Path | None = None  # folder
+    form: str = "png"  # of figures
+    report: Path | None = None
+    animate: Path | None = None  # file of a film
+    speed: float = SPEED
+    fps: float = FPS
+
+    def picture(self, name: str) -> Path | None:
+        """Return the file of a figure, or None without figures."""
+        return self.figures and self.figures / f"{name}.{self.form}"
+
+    def write(self, result: Any, written: dict[str, Path]) -> list[Path]:
+        """Write report, film and figures of a result; add the files to `written`, and return the figures."""
+        if self.report is not None:
+            written["report"] = result.save_report(self.report)
+        if self.animate is not None:
+            written["animation"] = result.animate(self.animate, self.speed, self.fps)
+        return [] if self.figures is None else result.plot(self.figures, self.form)
+
+    def show(self, result: Any, written: dict[str, Path], pictures: list[Path], **more: Any) -> None:
+        """Print a result with all files that were written for it; JSON has `more` keys."""
+        data = {**result.to_dict(), **more, **written, "figures": pictures}
+        print_result(self.as_json, data, result.report, [*written.values(), *pictures])
 
 
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, Path | None] | None = None) -> None:

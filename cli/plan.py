@@ -19,11 +19,10 @@ from .options import (
     check_animation,
     left_out,
     parameters,
-    print_result,
     schema_option,
     usual_file,
 )
-from .outputs import check_outputs
+from .outputs import Outputs, check_outputs
 from .resuming import checkpoint_of, long_run
 from .sweep import sweep
 from .watching import watching
@@ -73,6 +72,7 @@ def plan(
     With --vary it plans once per combination of the given values, and writes a table.
     """
     check_animation(animate, speed, fps)
+    outputs = Outputs(as_json, figures, form, report, animate, speed, fps)
     if vary:
         for name, value in (("--report", report), ("--animate", animate), ("--robust", robust)):
             if value is not None:
@@ -82,7 +82,7 @@ def plan(
                 raise InputError(f"{name} must be left out with --vary, got {shown(str(value))}; {instead}")
         where = {"workers": workers, "scheduler": scheduler, "checkpoint": checkpoint_of(checkpoint, resume)}
         where |= {"resume": resume is not None, "keep": keep}
-        sweep(robot, task, vary, where, out, figures and figures / f"sweep.{form}", as_json)
+        sweep(robot, task, vary, where, out, outputs)
         return
     many = {"--workers": workers != 1, "--scheduler": scheduler, "--checkpoint": checkpoint}
     when = "without --vary: it is an option for many plans"
@@ -93,8 +93,7 @@ def plan(
 
     loaded, read = load(robot), read_task(task)
     target = check_ending("--out", out or usual_file(loaded.name, f"{read.name}.nc"), ".nc", ".mcap")
-    drawn = figures and figures / f"path.{form}"
-    check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": drawn})
+    check_outputs({"--out": target, "--report": report, "--animate": animate, "--figures": outputs.picture("path")})
     with watching(f"planning {read.name}", quiet=as_json) as watch:
         planned = plan_motion(loaded, read, watch, robust=robust)
         if out is None and not planned.feasible:  # it replaces no plan that is
@@ -104,12 +103,7 @@ def plan(
             watch.now("searching for feasible tasks near this one")
             _ = planned.relaxations
         watch.now("drawing")
-        pictures = planned.plot(figures, form) if figures else []
-        if report is not None:
-            written["report"] = planned.save_report(report)
-        if animate is not None:
-            written["animation"] = planned.animate(animate, speed, fps)
-    data = {**planned.to_dict(), **written, "figures": pictures}
-    print_result(as_json, data, planned.report, (*written.values(), *pictures))
+        pictures = outputs.write(planned, written)
+    outputs.show(planned, written, pictures)
     if not planned.feasible:
         raise typer.Exit(1)

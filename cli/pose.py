@@ -23,7 +23,7 @@ from .options import (
     print_table,
     print_written,
 )
-from .outputs import check_outputs
+from .outputs import Outputs, check_outputs
 
 if TYPE_CHECKING:
     from ..estimation import PoseEstimate
@@ -72,7 +72,8 @@ def pose(
         left_out({"--out": out, "--figures": figures, "--fields": fields}, "with --lengths")
     else:
         left_out({"--start": start, "--carrier-pose": carrier_pose}, "with --log")
-        _of_log(loaded, log, fields, sigma, out or Path(f"{log[0].stem}-poses.csv"), figures, form, as_json)
+        target, outputs = out or Path(f"{log[0].stem}-poses.csv"), Outputs(as_json, figures, form)
+        _of_log(loaded, log, fields, sigma, target, outputs)
         return
     assert lengths is not None
     measured = numbers("--lengths", lengths, loaded.m)
@@ -91,16 +92,7 @@ def pose(
         raise typer.Exit(1)
 
 
-def _of_log(
-    robot: Robot,
-    logs: list[Path],
-    fields: Path | None,
-    sigma: str,
-    out: Path,
-    figures: Path | None,
-    form: str,
-    as_json: bool,
-) -> None:
+def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out: Path, outputs: Outputs) -> None:
     """Write the poses of a log."""
     import numpy as np
 
@@ -111,7 +103,7 @@ def _of_log(
     from ..figures import calibration, style
 
     check_ending("--out", out, ".csv")
-    picture = figures and figures / f"consistency.{form}"
+    picture = outputs.picture("consistency")
     check_outputs({"--out": out, "--figures": picture}, {f"the log {log}": log for log in logs})
     stated = by_name("--sigma", sigma) if "=" in sigma else {}
     sigma = str(stated.get("lengths", SIGMA)) if stated else sigma
@@ -123,7 +115,7 @@ def _of_log(
         drawn = calibration.consistency(found.estimate.residuals, found.cost, found.largest, found.times)
         files.append(style.save(drawn, picture))
     data: dict[str, Any] = {"robot": robot.name, **found.to_dict(), "notes": read.notes, "files": files}
-    if as_json:
+    if outputs.as_json:
         print_json(data)
     else:
         sigmas = np.sqrt(np.diagonal(found.estimate.covariance, axis1=-2, axis2=-1))

@@ -32,7 +32,7 @@ from .options import (
     parameters,
     print_result,
 )
-from .outputs import check_outputs
+from .outputs import Outputs, check_outputs
 from .replay import replay_log
 from .resuming import checkpoint_of, long_run, resumable
 from .stopping import add_to_message
@@ -136,8 +136,7 @@ def simulate(
         of_plan |= {"--seed": seed, "--runs": runs, "--animate": animate}
         left_out(of_plan, "with a recording")
         options = {"poses": poses, "fields": fields, "drive": drive, "delay": delay, "window": window}
-        outputs = {"--out": out, "--fit": fit, "--report": report}
-        replay_log(robot, plan, options | {"tolerance": tolerance}, outputs, figures, form, as_json)
+        replay_log(robot, plan, options | {"tolerance": tolerance}, out, fit, Outputs(as_json, figures, form, report))
         return
     left_out(of_log, "without a recording")
     stored = checkpoint_of(checkpoint, resume)
@@ -155,9 +154,10 @@ def simulate(
             raise InputError(f"{printable(str(plan))}: no such file")
         what, figure = ("simulation", "simulation") if runs is None else ("runs", "errors")
         target = check_ending("--out", out or Path(f"{plan.stem}-{what}.nc"), *((".nc",) if runs else (".nc", ".mcap")))
-        outputs = {"the checkpoint": stored, "--out": target, "--animate": animate, "--report": report}
-        outputs["--figures"] = figures and figures / f"{figure}.{form}"
-        check_outputs(outputs, {"the plan": plan, "--noise": noise, "--mismatch": mismatch})
+        outputs = Outputs(as_json, figures, form, report, animate, speed, fps)
+        files = {"the checkpoint": stored, "--out": target, "--animate": animate, "--report": report}
+        files["--figures"] = outputs.picture(figure)
+        check_outputs(files, {"the plan": plan, "--noise": noise, "--mismatch": mismatch})
         kinds = (ComputedTorque, Predictive, LengthControl, OpenLoop, FaultTolerant)
         sensors = None if noise is None else read_yaml(noise, Noise)
         kind = dict(zip(CONTROLLERS, kinds, strict=True))[controller]
@@ -170,11 +170,10 @@ def simulate(
         )
         run = partial(simulate, loaded, plan, pilot, seed=seed, conditions=conditions)
         if runs is None:
-            film = None if animate is None else (animate, speed, fps)
-            passed = _once(run, plan.stem, target, (figures, form), film, report, as_json)
+            passed = _once(run, plan.stem, target, outputs)
         else:
             where = Execution(workers, scheduler, stored, resume is not None)
-            passed = _often(partial(run, runs=runs), plan.stem, where, target, (figures, form), as_json)
+            passed = _often(partial(run, runs=runs), plan.stem, where, target, outputs)
     if not passed:
         raise typer.Exit(1)
 
@@ -190,54 +189,32 @@ def _named(events: list[str]) -> Iterator[None]:
         raise InputError(text) from None
 
 
-def _once(
-    run: Callable[[], Simulation],
-    plan: str,
-    target: Path,
-    drawn: tuple[Path | None, str],
-    film: tuple[Path, float, float] | None,
-    report: Path | None,
-    as_json: bool,
-) -> bool:
+def _once(run: Callable[[], Simulation], plan: str, target: Path, outputs: Outputs) -> bool:
     """Simulate once, save, draw and print; return whether the run passed."""
-    figures, form = drawn
-    with watching(f"simulating {plan}", quiet=as_json) as watch:
+    with watching(f"simulating {plan}", quiet=outputs.as_json) as watch:
         flight = run()
         written = {"file": flight.save(target)}
-        if report is not None:
-            written["report"] = flight.save_report(report)
         watch.now("drawing")
-        pictures = [] if figures is None else flight.plot(figures, form)
-        if film is not None:
-            written["animation"] = flight.animate(*film)
-    data = {**flight.to_dict(), **written, "figures": pictures}
-    print_result(as_json, data, flight.report, (*written.values(), *pictures))
+        pictures = outputs.write(flight, written)
+    outputs.show(flight, written, pictures)
     return flight.passed
 
 
-def _often(
-    run: Callable[..., xr.Dataset],
-    plan: str,
-    where: Execution,
-    target: Path,
-    drawn: tuple[Path | None, str],
-    as_json: bool,
-) -> bool:
+def _often(run: Callable[..., xr.Dataset], plan: str, where: Execution, target: Path, outputs: Outputs) -> bool:
     """Simulate with many seeds, save, draw and print; return whether all runs passed."""
     from ..figures import flight as figure
     from ..figures import style
     from ..figures.envelopes import envelopes
     from ..simulation.flights import report, save, summary
 
-    figures, form = drawn
-    with counting(f"simulating {plan}", "passed", quiet=as_json) as show:
+    with counting(f"simulating {plan}", "passed", quiet=outputs.as_json) as show:
         flights = run(execution=replace(where, progress=resumable(show, where.checkpoint, "runs")))
     add_to_message("")
     file = save(flights, target)
     pictures = []
-    if figures is not None:
+    if outputs.figures is not None:
         drawings = {"errors": figure.errors(flights), "envelopes": envelopes(flights)}
-        pictures = [style.save(drawing, figures / f"{name}.{form}") for name, drawing in drawings.items()]
+        pictures = style.save_all(lambda: drawings, outputs.figures, outputs.form)
     data = {**summary(flights), "file": file, "figures": pictures}
-    print_result(as_json, data, lambda: report(flights).text(), (file, *pictures))
+    print_result(outputs.as_json, data, lambda: report(flights).text(), (file, *pictures))
     return bool(flights["passed"].all())

@@ -5,8 +5,8 @@ from pathlib import Path
 import typer
 
 from ..base.inputs import check_ending
-from .options import JsonOption, ReportOption, RobotArgument, parameters, print_result, usual_file
-from .outputs import check_outputs
+from .options import JsonOption, ReportOption, RobotArgument, parameters, usual_file
+from .outputs import Outputs, check_outputs
 
 
 @parameters("""
@@ -43,8 +43,7 @@ def time(
     written = {}
     if found.feasible:
         written["file"] = found.scenario.task.model_copy(update={"name": f"{read.name[:54]}-timed"}).save(target)
-    if report is not None:
-        written["report"] = found.save_report(report)
-    print_result(as_json, {**found.to_dict(), "file": None, **written}, found.report, list(written.values()))
+    outputs = Outputs(as_json, report=report)
+    outputs.show(found, written, outputs.write(found, written), file=None)
     if not found.feasible:
         raise typer.Exit(1)
