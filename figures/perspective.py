@@ -66,12 +66,8 @@ class Perspective:
         ax.set_axis_off()
         ax.set_xticks([])
         ax.set_yticks([])
-        first, last = np.floor(self.low[:2] / self.cell) * self.cell, np.ceil(self.high[:2] / self.cell) * self.cell
-        for axis in (0, 1):
-            for at in np.arange(first[axis], last[axis] + 0.5 * self.cell, self.cell):
-                ends = np.array([[*first, self.floor], [*last, self.floor]])
-                ends[:, axis] = at
-                ax.plot(*self(ends).T, color=FLOOR, linewidth=0.5)
+        for line in floor_grid(self.low, self.high, self.cell, self.floor):
+            ax.plot(*self(line).T, color=FLOOR, linewidth=0.5)
 
 
 def cell_of(size: float) -> float:
@@ -79,3 +75,14 @@ def cell_of(size: float) -> float:
     wanted = size / CELLS
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+
+
+def floor_grid(low: np.ndarray, high: np.ndarray, cell: float, floor: float) -> list[np.ndarray]:
+    """Return the lines (2, 3) of the grid at the height `floor` under a box with the corners low and high, (3,) [m]."""
+    first, last = np.floor(low[:2] / cell) * cell, np.ceil(high[:2] / cell) * cell
+    lines = []
+    for axis in (0, 1):
+        for at in np.arange(first[axis], last[axis] + 0.5 * cell, cell):
+            lines.append(np.array([[*first, floor], [*last, floor]]))
+            lines[-1][:, axis] = at
+    return lines

@@ -16,6 +16,8 @@ DASHES = ([], [8, 3], [2, 3], [8, 3, 2, 3])  # of the first eight colours, and o
 LIMIT_DASH = [2, 2]
 OTHER = [4, 4]  # of the plan that the shown one is compared with
 
+Line = tuple[np.ndarray, str, dict[str, Any]]  # values, name and look of a curve
+
 
 class Charts:
     """Charts of tensions and margin in the panel of a viser server.
@@ -51,14 +53,7 @@ class Charts:
         column[self._curves.nearest(time)] = 1.0
         return column
 
-    def _chart(
-        self,
-        gui: Any,
-        title: str,
-        lines: list[tuple[np.ndarray, str, dict[str, Any]]],
-        height: int,
-        limits: Iterable[float] = (),
-    ) -> Any:
+    def _chart(self, gui: Any, title: str, lines: list[Line], height: int, limits: Iterable[float] = ()) -> Any:
         """Return the handle of a chart, and its columns without time and cursor."""
         known = np.concatenate([values[np.isfinite(values)] for values, _, _ in lines])
         low, high = min(float(known.min(initial=0.0)), 0.0), float(known.max(initial=0.0))

@@ -15,13 +15,12 @@ import numpy as np
 
 from ..figures import style
 from ..figures.hull import faces
-from ..figures.perspective import ALONG
+from ..figures.perspective import ALONG, floor_grid
 from ..figures.robot import box_edges
 from ..figures.tension_colours import NO_TENSION, rgb, shades
 from ..models import Robot
 from ..models.body import surface
 from ..models.record import record_of
-from .geometry import Geometry
 from .posing import few_cables, opening_pose
 from .shapes import posts, rotors
 from .sliders import sliders
@@ -38,9 +37,8 @@ def live_page(subject: Subject) -> str:
 
     Raises `InputError` if the robot is too large for the core, or the robot cannot be drawn.
     """
-    robot, geometry = subject.robot, Geometry(subject.robot)
-    data = _data(subject, geometry)
-    moving = any(it.carrier is not None and it.coordinate < 3 for it in sliders(robot, geometry))
+    data, geometry = _data(subject), subject.geometry
+    moving = any(it.carrier is not None and it.coordinate < 3 for it in sliders(subject.robot, geometry))
     return Template((FOLDER / "live.html").read_text(encoding="utf-8")).substitute(
         title=escape(subject.title),
         carriers=" or a carrier" if moving else "",
@@ -50,9 +48,9 @@ def live_page(subject: Subject) -> str:
     )
 
 
-def _data(subject: Subject, geometry: Geometry) -> dict[str, Any]:
-    robot, extent = subject.robot, geometry.extent
-    cloud = subject.cloud
+def _data(subject: Subject) -> dict[str, Any]:
+    robot, geometry, cloud = subject.robot, subject.geometry, subject.cloud
+    extent, cell = geometry.extent, geometry.extent.cell
     platform = robot.attachments if robot.platform.body is None else surface(robot.platform.body)
     return {
         "name": robot.name,
@@ -76,7 +74,7 @@ def _data(subject: Subject, geometry: Geometry) -> dict[str, Any]:
             for box in carrier.drawing.boxes
             for edge in box_edges(np.array(box.min), np.array(box.max))
         ],
-        "grid": _grid(geometry),
+        "grid": [line.tolist() for line in floor_grid(extent.low - cell, extent.high + cell, cell, extent.floor)],
         "cloud": []
         if cloud is None
         else [[place, _css(hue)] for place, hue in zip(cloud.positions.tolist(), cloud.colours, strict=True)],
@@ -109,19 +107,6 @@ def _body(name: str, corners: np.ndarray, colour: tuple[int, ...], lines: list[n
         "colour": colour,
         "lines": [line.tolist() for line in lines],
     }
-
-
-def _grid(geometry: Geometry) -> list[list[list[float]]]:
-    """Return the lines of the floor's grid, around the robot and one cell beyond."""
-    extent, cell = geometry.extent, geometry.extent.cell
-    low, high = np.floor(extent.low / cell) - 1, np.ceil(extent.high / cell) + 1
-    lines = []
-    for axis in (0, 1):
-        for k in np.arange(low[axis], high[axis] + 1):
-            ends = np.array([[0.0, 0.0, extent.floor], [0.0, 0.0, extent.floor]])
-            ends[:, axis], ends[:, 1 - axis] = k * cell, (low[1 - axis] * cell, high[1 - axis] * cell)
-            lines.append(ends.tolist())
-    return lines
 
 
 def _css(colour: np.ndarray) -> str:

@@ -9,7 +9,6 @@ from urllib.parse import parse_qs
 import numpy as np
 
 from ..models import available
-from .geometry import Geometry
 from .panel import Panel
 from .stage import Stage
 from .subject import Subject, read
@@ -30,10 +29,9 @@ class Live:
         server.on_client_connect(lambda client: self._stage.mind(client))
 
     def _show(self, subject: Subject) -> None:
-        geometry = Geometry(subject.robot)
         self._subject = subject
-        self._stage = Stage(self._server, subject, geometry, captioned=False)
-        self._panel = Panel(self._server, subject, geometry, self._stage, self._robots, self.switch)
+        self._stage = Stage(self._server, subject, captioned=False)
+        self._panel = Panel(self._server, subject, self._stage, self._robots, self.switch)
 
     def switch(self, robot: str) -> None:
         """Show a robot of the library, or the one that the view began with, instead."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -18,7 +18,7 @@ from ..workspace.surface import Surface
 from ..workspace.surface import surface as surface_of
 from . import labels
 from .frames import Frames
-from .geometry import FARTHEST, Geometry
+from .geometry import FARTHEST
 from .posing import Posing
 from .replay import Replay
 from .sliders import whole_steps
@@ -34,6 +34,7 @@ PATIENCE = 60.0  # [s] for a browser to draw a picture
 FINE = 2.0  # times the size in the browser: of a saved picture
 RATE = 12.5  # [1/s]
 LONGEST = 12.0  # [s] of the film: longer motions are shown faster
+Switch = Callable[[str], None]  # to the robot of a name
 
 
 class Panel:
@@ -43,9 +44,8 @@ class Panel:
         self,
         server: viser.ViserServer,
         subject: Subject,
-        geometry: Geometry,
         stage: Stage,
-        robots: tuple[str, ...],
+        robots: Sequence[str],
         switch: Callable[[str], None],
     ):
         self._subject, self._stage = subject, stage
@@ -61,7 +61,7 @@ class Panel:
         self._gui.add_html(labels.NARROW)
         self._controls: Posing | TimeLine
         if subject.replay is None:
-            self._controls = Posing(server, frames, subject.robot, geometry, self._show, self._refuse)
+            self._controls = Posing(server, frames, subject.geometry, self._show, self._refuse)
         else:
             self._controls = TimeLine(server, frames, subject.replay, self._show, subject.other)
         with self._gui.add_folder("Picture"):

@@ -21,7 +21,7 @@ from .frames import Frames
 from .geometry import Geometry
 from .labels import link
 from .sliders import Slider, sliders
-from .snapshot import Snapshot, at_rest
+from .snapshot import Show, at_rest
 from .stage import move
 
 if TYPE_CHECKING:
@@ -36,20 +36,15 @@ class Posing:
 
     - `server`: its panel gets sliders, its scene handles.
     - `frames`: the marks of instants on it.
-    - `robot`, `geometry`: the robot, and its geometry.
+    - `geometry`: the geometry of the robot.
     - `show`, `refuse`: draw an instant, and show why there is none.
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        frames: Frames,
-        robot: Robot,
-        geometry: Geometry,
-        show: Callable[[Snapshot], None],
-        refuse: Callable[[str], None],
+        self, server: viser.ViserServer, frames: Frames, geometry: Geometry, show: Show, refuse: Callable[[str], None]
     ):
-        self._server, self._frames, self._robot, self._geometry = server, frames, robot, geometry
+        self._server, self._frames, self._geometry, robot = server, frames, geometry, geometry.robot
+        self._robot = robot
         self._show, self._refuse = show, refuse
         self._dynamics, self._settings = Dynamics(robot), sliders(robot, geometry)
         self._busy, self._latest = threading.Lock(), 0

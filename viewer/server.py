@@ -19,7 +19,6 @@ from ..base.writing import whole_file
 from ..figures.perspective import ALONG
 from .access import guarded
 from .frames import Frames, with_script
-from .geometry import Geometry
 from .live_page import live_page
 from .live_view import Live
 from .page import aside, camera
@@ -97,8 +96,7 @@ def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
 def _film(subject: Subject, replay: Replay) -> str:
     # viser records what a server is told, so there is one, on a port that nobody is told.
     with _started(LOOPBACK, 0) as server:
-        geometry = Geometry(subject.robot)
-        stage = Stage(server, subject, geometry, captioned=True)
+        stage = Stage(server, subject, captioned=True)
         frames = [replay.at(int(index)) for index in replay.frames(FRAME_RATE)]
         marks = Frames(server)
         with marks.instant():

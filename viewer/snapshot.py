@@ -1,5 +1,6 @@
 """Describe a robot at one instant: its points, and its tensions or a certificate."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,9 @@ class Snapshot(Displayed):
     time: float | None = None  # [s]; None at rest
     cut: np.ndarray | None = None  # which cables have been cut, (m,); None if none have
     events: tuple[str, ...] = ()  # events of a simulation until now, as texts
+
+
+Show = Callable[[Snapshot], None]
 
 
 def at_rest(dynamics: Dynamics, geometry: Geometry, pose: np.ndarray, carriers: np.ndarray) -> Snapshot:

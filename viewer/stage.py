@@ -19,7 +19,7 @@ from ..figures.robot import box_edges
 from ..figures.tension_colours import place, rgb, shades
 from ..models.body import surface
 from . import labels
-from .geometry import FIELD_OF_VIEW, Extent, Geometry
+from .geometry import FIELD_OF_VIEW, Extent
 from .shapes import posts, rotors, sheaves
 from .snapshot import Snapshot, arrow
 from .subject import Subject
@@ -50,15 +50,14 @@ class Stage:
 
     - `server`: only its scene and camera are used.
     - `subject`: the robot, plan or workspace to show.
-    - `geometry`: the geometry of its robot.
     - `captioned`: show time, status and margin in the scene, for a page without a panel.
     """
 
-    def __init__(self, server: viser.ViserServer, subject: Subject, geometry: Geometry, captioned: bool):
+    def __init__(self, server: viser.ViserServer, subject: Subject, captioned: bool):
         # viser calls what minds cameras from many threads.
         self._scene, self._left, self._turning = server.scene, False, threading.RLock()
         self._robot = subject.robot
-        extent = subject.replay.extent if subject.replay else geometry.extent
+        extent = subject.replay.extent if subject.replay else subject.geometry.extent
         if subject.other is not None:
             extent = Extent.of(*extent, *subject.other.extent)
         self.extent = extent  # box around what is shown; the initial camera looks at its centre

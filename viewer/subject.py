@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import xarray as xr
@@ -15,6 +16,7 @@ from ..base.inputs import file_path, printable, required, shown
 from ..base.netcdf import load_netcdf
 from ..models import Robot, available, load
 from .cloud import Cloud, cloud
+from .geometry import Geometry
 from .replay import Replay
 from .snapshot import Snapshot
 
@@ -55,6 +57,11 @@ class Subject(Displayed):
         if self.replay is not None and self.replay.reference is not None:
             return "simulation"
         return "plan" if self.replay else "workspace" if self.cloud else "robot"
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """Return the geometry of its robot; raise InputError if it cannot be drawn."""
+        return self.replay.geometry if self.replay else Geometry(self.robot)
 
     def other_at(self, instant: Snapshot) -> Snapshot | None:
         """Return the instant of the other motion at the same time, or its last instant; None without another motion."""

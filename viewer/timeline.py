@@ -15,7 +15,7 @@ from .charts import Charts
 from .curves import curves
 from .frames import Frames
 from .replay import Replay
-from .snapshot import Snapshot
+from .snapshot import Show
 
 if TYPE_CHECKING:
     import viser
@@ -39,12 +39,7 @@ class TimeLine:
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        frames: Frames,
-        replay: Replay,
-        show: Callable[[Snapshot], None],
-        other: Replay | None = None,
+        self, server: viser.ViserServer, frames: Frames, replay: Replay, show: Show, other: Replay | None = None
     ):
         self._frames, self._replay, self._show = frames, replay, show
         self._playing, self._closed, self._busy = threading.Event(), threading.Event(), threading.Lock()
