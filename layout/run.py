@@ -12,7 +12,7 @@ from ..base.inputs import shown
 from ..models import Robot
 from ..models.files import AnyRobot, as_robot
 from ..ocp.planner import plan
-from .evaluation import NO_BOUNDS, Evaluation, Rows, rows_of, with_tasks
+from .evaluation import NO_BOUNDS, Evaluation, rows_of, with_tasks
 from .goal import goal_of
 from .growth import grow
 from .impossibility import find_impossibility
@@ -22,7 +22,7 @@ from .reasons import reasons
 from .requirements import Free, Requirement, Requirements, read_requirements
 from .result import Design
 from .room import room_of
-from .search import ROOM_AUDITED, Progress, audited_rows, few, search
+from .search import ROOM_AUDITED, Found, Progress, audited_rows, few, search
 from .variables import Variables, variables_of
 
 
@@ -92,26 +92,27 @@ def design(
         grid = with_tasks(grid, chosen, wanted.tasks)
         attachment_of, count = best_pairing(chosen, grid, cables, wanted)
         paired = variables_of(with_attachments(chosen, attachment_of), wanted)
-        return _designed(chosen, paired, wanted, np.zeros(0), grid, len(grid.pose_of), count, False)
+        best = Found(goal_of(paired, wanted), np.zeros(0), grid, starts=count)
+        return _designed(chosen, paired, wanted, best, len(grid.pose_of))
     on_progress, largest = progress or (lambda what, share, best: None), None
     if wanted.maximise == "volume":
         largest = grow(variables, wanted, on_progress)
         wanted, found = largest.requirements, largest.found
     else:
         found = search(variables, wanted, on_progress)
-    how = found.rows, len(grid.pose_of), found.starts
+    count = len(grid.pose_of)
     try:
-        result = _best_of(chosen, variables, wanted, found.y, *how, found.stopped)
+        result = _best_of(chosen, variables, wanted, found, count)
     except KeyboardInterrupt:  # judged again, without the plans of tasks, which take long
-        result = _best_of(chosen, variables, wanted, found.y, *how, True)
+        result = _best_of(chosen, variables, wanted, replace(found, stopped=True), count)
     if largest is not None:
         result = replace(result, size=largest.size, size_before=largest.size_before)
     return result
 
 
-def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, y: np.ndarray, *how: Any) -> Design:
+def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, found: Found, count: int) -> Design:
     """Return the layout that was found; if the robot itself is nearer to the requirements, that."""
-    result = _designed(chosen, variables, wanted, y, *how)
+    result = _designed(chosen, variables, wanted, found, count)
     if result.feasible:
         return result
     room = room_of(chosen, wanted)
@@ -120,35 +121,28 @@ def _best_of(chosen: Robot, variables: Variables, wanted: Requirements, y: np.nd
         fits = each.judgement is not None and each.judgement.keeps(room)
         return each.feasible, fits, min(each.margin, wanted.margin)
 
-    return max(result, _designed(chosen, variables, wanted, variables.of_robot(), *how), key=rank)
+    own = replace(found, y=variables.of_robot())
+    return max(result, _designed(chosen, variables, wanted, own, count), key=rank)
 
 
-def _designed(
-    before: Robot,
-    variables: Variables,
-    wanted: Requirements,
-    y: np.ndarray,
-    rows: Rows,
-    count: int,
-    starts: int,
-    stopped: bool,
-) -> Design:
-    """Judge the layout at the rows and at new random poses, and find the reasons."""
+def _designed(before: Robot, variables: Variables, wanted: Requirements, found: Found, count: int) -> Design:
+    """Judge a layout, whose search had `count` rows, at all rows and at new random poses, and find the reasons."""
+    y, rows, goal, room = found.y, found.rows, found.goal, room_of(before, wanted)
     robot = variables.robot_at(y)
     random = np.random.default_rng([wanted.seed, 1])
     audited = audited_rows(before, wanted, random)
     every = rows.joined(audited)
     margin = judged_margin(robot, before.length, every)
-    room, goal = room_of(before, wanted), goal_of(variables, wanted)
     placed = Evaluation(variables, rows.joined(few(audited, random, ROOM_AUDITED)), room)
     counts = room.frequency > 0.0 or goal.per_hertz > 0.0
     judgement = judge(robot, placed.rows, room, counts)
     feasible = margin >= wanted.margin and placed.missing(y) <= 0.0 and judgement.keeps(room)
-    plans = tuple(plan(robot, task) for task in wanted.tasks) if feasible and not stopped else ()
-    feasible &= len(plans) == len(wanted.tasks) and all(found.feasible for found in plans)
+    plans = tuple(plan(robot, task) for task in wanted.tasks) if feasible and not found.stopped else ()
+    feasible &= len(plans) == len(wanted.tasks) and all(each.feasible for each in plans)
     why = reasons(Evaluation(variables, rows, room), goal, y)
     return Design(
         robot, before, wanted, "feasible" if feasible else "not-found", margin,
         judged_margin(before, before.length, every), float(placed.distances(y).min(initial=np.inf)), judgement,
-        judge(before, placed.rows, room, counts), why, None, count, len(audited.pose_of), starts, stopped, plans,
+        judge(before, placed.rows, room, counts), why, None, count, len(audited.pose_of),
+        found.starts, found.stopped, plans,
     )  # fmt: skip
