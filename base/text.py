@@ -33,7 +33,8 @@ def quantity(value: Number, unit: str = "", digits: int = DIGITS) -> str:
     if value is None or math.isnan(value):
         return NO_VALUE
     if isinstance(value, int):
-        return f"{_whole(value)} {unit}".rstrip()
+        whole = f"{value:,}".replace(",", " ") if abs(value) >= GROUPED_FROM else str(value)
+        return f"{whole} {unit}".rstrip()
     scale, unit, digits = _scaled(abs(float(value)), unit, digits)
     return f"{_rounded(scale * float(value), digits)} {unit}".rstrip()
 
@@ -146,10 +147,6 @@ def _decimals(value: float, count: int) -> str:
     """Write a number with so many decimals; zero has no sign."""
     value = round(value, count) + 0.0
     return f"{value:,.{count}f}".replace(",", " ") if abs(value) >= GROUPED_FROM else f"{value:.{count}f}"
-
-
-def _whole(value: int) -> str:
-    return f"{value:,}".replace(",", " ") if abs(value) >= GROUPED_FROM else str(value)
 
 
 def in_columns(rows: Sequence[Sequence[str]], right: Collection[int]) -> list[str]:

@@ -16,6 +16,7 @@ import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
+from ..base.inputs import whole_number
 from ..control import ComputedTorque, Controller, OpenLoop, Predictive
 from ..models import Robot, load
 from ..simulation import simulate
@@ -194,8 +195,7 @@ def run(steps: int = 500, seeds: int = 3, tasks: Sequence[Task] = TASKS, progres
     is out of range.
     """
     for name, value, most in (("steps", steps, 1_000_000), ("seeds", seeds, 10_000)):
-        if not 1 <= value <= most:
-            raise InputError(f"{name} must be a whole number from 1 to {most}, got {value}")
+        whole_number(name, value, 1, most)
     rows, whole, errors = list[Row](), list[Step](), list[Error]()
     for number, task in enumerate(tasks):
 

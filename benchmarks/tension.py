@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import InputError
+from ..base.inputs import whole_number
 from ..base.writing import check_writable, whole_file
 from ..figures import style
 from .harness import alternating, machine, ratio, table
@@ -83,9 +84,8 @@ def run(
 
     Raises `InputError` if a number is out of range.
     """
-    for name, value in (("count", count), ("repeats", repeats)):
-        if not 1 <= value <= MOST:
-            raise InputError(f"{name} must be a whole number from 1 to {MOST}, got {value}")
+    whole_number("count", count, 1, MOST)
+    whole_number("repeats", repeats, 1, MOST)
     if not m or not all(1 <= cables <= 16 for cables in m):
         raise InputError(f"m must be numbers of cables from 1 to 16, got {list(m)}")
     if not limit > 0:

@@ -47,22 +47,20 @@ def convergence(iterates: Sequence[Iterate]) -> style.Figure:
 
 
 def _scale_objective(ax: style.Axes, values: np.ndarray) -> None:
-    """Use a logarithmic axis; if an objective is not positive, one that is linear near zero."""
+    """Use a logarithmic axis; if an objective is not positive, one that is linear near zero.
+
+    An axis of less than a decade has plain numbers as labels, because it may contain no power of ten.
+    """
+    from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
+
     sizes = np.abs(values[np.isfinite(values) & (values != 0)])
     if not sizes.size:
         return
     if (values[np.isfinite(values)] > 0).all():
         ax.set_yscale("log")
         if sizes.max() < 10 * sizes.min():
-            _plain_labels(ax)
+            ax.yaxis.set_major_locator(MaxNLocator(6))
+            ax.yaxis.set_minor_locator(NullLocator())
+            ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     else:
         ax.set_yscale("symlog", linthresh=float(sizes.min()))
-
-
-def _plain_labels(ax: style.Axes) -> None:
-    """Label a logarithmic axis of less than a decade by plain numbers, because it may contain no power of ten."""
-    from matplotlib.ticker import MaxNLocator, NullLocator, StrMethodFormatter
-
-    ax.yaxis.set_major_locator(MaxNLocator(6))
-    ax.yaxis.set_minor_locator(NullLocator())
-    ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))

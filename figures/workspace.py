@@ -78,7 +78,8 @@ def reached(result: xr.Dataset, anchors: np.ndarray | None = None) -> style.Figu
         canvas = style.figure()
         canvas.suptitle(title, fontsize=style.TEXT)
         along = thick[0] if thick else "x"
-        share = _share(result, tuple(name for name in ("x", "y", "z") if name != along))
+        tried, held = (result[name].sum([axis for axis in "xyz" if axis != along]) for name in ("tried", "reached"))
+        share = (held / tried.where(tried > 0)).where(held > 0, np.nan)  # white without an accepted sample
         style.axes(canvas, f"{along} [m]", "share accepted [-]").plot(result[along], share, color=style.colour(0))
         return canvas
     ends = np.array(np.meshgrid(*(outer_edges(result[name].values) for name in "xyz"))).reshape(3, -1).T
@@ -125,10 +126,3 @@ def outer_edges(centres: np.ndarray) -> tuple[float, float]:
     """Return the outer edges of equal cells, from their centres."""
     half = 0.5 * float(centres[1] - centres[0]) if len(centres) > 1 else 0.0
     return float(centres[0]) - half, float(centres[-1]) + half
-
-
-def _share(result: xr.Dataset, over: tuple[str, ...]) -> xr.DataArray:
-    """Return the accepted share, nan where nothing was tried."""
-    tried, reached = result["tried"].sum(over), result["reached"].sum(over)
-    # Lines without an accepted sample stay white.
-    return (reached / tried.where(tried > 0)).where(reached > 0, np.nan)

@@ -85,16 +85,9 @@ class Extremes:
         for name, each in (("tension_min", self._least.min(axis=1)), ("tension_max", self._most.max(axis=1))):
             result[name] = np.where(np.isinf(each), 0.0, each)
         # Of fewer periods than parts, some have none and keep the values before.
-        last = np.arange(PARTS) if len(self._references) >= PARTS else _filled(len(self._references))
-        over_time = self._over_time[:, last]
+        filled = np.unique(np.arange(len(self._references)) * PARTS // len(self._references))
+        over_time = self._over_time[:, filled[np.searchsorted(filled, np.arange(PARTS), side="right") - 1]]
         over_time[..., 0], over_time[..., 1] = np.sqrt(over_time[..., 0]), -over_time[..., 1]
         result["over_time"] = np.where(np.isinf(over_time), np.nan, over_time)
         result["exceeded"] = np.maximum(((self._most - self._t_max) / self._range).max(axis=1), 0.0)
         return result
-
-
-def _filled(periods: int) -> np.ndarray:
-    """Return, for each part of the time, the last part that has one of so few periods, (PARTS,)."""
-    own = np.zeros(PARTS, dtype=int)
-    own[np.arange(periods) * PARTS // periods] = np.arange(periods) * PARTS // periods
-    return np.maximum.accumulate(own)

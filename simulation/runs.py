@@ -20,7 +20,7 @@ from ..base.execution import Execution, start_workers
 from ..base.version import __version__
 from ..control import Controller
 from ..plant import Plant
-from .experiment import Experiment, Wind
+from .experiment import Experiment
 from .flights import copies, fly_block, passed
 from .run_statistics import FIGURES
 from .winds import MeanWind
@@ -147,7 +147,7 @@ def _header(plant: Plant, controller: Controller, conditions: Experiment, seeds:
     references = [part for reference in conditions.references for part in reference[:7] if part is not None]
     motion = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in references)).hexdigest()
     try:
-        by, wind = identity(controller), None if conditions.wind is None else _named(conditions.wind)
+        by, wind = identity(controller), None if conditions.wind is None else identity(conditions.wind)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise InputError(
             f"checkpoint must be None for a controller or a wind that cannot be stored: {str(error).splitlines()[0]}"
@@ -156,19 +156,13 @@ def _header(plant: Plant, controller: Controller, conditions: Experiment, seeds:
         "robot": f"{plant.robot.name} {identity(plant)}",
         "reference": f"{len(conditions.references)} periods {motion[:16]}",
         "controller": f"{type(controller).__name__} {by}",
-        "wind": wind,
+        "wind": f"{conditions.wind} {wind}" if isinstance(conditions.wind, MeanWind) else wind,  # readable if it can be
         "seeds": f"{seeds.start} to {seeds.stop - 1}",
         **conditions.to_dict(),
         "statistics": f"{FIGURES.itemsize} bytes a run",
         "towline": __version__,
         "numpy": np.__version__,
     }
-
-
-def _named(wind: Wind) -> str:
-    """Return an identification of a wind, readable unless it is a user's function."""
-    known = f"{wind} " if isinstance(wind, MeanWind) else ""
-    return known + identity(wind)
 
 
 class _Pickler(pickle.Pickler):

@@ -67,7 +67,8 @@ def step_files(robot: Robot, precision: str = "double") -> dict[str, str]:
     home = ", ".join(literal(value) for index in moving_carriers(robot) for value in robot.carrier_home[index])
     has_wind = robot.platform.aero is not None
     columns = _columns(moving, has_wind)
-    counts = list(accumulate([18, *([6 * len(moving)] if moving else []), *([3] if has_wind else []), 6]))
+    sizes = [18, 6 * len(moving), 3 * has_wind, 6]
+    counts = list(accumulate(size for size in sizes if size))
     values = {
         "name": _comment(robot.name),
         "source": _comment(f"Numbers of the robot: {robot.source}"),
