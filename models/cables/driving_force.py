@@ -23,7 +23,7 @@ from ...base.display import Displayed
 from ...base.errors import InputError
 from ...base.inputs import HUGE, TINY, number, one_of, whole_number
 from ..batch import as_array
-from ..dynamics import Dynamics
+from ..dynamics import dynamics_of
 from ..points import rotations
 from ..robot import Robot
 from .element_chain import MOST
@@ -130,7 +130,7 @@ def driving_force(
     if not (pretension >= 0).all():
         raise InputError(f"pretension must have numbers >= 0, got {pretension.min():g}")
 
-    dynamics = Dynamics(robot).relative
+    dynamics = dynamics_of(robot).relative
     w = dynamics.required_wrench(
         pose, velocity, acceleration, carrier_pose, carrier_velocity, carrier_acceleration, wind
     )
