@@ -190,6 +190,17 @@ def test_docstrings_and_messages():
     assert not hits, "\n".join(hits)
 
 
+def test_messages_that_troubleshooting_quotes_exist():
+    """Check each part between the values of a message; its first word may be the name of a field."""
+    texts = "\n".join(text for _, text in literals())
+    page = (ROOT / "docs" / "troubleshooting.md").read_text()
+    quoted = [part for line in re.findall(r"^`.+`", page, re.MULTILINE) for part in re.findall(r"`([^`]+)`", line)]
+    ours = [text for text in quoted if not text.startswith(("towline", "No module"))]  # of the shell, of Python
+    parts = [part.strip() for text in ours for part in re.split(r"…|; |'[^']*'", text) if " " in part.strip()]
+    assert len(parts) > 5
+    assert not [part for part in parts if part not in texts and part.partition(" ")[2] not in texts]
+
+
 def test_sections_of_docstrings_are_those_that_the_site_reads():
     hits = [place for place, text in literals() if re.search(r"^ *[A-Z][a-z]+\n *-{4,}$", text, re.MULTILINE)]
     assert not hits, f"use Args:, Returns:, Raises: and Attributes: in {', '.join(hits)}"
