@@ -35,9 +35,9 @@ def with_change(task, relaxed):
     field, _, side = name.removeprefix("limits.").partition(".")
     if not side:
         return task | {"limits": limits | {field: value}}
-    side, _, axis = side.partition(", ")
+    side, _, axis = side.rstrip("]").partition("[")
     bound = dict(limits[field])
-    bound[side] = [value if "xyz"[i] == axis else old for i, old in enumerate(bound[side])] if axis else value
+    bound[side] = [value if str(i) == axis else old for i, old in enumerate(bound[side])] if axis else value
     return task | {"limits": limits | {field: bound}}
 
 
@@ -48,7 +48,7 @@ def with_change(task, relaxed):
         ({"platform_acceleration": 0.5}, {"duration", "limits.platform_acceleration"}),
         ({"cable_speed": 0.2}, {"duration", "limits.cable_speed"}),
         ({"cable_length": {"min": 3.2, "max": 9.0}}, {"limits.cable_length.min"}),
-        ({"platform_box": {"min": [-1, -1, 0], "max": [1, 1, 1.1]}}, {"limits.platform_box.max, z"}),
+        ({"platform_box": {"min": [-1, -1, 0], "max": [1, 1, 1.1]}}, {"limits.platform_box.max[2]"}),
         ({"cable_clearance": 0.5}, {"limits.cable_clearance"}),
         ({"keep_out": [{**BALL, "platform": 1.0, "cables": None}]}, {"clearance of platform from post"}),
     ],
@@ -101,7 +101,7 @@ class Low(Limit):
     ("limits", "offered"),
     [
         ({"platform_speed": 0.2}, {"duration", "limits.platform_speed"}),
-        ({"platform_box": {"min": [-1, -1, 0], "max": [1, 1, 1.1]}}, {"limits.platform_box.max, z"}),
+        ({"platform_box": {"min": [-1, -1, 0], "max": [1, 1, 1.1]}}, {"limits.platform_box.max[2]"}),
         ({"keep_out": [{**BALL, "centre": [0.25, 0.15, 1.15], "platform": 0.2, "cables": None}]}, set()),
     ],
     ids=["speed", "end", "inside"],

@@ -270,7 +270,7 @@ def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond:
         else:
             axis = "xyz".index(excess.about[-1])
             bound[side] = tuple(value if i == axis else old for i, old in enumerate(bound[side]))
-            name = f"{name}, {'xyz'[axis]}"
+            name = f"{name}[{axis}]"
     elif isinstance(bound, float) and value != 0:
         limits[excess.limit] = value = abs(value)
     else:

@@ -108,7 +108,7 @@ def _lengths(robot: Robot, numbers: list[_Number]) -> _Suspect | None:
     centre, size = (points.min(axis=0) + points.max(axis=0)) / 2, float(np.linalg.norm(np.ptp(points, axis=0)))
     confined = all(robot.carriers[index].confined for index in robot.carrier_of_cable)
     lower = {each.key.removesuffix(".min"): each.of("m") for each in numbers if each.key.endswith(".min")}
-    keys, largest = [], 0.0
+    keys, largest, written = [], 0.0, 0.0
     for each in numbers:
         values = each.of("m")
         if not values.size or each.key.endswith(".min"):
@@ -122,9 +122,9 @@ def _lengths(robot: Robot, numbers: list[_Number]) -> _Suspect | None:
             away = np.maximum(np.maximum(low - centre, centre - values), 0.0)  # of the box
         if np.isfinite(far := float(away.max())) and far > (FAR if confined else FAR_ANYWHERE) * size:
             keys.append(each.key.removesuffix(".max"))
-            largest = max(largest, far)
+            largest, written = max(largest, far), max(written, float(np.abs(values).max()))
     named = "millimetres" if largest >= 1e3 * LEAST * size else "centimetres"
-    return _Suspect(keys, largest, named) if keys and largest <= SMALLER[named] * size else None
+    return _Suspect(keys, written, named) if keys and largest <= SMALLER[named] * size else None
 
 
 def _above(numbers: list[_Number], unit: str, named: str, most: Callable[[str], float]) -> _Suspect | None:
