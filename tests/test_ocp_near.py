@@ -55,12 +55,17 @@ def test_rows_of_far_places_are_left_out():
     assert whole.suffices(guess)
 
 
+@pytest.fixture(scope="module")
+def expected():
+    found = plan("ipanema-1", TASK)
+    assert found.feasible
+    return found
+
+
 @pytest.mark.parametrize("reach", [0.0, 0.05])
-def test_what_a_solution_exceeds_is_added(monkeypatch, reach):
-    expected = plan("ipanema-1", TASK)
+def test_what_a_solution_exceeds_is_added(monkeypatch, expected, reach):
     monkeypatch.setattr(search, "NEAR", reach)
     planned = plan("ipanema-1", TASK)
-    assert expected.feasible
     assert planned.feasible
     assert planned.objective == pytest.approx(expected.objective, rel=1e-3)
 
