@@ -1,6 +1,6 @@
 """`Region`: ranges of the positions, attitudes, carriers' positions or cable lengths to sample, as data."""
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -12,7 +12,8 @@ from ..models.part import Box, Name, Part, PositiveRange, Vector3, optional
 class AngleBox(Box):
     """A box of attitudes (roll, pitch, yaw) [rad]."""
 
-    sides, unit = ("for roll", "for pitch", "for yaw"), "rad"
+    sides: ClassVar[tuple[str, ...]] = ("for roll", "for pitch", "for yaw")
+    unit: ClassVar[str] = "rad"
 
     min: Vector3
     max: Vector3

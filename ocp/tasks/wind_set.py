@@ -25,7 +25,7 @@ itself, `WindDisc.possible`, have to prove it.
 """
 
 from itertools import product
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -50,7 +50,7 @@ _STEPS = 1.0 / 1.2207440846057596 ** np.arange(1, 4)
 class WindBox(Box):
     """All winds from min to max, constant or not: tensions exist in every one of them."""
 
-    unit = "m/s"
+    unit: ClassVar[str] = "m/s"
 
     min: Vector3 = Field(description="corner in {G} [m/s]")
     max: Vector3 = Field(description="corner in {G} [m/s]")
