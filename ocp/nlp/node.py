@@ -71,7 +71,10 @@ def node_of(
 
     axes = ("fx", "fy", "fz", "mx", "my", "mz")
     in_balance = [Row(f"balance {axes[row]}", 0.0, 0.0) for _ in balances for row in moving]
-    constraints: list[tuple[list[Any], list[Row]]] = [(balances, in_balance)]
+    # No row says 0 = 0, such as of moments about where all cables end: IPOPT refuses more equations than unknowns.
+    each_row = ca.vertsplit(ca.vertcat(*balances))
+    needed = [i for i, value in enumerate(each_row) if not value.is_zero()]
+    constraints: list[tuple[list[Any], list[Row]]] = [([each_row[i] for i in needed], [in_balance[i] for i in needed])]
     if robot.fixed_lengths is not None and not scenario.relative:
         lengths = dynamics.cable_lengths(platform[0], pose_rows[0])
         squares = (lengths / robot.fixed_lengths) ** 2  # no square root in the derivatives

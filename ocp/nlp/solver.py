@@ -31,6 +31,10 @@ PATIENCE = 10  # iterations without a better one
 # iteration of a team past obstacles takes less than half of the time that it takes with MUMPS's own choice. Without a
 # permutation that scales it would take another tenth less, but short motions of teams are then not found.
 TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
+# What IPOPT adds to constraints where MUMPS calls their Jacobian singular. The motion of a quadrotor with a slung load
+# follows from that of the load, and the nodes' accelerations alone are left, times the square of a step: much less than
+# IPOPT's default, 1e-8, which then makes each iteration miss its aim. A minimum time took 300 iterations, and takes 36.
+NEARLY_SINGULAR = {"jacobian_regularization_value": 1e-13}
 TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
 VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
@@ -115,7 +119,7 @@ class Solver:
     def _make(self, start: dict[str, Any]) -> ca.Function:
         scenario = self.program.scenario
         thrusts = any(scenario.robot.carriers[index].efforts for index, _ in scenario.carrier_free)
-        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations}
+        accuracy = {"tol": 1e-8, "constr_viol_tol": 1e-9, "max_iter": self._max_iterations} | NEARLY_SINGULAR
         accuracy |= TEAM if thrusts and scenario.count > MANY else {}
         # What its check of the inputs warns of, more equations than unknowns, is an answer here: no solution.
         options = {"print_time": False, "error_on_fail": False, "inputs_check": False, "calc_lam_p": False}
