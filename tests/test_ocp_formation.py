@@ -115,9 +115,10 @@ def test_a_time_limit_ends_a_search():
         took.append(time.process_time() - before)
         assert found.status == "not-found"
         assert found.message == "time limit"
-        assert "the time limit of" in found.report()
+        assert found.reason.startswith("the time limit of")
         assert found.audit.excess or found.audit.violation.max() > found.audit.tolerance  # of the best attempt
     assert took[1] < 1.0 + 2 * took[0]
+    assert found.reason in found.report()
 
 
 def test_quadrotors_go_through_a_slot_and_back():
