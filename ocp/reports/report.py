@@ -291,6 +291,8 @@ def _audit(plan: PlanData) -> list[Fact]:
     worst = quantity(audit.violation.max(), "N")
     if not worst.startswith("0 "):
         worst += f" at t = {audit.times[audit.worst]:.3f} s"
+    if plan.law is not None and not plan.law.exists:
+        worst += " of the motion shown"
     facts = [
         ("instants", f"{quantity(len(audit.times))}, one every {quantity(1e3 / audit.rate, 'ms')}"),
         ("largest wrench error", f"{worst} (tolerance {quantity(audit.tolerance, 'N', digits=2)})"),
