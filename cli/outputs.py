@@ -9,7 +9,7 @@ from .options import FPS, SPEED, print_result
 
 
 class Outputs(NamedTuple):
-    """What a command writes besides the file of its result, and how it prints the result."""
+    """The files that a command writes besides that of its result, and how it prints the result."""
 
     as_json: bool
     figures: Path | None = None  # folder
