@@ -13,6 +13,7 @@ from ..models.trajectory import moved_on
 from ..plant import Plant
 from ..plant.steps import winding_time
 from .as_floats import as_floats, is_time, measured_at, rows_of
+from .calm_integral import calm_integral
 from .command import HOLD, OFF, PLANNED, Command
 from .controller import Controller
 from .deviation import Deviation
@@ -20,9 +21,10 @@ from .open_loop import planned_command
 from .reference import Reference
 from .state import State
 
-SHARE = 0.05  # of the robot's length: the default of `most`
+SHARE, STRAIN = 0.05, 0.005  # of the robot's length, and of the longest cable: the default of `most`
 CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]
 NEVER = -1.0  # [s]: shorter than any step
+USUAL = 4.0, 10.0  # P and I [1/s] of a current pose
 
 
 class LengthControl(Controller):
@@ -47,9 +49,10 @@ class LengthControl(Controller):
             of the measured pose: 4 and 10 if it is current, 0.3 and 2 if it is at most 20 ms old, less beyond. It is
             also 0.3 and 2, or less, if cables do not stretch or are too stiff for the period of the steps. For a late
             pose without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the
-            platform on its cables grow.
-        most: Largest correction of a length [m]; default: 5 % of the robot's length. At this value the integral stops,
-            and the status is "hold".
+            platform on its cables grow. I is smaller if the platform on cables with the file's damping oscillates so
+            slowly that it would never come to rest (control/calm_integral.py).
+        most: Largest correction of a length [m]; default: 5 % of the robot's length, but at least 0.5 % of the longest
+            cable, which stretches about as much. At this value the integral stops, and the status is "hold".
 
     Attributes:
         stiffness: E A that it takes for each cable, (m,) [N]; infinity for one that does not stretch.
@@ -85,16 +88,21 @@ class LengthControl(Controller):
         self._damping = np.array([cable.damping or 0.0 for cable in self.robot.cables])
         if not (self.stiffness > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
+        lengths = np.linalg.norm(self.robot.home_anchors - self.robot.home_attachments, axis=1)
+        usual = max(SHARE * self.robot.length, STRAIN * float(lengths.max()))
         elastic = bool(np.isfinite(self.stiffness).all())
-        self._yields, self._settling = NEVER, np.inf
+        self._yields, self._settling, self._calm = NEVER, np.inf, 1.0
         if elastic:
-            lengths = np.linalg.norm(self.robot.home_anchors - self.robot.home_attachments, axis=1)
             self._yields = winding_time(Plant(self.robot, stiffness=self.stiffness)) / 2
             self._settling = float((self._damping * lengths / self.stiffness).min()) or np.inf  # unknown
         self._lag = number("lag", lag, 0.0, 1.0)
         self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
         self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
-        self._most = number("most", SHARE * self.robot.length if most is None else most, 0.0, 1e3)
+        if elastic and self._settling < np.inf:
+            proportional = USUAL[0] if self._proportional is None else self._proportional
+            calm = calm_integral(self.robot, self.stiffness, self._damping, proportional, USUAL[1])
+            self._calm = calm / USUAL[1]
+        self._most = number("most", usual if most is None else most, 0.0, 1e3)
         self._dynamics, self._deviation = dynamics_of(self.robot), Deviation(self.robot)
         self.reset()
 
@@ -172,7 +180,7 @@ class LengthControl(Controller):
         proportional, integral = _gains(age, yields := dt <= min(self._yields, self._settling))
         proportional = proportional if yields else min(proportional, self._settling / (2 * max(dt, 1e-9)))
         proportional = proportional if self._proportional is None else self._proportional
-        integral = integral if self._integral is None else self._integral
+        integral = self._calm * integral if self._integral is None else self._integral
         total = before + dt * error
         ahead = proportional * (error + self._lag * drift) + integral * (total + self._lag * error)
         with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
@@ -191,6 +199,6 @@ def _gains(age: float, yields: bool) -> tuple[float, float]:
     With lengths that follow h late, the damping is 2 d w (1 + P) - P w^2 h, positive for h up to C L0 / EA = 2 d / w.
     """
     if age <= CURRENT and yields:
-        return 4.0, 10.0
+        return USUAL
     share = min(1.0, LATE / max(age, CURRENT))
     return 0.3 * share, 2.0 * share

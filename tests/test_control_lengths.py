@@ -232,3 +232,19 @@ def test_cables_that_do_not_yield_are_corrected_by_less_than_the_error(name, sti
     run = simulate(robot, robot.home, LengthControl(robot), duration=1.0, period=period, events=events)
     assert run.error.max() < 0.02 * 9.81 * 0.2**2 / 2
     assert run.answered["as planned"] == len(run.error)
+
+
+def test_a_platform_that_turns_slowly_comes_to_rest():
+    """ipanema-1's attachments are 85 mm from its centre: it turns at 1 Hz, which an I of 10 doubles every second."""
+    robot = elastic("ipanema-1", 2e5)
+    push = {"kind": "push", "at": 0.1, "duration": 0.1, "force": [0, 0, 0], "moment": [1, 1, 1]}
+    run = simulate(robot, robot.home, LengthControl(robot), duration=1.6, events=[push])
+    turned = np.abs(run.record.motions[:, 0, 3:6] - robot.home[3:])
+    assert (turned[950:].max(axis=0) < 1.03 * turned[300:950].max(axis=0)).all()
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.2])
+def test_a_small_platform_on_long_cables_has_room_for_their_stretch(factor):
+    """5 % of ipanema-1's length are 4 mm, less than a wrong stiffness makes of 2.6 m under 700 N."""
+    controller = LengthControl(elastic("ipanema-1", 1e5))
+    assert controller._most > abs(1 - 1 / factor) * 2.6 * 700 / 1e5
