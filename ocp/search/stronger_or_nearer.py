@@ -31,6 +31,7 @@ from .largest_share import HALVINGS, RESERVES, Variation, largest_share
 from .longer_phases import longer_phases
 from .relaxations import LONGER, longer_durations, near_motion, other_duration, rounded, slower
 from .search import Search
+from .tilting import tilting_platform
 
 PLACES = 31  # of a path, at which a shifted one is compared
 SHIFT_STEP = 1.3  # of a shift to the next one that is tried
@@ -90,6 +91,7 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
         return found + ([] if blocked else _shifted_path(search, scenario, audit) or _nearer_end(search, scenario))
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
     for make in (
+        tilting_platform,
         _nearer_end,
         _smaller_circle,
         _other_yaws,

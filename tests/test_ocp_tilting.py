@@ -1,0 +1,60 @@
+"""A platform on four cables tilts as it moves: a path that keeps it level is infeasible, and the advice says so."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from towline.models import Robot
+from towline.ocp import plan
+
+ANCHORS = np.array([[-2.0, -2.0, 3.0], [2.0, -2.0, 3.0], [2.0, 2.0, 3.0], [-2.0, 2.0, 3.2]])
+ATTACHMENTS = np.array([[-0.2, -0.2, 0.1], [0.2, -0.2, 0.1], [0.2, 0.2, 0.1], [-0.2, 0.2, 0.1]])
+MASS = 10.0
+
+
+def suspended():
+    cables = [
+        {"carrier": "frame", "anchor": anchor, "attachment": attachment, "t_min": 5, "t_max": 400}
+        for anchor, attachment in zip(ANCHORS.tolist(), ATTACHMENTS.tolist(), strict=True)
+    ]
+    platform = {"mass": MASS, "inertia": [2e-4, 2e-4, 3e-4, 0, 0, 0], "home": [0, 0, 1, 0, 0, 0]}
+    frame = {"name": "frame", "kind": "ground"}
+    return Robot.model_validate(
+        {"name": "four", "source": "a test", "platform": platform, "carriers": [frame], "cables": cables}
+    )
+
+
+def unbalanced(pose, tensions):
+    """Return force and moment about the platform's origin, where its CoM is, that are not in balance at rest."""
+    arms = Rotation.from_euler("ZYX", pose[[5, 4, 3]]).apply(ATTACHMENTS)
+    lines = ANCHORS - pose[:3] - arms
+    forces = tensions[:, None] * lines / np.linalg.norm(lines, axis=1)[:, None]
+    return np.append(forces.sum(axis=0) - [0, 0, MASS * 9.81], np.cross(arms, forces).sum(axis=0))
+
+
+def test_the_tube_in_which_it_may_tilt_is_offered():
+    task = {"path": {"kind": "line", "start": [0.1, 0, 1], "end": [0.5, 0.2, 1.3]}, "duration": 3}
+    refused = plan(suspended(), task)
+    assert refused.certificate is not None
+    (offer,) = (each for each in refused.relaxations if each.name == "tube.attitude")
+    again = plan(suspended(), {**task, "tube": {"attitude": offer.possible}})
+    assert again.feasible, again.report()
+    audit = again.audit
+    assert 0.05 < np.abs(audit.motion.pose[:, 3:]).max() <= offer.possible + 1e-9
+    np.testing.assert_allclose(audit.motion.pose[[0, -1], :3], [[0.1, 0, 1], [0.5, 0.2, 1.3]], atol=1e-9)
+    for end in (0, -1):  # at rest, but for an angular acceleration
+        np.testing.assert_allclose(unbalanced(audit.motion.pose[end], audit.tensions[end]), 0, atol=0.02)
+    level = np.append(audit.motion.pose[-1, :3], np.zeros(3))
+    assert np.abs(unbalanced(level, audit.tensions[-1])).max() > 1.0
+
+
+def test_it_is_not_offered_where_enough_cables_hold_each_attitude():
+    refused = plan("point-mass-3", {"path": {"kind": "line", "start": [0, 0, 1], "end": [1.5, 0.5, 1]}, "duration": 5})
+    assert not refused.feasible
+    assert "tube.attitude" not in [each.name for each in refused.relaxations]
+
+
+def test_what_no_tilt_makes_feasible_is_not_offered():
+    """Outside the anchors no attitude balances the weight."""
+    task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [4, 0, 1]}, "duration": 5, "steps": 30}
+    refused = plan(suspended(), task)
+    assert "tube.attitude" not in [each.name for each in refused.relaxations]
