@@ -130,6 +130,7 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
             except Exception as error:  # it may fail at any place of three libraries
                 # HDF5 has its own message of several lines, where others have a few words.
                 reason = printable((str(getattr(error, "strerror", None) or error) or "empty").splitlines()[0])
+                reason = "not a NetCDF file" if "signature not found" in reason else reason
             gc.collect()
         finally:
             sys.unraisablehook = hook

@@ -60,7 +60,7 @@ CONTROLLERS: tuple[str, ...] = ("computed-torque", "predictive", "lengths", "ope
         stops), 'lose quad1 at 2' (the carrier's actuators stop), 'miss 0.05 at 1.2' (no command for 0.05 s), 'carry 2.5
         at 1' (the platform carries a load of 2.5 kg; 0: none), 'stop at 3' (the reference stops on its path), 'follow
         next.nc at 3' (another plan becomes the reference), 'push 20 0 0 at 1 for 0.5' (a force on the platform [N]), or
-        the YAML file of a list of events. Repeat the option for more.
+        a YAML file with the list `events`. Repeat the option for more.
     --duration: Simulated time [s]; default: the plan's. After the end of the plan the robot holds the final pose.
     --tolerance: Largest position error allowed for a pass [m]; default: 0.05 m, or 5 % of the mean cable length at home
         if that is less.

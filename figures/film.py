@@ -26,7 +26,7 @@ def frame_rate(path: Path, rate: float) -> float:
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError(f"file must end in {' or '.join(SUFFIXES)}, got {shown(path.name)}")
+        raise InputError(f"the film's file must end in {' or '.join(SUFFIXES)}, got {shown(path.name)}")
     fastest = 1 / (SHORTEST * TICK) if suffix == ".gif" else FASTEST
     rate = number("fps", rate, 0.1, fastest, also=f" for {suffix}")
     if suffix == ".gif":

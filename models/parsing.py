@@ -179,6 +179,12 @@ def _without_branches(details: list[Any]) -> list[Any]:
         "Input should ": "must ",
         "a valid tuple": "a list",
         "a valid dictionary": "a mapping",
+        "a valid string": "text",
+        "a valid integer": "a whole number",
+        "a valid boolean": "true or false",
+        ", got a number with a fractional part": "",
+        ", unable to parse string as an integer": "",
+        ", unable to interpret input": "",
     }
     for old, new in words.items():
         details = [detail | {"msg": detail["msg"].replace(old, new)} for detail in details]

@@ -23,12 +23,12 @@ class Conditions(Displayed):
             default: no aerodynamic forces.
         gusts: Intensity of Dryden turbulence, which is added to a constant wind [m/s].
         noise: Sensor noise, a `Noise` or a mapping (default: none).
-        events: Events, each a line, a mapping, the YAML file of a list, or an `Event` (times in [s], cables count from
-            1): "cut 3 at 2.5", a cable breaks; "stick 2 at 1", a winch stops; "lose quad1 at 2", the actuators of a
-            carrier stop; "miss 0.05 at 1.2", the controller does not respond; "carry 2.5 at 1", the platform carries a
-            load [kg]; "stop at 3", the reference stops on its path as `control.stop` does; "follow next.nc at 3",
-            another plan becomes the reference; "push 20 0 0 at 1 for 0.5", a force on the platform in {G} [N]; a `Wall`
-            that the platform meets.
+        events: Events, each a line, a mapping, a YAML file with the list `events`, or an `Event` (times in [s], cables
+            count from 1): "cut 3 at 2.5", a cable breaks; "stick 2 at 1", a winch stops; "lose quad1 at 2", the
+            actuators of a carrier stop; "miss 0.05 at 1.2", the controller does not respond; "carry 2.5 at 1", the
+            platform carries a load [kg]; "stop at 3", the reference stops on its path as `control.stop` does; "follow
+            next.nc at 3", another plan becomes the reference; "push 20 0 0 at 1 for 0.5", a force on the platform in
+            {G} [N]; a `Wall` that the platform meets.
         disturbance: Constant force [N] and moment about the CoM [N m] on the platform in {G}, (6,); default: none.
         duration: Simulated time [s] (default: until every reference has ended). If it is longer, the robot holds the
             final pose.

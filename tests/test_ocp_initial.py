@@ -99,7 +99,7 @@ def test_a_start_outside_the_tube_is_proven_impossible():
     [
         (
             {"initial": {"pose": [0, 0, 1, 0, 0, 0.5]}, "tube": {"position": 0.1}},
-            "initial must have the yaw of the platform",
+            "initial: yaw of the platform must be",
         ),
         (
             {"initial": {"pose": [0, 0, 1, 0, 0, 0], "carrier_pose": [[0] * 6] * 2}},

@@ -179,7 +179,7 @@ def test_a_state_of_a_controller_is_an_initial_state():
     np.testing.assert_allclose(poses, [pose, *carriers], atol=1e-9)
     np.testing.assert_allclose(velocities[0], 0.05, atol=1e-5)
     far = State(pose, np.zeros(6), carriers + 0.02, 0 * carriers)
-    with pytest.raises(InputError, match=r"initial must have the x of the .* that the task prescribes, .*within 0.01"):
+    with pytest.raises(InputError, match=r"initial: x of the .* must be within 0.01 of .*, which the task prescribes"):
         plan(GROUND, task, initial=far)
 
 
@@ -220,7 +220,7 @@ def test_what_does_not_fit_is_one_line(change, message):
     ("change", "message"),
     [
         ({"final": {"acceleration": 0}}, "final.acceleration must be left out without final.pose or final.velocity"),
-        ({"final": {"pose": [1, 0, 1, 0, 0, 0]}}, "final must have the x of the platform"),
+        ({"final": {"pose": [1, 0, 1, 0, 0, 0]}}, "final: x of the platform must be"),
         ({"final": {"carrier_pose": [[0] * 6] * 2}}, "final.carrier_pose must have a row"),
     ],
 )

@@ -227,7 +227,7 @@ def test_fewer_processors_inside_of_a_block():
         ({"workers": 0}, "workers must be"),
         ({"keep": "some"}, "keep must be one of accepted, all, none, got 'some'"),
         ({"resume": True}, "checkpoint must be a path if resume is True"),
-        ({"size": 0.1}, "size must be None unless method is adaptive, got 0.1"),
+        ({"size": 0.1}, "size must be left out unless method is adaptive, got 0.1"),
         ({"method": "adaptive", "size": -1.0}, "size must be a number from 1e-09 to 1e+09 [m], or None, got -1.0"),
         ({"method": "adaptive", "size": "fine"}, "size must be a number"),
         ({"method": "adaptive", "samples": 4}, "samples must be at least 8, the corners of a cell, got 4"),

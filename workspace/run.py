@@ -115,7 +115,7 @@ def sample(
     if metrics and keep == "none":
         raise InputError("keep must be accepted or all with metrics, got 'none'")
     if size is not None and method != "adaptive":
-        raise InputError(f"size must be None unless method is adaptive, got {shown(size)}")
+        raise InputError(f"size must be left out unless method is adaptive, got {shown(size)}")
     domain = Domain.of(robot, region)
     refinement = Refinement(domain, samples, size) if method == "adaptive" else None
     sampler = None if refinement else Sampler(method, samples, seed, tuple(domain.extent.tolist()))

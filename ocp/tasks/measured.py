@@ -92,7 +92,7 @@ def _agree(measured: np.ndarray, given: np.ndarray, name: str, coordinate: int) 
     ):
         if abs(far) > limit:
             raise InputError(
-                f"initial must have the {what}{COORDINATES[coordinate]} of the {name} that the task prescribes, "
-                f"{where:g} within {limit:g}, got {value:g}"
+                f"initial: {what}{COORDINATES[coordinate]} of the {name} must be within {limit:g} of {where:g}, which "
+                f"the task prescribes, got {value:g}"
             )
     measured[:] = given

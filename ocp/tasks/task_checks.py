@@ -295,6 +295,6 @@ def _check_state(scenario: Scenario, where: str, end: int, key: str, state: Init
                     if owner is None and not scenario.robot.dof_mask[i]:
                         hint = f"{coordinate} is not one of the platform's degrees of freedom"
                     raise InputError(
-                        f"{where}: {key} must have the {what}{coordinate} of the {name} that the task prescribes at "
-                        f"its {'end' if end else 'start'}, {value[i] - off:g}, got {value[i]:g}; {hint}"
+                        f"{where}: {key}: {what}{coordinate} of the {name} must be {value[i] - off:g}, as the task "
+                        f"prescribes at its {'end' if end else 'start'}, got {value[i]:g}; {hint}"
                     )
