@@ -68,6 +68,28 @@ def test_the_mass_by_load_cells_of_which_some_measure_nothing(fault, tmp_path):
     assert sigma < 0.06
 
 
+@pytest.mark.parametrize("decided", [True, False])
+def test_the_mass_by_load_cells_with_zeros(decided, tmp_path):
+    """Zeros of up to 9 N, where tensions are 70 N: a motion shows them, and a platform at one place does not."""
+    robot = user.robot_file(
+        tmp_path / "r.yaml", ANCHORS, ATTACHMENTS, [0, 0, 1.1, 0, 0, 0], 5.0, extra="  dof: [x, z, pitch]\n"
+    )
+    rows, tensions = recording()
+    zeros = np.array([8.0, -6.0, 9.0, -7.0])
+    log = read_log(saved(tmp_path, rows, tensions + zeros), robot=robot).measurements
+    log = log if decided else log.only(slice(100, 110))
+    found = calibrate(robot, log, free="mass")
+    assert found.free == ("mass", "zeros")
+    of = {one.name: one for one in found.parameters}
+    assert abs(of["mass"].value - 6.0) < 4 * of["mass"].sigma
+    if decided:
+        assert of["mass"].sigma < 0.15
+        assert all(abs(of[f"cables[{i}].zero"].value - zero) < 1.0 for i, zero in enumerate(zeros))
+        assert "mass, zeros from" in str(found.report())
+    else:
+        assert of["mass"].sigma > 0.3  # two zeros of 7 N, almost vertically
+
+
 def test_sound_sensors_are_not_saturated():
     """Sensors with coarse steps, a platform that waits at its largest tension, and cables without any tension."""
     rows, tensions = recording(400)

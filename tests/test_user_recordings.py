@@ -43,6 +43,15 @@ def test_four_cables_with_a_motion_capture_of_another_clock(tmp_path):
     assert "PASSED" in said
 
 
+def test_a_missing_reading_beside_the_file_of_a_motion_capture(tmp_path):
+    user.four_cables(tmp_path)
+    header, *rows = (tmp_path / "winches.csv").read_text().splitlines()
+    rows[100] = rows[100].split(";")[0] + ";1800;;1900;2000"
+    (tmp_path / "winches.csv").write_text("\n".join([header, *rows]) + "\n")
+    files = {"poses": tmp_path / "mocap.csv", "robot": user.hanging_robot(tmp_path)}
+    assert read_log(tmp_path / "winches.csv", **files).clock.offset == pytest.approx(0.041, abs=0.01)
+
+
 def test_locked_winches_have_no_clock(tmp_path):
     user.locked(tmp_path)
     robot = user.hanging_robot(tmp_path)

@@ -136,22 +136,29 @@ class Balance:
         return poses if poses.ndim == 2 else np.ascontiguousarray(poses[self._chosen])
 
     @property
+    def at_rest(self) -> bool:
+        """Return whether the platform is taken to be at rest in all samples."""
+        return not self._log.motion.sigma.any()
+
+    @property
     def equations(self) -> np.ndarray:
         """Return the number of equations of each sample beside those that tensions without measurement take, (N,)."""
         return np.maximum(len(self._rows) - self._log.lost[self._chosen].sum(axis=1), 0)
 
     def tensions(self, table: np.ndarray, smooth: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return the tensions that the platform feels [N], and their derivatives by capstan, friction, gain, (N, m, 3).
+        """Return the tensions that the platform feels [N], (N, m), with derivatives.
 
-        `table` is that of `Parameters`, (m, 14).
+        The derivatives are by capstan, friction, gain and zero, (N, m, 4). `table` is that of `Parameters`, (m, 15).
         """
-        terms = self._log.terms[int(smooth)][:, self._chosen]
-        gain = table[:, 13]
+        moving, signs, y = self._log.terms[int(smooth)][:, self._chosen]
+        gain, zero = table[:, 13], table[:, 14]
+        moving, y = moving - zero * signs, y - zero
         capstan = np.clip(table[:, 11], -MOST_CAPSTAN, MOST_CAPSTAN)  # a step of the fit may be far too long
         even, odd = np.cosh(capstan), np.sinh(capstan)  # of exp(capstan s), whose s is -1 or 1
-        by_gain = even * terms[2] + odd * terms[0]
-        by = np.stack([gain * (odd * terms[2] + even * terms[0]), terms[1], by_gain], axis=2)
-        return gain * by_gain + table[:, 12] * terms[1], by
+        by_gain = even * y + odd * moving
+        by_zero = -gain * (even + odd * signs)
+        by = np.stack([gain * (odd * y + even * moving), signs, by_gain, by_zero], axis=2)
+        return gain * by_gain + table[:, 12] * signs, by
 
     def _forces(
         self, of: Parameters, x: np.ndarray, placed: tuple[np.ndarray, np.ndarray], clock: float, noise: float
@@ -229,7 +236,7 @@ class Balance:
         for i in range(m):
             own = i * (of.clock // m)
             raw[..., own : own + 6], raw[..., own + 8] = S[:, i, :, :6], S[:, i, :, 6]
-            raw[..., own + 11 : own + 14] = felt[:, :, i]
+            raw[..., own + 11 : own + 15] = felt[:, :, i]
         raw[..., of.clock + 1] = np.concatenate([pull, np.cross(arm, pull)], axis=1)
         by_com = mass * np.concatenate([by_arm, cross(arm) @ by_arm - cross(pull)], axis=1)
         raw[..., of.clock + 2 : of.clock + 5] = by_com @ rotation

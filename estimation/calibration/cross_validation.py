@@ -43,8 +43,8 @@ FEWEST = 40  # samples in all; of fewer, every other sample is left out
 CHANCE = 3.0  # times the logarithm of the number of residuals, by which a parameter of forces must reduce their squares
 WORSE = 1.02  # of the smallest error left out that a smaller set of parameters may have
 CLEANED = {"anchors", "offsets", "clock"}  # found while wrong readings are looked for
-FORCES = ("mass", "com", "capstan", "friction")  # of which auto selects
-ALWAYS = ("clock", "mass", "com", "capstan", "friction", "gains")  # groups that the sets of a comparison share
+FORCES = ("mass", "com", "capstan", "friction", "zeros")  # of which auto selects
+ALWAYS = ("clock", "mass", "com", "capstan", "friction", "gains", "zeros")  # groups that the sets of a comparison share
 CERTAIN = 3.0  # standard deviations that a clock offset must differ from 0
 NESTED: tuple[tuple[str, ...], ...] = (
     (),

@@ -90,7 +90,7 @@ class Residuals(NamedTuple):
 class Derivatives(NamedTuple):
     """Derivatives of the residuals of readings, and balance and directions, where measured, with their own."""
 
-    cables: np.ndarray  # derivatives by the parameters of the cable itself, (m, N, 14)
+    cables: np.ndarray  # derivatives by the parameters of the cable itself, (m, N, 15)
     others: np.ndarray  # derivatives by the parameters of the robot and slips, (m, N, 5 + slips)
     # derivatives by shift and rotation of the sample itself, and errors of its tensions, (m, N, 6 + d)
     poses: np.ndarray

@@ -132,7 +132,7 @@ def _generators(parameters: Parameters, state: State) -> Iterator[tuple[str, np.
     yield "the overall scale: no length is known for certain", size
     force = np.zeros(parameters.count)
     force[parameters.clock + 1] = state.x[parameters.clock + 1]
-    parameters.table(force)[:, 10:] = of_tensions * [-1.0, 0.0, 1.0, 1.0]
+    parameters.table(force)[:, 10:] = of_tensions * [-1.0, 0.0, 1.0, 1.0, 0.0]
     yield "mass and gains together: no force is known for certain", force
     for i in range(len(anchors)):
         for axis, unit in zip(AXES, np.eye(3), strict=True):

@@ -55,7 +55,7 @@ class Slip(NamedTuple):
 class _Projected(NamedTuple):
     """Residuals and their redundancies, (m, N), with derivatives by what varies, in metres.
 
-    - `own`: by the cable's own parameters, (m, N, k), those at `columns` (k,) of its 14.
+    - `own`: by the cable's own parameters, (m, N, k), those at `columns` (k,) of its 15.
     - `others`: by the robot's parameters and slips that vary, (m, N, d).
     - `root`: L^-1 G of each reading, (m, N, 6), if poses vary.
     """

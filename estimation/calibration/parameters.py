@@ -1,12 +1,12 @@
 """Parameters of a calibration: their names, and conversion from and to a robot.
 
-The vector x has fourteen numbers for each cable, in this order, then five of the robot, then one for each slip:
+The vector x has fifteen numbers for each cable, in this order, then five of the robot, then one for each slip:
 
-    anchor x y z  attachment x y z  offset  scale  radius  build-up  compliance  capstan  friction  gain
+    anchor x y z  attachment x y z  offset  scale  radius  build-up  compliance  capstan  friction  gain  zero
     clock  mass  com x y z
 
 With the measured tension y of a cable and the sign s of its speed (1: paid out), the platform feels the tension
-exp(capstan s) gain y + friction s, and compliance is 1 / (E A).
+exp(capstan s) gain (y - zero) + friction s, and compliance is 1 / (E A).
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,19 +22,26 @@ from ...base.inputs import number, shown
 from ...models import points
 from ...models.robot import Robot
 
-OF_CABLE = 14  # parameters of a cable
+OF_CABLE = 15  # parameters of a cable
 OF_ROBOT = 5  # clock offset, mass and CoM
 GEOMETRY = ("anchors", "attachments", "offsets", "scales", "radii", "build-up", "clock")
-IN_BALANCE = ("mass", "com", "capstan", "friction", "gains")  # groups that only the balance of forces determines
+IN_BALANCE = (
+    "mass",
+    "com",
+    "capstan",
+    "friction",
+    "gains",
+    "zeros",
+)  # groups that only the balance of forces determines
 GROUPS = (*GEOMETRY, "stiffness", *IN_BALANCE)
 COLUMNS = {"anchors": (0, 1, 2), "attachments": (3, 4, 5), "offsets": (6,), "scales": (7,), "radii": (8,)}
-COLUMNS |= {"build-up": (9,), "stiffness": (10,), "capstan": (11,), "friction": (12,), "gains": (13,)}
+COLUMNS |= {"build-up": (9,), "stiffness": (10,), "capstan": (11,), "friction": (12,), "gains": (13,), "zeros": (14,)}
 ROBOT_COLUMNS = {"clock": (0,), "mass": (1,), "com": (2, 3, 4)}
 WORDS = (
     *(f"{end}.{axis}" for end in ("anchor", "attachment") for axis in "xyz"),
-    *("offset", "scale", "pulley.radius", "build-up", "compliance", "capstan", "friction", "gain"),
+    *("offset", "scale", "pulley.radius", "build-up", "compliance", "capstan", "friction", "gain", "zero"),
 )
-UNITS = (*("m",) * 7, "1", "m", "1/m", "1/N", "1", "N", "1")
+UNITS = (*("m",) * 7, "1", "m", "1/m", "1/N", "1", "N", "1", "N")
 STIFFEST = 1e-12  # [1/N]; less compliance is none
 IN_PLANE = 1e-9  # [m] out of it
 LARGEST_PRIOR = 1e3
@@ -103,7 +110,7 @@ class Parameters(Displayed):
         return points.rotations(pose[:, 3:]), pose[:, :3]
 
     def table(self, x: np.ndarray) -> np.ndarray:
-        """Return the parameters of the cables, a row for each, (m, 14)."""
+        """Return the parameters of the cables, a row for each, (m, 15)."""
         return x[: self.clock].reshape(self.robot.m, OF_CABLE)
 
     def calibrated(self, x: np.ndarray, covariance: np.ndarray | None = None) -> Robot:

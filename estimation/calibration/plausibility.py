@@ -25,8 +25,9 @@ from ...models.files import as_robot
 from ...models.robot import Robot
 from ..logs.measurements import Measurements, changed, check_measurements, measured_poses, tracked
 from .attitudes import misread_attitudes
+from .differences import FEWEST, LogPart, medians
 from .frames import Frames, displaced_frames, fitted_frames
-from .geometry import length_of, runs
+from .geometry import length_of
 from .interpretations import FACTORS, Interpretation, interpretations
 from .parameters import Parameters
 
@@ -36,13 +37,11 @@ BY_CHANCE = 3.0  # standard deviations by which the squares of noise may exceed 
 LONG_TAIL = 4.0  # median sizes; differences beyond are wrong readings
 EXPLAINED = 0.1  # of the change of the readings, which differences are below if lengths and poses belong together
 MOST_SAMPLES = 400
-HOPELESS, STRIDE = 2.0, 5  # a convention is rejected if every fifth sample shows differences so many times larger
-FEWEST = 12, 24  # samples of which anchors, and attachments, are taken into account
+HOPELESS = 2.0  # a convention is rejected if the roughness is so many times larger
 LARGEST = 10.0  # times the cables' mean length, of a change of readings
 MANY_CABLES = 6  # of fewer cables, frames explain what wrong anchors do
 DISPLACED = 3.0  # times smaller differences, by a frame near the file's
 FAR = 3.0  # times the noise, of differences that are not explained yet
-PLAUSIBLE = 0.03  # of a cable's length, by which its ends may be displaced
 OTHER_FACTOR, SAME_FACTOR = 0.1, 0.01  # from 1, and from those of units
 
 
@@ -68,32 +67,6 @@ class Mistake(NamedTuple):
         """Return the error and how to correct it, in one line, None if it only means another frame."""
         hint = "; `towline calibrate --fix` corrects it" if self.corrected else ""
         return f"the log probably has an input error: {self.text}{hint}" if self.severe else None
-
-
-class _Log(NamedTuple):
-    """Samples with measured poses: the parameters' table, positions, rotations, angles as logged, and readings.
-
-    `carriers` are the poses of moving ones, (N, c, 6), which are read in the same way, or None.
-    """
-
-    robot: Robot
-    table: np.ndarray
-    position: np.ndarray
-    rotation: np.ndarray
-    angles: np.ndarray
-    y: np.ndarray
-    sigma: float
-    carriers: np.ndarray | None = None
-
-    def at(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        """Return positions, rotations and poses of carriers as another way means them."""
-        turned = self.rotation if way.turned is None else way.turned(self.rotation, self.angles)
-        carriers = None if self.carriers is None else self.carriers.copy()
-        for one in () if carriers is None else np.swapaxes(carriers, 0, 1):
-            one[:, :3] = way.placed(one[:, :3])
-            if way.turned is not None:
-                one[:, 3:] = points.angles(way.turned(points.rotations(one[:, 3:]), one[:, 3:]))
-        return way.placed(self.position), turned, carriers
 
 
 class _Way(NamedTuple):
@@ -130,23 +103,23 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     angles = points.angles(rotation) if given.poses is None else np.where(known[:, 3:], given.poses[:, 3:], 0.0)
     sigma = given.sigma.lengths
     seen = None if carriers is None else carriers[rows]
-    log = _Log(robot, table, position[rows], rotation[rows], angles[rows], readings[rows], sigma, seen)
-    order = np.arange(robot.m)
-    lengths, y = _parts(log, Interpretation(""))
-    e = (lengths - y[order, order])[:, : len(rows)]
+    log = LogPart(robot, table, position[rows], rotation[rows], angles[rows], readings[rows], sigma, seen)
+    log, e = log.sound()
+    order, e = np.arange(robot.m), e[:, : len(log.y)]
     noise = sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / e.size))
-    if max(map(_root_mean_square, e)) <= sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / len(rows))):
+    if max(map(_root_mean_square, e)) <= sigma * np.sqrt(1 + BY_CHANCE * np.sqrt(2 / len(log.y))):
         return _displaced(log, given, noise) if framed else None
     ways, as_given = _explanations(log, e, noise)
     best = min((way for way in ways if way.text), key=lambda way: way[:2])
     change = float(np.median(np.abs(log.y - np.median(log.y, axis=0))))
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
-    if far and framed and len(rows) >= FEWEST[1]:
+    if far and framed and len(log.y) >= FEWEST[1]:
         frames = fitted_frames(robot, table, log.position, log.rotation, log.y)
         moved = frames.of(position, rotation)
-        lengths, y = _parts(log._replace(position=moved[0][rows], rotation=moved[1][rows]), Interpretation(""))
-        size = _rms(_medians(lengths - y[order, order], len(rows)))
+        placed = frames.of(log.position, log.rotation)
+        there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
+        size = _rms(medians(left, len(there.y)))
         if VERY_CLEARLY * size < min(as_given, best.size) and size < EXPLAINED * change:
             return Mistake(_in_frame(frames._replace(size=size), as_given), _corrected(given, *moved, None, order, 1.0))
     if named:
@@ -184,7 +157,7 @@ def _corrected(
     return changed(given, lengths=lengths, poses=poses, tensions=tensions, carrier_poses=carriers)
 
 
-def _displaced(log: _Log, given: Measurements, noise: float) -> Mistake | None:
+def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | None:
     """Return a frame near the file's in which the poses agree much better with the readings up to offsets, or None."""
     if log.robot.m < MANY_CABLES or len(log.y) < FEWEST[1] or log.robot.dof_mask.sum() < 6:
         return None
@@ -198,7 +171,7 @@ def _displaced(log: _Log, given: Measurements, noise: float) -> Mistake | None:
     return Mistake(_in_frame(frames, before), corrected, severe=False)
 
 
-def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], float]:
+def _explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[_Way], float]:
     """Return explanations of differences e (m, N), and the size of these as they are."""
     from scipy.optimize import linear_sum_assignment
 
@@ -206,13 +179,13 @@ def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], f
     ways: list[_Way] = []
     turns: list[tuple[np.ndarray, _Way]] = []
     tried = interpretations(bool(np.ptp(log.angles, axis=0).any()))
-    base, rough = _parts(log, tried[0]), HOPELESS * _roughness(log, tried[0])
+    base, rough = log.parts(tried[0]), HOPELESS * log.roughness(tried[0])
     for way in tried:
-        if way.turned and _roughness(log, way) > rough:
+        if way.turned and log.roughness(way) > rough:
             continue
-        lengths, y = _parts(log, way) if way.placed is not tried[0].placed or way.turned else base
+        lengths, y = log.parts(way) if way.placed is not tried[0].placed or way.turned else base
         both = np.stack([lengths[:, None] - sign * way.factor * y for sign in (1, -1)]) / way.factor
-        apart = _medians(both, len(log.y))  # (2, m, m): of both signs, of cable i and column j
+        apart = medians(both, len(log.y))  # (2, m, m): of both signs, of cable i and column j
         plain, best = np.diag(apart[0]), apart.min(axis=0)
         columns = linear_sum_assignment(best**2)[1] if np.isfinite(best).all() else order
         signs = np.where(apart[1, order, columns] < apart[0, order, columns], -1.0, 1.0)
@@ -244,7 +217,7 @@ def _explanations(log: _Log, e: np.ndarray, noise: float) -> tuple[list[_Way], f
 def _multiples(lengths: np.ndarray, y: np.ndarray, count: int) -> list[_Way]:
     """Return the explanation that readings count something whose size is another one for each cable, or nothing.
 
-    - `lengths`, `y`: as `_parts` returns them for `count` samples.
+    - `lengths`, `y`: as `LogPart.parts` returns them for `count` samples.
     """
     from scipy.optimize import linear_sum_assignment
 
@@ -253,7 +226,7 @@ def _multiples(lengths: np.ndarray, y: np.ndarray, count: int) -> list[_Way]:
     sizes = np.abs(fitted)
     for usual, near in ((1.0, OTHER_FACTOR), *((factor, SAME_FACTOR) for factor in FACTORS)):
         sizes = np.where(np.abs(sizes / usual - 1) < near, usual, sizes)
-    apart = _medians(lengths[:, None] - (np.sign(fitted) * sizes)[..., None] * y, count)
+    apart = medians(lengths[:, None] - (np.sign(fitted) * sizes)[..., None] * y, count)
     if not np.isfinite(apart).all():
         return []
     columns = linear_sum_assignment(apart**2)[1]
@@ -317,45 +290,6 @@ def _too_large(robot: Robot, given: Measurements, readings: np.ndarray) -> Mista
     position, rotation, _ = measured_poses(robot, given)
     corrected = _corrected(given, position, rotation, given.carrier_poses, np.arange(robot.m), 1e-3)
     return Mistake(text, corrected, factors=1e-3)
-
-
-def _parts(log: _Log, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
-    """Return what an offset and displaced ends of cable i explain neither of its lengths nor of the reading of cable j.
-
-    (m, N + c) and (m, m, N + c) [m]; displaced anchors and attachments are taken into account with enough samples, and
-    the last c columns are what they cost.
-    """
-    run = runs(log.robot, log.table, *log.at(way))
-    explained = [np.ones((*run.lengths.shape, 1))]
-    if len(log.y) >= FEWEST[0]:
-        explained.append(run.by_geometry[..., :3])
-    if len(log.y) >= FEWEST[1]:
-        explained.append(run.by_geometry[..., 3:6])
-    D = np.concatenate(explained, axis=2)  # (m, N, c)
-    count, c = D.shape[1:]
-    # A displacement by PLAUSIBLE costs as much as differences of the stated size.
-    length = float(np.nanmedian(run.lengths))
-    prior = np.sqrt(count) * log.sigma / (PLAUSIBLE * length) * np.eye(c)[1:]
-    Q = np.linalg.qr(np.concatenate([D, np.tile(prior, (len(D), 1, 1))], axis=1))[0]
-    both = np.concatenate([run.lengths[:, None], np.tile(log.y.T, (len(D), 1, 1))], axis=1)  # (m, 1 + m, N)
-    both = np.concatenate([both, np.zeros((*both.shape[:2], c - 1))], axis=2)
-    left = both - np.matmul(np.matmul(both, Q), np.swapaxes(Q, 1, 2))
-    left[..., :count] *= np.sqrt(count / (count - c))
-    left[..., count:] /= np.sqrt(count)
-    return left[:, 0], left[:, 1:]
-
-
-def _roughness(log: _Log, way: Interpretation) -> float:
-    """Return the median difference between lengths and readings of a few samples that offsets do not explain [m]."""
-    few = log._replace(**{name: getattr(log, name)[::STRIDE] for name in ("position", "rotation", "angles", "y")})
-    few = few if log.carriers is None else few._replace(carriers=log.carriers[::STRIDE])
-    apart = runs(few.robot, few.table, *few.at(way)).lengths - way.factor * few.y.T
-    return float(np.median(np.abs(apart - np.median(apart, axis=1, keepdims=True))))
-
-
-def _medians(left: np.ndarray, count: int) -> np.ndarray:
-    """Return sizes of what is left (..., N + c): the medians over N samples, and the penalties for displacements."""
-    return np.hypot(np.median(np.abs(left[..., :count]), axis=-1), np.linalg.norm(left[..., count:], axis=-1))
 
 
 def _rms(sizes: np.ndarray) -> float:

@@ -10,6 +10,7 @@ from .cross_validation import select
 from .parameters import GROUPS, check_free, check_prior
 from .plausibility import mistake
 from .solving import check_enough, solve, usual
+from .zeros import has_zeros, with_zeros
 
 
 def calibrate(
@@ -31,10 +32,10 @@ def calibrate(
         free: Parameters to estimate, any of anchors, attachments, offsets (of the lengths), scales (of the lengths),
             radii (of the pulleys), build-up (of cable on the drums), clock (time by which the clock of the poses is
             ahead of the clock of the lengths), com (CoM of the platform), and with tensions mass, stiffness, capstan
-            (friction as the logarithm of a ratio of tensions), friction (as a force) and gains (newtons per unit of the
-            tensions, if these are motor currents). Default: anchors and offsets, and the clock if times and poses of a
-            motion were measured. Or "auto": the smallest set whose cross-validation error is close to the
-            smallest one; this set may be empty.
+            (friction as the logarithm of a ratio of tensions), friction (as a force), gains (newtons per unit of the
+            tensions, if these are motor currents) and zeros (of load cells; also estimated if the log shows some).
+            Default: anchors and offsets, and the clock if times and poses of a motion were measured. Or "auto": the
+            smallest set whose cross-validation error is close to the smallest one; this set may be empty.
         prior: Standard deviations of the file's values, in the units of the parameters, by the names of `free`, such as
             {"anchors": 0.02}. Default: no prior; unobservable directions change as little as possible.
         outliers: True to detect outliers, which are left out, and slipped winches, whose cable gets a new offset after
@@ -59,4 +60,7 @@ def calibrate(
     if groups:
         check_enough(chosen, given, groups, priors)
     solved = solve(chosen, given, groups, priors, outliers)
+    if has_zeros(solved):
+        groups, priors = with_zeros(given, groups, priors)
+        solved = solve(chosen, given, groups, priors, outliers)
     return Calibration(solved, groups, priors, found)

@@ -91,6 +91,9 @@ def _aligned(
     if len(rows) < 4 or lengths.times is None or position.times is None:
         raise InputError("poses with positions must be measured to align the clocks, got none")
     rows = rows[:: max(1, len(rows) // MOST_ALIGNED)]
+    complete = np.isfinite(lengths.values).all(axis=1)
+    if complete.sum() < 4:
+        raise InputError(f"lengths must have four complete samples or more to align the clocks, got {complete.sum()}")
     if lengths.values.shape[1] != robot.m:
         raise InputError(f"lengths must have a column for each of the {robot.m} cables, got {lengths.values.shape[1]}")
     poses = np.tile(robot.home, (len(rows), 1))
@@ -111,7 +114,7 @@ def _aligned(
     effects = np.hstack(effects)
     effects = effects[:, np.ptp(effects, axis=0) > 1e-6]
     along = np.asarray(Dynamics(robot).cable_lengths(poses, carriers))
-    return align(lengths.times, lengths.values, position.times[rows], along, effects)
+    return align(lengths.times[complete], lengths.values[complete], position.times[rows], along, effects)
 
 
 class Seen(NamedTuple):

@@ -24,12 +24,13 @@ UNITS = {
 }
 _BEFORE = r"(?:.*[./_ ])?"
 _AFTER = r"(?:[./_ ](?:length|len|position|pos|data|value))*"
-_NUMBER = r"[_ ]?[\[(]?(\d+)[\])]?"
+_NUMBER = r"[./_ ]?[\[(]?(\d+)[\])]?"
 _OF = r"(?:(?:cable|rope|wire|winch|tether|tendon)[_ ]?)?"
-_BODY = r"(?:payload|load|platform|plat|end[_ ]?effector|ee|tcp|mp|mocap|vicon|optitrack|body|rb|object|pose"
-_BODY += r"|state(?:_?estimate)?)"
+_BODY = r"(?:payload|load|platform|plat|end[_ ]?effector|ee|tcp|mp|mocap|vicon|optitrack"
+_BODY += r"|(?:rigid[_ ]?)?body[_ ]?\d*|rb\d*|object|pose|state(?:_?estimate)?)"
 _DIRECTION = r"(?:dir(?:ection)?s?|(?:unit[_ ]?)?vec(?:tor)?s?)"
 _CABLE = r"(?:cable|rope|wire|tether|winch|c)s?[_ ./]?\[?(?:cable )?(\d+)\]?"
+_WINCH = r"(?:cable|rope|wire|tether|winch(?:e?s)?|motor|axis|drive|joint|actuator|[cm])s?[./_ ]?(\d+)[./_ ]"
 _SENSOR = r"(?:load[_ ]?cell|cable|rope|wire|winch|tension|force[_ ]?sensor|ft)"
 _NO_LENGTH = re.compile(r"tension|force|effort|speed|veloc|vel_|accel|current|torque|thrust|temp|status|error")
 _SENSED = r"(?:[./_ ](?:data|value|estimated?|est|measured?|total))*"
@@ -40,6 +41,7 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:l|rho|len|lengths?|cables?|ropes?|wires?|tethers?|tendons?|winch(?:es)?|drums?|encoders?|enc)"
         rf"{_NUMBER}{_AFTER}",
         rf"{_BEFORE}{_OF}lengths?[./_ ](?:data|values?|position)[\[.](\d+)\]?",
+        rf"{_BEFORE}{_WINCH}(?:[a-z]+[./_ ])?(?:cable|rope|wire)?[_ ]?(?:len|lengths?)(?:[./_ ](?:data|value))*",
         r"field\.position(\d+)",  # of a JointState that `rostopic echo -p` wrote
         r".*/position\[[^\]]*?(\d+)(?:[_ ][^\]0-9]+)?\]",  # also of winch_1_joint
         r".*/joints\[[^\]]*?(\d+)\]\.position",
@@ -47,7 +49,7 @@ PATTERNS = {
     "tensions": (
         rf"{_BEFORE}{_OF}(?:tensions?|forces?|load[_ ]?cells?|f|t){_NUMBER}(?:[./_ ](?:data|value))*",
         rf"{_BEFORE}{_OF}(?:tensions?|forces?)[./_ ](?:data|values?|effort)\[(\d+)\]",
-        r".*(?:cable|rope|wire|winch)[_ ]?(\d+)[./_ ](?:tension|force)(?:[./_ ](?:data|value))*",
+        rf".*{_WINCH}(?:[a-z]+[./_ ])?(?:tension|force)(?:[./_ ](?:data|value))*",
         rf"{_BEFORE}(?:tensions?|forces?)[./_ ](?:cable|rope|wire|winch)[_ ]?(\d+)",
         rf".*{_SENSOR}[_ ]?(\d+)[./_ ](?:.*[./_ ])?force[./_ ]z",  # of a WrenchStamped
     ),
@@ -76,8 +78,8 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
     "time": (
-        rf"[%_]*(t|(?:ros|sim|log|recv|rec)?[_ ]?times?|time_?us|{_BEFORE}time[_ ]?stamp|{_BEFORE}stamp|secs?|seconds)",
-        r"(elapsed(?:[_ ]time)?)",
+        rf"[%_]*(t|(?:ros|sim|log|recv|rec|unix)?[_ ]?times?|time_?us|{_BEFORE}(?:time[_ ]?)?stamp|secs?|seconds)",
+        r"(epoch|elapsed(?:[_ ]time)?)",
         rf"{_BEFORE}((?:milli|micro|nano)s(?:ec(?:ond)?s?)?)",  # since an Arduino was switched on
     ),
 }

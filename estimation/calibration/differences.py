@@ -1,0 +1,102 @@
+"""`LogPart`: samples of a log, and the differences between cable lengths and readings that offsets do not explain.
+
+The ends of cables may be displaced from the file's: what this explains is no difference, but it costs something.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...models import points
+from ...models.robot import Robot
+from .geometry import runs
+from .interpretations import Interpretation
+
+FEWEST = 12, 24  # samples of which anchors, and attachments, are taken into account
+PLAUSIBLE = 0.03  # of a cable's length, by which its ends may be displaced
+STRIDE = 5  # of samples of which the roughness is a median
+WRONG, MOST_WRONG = 6.0, 0.2  # median sizes, beyond which samples are left out, and how many may be
+MOST_ROUNDS = 4  # of leaving out samples
+AS_GIVEN = Interpretation("")
+
+
+class LogPart(NamedTuple):
+    """Samples with measured poses: the parameters' table, positions, rotations, angles as logged, and readings.
+
+    `carriers` are the poses of moving ones, (N, c, 6), which are read in the same way, or None.
+    """
+
+    robot: Robot
+    table: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray
+    angles: np.ndarray
+    y: np.ndarray
+    sigma: float
+    carriers: np.ndarray | None = None
+
+    def without(self, samples: np.ndarray) -> LogPart:
+        """Return the log without some samples (N,) of bool."""
+        parts = {name: getattr(self, name)[~samples] for name in ("position", "rotation", "angles", "y")}
+        return self._replace(**parts, carriers=None if self.carriers is None else self.carriers[~samples])
+
+    def at(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+        """Return positions, rotations and poses of carriers as another way means them."""
+        turned = self.rotation if way.turned is None else way.turned(self.rotation, self.angles)
+        carriers = None if self.carriers is None else self.carriers.copy()
+        for one in () if carriers is None else np.swapaxes(carriers, 0, 1):
+            one[:, :3] = way.placed(one[:, :3])
+            if way.turned is not None:
+                one[:, 3:] = points.angles(way.turned(points.rotations(one[:, 3:]), one[:, 3:]))
+        return way.placed(self.position), turned, carriers
+
+    def parts(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray]:
+        """Return the parts of lengths (m, N + c) and readings (m, m, N + c) that cables do not explain [m].
+
+        Cable i explains part of its own lengths and of the reading of each cable j, by an offset and, with enough
+        samples, by displaced anchors and attachments. The last c columns are what these cost.
+        """
+        run = runs(self.robot, self.table, *self.at(way))
+        explained = [np.ones((*run.lengths.shape, 1))]
+        if len(self.y) >= FEWEST[0]:
+            explained.append(run.by_geometry[..., :3])
+        if len(self.y) >= FEWEST[1]:
+            explained.append(run.by_geometry[..., 3:6])
+        D = np.concatenate(explained, axis=2)  # (m, N, c)
+        count, c = D.shape[1:]
+        # A displacement by PLAUSIBLE costs as much as differences of the stated size.
+        length = float(np.nanmedian(run.lengths))
+        prior = np.sqrt(count) * self.sigma / (PLAUSIBLE * length) * np.eye(c)[1:]
+        Q = np.linalg.qr(np.concatenate([D, np.tile(prior, (len(D), 1, 1))], axis=1))[0]
+        both = np.concatenate([run.lengths[:, None], np.tile(self.y.T, (len(D), 1, 1))], axis=1)  # (m, 1 + m, N)
+        both = np.concatenate([both, np.zeros((*both.shape[:2], c - 1))], axis=2)
+        left = both - np.matmul(np.matmul(both, Q), np.swapaxes(Q, 1, 2))
+        left[..., :count] *= np.sqrt(count / (count - c))
+        left[..., count:] /= np.sqrt(count)
+        return left[:, 0], left[:, 1:]
+
+    def sound(self, rounds: int = MOST_ROUNDS) -> tuple[LogPart, np.ndarray]:
+        """Return the log and its differences as given, (m, N + c), without samples in which these are far too large.
+
+        Cables may be slack at first, and displaced ends of cables would make up for this.
+        """
+        lengths, y = self.parts(AS_GIVEN)
+        order = np.arange(len(lengths))
+        left = lengths - y[order, order]
+        e = np.abs(left[:, : len(self.y)])
+        wrong = np.asarray((e > WRONG * np.median(e, axis=1, keepdims=True)).any(axis=0))
+        done = rounds == 0 or not wrong.any() or wrong.mean() > MOST_WRONG
+        return (self, left) if done else self.without(wrong).sound(rounds - 1)
+
+    def roughness(self, way: Interpretation) -> float:
+        """Return the median difference of lengths and readings that offsets do not explain, by a few samples [m]."""
+        few = self.without(np.arange(len(self.y)) % STRIDE > 0)
+        apart = runs(few.robot, few.table, *few.at(way)).lengths - way.factor * few.y.T
+        return float(np.median(np.abs(apart - np.median(apart, axis=1, keepdims=True))))
+
+
+def medians(left: np.ndarray, count: int) -> np.ndarray:
+    """Return sizes of what is left (..., N + c): the medians over N samples, and the penalties for displacements."""
+    return np.hypot(np.median(np.abs(left[..., :count]), axis=-1), np.linalg.norm(left[..., count:], axis=-1))

@@ -1,0 +1,61 @@
+"""`has_zeros`: whether load cells have constant errors (zeros) that the other parameters depend on.
+
+One step of the fit with zeros as further parameters shows how large they are, and whether the log decides them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..logs.load_cells import unreadable
+from ..logs.measurements import Measurements
+from ..pose.estimate import largest_cost
+from .fit import held
+from .geometry import length_of
+from .normal_equations import NormalEquations, metric
+from .parameters import COLUMNS
+from .solving import Solved, inflation_of, noise_of
+
+USUAL = 0.1  # of the mean tension, standard deviation of zeros
+CERTAIN = 1e-6  # probability that errors of the tensions look like zeros
+SMALLEST = 0.01  # of the mean tension, of zeros that are estimated
+DECIDED = 0.3  # of their prior's standard deviation, below which a log decides zeros
+
+
+def with_zeros(
+    measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]
+) -> tuple[tuple[str, ...], dict[str, float]]:
+    """Return parameters and standard deviations about the file's values with the zeros of load cells."""
+    assert measurements.tensions is not None
+    return (*groups, "zeros"), prior | {"zeros": USUAL * float(np.abs(measurements.tensions).mean())}
+
+
+def has_zeros(solved: Solved) -> bool:
+    """Return whether a fit of tensions should estimate the zeros of their load cells.
+
+    It should if the log shows zeros. If the log does not decide them at measured poses, it should too, because standard
+    deviations then include them. It should not if accelerations are unknown, because these may look like zeros, or if
+    carriers have thrusts, because their tensions follow from these.
+    """
+    of, state = solved.model, solved.fit.state
+    measured, groups, forces = of.measurements, of.parameters.groups, of.balanced
+    if forces is None or measured.tensions is None or not groups or "zeros" in groups:
+        return False
+    unknown, flies = of.size_is_open, any(carrier.actuators for carrier in of.robot.carriers)
+    if flies or (unknown and not forces.at_rest):
+        return False
+    groups, prior = with_zeros(measured, groups, of.prior)
+    model = replace(of, parameters=replace(of.parameters, groups=groups), prior=prior)
+    scale, varies = metric(model), model.parameters.varies
+    equations = NormalEquations.at(model, state, scale)
+    covariance = np.linalg.inv(held(equations.S, length_of(model.robot)))
+    columns = np.zeros(len(varies), dtype=bool)
+    model.parameters.table(columns)[:, COLUMNS["zeros"]] = True
+    own = columns[varies]
+    zeros, spread = (-covariance @ equations.b)[own], covariance[np.ix_(own, own)]
+    squares = float(zeros @ np.linalg.solve(spread, zeros)) / inflation_of(noise_of(solved))
+    size = np.sqrt(((zeros / scale[columns]) ** 2).mean()) / float(np.abs(measured.tensions).mean())
+    if squares > largest_cost(len(zeros), CERTAIN) and size > SMALLEST:
+        return True
+    open_ = np.sqrt(np.diag(spread)) / scale[columns] > DECIDED * prior["zeros"]
+    return not unknown and bool((open_ & ~unreadable(measured.tensions, measured.lengths).all(axis=0)).any())
