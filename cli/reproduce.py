@@ -51,6 +51,7 @@ def _show(account: Account) -> None:
         for claim in chapter.claims:
             typer.echo(f"    {claim.verdict.value:<15} {claim.id}")
             if claim.verdict is not Verdict.REPRODUCED:
-                typer.echo(f"      {claim.place}: {claim.why} {numbers_text(claim)}".rstrip())
+                typer.echo(f"      {claim.place}: {claim.statement}")
+                typer.echo(f"      {claim.why} {numbers_text(claim)}".rstrip())
     for title, why in account.broken.items():
         typer.echo(f"  {title}: not computed: {why}")
