@@ -1,5 +1,6 @@
 """`towline calibrate`: geometric calibration from a log of cable lengths."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +97,9 @@ def calibrate(
 
 def _sigma(text: str) -> Any:
     if "=" in text:
-        return by_name("--sigma", text)
+        from ..estimation.logs import Sigma
+
+        return by_name("--sigma", text, Sigma._fields)
     try:
         return float(text)
     except ValueError:
@@ -106,8 +109,8 @@ def _sigma(text: str) -> Any:
         ) from None
 
 
-def by_name(option: str, text: str) -> dict[str, float]:
-    """Read "anchors=0.02,offsets=0.05" as a mapping.
+def by_name(option: str, text: str, known: Collection[str] = ()) -> dict[str, float]:
+    """Read "anchors=0.02,offsets=0.05" as a mapping; its names must be `known` if any are.
 
     Raises `InputError` if the text is anything else.
     """
@@ -121,4 +124,6 @@ def by_name(option: str, text: str) -> dict[str, float]:
         except ValueError:
             accepted = "NAME=NUMBER, separated by commas, each name once"
             raise InputError(f"{option} must be {accepted}, got {text!r}") from None
+    if known and (others := [name for name in result if name not in known]):
+        raise InputError(f"{option} must name some of {', '.join(known)}, got {others[0]!r}")
     return result

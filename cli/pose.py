@@ -97,7 +97,7 @@ def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out
     import numpy as np
 
     from ..base.text import quantity
-    from ..estimation.logs import read_log
+    from ..estimation.logs import Sigma, read_log
     from ..estimation.pose.from_lengths import SIGMA
     from ..estimation.pose.from_log import poses_from_log
     from ..figures import calibration, style
@@ -105,7 +105,7 @@ def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out
     check_ending("--out", out, ".csv")
     picture = outputs.picture("consistency")
     check_outputs({"--out": out, "--figures": picture}, {f"the log {log}": log for log in logs})
-    stated = by_name("--sigma", sigma) if "=" in sigma else {}
+    stated = by_name("--sigma", sigma, Sigma._fields) if "=" in sigma else {}
     sigma = str(stated.get("lengths", SIGMA)) if stated else sigma
     deviations = numbers("--sigma", sigma, robot.m if len(sigma.replace(",", " ").split()) > 1 else 1)
     read = read_log(logs, stated or None, None, robot, fields)

@@ -9,8 +9,9 @@ import pytest
 
 from towline import load
 from towline.base.errors import InputError
+from towline.cli.calibrate import by_name
 from towline.estimation.calibration import Measurements, read_measurements
-from towline.estimation.logs import opening, tables
+from towline.estimation.logs import Sigma, opening, tables
 from towline.models import points
 from towline.ocp.tasks.paths.point_file import read_points
 
@@ -308,3 +309,9 @@ def test_empty_fields_and_quotes_are_read_as_before(tmp_path):
     log = read_measurements(tmp_path / "log.csv")
     np.testing.assert_array_equal(log.lengths, [[1.0], [2.0]])
     np.testing.assert_array_equal(log.poses[:, :3], [[np.nan] * 3, [1.0, 2.0, 3.0]])
+
+
+def test_an_unknown_name_in_an_option_is_refused_with_the_option_and_not_with_the_log():
+    assert by_name("--sigma", "lengths=0.001, clocks=0.1", Sigma._fields) == {"lengths": 0.001, "clocks": 0.1}
+    with pytest.raises(InputError, match=r"^--sigma must name some of lengths, .*, got 'lenghts'$"):
+        by_name("--sigma", "lengths=1,lenghts=1", Sigma._fields)
