@@ -8,6 +8,7 @@ import numpy as np
 
 from .errors import InputError
 from .inputs import printable, shown
+from .text import counted
 
 LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "km": 1e3, "in": 0.0254}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180}
@@ -114,7 +115,7 @@ def _numbers(rows: Rows, mark: str, titles: list[str], used: list[int], gaps: bo
     for row, (number, line) in enumerate(rows):
         cells = _split(line, mark)
         if len(cells) != len(titles):
-            values = f"{len(titles)} value{'s' * (len(titles) != 1)}"
+            values = counted(len(titles), "value")
             raise InputError(f"line {number} must have {values} like the header, got {len(cells)}")
         table[row] = [_value(cells[k], gaps) for k in used]
         wrong = np.flatnonzero(np.isinf(table[row]))

@@ -68,6 +68,17 @@ def quantity_range(values: Iterable[Number], unit: str = "", digits: int = DIGIT
     return f"{text} {unit}" if unit else text
 
 
+def counted(count: int, noun: str) -> str:
+    """Write how many things there are: "1 cable", "3 cables"."""
+    return f"{count} {noun}{'s' * int(count != 1)}"
+
+
+def numbered(noun: str, indices: Iterable[int]) -> str:
+    """Write which things are meant, by their numbers from 1: "cable 3", "cables 1, 2"."""
+    numbers = [str(index + 1) for index in indices]
+    return f"{noun}{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
+
+
 def any_of(names: Iterable[str]) -> str:
     """Write of which things one is meant: "cables[1]", "one of cables[1], cables[2]"; empty for none."""
     listed = list(names)

@@ -15,7 +15,7 @@ import typer
 from typer.core import TyperCommand
 
 from ..base.errors import InputError
-from ..base.text import in_columns
+from ..base.text import counted, in_columns
 
 if TYPE_CHECKING:
     import numpy as np
@@ -196,9 +196,7 @@ def numbers(option: str, text: str, count: int, rows: int | None = None) -> np.n
 
     from ..base.inputs import shown
 
-    accepted = f"{count} finite number{'s' if count > 1 else ''}" + (
-        f" for each of {rows} carriers, separated by ';'" if rows else ""
-    )
+    accepted = counted(count, "finite number") + (f" for each of {rows} carriers, separated by ';'" if rows else "")
     parts = text.split(";") if rows else [text]
     try:
         values = [[float(word) for word in part.replace(",", " ").split()] for part in parts]

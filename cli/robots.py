@@ -120,7 +120,7 @@ def _to_dict(robot: Robot, diagnosis: Diagnosis, at_home: TensionSolution, box: 
 
 
 def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution, box: RestingBox | None) -> None:
-    from ..base.text import quantity, quantity_range, quantity_row
+    from ..base.text import counted, quantity, quantity_range, quantity_row
 
     of = f"of {len(robot.platform.dof)}"
     highest = f"{result['rank_level']} with the platform level, {result['rank_tilted']} tilted"
@@ -128,10 +128,10 @@ def _show(robot: Robot, result: dict[str, Any], at_home: TensionSolution, box: R
     rank = f"rank {result['rank']} {of} at home{reason}"
     if result["rank"] < len(robot.platform.dof):
         rank += f"; highest rank near home: {highest}"
-    cables = f"{result['cables']} cable{'s' * (result['cables'] != 1)}"
     drive = "winches" if robot.drive == "both" and not any(carrier.moves for carrier in robot.carriers) else robot.drive
+    carriers = f"{_count(result['carriers'])} carrier{'s' * (len(robot.carriers) != 1)}"
     lines = [
-        f"{result['name']}: {cables}, {_count(result['carriers'])} carrier{'s' * (len(robot.carriers) != 1)}",
+        f"{result['name']}: {counted(robot.m, 'cable')}, {carriers}",
         f"  mass {quantity(result['mass'], 'kg')}, weight {quantity(result['weight'], 'N')}, "
         f"characteristic length {quantity(result['length'], 'm')}",
         f"  home ({quantity_row(result['home'])}) [m, rad], cable lengths there "

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..base.display import Displayed, Fact
-from ..base.text import quantity, quantity_range, quantity_row
+from ..base.text import numbered, quantity, quantity_range, quantity_row
 from ..figures.drawing import Drawing
 from ..figures.drawn import Drawn
 from ..figures.report import Part, Report, Reported, Section, Table
@@ -192,8 +192,8 @@ class Design(Drawn, Reported, Displayed):
             ("short by", text.short_by),
         ]
         if certificate.at_max.size:
-            cables = ", ".join(str(cable + 1) for cable in certificate.at_max)
-            idea = ("stronger cables", f"a higher t_max of cables {cables}, a smaller wrench, or larger boxes")
+            cables = numbered("cable", certificate.at_max)
+            idea = ("stronger cables", f"a higher t_max of {cables}, a smaller wrench, or larger boxes")
         else:
             idea = ("another pose", "or boxes of anchors farther along the direction; stronger cables do not help")
         return [Section("Why it is infeasible", facts), Section("What you can try", [idea])]
@@ -244,7 +244,7 @@ class Design(Drawn, Reported, Displayed):
 
     def _binding_row(self, one: Binding) -> list[str]:
         limits = [
-            f"{name} of cable{'s' * (len(cables) > 1)} {', '.join(str(i + 1) for i in cables)}"
+            f"{name} of {numbered('cable', cables)}"
             for name, cables in (("t_max", one.at_max), ("t_min", one.at_min))
             if cables
         ]

@@ -19,6 +19,7 @@ from ruamel.yaml.scanner import Scanner, ScannerError
 from ..base.errors import InputError
 from ..base.inputs import LONGEST_TEXT, MOST_ROWS, check_ending, file_path, printable, shown
 from ..base.reading import read_bytes
+from ..base.text import counted
 from ..base.writing import whole_file
 
 ENDINGS = (".yaml", ".yml")
@@ -111,7 +112,7 @@ def one_line(error: ValidationError, where: str, model: type[BaseModel]) -> str:
     details.sort(key=lambda detail: detail["type"] != "extra_forbidden")
     # A list whose items are wrong is counted by pydantic once more as too short.
     others = [other for other in details[1:] if other["type"] != "too_short"]
-    more = f"; {len(others)} more error{'s' * (len(others) > 1)}" if others else ""
+    more = f"; {counted(len(others), 'more error')}" if others else ""
     line = printable(_sentence(details[0], model))
     return (f"{where}: {line}" if where else line) + more
 
@@ -135,8 +136,8 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
     if kind == "union_tag_not_found":
         return f"{field}.kind is missing: one of {', '.join(tags)}"
     if kind == "too_short":
-        least = context["min_length"]
-        return f"{field} must have at least {least} item{'s' * (least != 1)}, got {context['actual_length']}"
+        least = counted(context["min_length"], "item")
+        return f"{field} must have at least {least}, got {context['actual_length']}"
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         kinds = f", one of {', '.join(tags)}" if tags else ""
         message = f"must be a mapping with {_keys(node)}{kinds}, got {shown(value)}"

@@ -20,7 +20,7 @@ from pydantic import Field, model_validator
 from ..base.display import BLUE, ORANGE, Curve, Fact, picture
 from ..base.errors import InputError
 from ..base.inputs import number, printable, required, shown, whole_number
-from ..base.text import quantity, quantity_range, quantity_row
+from ..base.text import counted, quantity, quantity_range, quantity_row
 from . import parameters, points
 from .cable import Cable
 from .carriers import AnyCarrier, Carrier, Drive
@@ -181,7 +181,7 @@ class Robot(Part):
     def _headline(self) -> str:
         kinds = [carrier.kind for carrier in self.carriers]
         carriers = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
-        return f"{self.name}: {self.m} cable{'s' * (self.m != 1)}, {carriers} carrier{'s' * (len(kinds) != 1)}"
+        return f"{self.name}: {counted(self.m, 'cable')}, {carriers} carrier{'s' * (len(kinds) != 1)}"
 
     def _facts(self) -> Iterable[Fact]:
         return [

@@ -14,7 +14,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.inputs import check_ending, file_path
 from ..base.netcdf import Contents, Variable, save_netcdf
-from ..base.text import quantity
+from ..base.text import counted, quantity
 from ..control import ANSWERS, Controller
 from ..figures.report import Report, Section
 from ..models.motion_file import over
@@ -174,7 +174,7 @@ def report(dataset: xr.Dataset) -> Report:
         "tolerance": quantity(1e3 * float(dataset.attrs["tolerance_m"]), "mm"),
         "tensions": f"{quantity(float(dataset['tension_min'].values.min()), 'N')} to "
         f"{quantity(float(dataset['tension_max'].values.max()), 'N')}",
-        "slack": f"in {_runs(int((slack > 0).sum()))}, up to {quantity(float(slack.max()), 's')}"
+        "slack": f"in {counted((slack > 0).sum(), 'run')}, up to {quantity(float(slack.max()), 's')}"
         if slack.any()
         else "none",
         "controller status": ", ".join(
@@ -182,15 +182,11 @@ def report(dataset: xr.Dataset) -> Report:
         ),
     }
     return Report(
-        about=f"{name}, {_runs(short['runs'])} of {longest}",
+        about=f"{name}, {counted(short['runs'], 'run')} of {longest}",
         status="passed" if short["passed"] == short["runs"] else "failed",
         summary=f"{short['passed']} passed",
         parts=[Section("", list(rows.items()))],
     )
-
-
-def _runs(count: int) -> str:
-    return f"{count} run{'s' * (count != 1)}"
 
 
 def save(dataset: xr.Dataset, file: str | os.PathLike[str]) -> Path:

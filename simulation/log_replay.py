@@ -17,7 +17,7 @@ from ..base.display import Displayed, Fact
 from ..base.errors import InputError
 from ..base.inputs import check_ending, file_path, flag, number, one_of
 from ..base.netcdf import Contents, Variable, save_netcdf
-from ..base.text import quantity
+from ..base.text import counted, quantity
 from ..estimation.logs.reading import Paths
 from ..estimation.logs.recorded import read_recorded
 from ..figures.drawn import Drawn
@@ -236,8 +236,7 @@ class Replay(Drawn, Reported, Displayed):
             kind = "thrusts" if windows.commanded else "motion of the carriers"
         facts = {
             "commands": kind,
-            "windows": f"{len(windows.starts)} of {quantity(windows.window, 's')}, "
-            f"{outliers} outlier{'s' * (outliers != 1)}",
+            "windows": f"{len(windows.starts)} of {quantity(windows.window, 's')}, {counted(outliers, 'outlier')}",
             "error": f"95 % within {_of('position', self.error)} (tolerance {_of('position', self.tolerance)})",
         }
         if self.fitted is not None and self.validation is not None:

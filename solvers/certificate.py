@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.display import Displayed, Fact
 from ..base.inputs import finite_array, required
-from ..base.text import quantity, quantity_row
+from ..base.text import numbered, quantity, quantity_row
 from ..base.tolerances import CANCELLED, NEGLIGIBLE, ORTHOGONAL, RANK, ROUNDED_PULL
 from .box_least_squares import Projection, project
 from .exact_arithmetic import exact_optimum
@@ -134,7 +134,7 @@ class Certificate(Displayed):
         """
         pull_only = " (the cables can pull only the other way)" if self.support < 0.0 and not self.singular else ""
         limits = [
-            f"{name} of cable{'s' if indices.size > 1 else ''} {', '.join(str(int(i) + 1) for i in indices)}"
+            f"{name} of {numbered('cable', indices)}"
             for name, indices in (("t_min", self.at_min), ("t_max", self.at_max))
             if indices.size
         ]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from towline.base.text import at_most, column, quantity, quantity_range, quantity_row, unbroken
+from towline.base.text import at_most, column, counted, numbered, quantity, quantity_range, quantity_row, unbroken
 
 WRITTEN = [
     (10337.2, "10 340"),
@@ -102,6 +102,13 @@ def test_a_column_has_equally_many_decimals():
     assert column([1.0, 20.125, -1e-9]) == ["1.00", "20.12", "0.00"]
     assert column([12345.6, 1.0, None, math.inf]) == ["12 346", "1", "-", "inf"]
     assert column([0.0, 0.0]) == ["0", "0"]
+
+
+def test_one_thing_has_no_plural():
+    assert [counted(count, "cable") for count in (0, 1, 2)] == ["0 cables", "1 cable", "2 cables"]
+    assert counted(np.int64(1), "more error") == "1 more error"
+    assert numbered("cable", np.array([2])) == "cable 3"
+    assert numbered("cable", (0, 4)) == "cables 1, 5"
 
 
 def test_errors_below_their_resolution_have_no_digits():

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ...base.display import Fact
-from ...base.text import quantity
+from ...base.text import counted, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
@@ -165,8 +165,7 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
         f"left out: cables[{one.cable}] at sample {one.sample}, off by {_mm(one.error)}" for one in wrong[:MOST_LISTED]
     ]
     if len(wrong) > MOST_LISTED:
-        more = len(wrong) - MOST_LISTED
-        lines.append(f"and {more} more reading{'s' * (more > 1)} left out")
+        lines.append(f"and {counted(len(wrong) - MOST_LISTED, 'more reading')} left out")
     return lines
 
 
@@ -180,6 +179,5 @@ def _of_open(result: CalibrationData) -> list[Part]:
         lines.append(f"poorly determined: {names}; measure other poses, or give a prior")
     if not texts:
         return [*lines, "all directions of the parameters are observable"]
-    count = f"{len(texts)} unobservable direction{'s' * (len(texts) > 1)}"
-    title = f"{count}, along which the file's values are kept:"
+    title = f"{counted(len(texts), 'unobservable direction')}, along which the file's values are kept:"
     return [*lines, Section(title, [("", text) for text in texts])]

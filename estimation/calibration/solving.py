@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.text import counted
 from ...models.robot import Robot
 from ..logs.cable_directions import placed
 from ..logs.measurements import Measurements, measured_poses, tracked
@@ -231,7 +232,7 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     wanted = int((parameters.varies & np.isinf(model.prior_sigmas)).sum())
     if equations < wanted or equations == 0:
         lost = int(unknown.any(axis=1).sum())
-        poses = f" with {lost} unknown pose{'s' * (lost > 1)}" if lost else ""
+        poses = f" with {counted(lost, 'unknown pose')}" if lost else ""
         raise InputError(
             f"measurements must give an equation for each of the {wanted} parameters without a prior, got {equations} "
             f"from {len(measurements)} samples of {robot.m} cables{poses}"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...base.display import Fact
-from ...base.text import quantity, quantity_row
+from ...base.text import counted, quantity, quantity_row
 from ...models.part import Vector3
 from ..result import PlanData
 from ..tasks.paths import FeedPath, TimedPath
@@ -21,8 +21,7 @@ def motion_facts(plan: PlanData) -> list[Fact]:
     speed, acceleration = (
         np.linalg.norm(part[:, :3], axis=1).max() for part in (audit.motion.velocity, audit.motion.acceleration)
     )
-    count = len(plan.phases)
-    kind = f"{count} phase{'s' * (count > 1)}" if count else task.path.kind
+    kind = counted(len(plan.phases), "phase") if plan.phases else task.path.kind
     path, law = plan.scenario.path, ""
     if isinstance(task.path, TimedPath):
         kind, law = task.path.along.kind, ", with its own time law"

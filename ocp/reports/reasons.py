@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...base.display import Fact
-from ...base.text import quantity, quantity_range, quantity_row
+from ...base.text import numbered, quantity, quantity_range, quantity_row
 from ...solvers import Certificate
 from ..audits.excess import TENSIONS, Excess
 from ..result import PlanData
@@ -82,8 +82,7 @@ def _bounds(plan: PlanData, certificate: Certificate) -> str:
     scenario, time = plan.scenario, certificate.time
     low, high = scenario.bounds_in(None if time is None else scenario.phases.at(time))
     limits = [
-        f"{name} of {'cables' if len(cables) > 1 else 'cable'} {', '.join(str(k + 1) for k in cables)} "
-        f"({quantity_row(np.unique(bound[cables]), 'N')})"
+        f"{name} of {numbered('cable', cables)} ({quantity_row(np.unique(bound[cables]), 'N')})"
         for name, cables, bound in (("t_min", certificate.at_min, low), ("t_max", certificate.at_max, high))
         if cables.size
     ]

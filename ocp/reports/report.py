@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ...base.display import Fact
-from ...base.text import at_most, column, quantity
+from ...base.text import at_most, column, counted, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Report, Section, Table
 from ...models.parsing import to_yaml
@@ -171,7 +171,7 @@ def _of_the_motion(plan: PlanData) -> str:
 
 def _more(count: int) -> str:
     """Return the number of limits that a sentence leaves out, to follow it; empty for none."""
-    return f", {count} other limit{'s' * (count > 1)} exceeded" if count else ""
+    return f", {counted(count, 'other limit')} exceeded" if count else ""
 
 
 def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ...base.text import quantity
+from ...base.text import counted, quantity
 from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS
 from ..audits.violation import relative_violation
@@ -135,7 +135,7 @@ class Search:
                 # From the guess again: a solution through a region would come out of it on any side.
                 outcome = self._run(mesh, guess or outcome.deviation, coarser, np.inf, more if added < ROUNDS else None)
             how = ended(outcome.message)
-            stage.message = f"{how} {'in' if how == 'solved' else 'after'} {_iterations(outcome.iterations)}"
+            stage.message = f"{how} {'in' if how == 'solved' else 'after'} {counted(outcome.iterations, 'iteration')}"
             if mesh.elastic:
                 stage.message += f", short by {quantity(outcome.slack, 'N')}"
         return outcome
@@ -165,7 +165,7 @@ class Search:
             self.solve_s += time.perf_counter() - built
             solver.prepare(None, near=True)  # for the next one
             self.build_s += built - start
-            stage.message = f"{ended(outcome.message)} in {_iterations(outcome.iterations)}"
+            stage.message = f"{ended(outcome.message)} in {counted(outcome.iterations, 'iteration')}"
         return outcome
 
     def approach(self, mesh: Mesh, guess: Deviation | None, scenario: Scenario | None = None) -> Deviation | None:
@@ -193,7 +193,9 @@ class Search:
                 outcome = linear.solve(motion, self._iteration, self.seconds_left)
                 self.solve_s += time.perf_counter() - start
                 iterations += outcome.iterations
-                stage.message = f"{ended(outcome.message)} after {_iterations(iterations)} in pass {passed + 1}"
+                stage.message = (
+                    f"{ended(outcome.message)} after {counted(iterations, 'iteration')} in pass {passed + 1}"
+                )
                 if not outcome.success:
                     break
                 start = time.perf_counter()
@@ -319,10 +321,6 @@ def ended(message: str) -> str:
     return ENDS.get(message, f"stopped ({message})")
 
 
-def _iterations(count: int) -> str:
-    return f"{count} iteration{'s' * (count != 1)}"
-
-
 def describe(audited: Audit) -> str:
     """Return the violations of an audit in short."""
     lines = []
@@ -330,5 +328,5 @@ def describe(audited: Audit) -> str:
         short = quantity(audited.violation.max(), "N")
         lines.append(f"short by up to {short} at t = {audited.times[audited.worst]:.3f} s")
     if count := sum(not lines or each.limit != TENSIONS for each in audited.excess):
-        lines.append(f"{count} {'other ' if lines else ''}limit{'s' * (count > 1)} exceeded")
+        lines.append(f"{counted(count, 'other limit' if lines else 'limit')} exceeded")
     return ", ".join(lines)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...base.display import Displayed
 from ...base.inputs import required
+from ...base.text import numbered
 from ...solvers import Certificate, TensionProblem, capacity_margin
 from ...statics.distribution import wrench_problem
 from ..tasks.paths import AnyPath, Curve, PathBase, TimedPath
@@ -81,12 +82,8 @@ def _tensions(problem: TensionProblem) -> str:
     pull = capacity_margin(problem).direction @ problem.A
     size = np.abs(pull).max(initial=0.0)
     at = {"t_min": np.flatnonzero(pull < -PULLS * size), "t_max": np.flatnonzero(pull > PULLS * size)}
-    cables_at_limits = [
-        f"{name} of cable{'s' * (cables.size > 1)} {', '.join(str(cable + 1) for cable in cables)}"
-        for name, cables in at.items()
-        if cables.size
-    ]
-    return "; ".join(cables_at_limits) or "tensions"
+    limits = [f"{name} of {numbered('cable', cables)}" for name, cables in at.items() if cables.size]
+    return "; ".join(limits) or "tensions"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
-from ....base.text import quantity
+from ....base.text import counted, quantity
 from ....models.part import NonNegative, Positive, optional
 from .base import PathBase, PoseOrPosition, or_file, or_number, with_points_of_file
 from .motion import Motion
@@ -130,10 +130,9 @@ class FeedPath(PathBase):
         if between.any():
             worst = int(np.argmin(np.where(between, slower, np.inf)))
             percent = quantity(100 * slower[worst], "%", digits=3)
-            corners = f"{between.sum()} corner{'s' * int(between.sum() > 1)}"
-            text += f"; slower in {corners}, down to {percent} of the feed at points[{worst}]"
+            text += f"; slower in {counted(between.sum(), 'corner')}, down to {percent} of the feed at points[{worst}]"
         stops = int(self.curve.sharp[1:-1].sum())
-        return text + (f"; {stops} stop{'s' * (stops > 1)} between the ends" if stops else "")
+        return text + (f"; {counted(stops, 'stop')} between the ends" if stops else "")
 
     def _feed_at(self, length: np.ndarray) -> np.ndarray:
         """Return the feed at lengths of the curve, (n,) [m/s]."""
