@@ -6,7 +6,7 @@ A motion q(tau) that is followed at a rate r(t), with dtau/dt = r, stays on its 
 
 with c the wrench of rest, a that of the velocity dq/dtau as an acceleration, and b what velocities and accelerations of
 the plan need in addition to c: r = 1 and u = 0 are the plan itself. Each facet of the available wrench set
-(`solvers.facets`) therefore bounds u at each tau and r. A stop takes the least u, from r = 1 to r = 0.
+(`solvers.available_wrench`) therefore bounds u at each tau and r. A stop takes the least u, from r = 1 to r = 0.
 """
 
 from __future__ import annotations
