@@ -2,10 +2,9 @@
 
 from typing import Self
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from .part import Finite, Name, NonNegative, Part, Positive, Vector3, optional
+from .part import Direction, Finite, Name, NonNegative, Part, Positive, Vector3, optional
 
 
 class Pulley(Part):
@@ -15,14 +14,7 @@ class Pulley(Part):
     """
 
     radius: Positive = Field(description="radius of the sheave [m]")
-    axis: Vector3 = optional("swivel axis in the carrier frame, of any length", (0.0, 0.0, 1.0))
-
-    @field_validator("axis")
-    @classmethod
-    def _has_a_direction(cls, axis: Vector3) -> Vector3:
-        if not np.linalg.norm(axis) > 0:
-            raise ValueError("must be a direction other than zero")
-        return axis
+    axis: Direction = optional("swivel axis in the carrier frame, of any length", (0.0, 0.0, 1.0))
 
 
 class Winch(Part):

@@ -40,6 +40,15 @@ Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9][
 # What nothing else refers to by its name may have spaces in it.
 Title = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z0-9]([A-Za-z0-9_. -]*[A-Za-z0-9_.-])?$")]
 
+
+def _check_direction(value: Vector3) -> Vector3:
+    if not np.linalg.norm(value) > 0:
+        raise ValueError("must be a direction other than zero")
+    return value
+
+
+Direction = Annotated[Vector3, AfterValidator(_check_direction)]
+"""A direction, of any length."""
 Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]
 COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
 
