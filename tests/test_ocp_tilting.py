@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from towline.benchmarks.scenes import forest
 from towline.models import Robot
 from towline.ocp import plan
 
@@ -58,3 +59,9 @@ def test_what_no_tilt_makes_feasible_is_not_offered():
     task = {"path": {"kind": "line", "start": [0, 0, 1], "end": [4, 0, 1]}, "duration": 5, "steps": 30}
     refused = plan(suspended(), task)
     assert "tube.attitude" not in [each.name for each in refused.relaxations]
+
+
+def test_a_point_mass_has_no_attitude_to_change():
+    refused = plan(*forest(4)[:2])  # quadrotors too near to each other at the goal
+    assert refused.status == "infeasible"
+    assert "a tilting platform" not in refused.report()

@@ -12,7 +12,7 @@ from ..global_path.space import Space
 from ..proofs.too_heavy import OF_WEIGHT
 from ..result import PlanData
 from ..tasks.paths import LinePath
-from ..tasks.scenario import POSITION, Scenario
+from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 from ..tasks.task_limits import OF_BODY
 from ..tasks.wind_set import WindBox, WindDisc
 from ..warnings.outside_frame import LEAVES
@@ -152,7 +152,7 @@ def _carriers(plan: PlanData) -> list[Fact]:
         return []
     if task.base.kind == "hold" and any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers):
         return [("moving carriers", "`base: {kind: free}`: the planner then chooses how the carriers move")]
-    if task.base.kind == "free" and not task.tube.turn:
+    if task.base.kind == "free" and not task.tube.turn and robot.dof_mask[ATTITUDE].any():
         tilts = "the platform may then tilt by 0.2 rad as it accelerates"
         return [("a tilting platform", f"`tube: {{attitude: 0.2}}`: {tilts}")]
     return []
