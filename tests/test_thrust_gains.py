@@ -43,3 +43,13 @@ def test_gains_drift_and_tilt_of_thrusts(gains, end, tilt, said, recorded, tmp_p
         assert words in note
     found = calibrate(robot, log.measurements, free=("offsets", "mass"))
     assert found.robot.platform.mass == pytest.approx(0.4, rel=0.01)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 3.0])
+def test_directions_that_contradict_thrusts_are_named(tilt, recorded, tmp_path):
+    """Without the load nothing tells which of them is wrong, and by 3 degrees cables seem 6 cm longer."""
+    turned = user.directions_of(recorded[2]) @ Rotation.from_euler("x", tilt, degrees=True).as_matrix()
+    path = user.flight(tmp_path / "flight.csv", recorded, turned, NAMES, load=False)
+    notes = [note for note in read_log(path, robot=user.team_robot(tmp_path)).notes if "one of them is wrong" in note]
+    assert len(notes) == (2 if tilt else 0)
+    assert all(2.0 < float(note.split(" differs by ")[1].split()[0]) < 4.0 for note in notes)

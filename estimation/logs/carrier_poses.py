@@ -54,10 +54,10 @@ def _plausible(robot: Robot, thrusts: np.ndarray, notes: list[str]) -> np.ndarra
     return result
 
 
-def tensions_by_thrust(
+def pulls_by_thrust(
     robot: Robot, measured: Measurements, poses: np.ndarray, thrusts: np.ndarray, notes: list[str]
 ) -> np.ndarray | None:
-    """Return the tension of each cable, (N, m) [N], if each is the only one of a carrier with recorded thrust.
+    """Return the pull of each carrier at its cable in {G}, (N, m, 3) [N], if all have one cable and recorded thrust.
 
     It is what remains of thrust (corrected by its gain), weight and inertia of the carrier, whose poses are (N, c, 6).
     """
@@ -71,14 +71,13 @@ def tensions_by_thrust(
         "tensions are computed from thrusts, weights and accelerations of the carriers",
     ]
     thrust_per_newton = {one.index: one.of(times) for one in gains}
-    pulls = np.empty((len(times), len(owner)))
+    pulls = np.empty((len(times), len(owner), 3))
     for cable, index in enumerate(owner):
         turn = points.rotations(poses[:, index, 3:])
         along = np.einsum("nij,nj->ni", turn, thrust_per_newton.get(int(index), np.eye(3)[[2]]))
         acceleration = parabolas.fitted(poses[:, index, :3]).bends
         mass = robot.carriers[index].mass
-        force = thrusts[:, index, None] * along + mass * (np.array(robot.gravity) - acceleration)
-        pulls[:, cable] = np.linalg.norm(force, axis=1)
+        pulls[:, cable] = thrusts[:, index, None] * along + mass * (np.array(robot.gravity) - acceleration)
     return pulls
 
 

@@ -14,7 +14,7 @@ from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from .alignment import Clock
 from .cable_directions import in_world, vectors
-from .carrier_poses import carriers_at, tensions_by_thrust
+from .carrier_poses import carriers_at, pulls_by_thrust
 from .clocks import Seen, clock_of_poses, set_clocks_of_carriers
 from .encoders import lengths_of
 from .frozen import seen
@@ -26,6 +26,7 @@ from .opening import recordings
 from .pose_track import PoseTrack
 from .recording import COUNTED, Recording, Samples
 from .streams import Reader, at_times, interpolated, like_time
+from .thrust_gains import notes_of_tilts
 
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 MOST_PARTIAL = 0.2  # of the samples, of which some but not all cables were measured
@@ -44,6 +45,7 @@ class Log(NamedTuple):
         recordings: The files.
         clock: Clock of the poses, if it differs from that of the lengths.
         ned: Direction of the x axis of {G}, if poses were converted from a frame of north, east, down.
+        pulls: Pulls of carriers at their cables by thrusts, in {G}, (N, m, 3) [N], if these give the tensions.
     """
 
     measurements: Measurements
@@ -53,6 +55,7 @@ class Log(NamedTuple):
     recordings: Sequence[Recording] = ()
     clock: Clock | None = None
     ned: str | None = None
+    pulls: np.ndarray | None = None
 
 
 def read_measurements(
@@ -168,15 +171,16 @@ def _with_carriers(read: Log, robot: Robot, given: LogMap | None) -> Log:
         raise InputError("lengths and poses of carriers must have samples at the same times, got none")
     if not kept.all():
         read.notes.append(f"samples skipped because carriers have no poses: {quantity(int((~kept).sum()))}")
-    tensions = None
+    tensions = pulls = None
     axis = ned_frame(robot, measured.poses, poses)
     if axis is not None:
         poses = carriers_from_ned(robot, poses, axis)
         read.notes.append(note_of(axis, measured.poses))
         measured = changed(measured, poses=platform_from_ned(robot, measured.poses, axis))
     if measured.tensions is None:
-        tensions = tensions_by_thrust(robot, measured.only(kept), poses[kept], thrusts[kept], read.notes)
-    return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions), ned=axis)
+        pulls = pulls_by_thrust(robot, measured.only(kept), poses[kept], thrusts[kept], read.notes)
+        tensions = None if pulls is None else np.linalg.norm(pulls, axis=2)
+    return read._replace(measurements=measured.only(kept).with_carriers(poses[kept], tensions), ned=axis, pulls=pulls)
 
 
 def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Log:
@@ -206,7 +210,10 @@ def _with_directions(read: Log, robot: Robot | None, given: LogMap | None) -> Lo
     world, note = next(iter(recorded.values())), None
     if robot is not None:
         world, note = in_world(robot, measured, recorded, None if given is None else given.directions_in)
-    return read._replace(measurements=measured.with_directions(world), notes=[*read.notes, *([note] if note else [])])
+    seen, notes = measured.with_directions(world), [*read.notes, *([note] if note else [])]
+    if robot is not None and read.pulls is not None and not read.fields.position and seen.directions is not None:
+        notes += notes_of_tilts(robot, seen.directions, read.pulls)
+    return read._replace(measurements=seen, notes=notes)
 
 
 def _fields(

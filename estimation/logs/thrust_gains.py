@@ -22,6 +22,7 @@ from .smoothing import FEWEST, Parabolas, within
 BLOCKS = 25  # of the record; the scatter of their sums gives the standard deviations, also of autocorrelated residuals
 CLEAR = 5.0  # standard deviations
 LEAST, SURE = 0.005, 0.01  # from a gain of 1 and from no tilt, of what is named, and the largest standard deviation
+LEAST_TILT = np.radians(1.0)  # of a direction of a cable, which is named
 FAR = 0.5  # from 1, of a gain that other errors explain better
 
 
@@ -87,6 +88,26 @@ def _factors(line: np.ndarray, needed: np.ndarray, lift: np.ndarray) -> np.ndarr
     away = np.abs(factors - [0, 0, 1, 0])
     clear = (away > np.maximum(CLEAR * sigma, LEAST)).any() and (sigma < SURE).all()
     return factors if clear and away.max() < FAR else None
+
+
+def notes_of_tilts(robot: Robot, directions: np.ndarray, pulls: np.ndarray) -> Iterator[str]:
+    """Yield a line for each cable whose direction differs from the pull by thrust, both (N, m, 3), in the mean."""
+    for cable, index in enumerate(robot.carrier_of_cable):
+        d, pull = directions[:, cable], -pulls[:, cable]
+        turns = np.cross(pull / np.linalg.norm(pull, axis=1, keepdims=True), d)
+        turns = turns[np.isfinite(turns).all(axis=1)]
+        if len(turns) <= BLOCKS:
+            continue
+        means = np.array([part.mean(axis=0) for part in np.array_split(turns, BLOCKS)])
+        sigma = float(np.linalg.norm(means.std(axis=0))) / np.sqrt(BLOCKS)
+        tilt = float(np.linalg.norm(means.mean(axis=0)))
+        if tilt > max(CLEAR * sigma, LEAST_TILT):
+            name = robot.carriers[index].name
+            size = quantity(np.degrees(tilt), "deg", 2)
+            yield (
+                f"the direction of cables[{cable}] differs by {size} (mean) from the pull that thrust, weight and "
+                f"motion of {name} need; one of them is wrong, so lengths and mass may be too"
+            )
 
 
 def notes(robot: Robot, gains: list[ThrustGain]) -> Iterator[str]:
