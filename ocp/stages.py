@@ -27,11 +27,12 @@ from .proofs.too_little_power import too_little_power
 from .result import Relaxed
 from .search.homotopy import from_easier
 from .search.longer_phases import longer_phases
+from .search.other_paths import slower_path
 from .search.reference import about_better_reference
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion
 from .search.search import Search
-from .search.stronger_or_nearer import near_chosen_motion, slower_path, stronger_or_nearer
+from .search.stronger_or_nearer import near_chosen_motion, stronger_or_nearer
 from .search.time_law import BOUND, fastest
 from .tasks.deviation import Deviation
 from .tasks.ends import between_fixed_values
@@ -124,7 +125,7 @@ def _blocked(search: Search) -> Plan | None:
     motion = between_fixed_values(slowest)
     audited = audit(slowest, motion, to_show=True)
     seconds = time.perf_counter() - start
-    near = partial(near_chosen_motion, search, slowest, motion, audited, proven=proof)
+    near = partial(near_chosen_motion, search, slowest, motion, audited)
     offers = partial(stronger_or_nearer, search, slowest, audited) if proof.by_weight else near
     return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)
 

@@ -15,7 +15,6 @@ from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan
 from towline.ocp.audits.audit import audit
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
-from towline.ocp.search import relaxations
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.task_limits import TaskLimits
@@ -340,9 +339,8 @@ def test_carriers_may_be_anywhere_around_a_platform_whose_frame_is_elsewhere(hei
 
 
 @pytest.mark.parametrize("name", ["wang-ctmrts-4", "wang-ctmrts-5", "wang-ctmrts-6"])
-def test_ends_that_carriers_cannot_hold_from_within_their_reach_are_proven(name, monkeypatch):
+def test_ends_that_carriers_cannot_hold_from_within_their_reach_are_proven(name):
     """By a linear program for the forces of cables towards all corners of the boxes; a nearer end is offered."""
-    monkeypatch.setattr(relaxations, "LEAST_SECONDS", 300.0)
     robot, rng, proofs = load(name), np.random.default_rng(3), []
     for _ in range(12):
         way = rng.normal(size=3) * [1, 1, 0.6]

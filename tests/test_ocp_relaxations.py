@@ -17,12 +17,6 @@ TASK = {"path": LINE, "duration": 2}
 BALL = {"kind": "sphere", "name": "post", "centre": [0.25, 0.15, 2.0], "radius": 0.2}
 
 
-@pytest.fixture(autouse=True)
-def unhurried(monkeypatch):
-    """A machine with other work to do is offered the same."""
-    monkeypatch.setattr(relaxations, "LEAST_SECONDS", 300.0)
-
-
 def with_change(task, relaxed):
     """The task with what is offered, by the words of the offer."""
     name, value = relaxed.name, relaxed.possible
@@ -119,7 +113,7 @@ def test_a_motion_in_a_tube_is_offered_what_it_needs(limits, offered):
 def test_no_longer_duration_is_tried_where_an_end_is_in_the_way(monkeypatch):
     """Spare a program or two for nothing: whether an end is inside a ball does not depend on time."""
     durations = []
-    monkeypatch.setattr(relaxations, "_longer_duration", lambda search: durations.append(search) or [])
+    monkeypatch.setattr(relaxations, "_longer_duration", lambda *given: durations.append(given) or [])
     for limits in ({"keep_out": [{**BALL, "centre": [0.5, 0.3, 1.2], "cables": None}]}, {"platform_speed": 0.2}):
         task = TASK | {"tube": {"position": 0.02}, "steps": 20, "limits": limits}
         _ = plan(ROBOT, task).relaxations

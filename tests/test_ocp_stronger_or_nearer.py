@@ -427,3 +427,26 @@ def test_the_largest_circle_that_is_feasible_is_offered():
     (offer,) = [each for each in plan("cogiro", {"path": circle, "duration": 5}).relaxations if "radius" in each.name]
     for radius, feasible in ((offer.possible, True), (1.03 * offer.possible, False)):
         assert plan("cogiro", {"path": circle | {"radius": radius}, "duration": 5}).feasible == feasible
+
+
+def test_a_path_that_leaves_the_frame_on_both_sides_is_drawn_in_towards_home():
+    start, end, home = np.array([-3, 0.2, 1.0]), np.array([3, 0.1, 1.4]), np.array(load("ipanema-1").home[:3])
+
+    def task(share):
+        ends = (home + share * (end - home)).tolist(), (home + share * (start - home)).tolist()
+        return {"path": {"kind": "line", "start": ends[1], "end": ends[0]}, "duration": 8}
+
+    (offer,) = plan("ipanema-1", task(1.0)).relaxations
+    assert offer.name == "size of the path"
+    assert plan("ipanema-1", task(offer.possible / 100)).feasible
+    assert not plan("ipanema-1", task(1.05 * offer.possible / 100)).feasible
+
+
+def test_a_disc_of_winds_is_offered_a_speed_that_is_feasible_from_every_side():
+    task = {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 0.5}
+    (offer,) = plan("wang-flying", task | {"wind": {"speed": 40}}).relaxations
+    assert offer.name == "wind"
+    assert not plan("wang-flying", task | {"wind": {"speed": 1.05 * offer.possible}}).feasible
+    for side in np.linspace(0, 2 * np.pi, 5):
+        wind = offer.possible * np.array([np.cos(side), np.sin(side), 0])
+        assert plan("wang-flying", task | {"wind": wind.tolist()}).feasible

@@ -26,6 +26,7 @@ from .waiting import Errands, wait_for
 MET = 1e-8  # what constraints of a program may miss, in its units
 BETTER = 1e-3  # of the objective: what a solution must be better by for the search to go on
 PATIENCE = 10  # iterations without a better one
+MOST_ITERATIONS = 400
 # Of the pivot tolerances of MUMPS the larger one refactorises less where thrust directions are equations: teams of
 # quadrotors then take half of the time. Of other robots each iteration takes 10 % longer. Ordered by METIS, an
 # iteration of a team past obstacles takes less than half of the time that it takes with MUMPS's own choice. Without a
@@ -83,7 +84,7 @@ _STARTS: dict[str, dict[str, Any]] = {
 class Solver:
     """IPOPT for one program, to be run from several guesses, or from its own last solution."""
 
-    def __init__(self, program: Program, max_iterations: int = 400):
+    def __init__(self, program: Program, max_iterations: int = MOST_ITERATIONS):
         self._watch = _Watch(program)
         self._max_iterations = max_iterations
         self._solvers: dict[str, ca.Function] = {}

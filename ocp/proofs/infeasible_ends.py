@@ -25,7 +25,7 @@ from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 from .no_attitude import CERTAIN, no_attitude
 from .out_of_reach import out_of_reach
-from .too_fast import OF_DURATION, too_fast
+from .too_fast import too_fast
 from .too_heavy import OF_WEIGHT, too_heavy
 
 PLACES = 41  # along the path
@@ -45,11 +45,6 @@ class InfeasibleEnds(NamedTuple):
         if self.certificate is not None:
             lines.append(f"no tensions at t = {self.certificate.time:.3f} s")
         return "; ".join(lines)
-
-    @property
-    def by_rates(self) -> bool:
-        """Return whether speeds and accelerations are exceeded, which fall with a longer duration, and no others."""
-        return bool(self.excess) and all("/s" in excess.unit or excess.limit == OF_DURATION for excess in self.excess)
 
     @property
     def by_weight(self) -> bool:

@@ -49,14 +49,14 @@ def out_of_reach(
     scaled = A[0] / np.repeat([1.0, robot.length], 3)[:, None]
     if free.all() and not any(box for _, box in boxes) and np.linalg.matrix_rank(scaled) == robot.dof_mask.sum():
         return None  # pulls in all directions at these attachments exert all wrenches
-    worst: Certificate | None = None
-    for row in np.flatnonzero(~solve_batch(A, w, *limits, length=robot.length).feasible):
+    batch = solve_batch(A, w, *limits, length=robot.length)
+    short = np.where(batch.feasible, -np.inf, np.nan_to_num(batch.shortfall))
+    for row in np.argsort(-short)[: np.count_nonzero(~batch.feasible)]:  # one certificate takes as long as the batch
         found = certify(wrench_problem(robot, A[row], w[row], *limits))
-        least = UNDERACTUATED_TOLERANCE * robot.force_scale if worst is None else worst.shortfall
-        if found is not None and found.shortfall > least:
+        if found is not None and found.shortfall > UNDERACTUATED_TOLERANCE * robot.force_scale:
             # Each corner's pull is a cable of the problem; a cable of the robot gives their sum.
             pulls = (A[row, :3] * found.closest).reshape(3, 8, robot.m).sum(axis=1)
             none = np.zeros(0, dtype=np.intp)
             closest = np.linalg.norm(pulls, axis=0)
-            worst = replace(found, time=float(times[row]), at_max=none, at_min=none, closest=closest)
-    return worst
+            return replace(found, time=float(times[row]), at_max=none, at_min=none, closest=closest)
+    return None

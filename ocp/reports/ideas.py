@@ -1,6 +1,7 @@
 """What may help a plan for which no feasible change was found: `ideas`, rows of its report.
 
-None of them is planned: a relaxation is, and takes the place of these. Positions are checked at rest.
+None of them is planned: a relaxation is. With it, only ways past obstacles, moving carriers and stronger ones remain.
+Positions are checked at rest.
 """
 
 import numpy as np
@@ -29,6 +30,8 @@ def ideas(plan: PlanData) -> list[Fact]:
     """Return what may help, the most likely first; empty for a feasible plan, or if nothing is known to."""
     if plan.feasible:
         return []
+    if plan.relaxations:
+        return [*_obstacles(plan), *_carriers(plan), *_strength(plan)]
     found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"makes it feasible, as far as was tried: no duration, limit, {tried}")]

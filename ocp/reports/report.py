@@ -42,7 +42,7 @@ def sections(plan: PlanData) -> list[Section]:
     bottlenecks = [] if plan.law is None else [("", each.describe()) for each in plan.law.bottlenecks]
     every = [
         Section(titles.get(plan.status.value, "Limits"), reasons(plan)),
-        Section(TRY, units(plan) + ([_relaxation(plan, relaxed) for relaxed in plan.relaxations] or ideas(plan))),
+        Section(TRY, units(plan) + [_relaxation(plan, relaxed) for relaxed in plan.relaxations] + ideas(plan)),
         Section("Warnings", [("warning", sentence) for sentence in plan.warnings]),
         Section("Active limits along the path (s = 0 at its start, 1 at its end)", bottlenecks),
         Section("Soft limits exceeded", [("limit", str(excess)) for excess in plan.audit.soft_excess]),

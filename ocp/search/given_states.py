@@ -4,14 +4,12 @@ import numpy as np
 
 from ...base.text import quantity
 from ..audits.audit import Audit
-from ..nlp.rows import Mesh
 from ..plan import Plan
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
-from ..tasks.status import MotionStatus
-from .relaxations import BEYOND, SHRINK, rounded, solved
+from .relaxations import BEYOND, planned, rounded
 from .search import Search
 
 HALVINGS = 5  # of the speeds: each solves a program
@@ -31,7 +29,7 @@ def _wider_tube(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
         return []
     radius = rounded((1 + BEYOND) * off, up=True)
     wider = {"tube": tube.model_copy(update={"position": radius})}
-    plan = _planned(search, lay_out(scenario.robot, scenario.task.model_copy(update=wider)))
+    plan = _unless_proven(search, lay_out(scenario.robot, scenario.task.model_copy(update=wider)))
     return [] if plan is None else [Relaxed("tube.position", "m", tube.radius, radius, plan)]
 
 
@@ -55,7 +53,7 @@ def _lower_speeds(search: Search, scenario: Scenario) -> list[Relaxed]:
             given = [key for key in ("velocity", "acceleration") if getattr(state, key, None) is not None]
             slower = {key: tuple(share * value for value in getattr(state, key)) for key in given}
             states[name] = None if state is None else state.model_copy(update=slower)
-        plan = _planned(search, lay_out(scenario.robot, task.model_copy(update=states)))
+        plan = _unless_proven(search, lay_out(scenario.robot, task.model_copy(update=states)))
         low, high, best = (low, share, best) if plan is None else (share, high, plan)
     if best is None:
         return []
@@ -64,12 +62,6 @@ def _lower_speeds(search: Search, scenario: Scenario) -> list[Relaxed]:
     return [Relaxed(name, unit, speed, low * speed, best, detail)]
 
 
-def _planned(search: Search, scenario: Scenario) -> Plan | None:
-    """Return the plan of a scenario, if its program has a solution that passes its audit."""
-    if infeasible_ends(scenario) is not None:
-        return None
-    outcome = solved(search, scenario, None, Mesh(scenario.task.steps, shrink=SHRINK))
-    if not outcome.success:
-        return None
-    audit = search.audit_motion(scenario, outcome.deviation, "audit, other states")
-    return Plan(scenario, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0) if audit.passed else None
+def _unless_proven(search: Search, scenario: Scenario) -> Plan | None:
+    """Return the plan of a scenario, if one is found; the program of one that is proven infeasible is not solved."""
+    return planned(search, scenario, "audit, other states") if infeasible_ends(scenario) is None else None

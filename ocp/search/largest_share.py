@@ -1,24 +1,23 @@
 """Find the largest variation of a task that is feasible: `largest_share`."""
 
 from collections.abc import Callable
+from itertools import product
 from typing import TypeAlias
 
 import numpy as np
 
 from ...solvers import solve_batch
-from ..nlp.rows import Mesh
-from ..plan import Plan
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.scenario import Scenario
-from ..tasks.status import MotionStatus
-from .relaxations import ORDERS, rounded, solved
+from ..tasks.wind_set import possible_winds_at
+from .relaxations import ORDERS, planned, rounded
 from .search import Search
 
 INSTANTS = 120  # at which tensions must exist before a motion is audited
 HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
-OF_PROGRAMS = *RESERVES[1:], 0.5, 0.25  # likewise, of what is only not proven infeasible
+OF_PROGRAMS = *RESERVES[1:], 0.5, 0.25, 0.1  # likewise, of what is only not proven infeasible; the last one first
 
 Variation: TypeAlias = tuple[Scenario, float, str]
 """The scenario of a varied task, the value in which it differs, and a text that follows the value in reports."""
@@ -43,17 +42,13 @@ def largest_share(
         low, high = (middle, high) if _may_be_feasible(make(middle)[0], rates) else (low, middle)
     if low == 0.0:
         return []
-    for reserve in OF_PROGRAMS if make(low)[0].carrier_free else RESERVES:
+    reserves = RESERVES
+    if make(low)[0].carrier_free:
+        least = make(OF_PROGRAMS[-1] * low)[0]
+        reserves = OF_PROGRAMS if planned(search, least, f"audit, other {name}") is not None else ()
+    for reserve in reserves:
         varied, value, detail = make(reserve * low)
-        deviation = None
-        if varied.carrier_free:
-            outcome = solved(search, varied, None, Mesh(varied.task.steps))
-            if not outcome.success:
-                continue
-            deviation = outcome.deviation
-        audit = search.audit_motion(varied, deviation, f"audit, other {name}")
-        if audit.passed:
-            plan = Plan(varied, MotionStatus.FEASIBLE, deviation, audit, 0.0, 0.0)
+        if (plan := planned(search, varied, f"audit, other {name}")) is not None:
             return [Relaxed(name, unit, make(1.0)[1], rounded(value, up), plan, detail)]
     return []
 
@@ -66,21 +61,24 @@ def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
     if scenario.carrier_free:
         return infeasible_ends(scenario) is None
     times = np.linspace(0.0, scenario.duration, INSTANTS)
-    if _exceeds(scenario, times, rates):
+    if exceeds(scenario, times, rates):
         return False
     times = times[~scenario.phases.resting(times)]
     platform, carriers = scenario.motion(times, None)
     mask = scenario.robot.dof_mask
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
     low, high = scenario.bounds_at(times)
-    for extreme in (None, *range(scenario.phases.extremes)):
-        w = scenario.required_wrench(times, platform, carriers, scenario.wind, extreme) * mask
+    winds = [scenario.wind]
+    if scenario.wind_set is not None:
+        winds = possible_winds_at(scenario.wind_set, scenario.robot, platform.pose, platform.velocity)
+    for wind, extreme in product(winds, (None, *range(scenario.phases.extremes))):
+        w = scenario.required_wrench(times, platform, carriers, wind, extreme) * mask
         if (solve_batch(A, w, low, high, length=scenario.robot.length).code != 0).any():
             return False
     return True
 
 
-def _exceeds(scenario: Scenario, times: np.ndarray, rates: bool) -> bool:
+def exceeds(scenario: Scenario, times: np.ndarray, rates: bool) -> bool:
     """Return whether a fixed motion exceeds a hard limit that does not depend on tensions at some of `times`.
 
     Without `rates`, speeds and accelerations are left out.

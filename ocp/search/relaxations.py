@@ -11,8 +11,8 @@ from ...models.part import PositiveRange
 from ..audits.audit import Audit, other_tensions_may_pass
 from ..audits.excess import Excess
 from ..limits.bodies import LOAD, PLATFORM
-from ..nlp.rows import Mesh
-from ..nlp.solver import Outcome
+from ..nlp.rows import MANY, Mesh
+from ..nlp.solver import MOST_ITERATIONS, Outcome
 from ..plan import Plan
 from ..proofs.durations import Durations
 from ..proofs.infeasible_ends import infeasible_ends
@@ -22,21 +22,23 @@ from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Task
+from .refinement import refine
 from .search import Search
 
 LONGER = 1.002  # than the shortest duration: between the places that were checked slightly more can be needed
 LONGEST = 100.0  # times the duration that is requested, or else needed by tensions: a longer one does not help
 TRIES = 3  # of a duration: not all that is exceeded falls as speeds and accelerations do
 DIGITS = 4  # of what is offered: reports print no more
-HALVINGS = 12  # of a margin
+HALVINGS = 12  # of a margin, and of the ratio of two durations
 PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter
 TIME_COUNTS = 1e-2  # of the requested duration: it adds one to the objective, so that other costs hardly matter
 ORDERS = {"/s": 1, "W": 1, "/s^2": 2, "/s^3": 3}  # of the rates with such units, which fall with 1/T to that power
-LONGEST_CHOSEN = 20.0  # times the requested duration: the program starts at its geometric mean with the requested one
+LONGEST_CHOSEN = 20.0  # times the shortest duration: the program starts at the geometric mean of both
 LONGER_CHOSEN = 1.05  # than the shortest duration, at which almost nothing is left to choose
 BEYOND = 0.05  # of the change of a limit, more than the least, at which almost nothing is left to choose
 SHRINK = 5e-3  # of the limits, for what happens between the nodes
-LEAST_SECONDS = 5.0  # for a program, however short the search was
+WORK = 5e4  # of the program of a relaxation, as iterations times free coordinates at its nodes: a few seconds
+LEAST_ITERATIONS = 40  # of the largest programs too
 
 
 class Change(NamedTuple):
@@ -55,11 +57,14 @@ def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None
 
 
 def near_motion(
-    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, slower_helps: bool
+    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, span: tuple[float, float]
 ) -> list[Relaxed]:
-    """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one."""
+    """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one.
+
+    A longer duration is searched for in a `span` [s], unless its ends are equal.
+    """
     limits = _soft_limits(search, deviation) or _other_limits(search, scenario, deviation, audit)
-    return (_longer_duration(search) if slower_helps else []) + limits
+    return (_longer_duration(search, *span) if span[0] < span[1] else []) + limits
 
 
 def other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
@@ -172,56 +177,100 @@ def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
     return _other_limits(search, lasting, outcome.deviation, audit, BEYOND)
 
 
-def _longer_duration(search: Search) -> list[Relaxed]:
+def _longer_duration(search: Search, shortest: float, longest: float) -> list[Relaxed]:
     """Return a longer duration at which a scenario's motion, which the planner chooses, is possible, if it is shown."""
     scenario, task = search.scenario, search.scenario.task
-    if not scenario.stretches:
-        return []
     requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
-    shortest, longest = longer_durations(scenario)
     if LONGER_CHOSEN * shortest > longest:
         return []
-    open_task = task.model_copy(
-        update={
-            "duration": PositiveRange(min=shortest, max=longest),
-            "objective": task.objective.model_copy(update={"time": TIME_COUNTS * requested}),
-        }
-    )
-    outcome = solved(search, lay_out(scenario.robot, open_task), None, Mesh(task.steps))
-    for attempt in range(TRIES):
-        if not outcome.success:
+    plan = None
+    if scenario.count <= MANY:
+        objective = task.objective.model_copy(update={"time": TIME_COUNTS * requested})
+        open_task = {"duration": PositiveRange(min=shortest, max=longest), "objective": objective}
+        outcome = solved(search, lay_out(scenario.robot, task.model_copy(update=open_task)), None, Mesh(task.steps))
+        if outcome.success:
+            near = LONGER_CHOSEN * max(outcome.duration, requested)
+            plan = _ever_shorter(search, near, shortest, np.sqrt(2), outcome)
+    plan = plan or _ever_shorter(search, longest, shortest, 3.0)
+    return [] if plan is None else [Relaxed("duration", "s", requested, plan.scenario.duration, plan)]
+
+
+def _ever_shorter(
+    search: Search, seconds: float, shortest: float, factor: float, near: Outcome | None = None
+) -> Plan | None:
+    """Return the plan with the last feasible of some durations, each a `factor` less than the one before.
+
+    Each program starts from the motion with the longer duration, the first one from a motion that is `near`.
+    """
+    best = None
+    while seconds > LONGER_CHOSEN * shortest:
+        plan = _lasting(search, seconds, best or near)
+        if plan is None:
             break
-        near = rounded(LONGER_CHOSEN * max(outcome.duration, requested), up=True)
-        mesh = Mesh(task.steps * 2**attempt, shrink=SHRINK * (1 + attempt))
-        longer = lay_out(scenario.robot, task.model_copy(update={"duration": near}))
-        outcome = solved(search, longer, outcome.deviation.stretched(near / outcome.duration), mesh)
-        audit = search.audit_motion(longer, outcome.deviation)
-        if audit.passed:
-            plan = Plan(longer, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0)
-            return [Relaxed("duration", "s", requested, near, plan)]
-    return []
+        best, seconds = plan, plan.scenario.duration / factor
+    return best
+
+
+def _lasting(search: Search, seconds: float, near: Plan | Outcome | None) -> Plan | None:
+    """Return the plan of the search's task with another duration, from a motion that is `near`."""
+    scenario, seconds = search.scenario, rounded(seconds, up=True)
+    longer = lay_out(scenario.robot, scenario.task.model_copy(update={"duration": seconds}))
+    deviation = None if near is None else near.deviation
+    guess = deviation and deviation.stretched(seconds / deviation.nodes[-1])
+    return planned(search, longer, "audit, longer duration", guess)
+
+
+def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | None = None) -> Plan | None:
+    """Return a feasible plan of another scenario, whose audit is a stage with a `name`; None if none is found.
+
+    Without free coordinates it is the motion itself, else the solution of the program, refined as that of any task.
+    """
+    if not scenario.count:
+        audit = search.audit_motion(scenario, None, name)
+        return Plan(scenario, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None
+    beside = _beside(search, scenario)
+    outcome = beside.solve("program of a relaxation", Mesh(scenario.task.steps), guess)
+    if not outcome.success:
+        return None
+    refine(beside, outcome)
+    plan = beside.best()
+    return plan if plan.feasible else None
 
 
 def longer_durations(scenario: Scenario) -> tuple[float, float]:
     """Return the range of durations in which a feasible one is searched for; its ends are equal if none can be.
 
-    It is longer than what is requested, and than any duration that is proven to be too short.
+    It begins with what is requested, or nearly the longest duration that is proven to be too short.
     """
+    if not scenario.stretches:
+        return scenario.duration, scenario.duration
     span = scenario.duration_range
-    shortest = scenario.duration if span is None else span.max
-    longest = min(LONGEST_CHOSEN * shortest, scenario.longest)
-    while (proof := infeasible_ends(scenario.lasting(longest))) is not None:
-        if not proof.by_rates or longest == scenario.longest:
-            return longest, longest
-        shortest, longest = longest, min(LONGEST_CHOSEN * longest, scenario.longest)
-    return shortest, longest
+    shortest, longest = scenario.duration if span is None else span.max, scenario.longest
+    if infeasible_ends(scenario.lasting(longest)) is not None:
+        return longest, longest
+    if infeasible_ends(scenario.lasting(shortest)) is not None:
+        possible = longest
+        for _ in range(HALVINGS):
+            middle = float(np.sqrt(shortest * possible))
+            proven = infeasible_ends(scenario.lasting(middle)) is not None
+            shortest, possible = (middle, possible) if proven else (shortest, middle)
+    return shortest, min(LONGEST_CHOSEN * shortest, longest)
 
 
 def solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:
-    """Solve another scenario's program, in the time that the task's limit left and no longer than the search took."""
-    left = scenario.task.time_limit - search.solve_s
-    beside = Search(scenario, {}, search.progress, min(left, max(search.solve_s, LEAST_SECONDS)))
-    return beside.solve("program of a relaxation", mesh, guess)
+    """Solve another scenario's program."""
+    return _beside(search, scenario).solve("program of a relaxation", mesh, guess)
+
+
+def _beside(search: Search, scenario: Scenario) -> Search:
+    """Return the search for a motion of another scenario, in the time that the task's limit left.
+
+    Each program may take a few seconds' iterations, or as many as the search took: unlike of seconds, a busy machine
+    has as many.
+    """
+    affordable = int(WORK / (max(scenario.count, 1) * scenario.task.steps))
+    most = min(max(affordable, search.iterations, LEAST_ITERATIONS), MOST_ITERATIONS)
+    return Search(scenario, {}, search.progress, scenario.task.time_limit - search.solve_s, most)
 
 
 def rounded(value: float, up: bool) -> float:

@@ -19,7 +19,7 @@ from ..nlp.linear import LinearDistances
 from ..nlp.near import Near, has_places
 from ..nlp.program import Program, build
 from ..nlp.rows import Mesh
-from ..nlp.solver import SETTLED, TIME_LIMIT, Outcome, Progress, Solver
+from ..nlp.solver import MOST_ITERATIONS, SETTLED, TIME_LIMIT, Outcome, Progress, Solver
 from ..nlp.stages import Stages
 from ..nlp.waiting import raise_if_swallowed, wait_for
 from ..plan import Plan
@@ -53,13 +53,19 @@ class Search:
 
     New `solvers` are added to those that exist already, by mesh. `progress` is called with (iteration, objective,
     infeasibility). All that the search does takes `seconds`, from now on; default: the task's time limit, less what the
-    last audit takes.
+    last audit takes. Each run of a solver takes at most `most_iterations`.
     """
 
     def __init__(
-        self, scenario: Scenario, solvers: dict[Mesh, Solver], progress: Progress | None, seconds: float | None = None
+        self,
+        scenario: Scenario,
+        solvers: dict[Mesh, Solver],
+        progress: Progress | None,
+        seconds: float | None = None,
+        most_iterations: int = MOST_ITERATIONS,
     ):
         self.scenario, self.progress, self._solvers = scenario, progress, solvers
+        self._most_iterations = most_iterations
         limit = scenario.task.time_limit
         own = limit - min(FOR_AUDIT * limit, MOST_FOR_AUDIT)
         self._deadline = time.perf_counter() + (own if seconds is None else seconds)
@@ -97,6 +103,11 @@ class Search:
         self._iterates.append((iteration, objective, infeasibility))
         if self.progress is not None:
             self.progress(iteration, objective, infeasibility)
+
+    @property
+    def iterations(self) -> int:
+        """Return how many iterations all runs of solvers have taken."""
+        return len(self._iterates)
 
     @property
     def seconds_left(self) -> float:
@@ -228,9 +239,11 @@ class Search:
         known = self._solvers.get(mesh)
         again = known is not None and guess is None and known.has_solution  # continues from there, with its own rows
         if near is not None:
-            self._solvers[mesh] = wait_for(lambda: Solver(self._build(self.scenario, mesh, near)))
+            self._solvers[mesh] = wait_for(
+                lambda: Solver(self._build(self.scenario, mesh, near), self._most_iterations)
+            )
         elif known is None or not (again or np.isfinite(reach) or known.program.near.is_everywhere):
-            self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach)))
+            self._solvers[mesh] = wait_for(lambda: Solver(self._built(mesh, guess, reach), self._most_iterations))
         solver = self._solvers[mesh]
         solver.prepare(guess, coarser)
         built = time.perf_counter()

@@ -1,66 +1,51 @@
-"""What else would make a motion feasible: a nearer end, another place, feed or yaw, less wind or mass, other cables."""
+"""What else would make a motion feasible: another path (`other_paths`), less wind or mass, other cables."""
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ...base.text import quantity
 from ...models import Robot
-from ...solvers.margins import margins
+from ...models.part import Vector3
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
-from ..audits.tensions import scaled
-from ..global_path.at_rest import AtRest
-from ..plan import Plan
 from ..proofs.durations import durations
-from ..proofs.infeasible_ends import InfeasibleEnds, infeasible_ends
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.ends import fixed_values
 from ..tasks.lay_out import lay_out
-from ..tasks.paths import AnyPath, CirclePath, FeedPath, LinePath, WaypointPath
-from ..tasks.paths.shifted import shifted
 from ..tasks.phase import Load
-from ..tasks.scenario import POSITION, Scenario
-from ..tasks.status import MotionStatus
+from ..tasks.scenario import Scenario
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
 from .given_states import near_given_states
-from .largest_share import HALVINGS, RESERVES, Variation, largest_share
+from .largest_share import Variation, exceeds, largest_share
 from .longer_phases import longer_phases
+from .other_paths import near_home, nearer_end, other_yaws, shifted_path, slower_path, smaller_circle
 from .relaxations import LONGER, longer_durations, near_motion, other_duration, rounded, slower
 from .search import Search
 from .tilting import tilting_platform
 
-PLACES = 31  # of a path, at which a shifted one is compared
-SHIFT_STEP = 1.3  # of a shift to the next one that is tried
-SHIFTS = SHIFT_STEP ** np.arange(-36, 0)  # that are tried, in parts of the distance between the farthest anchors
-YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
+AT_EASE = 10.0  # times the time in which a force like the platform's weight moves it across the robot
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 
 
-def near_chosen_motion(
-    search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, proven: InfeasibleEnds | None = None
-) -> list[Relaxed]:
+def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
     """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one.
 
-    If no duration and no limit of the task does, it is what the platform could do exactly on its path. If the task is
-    `proven` infeasible, a longer duration is only tried if that is not, and for flying carriers, whose programs take
-    long, only if tensions exist at both ends.
+    If no duration and no limit of the task does, it is what the platform could do exactly on its path. A longer
+    duration is only tried if nothing proves it infeasible.
     """
-    slower_helps = True
-    if proven is not None and scenario.stretches:
-        flying = any(carrier.efforts for carrier in scenario.robot.carriers)
-        shortest, longest = longer_durations(scenario)
-        slower_helps = shortest < longest and not (flying and proven.certificate is not None)
+    span = longer_durations(scenario)
+    slower_helps = span[0] < span[1] or not scenario.stretches
     longer = longer_phases(search, scenario, audit) if slower_helps else []
-    found = near_motion(search, scenario, deviation, audit, slower_helps) or near_given_states(search, scenario, audit)
+    found = near_motion(search, scenario, deviation, audit, span) or near_given_states(search, scenario, audit)
     if found:
         return longer + found
-    if scenario.carrier_free:  # only what is proven of it tells how near an end must be
-        proof = infeasible_ends(scenario)
-        return [] if proof is None or proof.certificate is None else _nearer_end(search, scenario)
+    if scenario.carrier_free:
+        return longer + _one_of_a_team(search, scenario)
     if np.abs([fixed.value for fixed in fixed_values(scenario)]).max(initial=0.0) > 0:
         return []  # no motion is exactly on the path
     along = search.audit_motion(scenario, None, "audit of the path")
@@ -73,28 +58,64 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     """Return feasible variations of what a task does not name: where its path is, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change; if speeds or accelerations are
-    exceeded too, it may also need a longer duration, which is not tried in phases. The list is empty if the motion
-    exceeds other limits, or for boxes of winds and uncertain robots.
+    exceeded too, it may also need a longer duration, which is not tried in phases. If there is none, it is a path of
+    the same form near the platform's home, if necessary at ease, unless a region is in the way. The list is empty for
+    uncertain robots.
     """
     task = scenario.task
-    if isinstance(task.wind, WindBox | WindDisc) or task.robust is not None:
+    if task.robust is not None:
         return []
-    if scenario.carrier_free:  # all others would solve many programs
-        return _lighter_load(search, scenario)
-    others = [excess for excess in audit.excess if excess.limit != TENSIONS]
+    if scenario.carrier_free:
+        return _one_of_a_team(search, scenario)
+    found = _changes(search, scenario, audit)
+    if found or _blocked(audit):
+        return found
+    return near_home(search, scenario) or _at_ease_near_home(search, scenario)
+
+
+def _blocked(audit: Audit) -> bool:
+    return any(excess.limit == "keep_out" for excess in audit.excess)
+
+
+def _at_ease_near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the largest feasible path near the platform's home without margin and wind, and with a longer duration."""
+    eased: dict[str, object] = {"margin": 0.0, "wind": None}
+    conditions = ["a margin of 0 N"] * bool(scenario.hard_margin) + ["no wind"] * (scenario.task.wind is not None)
+    robot, size = scenario.robot, float(np.linalg.norm(np.ptp(scenario.robot.home_anchors, axis=0)))
+    seconds = rounded(AT_EASE * np.sqrt(size * robot.platform.mass / robot.force_scale), up=True)
+    if scenario.stretches and scenario.duration < seconds <= scenario.longest:
+        eased["duration"] = seconds
+        conditions.append(f"a duration of {quantity(seconds, 's')}")
+    if not conditions:
+        return []
+    calm = lay_out(scenario.robot, scenario.task.model_copy(update=eased))
+    return [replace(each, detail=f"{each.detail}, with {', '.join(conditions)}") for each in near_home(search, calm)]
+
+
+def _one_of_a_team(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the first change with which free carriers are found to hold the platform: each solves programs."""
+    changes = (_less_wind, _lighter_load, _lighter_platform, nearer_end, near_home)
+    return next((found for make in changes if (found := make(search, scenario))), [])
+
+
+def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the changes of the path, of the task and of the robot with which a fixed motion is feasible."""
+    task, others = scenario.task, [excess for excess in audit.excess if excess.limit != TENSIONS]
     if others and task.phases is not None:
         return []
     factors = [slower(excess) for excess in others]
     found = slower_path(search, scenario, audit)
     if min(factors, default=2.0) <= 1.0 or (others and not scenario.stretches):
-        blocked = any(excess.limit == "keep_out" for excess in others)  # ideas name other ends and ways round
-        return found + ([] if blocked else _shifted_path(search, scenario, audit) or _nearer_end(search, scenario))
+        if _blocked(audit):  # ideas name other places and ways round
+            inside = exceeds(scenario, np.array([scenario.duration]), rates=False)
+            return found + (nearer_end(search, scenario) if inside else [])
+        return found + (shifted_path(search, scenario, audit) or nearer_end(search, scenario))
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
     for make in (
         tilting_platform,
-        _nearer_end,
-        _smaller_circle,
-        _other_yaws,
+        nearer_end,
+        smaller_circle,
+        other_yaws,
         _less_wind,
         _lighter_load,
         _surer_load,
@@ -108,193 +129,34 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
             with_it = f", with a duration of {quantity(seconds, 's')}"
             its = [replace(each, detail=each.detail + with_it) for each in make(search, longer)]
         found += its
-    return found + _shifted_path(search, scenario, audit)
-
-
-def _nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the farthest end of a straight line, as far from its start, up to which it is feasible."""
-    path = scenario.task.path
-    if not isinstance(path, LinePath):
-        return []
-    start, way = np.array(path.start), np.array(path.end) - np.array(path.start)
-    whole, turns = float(np.linalg.norm(way[:3])), not way[:3].any()
-
-    def to(share: float) -> Variation:
-        end = start + share * way
-        nearer = path.model_copy(update={"end": tuple(end.tolist())})
-        place = ", ".join(f"{value:.4g}" for value in (np.rad2deg(end[3:]) if turns else end[:3]))
-        varied = _along(scenario, nearer)
-        if turns:
-            return varied, 100 * share, f"of it, to roll, pitch, yaw ({place}) degrees"
-        return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place})"
-
-    return (
-        largest_share(search, to, "part of the rotation", "%")
-        if turns
-        else largest_share(search, to, "length of the line", "m")
-    )
-
-
-def _smaller_circle(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest radius of a circle, at its angular velocity, with which it is feasible."""
-    path = scenario.task.path
-    if not isinstance(path, CirclePath) or any(carrier.moves for carrier in scenario.robot.carriers):
-        return []  # carriers that move with the platform may make all of it feasible
-
-    def with_radius(share: float) -> Variation:
-        smaller = path.model_copy(update={"radius": share * path.radius})
-        return _along(scenario, smaller), share * path.radius, f"instead of {quantity(path.radius, 'm')}"
-
-    return largest_share(search, with_radius, "path.radius", "m")
-
-
-def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
-    """Return the largest feed or angular velocity of a path that has its own, at which it is feasible.
-
-    `audit` is that of the motion exactly on the path.
-    """
-    path, factors = scenario.task.path, [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
-    if not isinstance(path, FeedPath | CirclePath) or min(factors, default=2.0) <= 1.0:
-        return []
-    fed = isinstance(path, FeedPath)
-    fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
-    others = ", the others by the same factor" if fed and path.feed is None else ""
-
-    least = scenario.duration / scenario.longest  # else it would last too long to be audited
-
-    def at(share: float) -> Variation:
-        share = max(share, least)
-        data = path.model_dump()  # a copy of the path would keep its law
-        for name, power in (("rate", 1), ("drift", 1), ("feed", 1), ("feeds", 1), ("acceleration", 2)):
-            if data.get(name) is not None:
-                data[name] = (share**power * np.array(data[name])).tolist()
-        push = f"{others}, with an acceleration of {quantity(data['acceleration'], 'm/s^2')}" if fed else ""
-        return _along(scenario, type(path).model_validate(data)), share * fastest, push.removeprefix(", ")
-
-    name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
-    return largest_share(search, at, name, unit, up=fastest < 0, most=1.0 / max(factors, default=1.0))
-
-
-def _shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
-    """Return the smallest shift of the whole path along an axis of {G} with which it is feasible.
-
-    Shifts are compared at rest, at some positions of the path; the audit decides. The list is empty where other
-    positions of the carriers are better advice.
-    """
-    task, path, robot = scenario.task, scenario.task.path, scenario.robot
-    movable = any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers)
-    if movable or scenario.relative or task.phases is not None or task.initial is not None:
-        return []
-    times = np.linspace(0.0, scenario.duration, PLACES)
-    platform, carriers = scenario.motion(times, None)
-    size = float(np.linalg.norm(np.ptp(robot.home_anchors, axis=0)))
-    kept = AtRest(scenario, size)
-
-    def holds(by: np.ndarray) -> bool:
-        poses = platform.pose.copy()
-        poses[:, :3] += by
-        return bool((kept(poses, carriers.pose).slack >= 0).all())
-
-    if holds(np.zeros(3)):
-        return []
-    shortest = np.full(3, np.inf)
-    for way in (sign * np.eye(3)[axis] for axis in POSITION if robot.dof_mask[axis] for sign in (1, -1)):
-        far = next((far for far in SHIFTS * size if far < np.abs(shortest).max() and holds(far * way)), None)
-        if far is None:
-            continue
-        low, high = far / SHIFT_STEP, far
-        for _ in range(HALVINGS // 2):
-            middle = (low + high) / 2
-            low, high = (low, middle) if holds(middle * way) else (middle, high)
-        if high < np.abs(shortest).max():
-            shortest = high * way
-    if np.isinf(shortest).any():
-        return []
-    axis = int(np.abs(shortest).argmax())
-    for reserve in RESERVES:
-        by = rounded(float(np.abs(shortest[axis])) / reserve, up=True) * np.sign(shortest)
-        moved = _along(scenario, shifted(path, by))
-        audit = search.audit_motion(moved, None, "audit, shifted path")
-        if audit.passed:
-            plan = Plan(moved, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0)
-            return [Relaxed("shift of the path", "m", 0.0, float(by[axis]), plan, f"along {'xyz'[axis]}")]
-    return []
-
-
-def _other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return feasible yaws for the points of the path at which no tensions hold the platform at rest.
-
-    Each lies between the given yaw and the one with the largest capacity margin there, as near to the given one as
-    tensions at rest permit, or by one factor less.
-    """
-    path, robot = scenario.task.path, scenario.robot
-    if not isinstance(path, LinePath | WaypointPath) or scenario.relative or not robot.dof_mask[5]:
-        return []
-    line = isinstance(path, LinePath)
-    points = np.array([path.start, path.end] if line else path.points)
-    names = ["path.start", "path.end"] if line else [f"path.points[{i}]" for i in range(len(points))]
-    wrong = np.flatnonzero(_margins_at_yaws(scenario, points, points[:, 5:])[:, 0] < 0)
-    given, held = points[wrong, 5], _margins_at_yaws(scenario, points[wrong], np.tile(YAWS, (len(wrong), 1)))
-    if not len(wrong) or held.max(axis=1).min() < 0:
-        return []
-    back = np.angle(np.exp(1j * (YAWS[held.argmax(axis=1)] - given)))
-    shares = np.linspace(0.0, 1.0, len(YAWS))
-    between = given[:, None] + back[:, None] * (1 - shares)
-    nearest = shares[np.argmax(_margins_at_yaws(scenario, points[wrong], between) < 0, axis=1) - 1]
-
-    def with_yaws(share: float) -> Variation:
-        turned, yaws = points.copy(), given + (1 - share * nearest) * back
-        turned[wrong, 5] = yaws
-        rows = tuple(map(tuple, turned.tolist()))
-        path_with_yaws = path.model_copy(update={"start": rows[0], "end": rows[-1]} if line else {"points": rows})
-        others = [f"{quantity(yaw, 'rad')} at {names[i]}" for i, yaw in zip(wrong[1:], yaws[1:], strict=True)]
-        detail = ", ".join([f"instead of {quantity(given[0], 'rad')}", *others])
-        return _along(scenario, path_with_yaws), float(yaws[0]), detail
-
-    found = largest_share(search, with_yaws, f"yaw at {names[wrong[0]]}", "rad", up=bool(back[0] > 0))
-    return [replace(each, requested=float(given[0])) for each in found]
-
-
-def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -> np.ndarray:
-    """Return the capacity margins at rest at points (n, 6) with yaws (n, k), carriers as at the start, (n, k) [N]."""
-    poses = np.repeat(points, yaws.shape[1], axis=0)
-    poses[:, 5] = yaws.ravel()
-    still, axes = np.zeros_like(poses), np.flatnonzero(scenario.robot.dof_mask)
-    carriers = np.vstack([carrier.pose for carrier in scenario.references(np.zeros(1))[1]])
-    A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, carriers))[:, axes]
-    w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still, wind=scenario.wind))[:, axes]
-    return margins(A, w, *scenario.bounds()).reshape(yaws.shape)
-
-
-def _along(scenario: Scenario, path: AnyPath) -> Scenario:
-    """Return the scenario along another path. Where a given state is that of an end of the path, it moves with it."""
-    times, changes = np.array([0.0, scenario.duration]), dict[str, object](path=path)
-    motion = scenario.along(path, scenario.duration).motion(times, None)[0]
-    for row, key in enumerate(("initial", "final")):
-        state, moved = getattr(scenario.task, key), dict[str, tuple[float, ...]]()
-        for name, values in zip(("pose", "velocity", "acceleration"), motion, strict=True):
-            given = None if state is None else getattr(state, name)
-            if given is not None:
-                fixed = ~np.isin(np.arange(6), scenario.platform_free)
-                moved[name] = tuple(np.where(fixed, values[row], given).tolist())
-        if state is not None:
-            changes[key] = state.model_copy(update=moved)
-    return lay_out(scenario.robot, scenario.task.model_copy(update=changes))
+    return found + shifted_path(search, scenario, audit)
 
 
 def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the strongest wind from the same direction that is feasible."""
+    """Return the strongest wind, or set of winds, from the same directions that is feasible."""
     wind = scenario.task.wind
-    if wind is None or isinstance(wind, WindBox | WindDisc) or not any(wind):
+    fastest = max(_speeds(wind), default=0.0)
+    if wind is None or not fastest:
         return []
-    velocity = np.array(wind)
-    speed = float(np.linalg.norm(velocity))
 
     def with_wind(share: float) -> Variation:
-        task = scenario.task.model_copy(update={"wind": tuple((share * velocity).tolist())})
-        return lay_out(scenario.robot, task), share * speed, f"instead of {quantity(speed, 'm/s')}"
+        if isinstance(wind, tuple):
+            weaker: Any = tuple(share * value for value in wind)
+        else:
+            fields = {name: (share * np.array(value)).tolist() for name, value in wind.model_dump().items()}
+            weaker = type(wind).model_validate(fields)
+        task = scenario.task.model_copy(update={"wind": weaker})
+        return lay_out(scenario.robot, task), share * fastest, f"instead of {quantity(fastest, 'm/s')}"
 
     return largest_share(search, with_wind, "wind", "m/s")
+
+
+def _speeds(wind: Vector3 | WindBox | WindDisc | None) -> list[float]:
+    """Return the speeds [m/s] of a wind, of the corners of a box of winds or of the fastest of a disc."""
+    if isinstance(wind, WindDisc):
+        return [wind.speed]
+    corners = [wind.min, wind.max] if isinstance(wind, WindBox) else [] if wind is None else [wind]
+    return [float(np.linalg.norm(corner)) for corner in corners]
 
 
 def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:

@@ -187,7 +187,7 @@ class Scenario(Displayed):
         times: np.ndarray,
         platform: Motion,
         carriers: Motion | None = None,
-        wind: Vector3 | None = None,
+        wind: Vector3 | np.ndarray | None = None,
         extreme: int | None = None,
     ) -> np.ndarray:
         """Return the wrench that platform and load need at `times` for a motion in {G}, (n, 6) [N, N m].

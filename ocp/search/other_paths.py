@@ -1,0 +1,210 @@
+"""What path near a task's own is feasible: a nearer end, a smaller, slower or shifted path, other yaws."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.text import quantity, quantity_row
+from ...solvers.margins import margins
+from ..audits.audit import Audit
+from ..audits.excess import TENSIONS
+from ..audits.tensions import scaled
+from ..global_path.at_rest import AtRest
+from ..result import Relaxed
+from ..tasks.lay_out import lay_out
+from ..tasks.paths import AnyPath, CirclePath, FeedPath, LinePath, WaypointPath
+from ..tasks.paths.shifted import shifted, shrunk
+from ..tasks.scenario import POSITION, Scenario
+from .largest_share import HALVINGS, RESERVES, Variation, largest_share
+from .relaxations import planned, rounded, slower
+from .search import Search
+
+PLACES = 31  # of a path, at which a shifted one is compared
+SHIFT_STEP = 1.3  # of a shift to the next one that is tried
+SHIFTS = SHIFT_STEP ** np.arange(-36, 0)  # that are tried, in parts of the distance between the farthest anchors
+YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
+
+
+def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the farthest end of a straight line, as far from its start, up to which it is feasible."""
+    path = scenario.task.path
+    if not isinstance(path, LinePath):
+        return []
+    start, way = np.array(path.start), np.array(path.end) - np.array(path.start)
+    whole, turns = float(np.linalg.norm(way[:3])), not way[:3].any()
+
+    def to(share: float) -> Variation:
+        end = start + share * way
+        nearer = path.model_copy(update={"end": tuple(end.tolist())})
+        place = ", ".join(f"{value:.4g}" for value in (np.rad2deg(end[3:]) if turns else end[:3]))
+        varied = _along(scenario, nearer)
+        if turns:
+            return varied, 100 * share, f"of it, to roll, pitch, yaw ({place}) degrees"
+        return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place})"
+
+    return (
+        largest_share(search, to, "part of the rotation", "%")
+        if turns
+        else largest_share(search, to, "length of the line", "m")
+    )
+
+
+def smaller_circle(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the largest radius of a circle, at its angular velocity, with which it is feasible."""
+    path = scenario.task.path
+    if not isinstance(path, CirclePath) or any(carrier.moves for carrier in scenario.robot.carriers):
+        return []  # carriers that move with the platform may make all of it feasible
+
+    def with_radius(share: float) -> Variation:
+        smaller = path.model_copy(update={"radius": share * path.radius})
+        return _along(scenario, smaller), share * path.radius, f"instead of {quantity(path.radius, 'm')}"
+
+    return largest_share(search, with_radius, "path.radius", "m")
+
+
+def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the largest feed or angular velocity of a path that has its own, at which it is feasible.
+
+    `audit` is that of the motion exactly on the path.
+    """
+    path, factors = scenario.task.path, [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
+    if not isinstance(path, FeedPath | CirclePath) or min(factors, default=2.0) <= 1.0:
+        return []
+    fed = isinstance(path, FeedPath)
+    fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
+    others = ", the others by the same factor" if fed and path.feed is None else ""
+
+    least = scenario.duration / scenario.longest  # else it would last too long to be audited
+
+    def at(share: float) -> Variation:
+        share = max(share, least)
+        data = path.model_dump()  # a copy of the path would keep its law
+        for name, power in (("rate", 1), ("drift", 1), ("feed", 1), ("feeds", 1), ("acceleration", 2)):
+            if data.get(name) is not None:
+                data[name] = (share**power * np.array(data[name])).tolist()
+        push = f"{others}, with an acceleration of {quantity(data['acceleration'], 'm/s^2')}" if fed else ""
+        return _along(scenario, type(path).model_validate(data)), share * fastest, push.removeprefix(", ")
+
+    name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
+    return largest_share(search, at, name, unit, up=fastest < 0, most=1.0 / max(factors, default=1.0))
+
+
+def near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the largest path of the same form, drawn in towards the platform's home, that is feasible.
+
+    Its attitudes come nearer to that of home in proportion. It is what remains where both ends cannot be reached.
+    """
+    path, home = scenario.task.path, scenario.robot.home
+    if not isinstance(path, LinePath | WaypointPath | CirclePath) or scenario.relative:
+        return []
+
+    def about_home(share: float) -> Variation:
+        place = quantity_row(home[:3] + 0.0)
+        return _along(scenario, shrunk(path, home, share)), 100 * share, f"of it, drawn in towards ({place}) m, home"
+
+    return largest_share(search, about_home, "size of the path", "%", rates=True)
+
+
+def shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the smallest shift of the whole path along an axis of {G} with which it is feasible.
+
+    Shifts are compared at rest, at some positions of the path; the audit decides. The list is empty where other
+    positions of the carriers are better advice.
+    """
+    task, path, robot = scenario.task, scenario.task.path, scenario.robot
+    movable = any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers)
+    if movable or scenario.relative or task.phases is not None or task.initial is not None:
+        return []
+    times = np.linspace(0.0, scenario.duration, PLACES)
+    platform, carriers = scenario.motion(times, None)
+    size = float(np.linalg.norm(np.ptp(robot.home_anchors, axis=0)))
+    kept = AtRest(scenario, size)
+
+    def holds(by: np.ndarray) -> bool:
+        poses = platform.pose.copy()
+        poses[:, :3] += by
+        return bool((kept(poses, carriers.pose).slack >= 0).all())
+
+    if holds(np.zeros(3)):
+        return []
+    shortest = np.full(3, np.inf)
+    for way in (sign * np.eye(3)[axis] for axis in POSITION if robot.dof_mask[axis] for sign in (1, -1)):
+        far = next((far for far in SHIFTS * size if far < np.abs(shortest).max() and holds(far * way)), None)
+        if far is None:
+            continue
+        low, high = far / SHIFT_STEP, far
+        for _ in range(HALVINGS // 2):
+            middle = (low + high) / 2
+            low, high = (low, middle) if holds(middle * way) else (middle, high)
+        if high < np.abs(shortest).max():
+            shortest = high * way
+    if np.isinf(shortest).any():
+        return []
+    axis = int(np.abs(shortest).argmax())
+    for reserve in RESERVES:
+        by = rounded(float(np.abs(shortest[axis])) / reserve, up=True) * np.sign(shortest)
+        moved = _along(scenario, shifted(path, by))
+        if (plan := planned(search, moved, "audit, shifted path")) is not None:
+            return [Relaxed("shift of the path", "m", 0.0, float(by[axis]), plan, f"along {'xyz'[axis]}")]
+    return []
+
+
+def other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return feasible yaws for the points of the path at which no tensions hold the platform at rest.
+
+    Each lies between the given yaw and the one with the largest capacity margin there, as near to the given one as
+    tensions at rest permit, or by one factor less.
+    """
+    path, robot = scenario.task.path, scenario.robot
+    if not isinstance(path, LinePath | WaypointPath) or scenario.relative or not robot.dof_mask[5]:
+        return []
+    line = isinstance(path, LinePath)
+    points = np.array([path.start, path.end] if line else path.points)
+    names = ["path.start", "path.end"] if line else [f"path.points[{i}]" for i in range(len(points))]
+    wrong = np.flatnonzero(_margins_at_yaws(scenario, points, points[:, 5:])[:, 0] < 0)
+    given, held = points[wrong, 5], _margins_at_yaws(scenario, points[wrong], np.tile(YAWS, (len(wrong), 1)))
+    if not len(wrong) or held.max(axis=1).min() < 0:
+        return []
+    back = np.angle(np.exp(1j * (YAWS[held.argmax(axis=1)] - given)))
+    shares = np.linspace(0.0, 1.0, len(YAWS))
+    between = given[:, None] + back[:, None] * (1 - shares)
+    nearest = shares[np.argmax(_margins_at_yaws(scenario, points[wrong], between) < 0, axis=1) - 1]
+
+    def with_yaws(share: float) -> Variation:
+        turned, yaws = points.copy(), given + (1 - share * nearest) * back
+        turned[wrong, 5] = yaws
+        rows = tuple(map(tuple, turned.tolist()))
+        path_with_yaws = path.model_copy(update={"start": rows[0], "end": rows[-1]} if line else {"points": rows})
+        others = [f"{quantity(yaw, 'rad')} at {names[i]}" for i, yaw in zip(wrong[1:], yaws[1:], strict=True)]
+        detail = ", ".join([f"instead of {quantity(given[0], 'rad')}", *others])
+        return _along(scenario, path_with_yaws), float(yaws[0]), detail
+
+    found = largest_share(search, with_yaws, f"yaw at {names[wrong[0]]}", "rad", up=bool(back[0] > 0))
+    return [replace(each, requested=float(given[0])) for each in found]
+
+
+def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -> np.ndarray:
+    """Return the capacity margins at rest at points (n, 6) with yaws (n, k), carriers as at the start, (n, k) [N]."""
+    poses = np.repeat(points, yaws.shape[1], axis=0)
+    poses[:, 5] = yaws.ravel()
+    still, axes = np.zeros_like(poses), np.flatnonzero(scenario.robot.dof_mask)
+    carriers = np.vstack([carrier.pose for carrier in scenario.references(np.zeros(1))[1]])
+    A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, carriers))[:, axes]
+    w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still, wind=scenario.wind))[:, axes]
+    return margins(A, w, *scenario.bounds()).reshape(yaws.shape)
+
+
+def _along(scenario: Scenario, path: AnyPath) -> Scenario:
+    """Return the scenario along another path. Where a given state is that of an end of the path, it moves with it."""
+    times, changes = np.array([0.0, scenario.duration]), dict[str, object](path=path)
+    motion = scenario.along(path, scenario.duration).motion(times, None)[0]
+    for row, key in enumerate(("initial", "final")):
+        state, moved = getattr(scenario.task, key), dict[str, tuple[float, ...]]()
+        for name, values in zip(("pose", "velocity", "acceleration"), motion, strict=True):
+            given = None if state is None else getattr(state, name)
+            if given is not None:
+                fixed = ~np.isin(np.arange(6), scenario.platform_free)
+                moved[name] = tuple(np.where(fixed, values[row], given).tolist())
+        if state is not None:
+            changes[key] = state.model_copy(update=moved)
+    return lay_out(scenario.robot, scenario.task.model_copy(update=changes))
