@@ -67,8 +67,8 @@ def _fixed_motion(search: Search) -> Plan:
     """Plan a task with free tensions only: each instant is a separate tension-distribution problem.
 
     If only limits on tension rates or on the forces at carriers are exceeded, the program searches for tensions
-    that keep them. If the objective weighs more than the sum of squared tensions, it also searches for cheaper
-    ones.
+    that keep them. If more costs than the sum of squared tensions, such as a soft limit that they exceed, it also
+    searches for cheaper ones.
     """
     start = time.perf_counter()
     audit = search.audit_motion(search.scenario, None)
@@ -86,8 +86,10 @@ def _fixed_motion(search: Search) -> Plan:
         status, reason = MotionStatus.NOT_FOUND, chosen.reason
     plan = Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, reason=reason)
     if audit.passed:
-        weighed = search.scenario.task.objective
-        if weighed.margin is weighed.tension_rate is None or not other_tensions_exist(search.scenario, audit):
+        weighed, of_tensions = search.scenario.task.objective, search.scenario.limits.of_tensions
+        soft = any(excess.limit in of_tensions for excess in audit.soft_excess)
+        alone = not (soft or weighed.own) and weighed.margin is weighed.tension_rate is None
+        if alone or not other_tensions_exist(search.scenario, audit):
             return plan
         chosen = _free_motion(search, None)
         return chosen if chosen.feasible and cost(chosen) < cost(plan) else plan

@@ -36,4 +36,15 @@ def cost(plan: PlanData) -> float:
     """Return the objective of a feasible plan without free coordinates, but for the jerk that it does not have."""
     audit, task = plan.audit, plan.scenario.task
     margin = 0.0 if plan.margin is None else plan.margin - task.margin
-    return plan.scenario.costs.along(audit.times, audit.motion, audit.carriers, audit.tensions, margin)
+    costs = plan.scenario.costs.along(audit.times, audit.motion, audit.carriers, audit.tensions, margin)
+    return costs + _of_soft_limits(plan.scenario, audit)
+
+
+def _of_soft_limits(scenario: Scenario, audit: Audit) -> float:
+    """Return what exceeding the soft limits costs: at each instant the largest excess over those of one name."""
+    beyond: dict[str, np.ndarray] = {}
+    for limit, values in zip(scenario.limits, audit.limited, strict=True):
+        if limit.soft is not None:
+            excess = np.maximum(limit.low - values, values - limit.high).max(axis=1) / limit.soft
+            beyond[limit.name] = np.fmax(beyond.get(limit.name, 0.0), excess)  # nan: not in force
+    return float(sum((each**2).mean() for each in beyond.values()))
