@@ -1,14 +1,19 @@
 """What went wrong first: in the report, the numbers, the figures, the film and the viewer; and cut cables hang."""
 
 import json
+from string import Template
 
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib import pyplot
+from ruamel.yaml import YAML
+from scipy.spatial.transform import Rotation
 
 from towline import load, simulate
+from towline.cli.new import TEMPLATES
 from towline.figures.cut_cables import drawn_ends
+from towline.models import Robot
 from towline.statics.scene import scene
 from towline.viewer import read
 from towline.viewer.labels import readout
@@ -106,3 +111,20 @@ def test_the_viewer_reads_cuts_and_events(failed, tmp_path):
         damaged = file.load().assign_attrs(report="no JSON")
     damaged.to_netcdf(tmp_path / "damaged.nc", engine="h5netcdf")
     assert read(tmp_path / "damaged.nc").replay.at(0).events == ()
+
+
+def test_a_shortfall_is_not_that_of_angles_without_meaning():
+    """A load on two of three cables pitches to 90 degrees, where it turns slowly, and roll and yaw race."""
+    text = Template((TEMPLATES / "towing.yaml").read_text()).substitute(name="tugs")
+    robot = Robot.model_validate(YAML(typ="safe").load(text))
+    run = simulate(robot, robot.home, duration=1.2, events=["cut 1 at 0.05"])
+    poses, shortfall = run.trajectory["pose"].values, run.record.shortfall[: len(run.times)]
+    turned = Rotation.from_euler("ZYX", poses[:, [5, 4, 3]])
+    speed = np.linalg.norm((turned[1:] * turned[:-1].inv()).as_rotvec(), axis=1) / run.period
+    weight = 9.81 * robot.platform.mass
+    assert np.nanmax(shortfall) > 100 * weight
+    assert np.abs(run.record.motions[:, 0, 9]).max() > 100 * speed.max()
+    merit = run.figures_of_merit()["shortfall_max"]
+    assert 0.1 * weight < merit < 2 * weight
+    assert merit in shortfall
+    assert "at a pitch beyond 1.2 rad" in run.report()
