@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from towline.benchmarks.scenes import forest
+from towline.benchmarks.scenes import carried
 from towline.models import Robot
 from towline.ocp import plan
 
@@ -12,10 +12,11 @@ ATTACHMENTS = np.array([[-0.2, -0.2, 0.1], [0.2, -0.2, 0.1], [0.2, 0.2, 0.1], [-
 MASS = 10.0
 
 
-def suspended():
+def suspended(count=4):
+    ends = list(zip(ANCHORS.tolist(), ATTACHMENTS.tolist(), strict=True))[:count]
     cables = [
         {"carrier": "frame", "anchor": anchor, "attachment": attachment, "t_min": 5, "t_max": 400}
-        for anchor, attachment in zip(ANCHORS.tolist(), ATTACHMENTS.tolist(), strict=True)
+        for anchor, attachment in ends
     ]
     platform = {"mass": MASS, "inertia": [2e-4, 2e-4, 3e-4, 0, 0, 0], "home": [0, 0, 1, 0, 0, 0]}
     frame = {"name": "frame", "kind": "ground"}
@@ -48,6 +49,21 @@ def test_the_tube_in_which_it_may_tilt_is_offered():
     assert np.abs(unbalanced(level, audit.tensions[-1])).max() > 1.0
 
 
+def test_it_is_offered_also_where_its_first_program_is_too_coarse():
+    points = [[0, 0, 1], [0.3, 0, 1.2], [0.3, 0.3, 1]]
+    task = {"path": {"kind": "waypoints", "points": points}, "duration": 4, "steps": 30}
+    (offer,) = (each for each in plan(suspended(), task).relaxations if each.name == "tube.attitude")
+    assert plan(suspended(), {**task, "tube": {"attitude": offer.possible}}).feasible
+
+
+def test_it_is_not_offered_where_ipopt_takes_no_program():
+    """On three cables and a closed path there are more equations than unknowns: zeros are no solution of them."""
+    path = {"kind": "circle", "centre": [0, 0, 1.2], "radius": 0.3, "rate": 2}
+    refused = plan(suspended(3), {"path": path, "tube": {"ends": "periodic"}, "steps": 20})
+    assert not refused.feasible
+    assert "tube.attitude" not in [each.name for each in refused.relaxations]
+
+
 def test_it_is_not_offered_where_enough_cables_hold_each_attitude():
     refused = plan("point-mass-3", {"path": {"kind": "line", "start": [0, 0, 1], "end": [1.5, 0.5, 1]}, "duration": 5})
     assert not refused.feasible
@@ -62,6 +78,10 @@ def test_what_no_tilt_makes_feasible_is_not_offered():
 
 
 def test_a_point_mass_has_no_attitude_to_change():
-    refused = plan(*forest(4)[:2])  # quadrotors too near to each other at the goal
+    low, high = [-1, -1, -1], [2, 1, 1]
+    refused = plan(
+        *carried(1, [0, 0, 0], [1, 0, 0], low, high, [], at_goal=[(0.0, 1.0)])
+    )  # at rest it hangs vertically
     assert refused.status == "infeasible"
+    assert refused.certificate is not None
     assert "a tilting platform" not in refused.report()

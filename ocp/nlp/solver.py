@@ -172,7 +172,8 @@ class Solver:
         x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
         objective = float(result["f"])
         message = statistics["return_status"]
-        met = program.violation(x, result["g"].full().ravel()) <= MET
+        # IPOPT did not start on more equations than unknowns, and what it returns of them is zeros.
+        met = watch.iteration > 0 and program.violation(x, result["g"].full().ravel()) <= MET
         if watch.settled or watch.late:
             message = TIME_LIMIT if watch.late else SETTLED
             if len(watch.best):

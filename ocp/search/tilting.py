@@ -3,12 +3,10 @@
 import numpy as np
 
 from ..nlp.rows import Mesh
-from ..plan import Plan
 from ..result import Relaxed
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import ATTITUDE, Scenario
-from ..tasks.status import MotionStatus
-from .relaxations import rounded, solved
+from .relaxations import planned, rounded, solved
 from .search import Search
 
 MOST = 0.5  # [rad], of a tilt that is offered
@@ -30,13 +28,9 @@ def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
 
     free = with_tilt(MOST)
     outcome = solved(search, free, None, Mesh(task.steps))
-    if not outcome.success:
-        return []
     turns = [column for column, (owner, axis) in enumerate(free.owners()) if owner is None and axis in angles]
     tilt = min(rounded(SPARE * float(np.abs(outcome.deviation.q[:, turns]).max()), up=True), MOST)
-    tilted = with_tilt(tilt).lasting(outcome.duration)
-    audit = search.audit_motion(tilted, outcome.deviation, "audit, tilting platform")
-    if not audit.passed:
+    if not outcome.success or not tilt:
         return []
-    plan = Plan(tilted, MotionStatus.FEASIBLE, outcome.deviation, audit, 0.0, 0.0)
-    return [Relaxed("tube.attitude", "rad", task.tube.turn, tilt, plan, "about each axis")]
+    plan = planned(search, with_tilt(tilt), "audit, tilting platform", outcome.deviation)
+    return [] if plan is None else [Relaxed("tube.attitude", "rad", task.tube.turn, tilt, plan, "about each axis")]
