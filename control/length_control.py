@@ -56,6 +56,7 @@ class LengthControl(Controller):
 
     Attributes:
         stiffness: E A that it takes for each cable, (m,) [N]; infinity for one that does not stretch.
+        corrects: Whether it corrects lengths by the measured pose.
 
     Raises:
         InputError: If an argument has a wrong value, the robot has flying carriers, or its cables have fixed lengths.
@@ -98,6 +99,7 @@ class LengthControl(Controller):
         self._lag = number("lag", lag, 0.0, 1.0)
         self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
         self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
+        self.corrects = not self._proportional == self._integral == 0
         if elastic and self._settling < np.inf:
             proportional = USUAL[0] if self._proportional is None else self._proportional
             calm = calm_integral(self.robot, self.stiffness, self._damping, proportional, USUAL[1])
@@ -182,8 +184,8 @@ class LengthControl(Controller):
         proportional = proportional if self._proportional is None else self._proportional
         integral = self._calm * integral if self._integral is None else self._integral
         total = before + dt * error
-        ahead = proportional * (error + self._lag * drift) + integral * (total + self._lag * error)
         with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
+            ahead = proportional * (error + self._lag * drift) + integral * (total + self._lag * error)
             wanted = (J @ ahead[..., None])[..., 0]
         beyond = np.asarray(~(np.abs(wanted) <= self._most).all(axis=-1))
         self._sum = np.where(beyond[..., None], before, total)

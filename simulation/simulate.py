@@ -191,6 +191,13 @@ def _check_model(robot: Robot, controller: Controller) -> None:
             f"controller must be for robot {robot.name!r}, got {type(controller).__name__} for {model.name!r}"
         )
     if isinstance(inner, LengthControl):
+        undamped = [i for i, cable in enumerate(robot.cables) if cable.stiffness and not cable.damping]
+        if undamped and inner.corrects:
+            warn(
+                f"cables[{undamped[0]}].damping is missing in the robot file of {robot.name!r}: oscillations on cables "
+                "without damping grow by the corrections of LengthControl",
+                stacklevel=3,
+            )
         for i, (cable, taken) in enumerate(zip(robot.cables, inner.stiffness.tolist(), strict=True)):
             if not cable.stiffness and isfinite(taken):
                 raise InputError(

@@ -1,5 +1,7 @@
 """Winches that take lengths: a robot keeps its plan although stiffness and lag of its cables are not as in its file."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -248,3 +250,33 @@ def test_a_small_platform_on_long_cables_has_room_for_their_stretch(factor):
     """5 % of ipanema-1's length are 4 mm, less than a wrong stiffness makes of 2.6 m under 700 N."""
     controller = LengthControl(elastic("ipanema-1", 1e5))
     assert controller._most > abs(1 - 1 / factor) * 2.6 * 700 / 1e5
+
+
+def test_cables_without_damping_are_warned_of():
+    """From rest and rounding alone the oscillation grows by 1e12 within 3 s; without corrections it does not."""
+    frame = np.array([[x, y, z] for z in (3, 0) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))])
+    ends = np.sign(frame - [0, 0, 1.5]) * [0.1, 0.1, -0.1]
+    common = {"carrier": "frame", "t_min": 20, "t_max": 2000, "stiffness": 5e4}
+    cables = [
+        {"anchor": one, "attachment": end} | common for one, end in zip(frame.tolist(), ends.tolist(), strict=True)
+    ]
+    platform = {"mass": 10, "inertia": [0.2, 0.2, 0.3, 0, 0, 0], "home": [0, 0, 1, 0, 0, 0]}
+    whole = {
+        "name": "bare",
+        "source": "a test",
+        "platform": platform,
+        "carriers": [{"name": "frame", "kind": "ground"}],
+    }
+    bare = Robot.model_validate(whole | {"cables": cables})
+    with pytest.warns(UserWarning, match=r"cables\[0\]\.damping is missing in the robot file of 'bare'"):
+        run = simulate(bare, bare.home, LengthControl(bare), duration=3.2)
+    assert run.error[0] < 1e-12
+    assert run.error[-1] > 1e-3
+    for cable in cables:
+        cable["damping"] = 100.0
+    damped = Robot.model_validate(whole | {"cables": cables})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert simulate(damped, damped.home, LengthControl(damped), duration=0.5).error.max() < 1e-9
+        still = simulate(bare, bare.home, LengthControl(bare, proportional=0, integral=0), duration=1.5)
+    assert still.error.max() < 1e-9
