@@ -489,7 +489,14 @@ def test_a_solution_that_is_no_number_is_not_used_and_leaves_nothing_behind():
 
 def test_nothing_is_planned_where_residuals_are_no_numbers(monkeypatch):
     monkeypatch.setattr(Horizon, "residuals", Residuals(0.0, 0.0, np.nan, 0.0))
-    monkeypatch.setattr(Horizon, "converged", False)
+    solve = Horizon.solve
+
+    def without_result(horizon, *arguments, **named):
+        solve(horizon, *arguments, **named)
+        horizon.converged = False
+        return False
+
+    monkeypatch.setattr(Horizon, "solve", without_result)
     robot = load("cogiro")
     state, reference = rest(robot)
     controller = Predictive(robot)

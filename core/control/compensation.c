@@ -12,7 +12,8 @@
  *
  * With as many cables as degrees of freedom or more, dw = -d, the disturbance: the carriers take over what is steady,
  * and the tensions correct errors. With fewer the carriers have to correct them too: dw = w - A t_ref where they are now,
- * and dp adds to the offset that they have.
+ * and dp adds to the offset that they have. Of that offset only the part is kept that changes the wrench, of least norm:
+ * along a single cable, whose length is constant, another would lift the platform for good.
  */
 #include "control/equations.h"
 #include "control/internal.h"
@@ -21,7 +22,8 @@
 static const double SHARE = 0.05;
 /* and for those that correct errors, which leave to the tensions what tensions can give. */
 static const double ALONG = 1;
-static const double DAMPED = 1e-4; /* of the largest entry of the gram matrix */
+/* Added to the gram matrix, of its largest entry: for a change of the wrench, and for what is kept of an offset. */
+static const double DAMPED = 1e-4, NEARLY_NONE = 1e-9;
 
 enum { CARRIERS = TOWLINE_MOST_CARRIERS };
 
@@ -66,8 +68,8 @@ void towline_carrier_columns(const towline_robot *robot, const towline_controlle
 }
 
 /* Solve (share^2 A A' + G G') x = dw for what makes dw with least effort, dp = G' x; moments times `scale`. */
-static void least_effort(const towline_robot *robot, double share, const double *A, const double *missing, double scale,
-                         double columns[][6], double *x) {
+static void least_effort(const towline_robot *robot, double share, double damped, const double *A,
+                         const double *missing, double scale, double columns[][6], double *x) {
     const int m = robot->cables;
     double gram[6][7], largest = 0;
     for (int j = 0; j < 6; j++) {
@@ -81,9 +83,21 @@ static void least_effort(const towline_robot *robot, double share, const double 
         }
         largest = fmax(largest, gram[j][j]);
     }
-    for (int j = 0; j < 6; j++) { gram[j][j] += DAMPED * largest + 1e-30; }
+    for (int j = 0; j < 6; j++) { gram[j][j] += damped * largest + 1e-30; }
     solve_positive(gram);
     for (int j = 0; j < 6; j++) { x[j] = gram[j][6]; }
+}
+
+/* Write the change of the wrench (6) that the carriers' offsets make. */
+static void wrench_of_offsets(const towline_robot *robot, const towline_controller *controller, double scale,
+                              const towline_carrier_memory *memory, double columns[][6], double *wrench) {
+    memset(wrench, 0, 6 * sizeof *wrench);
+    for (int c = 0; c < robot->carriers; c++) {
+        for (int k = 0; k < 6; k++) {
+            const double reach = controller->reach[c][k], share = reach > 0 ? memory[c].offset[k] / reach : 0;
+            for (int j = 0; j < 6; j++) { wrench[j] += columns[6 * c + k][j] * share / (j < 3 ? 1 : scale); }
+        }
+    }
 }
 
 /* Let an offset go towards where it is wanted, by a lag of second order, for `dt` [s]; return its acceleration. */
@@ -109,19 +123,22 @@ static void add_offset(double turn, const double *offset, double *coordinates) {
 void towline_compensate(const towline_robot *robot, const towline_controller *controller, double dt,
                         const configuration *at, const double *A, const double *missing, towline_row *row) {
     const double scale = 1 / robot->length_scale, share = controller->corrects ? ALONG : SHARE;
-    double columns[6 * CARRIERS][6], x[6];
+    double columns[6 * CARRIERS][6], x[6], given[6], kept[6] = {0, 0, 0, 0, 0, 0};
     towline_carrier_columns(robot, controller, at, row->t_ref, scale, columns);
-    least_effort(robot, share * robot->force_scale, A, missing, scale, columns, x);
+    least_effort(robot, share * robot->force_scale, DAMPED, A, missing, scale, columns, x);
+    if (controller->corrects) {
+        wrench_of_offsets(robot, controller, scale, row->carrier_memory, columns, given);
+        least_effort(robot, 0, NEARLY_NONE, A, given, scale, columns, kept);
+    }
     for (int c = 0; c < robot->carriers; c++) {
         towline_carrier_memory *memory = &row->carrier_memory[c];
         double *carrier = row->carriers + 18 * c, bends[6];
         for (int k = 0; k < 6; k++) {
             const double reach = controller->reach[c][k];
-            double change = 0;
-            for (int j = 0; j < 6; j++) { change += columns[6 * c + k][j] * x[j]; }
-            const double wanted = (controller->corrects ? memory->offset[k] : 0) + change * reach;
-            bends[k] =
-                follow(controller, dt, fmin(fmax(wanted, -reach), reach), &memory->offset[k], &memory->offset_rate[k]);
+            double wanted = 0;
+            for (int j = 0; j < 6; j++) { wanted += columns[6 * c + k][j] * (x[j] + kept[j]) * reach; }
+            wanted = fmin(fmax(wanted, -reach), reach);
+            bends[k] = follow(controller, dt, wanted, &memory->offset[k], &memory->offset_rate[k]);
         }
         add_offset(carrier[5], bends, carrier + 12);
     }
