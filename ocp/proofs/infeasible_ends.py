@@ -25,8 +25,9 @@ from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 from .no_attitude import CERTAIN, no_attitude
 from .out_of_reach import out_of_reach
-from .too_fast import too_fast
+from .too_fast import OF_DURATION, too_fast
 from .too_heavy import OF_WEIGHT, too_heavy
+from .too_weak_carriers import too_weak_carriers
 
 PLACES = 41  # along the path
 GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner
@@ -64,7 +65,13 @@ def infeasible_ends(scenario: Scenario) -> InfeasibleEnds | None:
     proven = _exceeded(scenario, times, freedom, platform, carriers)
     proven += _stretched(scenario, times, freedom, platform, carriers)
     known = {(excess.limit, excess.about) for excess in proven}
-    hurried = _hurried(scenario, times, freedom, platform, carriers)
+    given = _given(freedom, len(times))
+    bodies = [Motion(*(part[given] for part in motion)) for motion in (platform, carriers)]
+    hurried = [*_hurried(scenario, times, freedom, platform, carriers)]
+    hurried += too_weak_carriers(scenario, times[given], *bodies)
+    durations = [excess for excess in hurried if excess.limit == OF_DURATION]
+    proven += [max(durations, key=lambda excess: excess.bound)] if durations else []
+    known |= {(excess.limit, excess.about) for excess in durations}
     proven += [excess for excess in hurried if (excess.limit, excess.about) not in known]
     proven += too_heavy(scenario, _resting(freedom, platform, carriers))
     certificate = _without_tensions(scenario, times, freedom, platform, carriers)
@@ -100,6 +107,16 @@ def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
         for order in range(3):
             freedom[0, order] = FREE if freedom[1:, : order + 1].any() else freedom[0, : order + 1].max()
     return freedom
+
+
+def _kinds(count: int) -> np.ndarray:
+    """Return which entry of `freedom` each of so many times has: start, end, or between."""
+    return np.array([0, 1] + [2] * (count - 2))
+
+
+def _given(freedom: list[np.ndarray], count: int) -> np.ndarray:
+    """Return at which of so many times the whole motion of the platform is given."""
+    return ~np.array([each[0].any() for each in freedom])[_kinds(count)]
 
 
 def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray]) -> tuple[Motion, Motion]:
@@ -257,9 +274,8 @@ def _beyond_reach(
     scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray], platform: Motion, carriers: Motion
 ) -> Certificate | None:
     """Return the certificate of the worst given pose at which carriers cannot hold the platform from their boxes."""
-    of = np.array([0, 1] + [2] * (len(times) - 2))
-    given = ~np.array([each[0].any() for each in freedom])[of] & ~scenario.phases.resting(times)
-    free = np.array([each[1:, 0].any(axis=1) for each in freedom])[of[given]]
+    given = _given(freedom, len(times)) & ~scenario.phases.resting(times)
+    free = np.array([each[1:, 0].any(axis=1) for each in freedom])[_kinds(len(times))[given]]
     moving, bases = (Motion(*(part[given] for part in motion)) for motion in (platform, carriers))
     return out_of_reach(scenario, times[given], moving, bases, free)
 

@@ -1,0 +1,105 @@
+"""Prove that flying carriers are too weak for a motion of the platform that the task gives: `too_weak_carriers`.
+
+The cables give the platform what the thrusts and weights of the carriers are more than what accelerates the carriers:
+
+    A t = F = sum of (thrust + m g - m a)      forces in {G}
+
+Along any direction d each thrust gives at most as much as its cone of permitted tilts lets it, and -m a at most m times
+the largest acceleration. A force F beyond the sum along d is out of reach, wherever the carriers are.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.text import quantity
+from ..audits.excess import Excess
+from ..limits.carriers import CarrierAcceleration, CarrierTilt
+from ..tasks.paths import Motion
+from ..tasks.scenario import Scenario
+from .too_fast import OF_DURATION
+
+DIRECTIONS = np.linspace(-np.pi / 2, np.pi / 2, 181)  # above the horizontal, in the vertical plane of the force
+CERTAIN = 1e-6  # of the weight
+HALVINGS = 30  # of the range of durations
+
+
+class _Carrier(NamedTuple):
+    """What bounds the force of a carrier."""
+
+    thrust: float  # largest [N]
+    tilt: float  # largest, of the thrust [rad]
+    mass: float  # [kg]
+    acceleration: float  # largest [m/s^2]
+
+
+def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, carriers: Motion) -> list[Excess]:
+    """Return the shortest duration in which carriers are strong enough, if the task's is shorter, else nothing.
+
+    `platform` and `carriers` have a given motion of the platform at `times` (n,) [s]; that of the carriers is free.
+    """
+    robot, known = scenario.robot, _carriers(scenario)
+    fixed = scenario.relative or scenario.phases.all or scenario.task.wind is not None or not scenario.stretches
+    if known is None or fixed or not robot.dof_mask[:3].all() or not len(times):
+        return []
+    gravity = np.array(robot.gravity)
+
+    def missing(longer: float) -> float:
+        """Return the most that is missing [N] in so many times the duration."""
+        slower = Motion(platform.pose, platform.velocity / longer, platform.acceleration / longer**2)
+        forces = scenario.required_wrench(times, slower, carriers)[:, :3]
+        return float((_along(forces) - _most(forces, known, gravity)).max())
+
+    enough = CERTAIN * robot.force_scale
+    if missing(1.0) <= enough:
+        return []
+    low, high = 1.0, 2.0
+    while missing(high) > enough and high < 2.0**HALVINGS:
+        low, high = high, 2 * high
+    if missing(high) > enough:  # not for lack of time
+        return []
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if missing(middle) > enough else (low, middle)
+    short = quantity(missing(1.0), "N")
+    why = f"the largest thrusts and accelerations of all carriers together miss {short} of the force on the platform"
+    return [Excess(OF_DURATION, "motion", None, scenario.duration, low * scenario.duration, "s", "at least", why)]
+
+
+def _carriers(scenario: Scenario) -> list[_Carrier] | None:
+    """Return what bounds the forces of all carriers; None if that of one is not known."""
+    found = []
+    for carrier in scenario.robot.carriers:
+        hard = [limit for limit in scenario.limits if limit.soft is None and carrier.name in limit.labels]
+        fastest = min((limit.high for limit in hard if isinstance(limit, CarrierAcceleration)), default=np.inf)
+        tilts = [limit for limit in hard if isinstance(limit, CarrierTilt)]
+        if carrier.body is None or not carrier.efforts or not np.isfinite(fastest):
+            return None
+        thrusts = [one for one in carrier.actuators if any(one.wrench[:3])]
+        upward = all(one.low >= 0 and one.wrench[2] >= 0 and not any(one.wrench[:2]) for one in thrusts)
+        tilt = min((limit.high for limit in tilts), default=np.pi) if upward else np.pi
+        found.append(_Carrier(carrier.force_max, tilt, carrier.body.mass, fastest))
+    return found
+
+
+def _directions(forces: np.ndarray) -> np.ndarray:
+    """Return unit vectors in the vertical planes of forces (n, 3), (n, k, 3)."""
+    ahead = forces[:, :2] / np.maximum(np.linalg.norm(forces[:, :2], axis=1, keepdims=True), 1e-300)
+    flat, up = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
+    return np.concatenate([ahead[:, None] * flat[:, None], np.tile(up[:, None], (len(forces), 1, 1))], axis=2)
+
+
+def _along(forces: np.ndarray) -> np.ndarray:
+    """Return what forces (n, 3) are along each direction, (n, k)."""
+    return np.einsum("nkj,nj->nk", _directions(forces), forces)
+
+
+def _most(forces: np.ndarray, carriers: list[_Carrier], gravity: np.ndarray) -> np.ndarray:
+    """Return the most that carriers give along each direction, (n, k)."""
+    directions = _directions(forces)
+    from_vertical = np.arccos(np.clip(directions[..., 2], -1, 1))
+    most = np.zeros(directions.shape[:2])
+    for carrier in carriers:
+        beyond = np.clip(from_vertical - carrier.tilt, 0, np.pi / 2)
+        most += carrier.thrust * np.cos(beyond) + carrier.mass * (directions @ gravity + carrier.acceleration)
+    return most
