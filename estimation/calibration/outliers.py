@@ -17,7 +17,7 @@ from .fit import fit, held
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import OF_CABLE, Parameters
-from .products import onto
+from .products import quadratic_forms
 from .sightings import SEEN
 
 LEVEL = 0.005  # of both tests, for all readings together
@@ -255,8 +255,8 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     inverse = np.linalg.inv(held(found.equations.S, length))
     for i in range(m):
         rows, columns = without_poses(model, found, i)
-        after = np.cumsum(rows[::-1], axis=0)[::-1]
-        absorbed = (onto(after, inverse[np.ix_(columns, columns)]) * after).sum(axis=1)
+        np.cumsum(rows[::-1], axis=0, out=rows[::-1])  # of all samples from one on
+        absorbed = quadratic_forms(rows, inverse[np.ix_(columns, columns)])
         total = np.cumsum(found.redundancy[i, ::-1])[::-1]
         information = np.maximum(total - absorbed, 1e-9 * max(float(total[0]), 1e-9))
         sums = np.cumsum(found.residuals[i, ::-1])[::-1]

@@ -21,7 +21,8 @@ def inner(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     return result
 
 
-def onto(A: np.ndarray, M: np.ndarray) -> np.ndarray:
-    """Multiply a tall matrix A (n, p) by M (p, q) in blocks, (n, q)."""
+def quadratic_forms(A: np.ndarray, M: np.ndarray) -> np.ndarray:
+    """Return a' M a of each row a of a tall matrix A (n, p), (n,), in blocks."""
     block = max(ONE_THREAD // max(M.size, 1), 1)
-    return np.concatenate([A[start : start + block] @ M for start in range(0, len(A), block)] or [A @ M])
+    parts = (A[start : start + block] for start in range(0, len(A), block))
+    return np.concatenate([((part @ M) * part).sum(axis=1) for part in parts] or [np.zeros(0)])
