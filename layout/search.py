@@ -26,11 +26,12 @@ AUDITED = 100_000  # random poses
 ROOM_AUDITED = 10_000  # of them, for distances and frequencies
 FEW = 32  # rows for annealing
 _ADDED, _APART = 20, 0.03  # worst poses that an audit adds, and how far apart they are, in sizes of the robot
-_SOON, _ROUNDS = 2, 6  # audits after a start that does not meet the requirements, and at the end
+_ROUNDS = 6  # audits at the end
 _ANNEALING, _IMPROVING = 0.3, 0.4  # of the time at most, for each start and each sequence of linear programs
 _STARTING, _SEARCHING = 0.45, 0.9  # of the time: when new starts end, and when only audits are left
 _DRAWN, _MOST_MOVES, _FEW_PROGRAMS = 4, 3, 15  # layouts near the best one, moves to each, programs from one of them
 _FIRST_STEP, _LATER_STEP = 0.1, 0.02  # longest steps of the first linear program, of the ranges
+_REPAIRS, _BY_POINTS = 4, 2  # of a layout that an audit refutes: at most, and those that may move points
 _SAME = 1e-3  # of the margin: what an audit may find less
 _SPARE, _FEW_SPARE = 0.002, 0.3  # of the clearance: what is searched for more than is asked, and at few poses
 
@@ -94,9 +95,10 @@ class _Search:
         while self.found.starts == 0 or self._share() < _SEARCHING:
             if self.found.starts == 0 and self._requirements.start == "robot":
                 own = self._y.copy()
+                if self._limits_alone(own):
+                    self._improve("the robot's own points", _FIRST_STEP, limits=True)
+                    self._y = own.copy()
                 self._improve("the robot's own layout", _FIRST_STEP)
-                if not self._met():
-                    self._settle(_SOON)
                 self._take(own)  # audits may find that the linear programs have made it worse
             elif self._share() < _STARTING or (not self._met() and self.found.starts % 2):
                 next(starts)
@@ -121,6 +123,12 @@ class _Search:
     def _met(self) -> bool:
         return self.found.outcome.missing <= 0.0 and self.found.outcome.margin >= self._requirements.margin
 
+    def _limits_alone(self, y: np.ndarray) -> bool:
+        """Return whether tension limits are free, besides points that already keep all bounds of the room."""
+        limits = self._variables.limits
+        every = Evaluation(self._variables, self.found.rows, self._room)
+        return bool(limits.any() and not limits.all()) and every.missing(y) <= 0.0
+
     def _starts(self) -> Iterator[None]:
         """Improve annealed layouts: one of each symmetry, then as often that of the best one as any other."""
         mirrors, rng = Mirrors(self._variables), self._rng
@@ -136,8 +144,6 @@ class _Search:
             self._improve(f"start {self.found.starts + 1}", _FIRST_STEP)
             if self.found.y is not before:
                 best, self._best_moves = kind, moves
-            if not self._met():
-                self._settle(_SOON)
             yield
 
     def _move_on(self) -> None:
@@ -166,22 +172,36 @@ class _Search:
         self._y = self.found.y.copy()
         self._improve(f"audit of start {self.found.starts}", _LATER_STEP)
 
-    def _improve(self, what: str, delta: float, programs: int = PROGRAMS) -> None:
-        """Improve a layout by linear programs, and keep it if it is the best."""
-        found = self.found
-        self._progress(what, min(self._share(), 1.0), found.outcome.margin)
-        ends = min(self._until, time.perf_counter() + _IMPROVING * self._requirements.time_limit)
-        evaluation = Evaluation(self._variables, found.rows, self._room.with_spare(_SPARE))
-        maximise(evaluation, found.goal, self._y, ends, delta, programs)
-        self._take(self._y)
+    def _improve(self, what: str, delta: float, programs: int = PROGRAMS, limits: bool = False) -> None:
+        """Improve a layout, or its tension limits alone, by linear programs, and keep it if it is the best.
 
-    def _take(self, y: np.ndarray) -> None:
-        """Audit a layout, add the worst poses to the rows, and keep it if it is the best."""
+        Where an audit finds it worse than the best one, the programs continue with the poses that this has added. Steps
+        of points may lose the margin again at other poses, so at last the tension limits restore it, if they are free:
+        for given points they are a linear problem.
+        """
+        found, variables = self.found, self._variables
+        ends = min(self._until, time.perf_counter() + _IMPROVING * self._requirements.time_limit)
+        for repair in range(_REPAIRS + 1):
+            self._progress(what, min(self._share(), 1.0), found.outcome.margin)
+            moved = variables.with_points_held(self._y) if limits else variables
+            evaluation = Evaluation(moved, found.rows, self._room.with_spare(_SPARE))
+            maximise(evaluation, found.goal, self._y, ends, delta, programs)
+            refuted = self._take(self._y)
+            if refuted is None:
+                break
+            delta, programs = _LATER_STEP, PROGRAMS
+            limits = refuted.missing <= 0.0 and bool(variables.limits.any()) and (limits or repair >= _BY_POINTS)
+
+    def _take(self, y: np.ndarray) -> Outcome | None:
+        """Audit a layout, add the worst poses to the rows, and keep it if it is the best.
+
+        Return its outcome if it is not the best, or does not meet the requirements, only at poses of the audit.
+        """
         found = self.found
         promised = Evaluation(self._variables, found.rows, self._room).outcome(y, found.goal)
         if not found.better(y, promised):
-            return  # the audit can only find less
-        audited, worst = self._audit(y)
+            return None  # the audit can only find less
+        audited, worst = self._audit(y, promised)
         agrees = audited.missing <= promised.missing and all(
             found >= wanted - _SAME * abs(wanted)
             for found, wanted in ((audited.margin, promised.margin), (audited.frequency, promised.frequency))
@@ -196,25 +216,27 @@ class _Search:
         )
         if found.better(y, outcome):
             found.y, found.outcome, found.audit_agrees = y.copy(), outcome, agrees
+            agrees |= self._met()
+        return None if agrees else outcome
 
-    def _audit(self, y: np.ndarray) -> tuple[Outcome, Rows]:
-        """Return the result at random poses, and the worst rows."""
+    def _audit(self, y: np.ndarray, promised: Outcome) -> tuple[Outcome, Rows]:
+        """Return the result at random poses, and the worst of those that are worse than promised."""
         variables, goal, rng = self._variables, self.found.goal, self._rng
         rows = audited_rows(variables.robot, self._requirements, rng)
         values = Evaluation(variables, rows).margins(y)
-        worst, margin = rows.only(_apart(rows, np.argsort(values)[:300], self._room.size)), float(values.min())
+        worst, margin = rows.only(_apart(rows, values, promised.margin, self._room.size)), float(values.min())
         some = few(rows, rng, ROOM_AUDITED)
         evaluation = Evaluation(variables, some, self._room)
         spaces, short = evaluation.spaces(y), 0.0
         outcome = evaluation.outcome_besides(y, goal._replace(per_hertz=0.0), margin)
         if spaces.size:
-            least = spaces.min(axis=1)
+            least = spaces.min(axis=1)[some.pose_of]
             short = max(0.0, -float(least.min()))
-            worst = worst.joined(some.only(_apart(some, np.argsort(least)[:100], self._room.size)))
+            worst = worst.joined(some.only(_apart(some, least, -promised.missing, self._room.size)))
         if goal.per_hertz:
             frequencies = evaluation.frequencies(y)[:, 0]
             outcome = outcome._replace(frequency=float(frequencies.min()))
-            worst = worst.joined(some.only(_apart(some, np.argsort(frequencies)[:100], self._room.size)))
+            worst = worst.joined(some.only(_apart(some, frequencies, promised.frequency, self._room.size)))
         return outcome._replace(missing=short), worst
 
 
@@ -225,16 +247,17 @@ def audited_rows(robot: Robot, requirements: Requirements, rng: np.random.Genera
     return rows_of(robot, require, [each.sampled(count, rng) for each in require])
 
 
-def _apart(rows: Rows, order: np.ndarray, size: float) -> np.ndarray:
-    """Return rows, the worst first, whose poses are some distance from each other, for a robot of a size [m]."""
-    picked: list[int] = []
+def _apart(rows: Rows, values: np.ndarray, below: float, size: float) -> np.ndarray:
+    """Return rows with values (K,) below a bound, the worst first, some distance apart, for a robot of a size [m]."""
+    order = np.flatnonzero(values < below)
+    order = order[np.argsort(values[order])]
     places = rows.poses[rows.pose_of[order]] / np.repeat([size, 1.0], 3)
-    for row in range(len(order)):
-        if all(np.abs(places[row] - places[other]).max() > _APART for other in picked):
-            picked.append(row)
-        if len(picked) == _ADDED:
-            break
-    return order[picked]
+    picked: list[int] = []
+    while order.size and len(picked) < _ADDED:
+        picked.append(int(order[0]))
+        far = np.abs(places - places[0]).max(axis=1) > _APART
+        order, places = order[far], places[far]
+    return np.array(picked, dtype=int)
 
 
 def few(rows: Rows, rng: np.random.Generator, most: int) -> Rows:

@@ -1,6 +1,6 @@
 """`Variables`: the free numbers of a robot as one vector inside bounds, and the robots that vectors stand for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,16 @@ class Variables:
     def size(self) -> int:
         """Return the number of variables."""
         return self.low.size
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Return which variables are tension limits, (p,)."""
+        return np.abs(self.S[6 * self.robot.m :]).sum(axis=0) > 0.0
+
+    def with_points_held(self, y: np.ndarray) -> "Variables":
+        """Return these variables with the points of y, (p,), as their only ones; the tension limits stay free."""
+        low, high = (np.where(self.limits, bound, y) for bound in (self.low, self.high))
+        return replace(self, low=low, high=high)
 
     def layout(self, y: np.ndarray) -> np.ndarray:
         """Return the layout, (8 m,)."""

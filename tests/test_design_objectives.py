@@ -4,8 +4,10 @@ from itertools import product
 
 import numpy as np
 import pytest
+import yaml
 
-from towline import Dynamics, InputError, TensionProblem, design, load, read_requirements
+from towline import Dynamics, InputError, Robot, TensionProblem, design, load, read_requirements
+from towline.cli.new import TEMPLATES
 from towline.layout import growth, search
 from towline.layout.evaluation import Evaluation, rows_of
 from towline.layout.goal import goal_of
@@ -89,6 +91,27 @@ def test_a_layout_is_never_worse_than_the_robots_own(monkeypatch):
     poses = np.zeros((8, 6))
     poses[:, :3] = list(product(*zip(wide["min"], wide["max"], strict=True)))
     assert least_margin(found.robot, poses) >= least_margin(ROBOT, poses) - 1e-6
+
+
+def test_more_freedom_needs_no_stronger_winches(monkeypatch):
+    """What audits take away from a layout with moved anchors is restored: weaker winches suffice than without it."""
+    monkeypatch.setattr(search, "_SEARCHING", 0.0)  # from the robot's own layout alone
+    monkeypatch.setattr(search, "AUDITED", 3000)
+    text = (TEMPLATES / "frame.yaml").read_text().replace("$name", "crane")
+    robot = Robot.model_validate(yaml.safe_load(text))
+    anchors = {"min": robot.anchors.min(axis=0).tolist(), "max": robot.anchors.max(axis=0).tolist()}
+    winches = {"part": "t_max", "range": {"min": 50, "max": 5000}}
+    box = {"min": [-1.2, -0.9, 0.3], "max": [1.2, 0.9, 1.5]}
+    needed = []
+    for free in ([winches], [winches, {"part": "anchor", "box": anchors}]):
+        data = {"free": free, "require": [{"box": box, "grid": [3, 3, 2]}], "minimise": "t_max", "margin": 10.0}
+        requirements = read_requirements({**data, "time_limit": 60.0})
+        variables = variables_of(robot, requirements)
+        found = variables.robot_at(search.search(variables, requirements, lambda what, share, margin: None).y)
+        places = requirements.require[0].places((2, 2, 2))
+        assert least_margin(found, places, robot.length) >= 10.0
+        needed.append(found.t_max.mean())
+    assert needed[1] < 0.9 * needed[0] < 0.9 * robot.t_max.mean()
 
 
 def test_slopes_of_the_longest_cables_are_those_of_differences():
