@@ -90,6 +90,18 @@ def test_the_mass_by_load_cells_with_zeros(decided, tmp_path):
         assert of["mass"].sigma > 0.3  # two zeros of 7 N, almost vertically
 
 
+def test_the_mass_by_load_cells_with_small_zeros(tmp_path):
+    """Zeros of 0.5 N, less than a hundredth of the tensions, are five standard deviations of a mass without them."""
+    robot = user.robot_file(
+        tmp_path / "r.yaml", ANCHORS, ATTACHMENTS, [0, 0, 1.1, 0, 0, 0], 5.0, extra="  dof: [x, z, pitch]\n"
+    )
+    rows, tensions = recording(2000)
+    log = read_log(saved(tmp_path, rows, tensions + np.array([0.1, -0.5, 0.5, -0.05])), robot=robot).measurements
+    found = calibrate(robot, log, free="mass")
+    (mass,) = (one for one in found.parameters if one.name == "mass")
+    assert abs(mass.value - 6.0) < 4 * mass.sigma
+
+
 def test_sound_sensors_are_not_saturated():
     """Sensors with coarse steps, a platform that waits at its largest tension, and cables without any tension."""
     rows, tensions = recording(400)

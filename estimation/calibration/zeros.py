@@ -18,7 +18,7 @@ from .solving import Solved, inflation_of, noise_of
 
 USUAL = 0.1  # of the mean tension, standard deviation of zeros
 CERTAIN = 1e-6  # probability that errors of the tensions look like zeros
-SMALLEST = 0.01  # of the mean tension, of zeros that are estimated
+SMALLEST = 1e-3  # of the mean tension, of zeros that are estimated
 DECIDED = 0.3  # of their prior's standard deviation, below which a log decides zeros
 
 
