@@ -70,6 +70,7 @@ class Moves:
         self._low, self._high, self._symmetry = variables.low, variables.high, symmetry
         following = set() if symmetry is None else set(symmetry.second.tolist())
         self._points = [point for point in variables.points if not following.intersection(point.tolist())]
+        self._placed = [point for point in self._points if not variables.limits[point].any()] or self._points
         groups: dict[tuple[float, ...], list[np.ndarray]] = {}
         for point in self._points:
             groups.setdefault((*self._low[point], *self._high[point]), []).append(point)
@@ -79,9 +80,12 @@ class Moves:
         """Return the variables of a random layout, (p,)."""
         return self._symmetric(rng.uniform(self._low, self._high))
 
-    def neighbour(self, y: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return a layout with two points swapped, one or two or a coordinate redrawn, or a small step, (p,)."""
-        low, high, points = self._low, self._high, self._points
+    def neighbour(self, y: np.ndarray, rng: np.random.Generator, limits: bool = True) -> np.ndarray:
+        """Return a layout with two points swapped, one or two or a coordinate redrawn, or a small step, (p,).
+
+        Without `limits`, tension limits are only swapped, unless nothing else is free: linear programs find them best.
+        """
+        low, high, points = self._low, self._high, self._points if limits else self._placed
         y, kind = y.copy(), rng.integers(5)
         point = points[rng.integers(len(points))]
         if kind == 0 and self._alike:

@@ -154,7 +154,7 @@ class _Search:
         for _ in range(_DRAWN):
             candidate = found.y
             for _ in range(rng.integers(1, _MOST_MOVES + 1)):
-                candidate = moves.neighbour(candidate, rng)
+                candidate = moves.neighbour(candidate, rng, limits=False)
             candidate_value, _ = merit(evaluation, found.goal, candidate)
             if candidate_value > value:
                 self._y, value = candidate, candidate_value
