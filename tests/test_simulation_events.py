@@ -122,8 +122,8 @@ def test_a_shortfall_is_not_that_of_angles_without_meaning():
     turned = Rotation.from_euler("ZYX", poses[:, [5, 4, 3]])
     speed = np.linalg.norm((turned[1:] * turned[:-1].inv()).as_rotvec(), axis=1) / run.period
     weight = 9.81 * robot.platform.mass
-    assert np.nanmax(shortfall) > 100 * weight
-    assert np.abs(run.record.motions[:, 0, 9]).max() > 100 * speed.max()
+    assert np.nanmax(shortfall) > 20 * weight  # of the controller, without this
+    assert np.abs(run.record.motions[:, 0, 9]).max() > 20 * speed.max()
     merit = run.figures_of_merit()["shortfall_max"]
     assert 0.1 * weight < merit < 2 * weight
     assert merit in shortfall

@@ -25,7 +25,7 @@ HALVINGS = 30  # of the range of durations
 
 
 class _Carrier(NamedTuple):
-    """What bounds the force of a carrier."""
+    """Bounds of the force of a carrier."""
 
     thrust: float  # largest [N]
     tilt: float  # largest, of the thrust [rad]
