@@ -208,8 +208,8 @@ def test_who_hangs_or_breaks_is_out_and_the_others_go_on():
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--count", "0"], "count must be a whole number from 1 to 100000, got 0"),
-        (["--repeats", "1000000"], "repeats must be a whole number from 1 to 100000, got 1000000"),
+        (["--count", "0"], "count must be a whole number from 1 to 100 000, got 0"),
+        (["--repeats", "1000000"], "repeats must be a whole number from 1 to 100 000, got 1000000"),
         (["--m", "8,x"], "--m must be numbers of cables from 1 to 16, separated by commas, got '8,x'"),
         (["--m", "99"], "m must be numbers of cables from 1 to 16, got [99]"),
     ],
