@@ -172,7 +172,7 @@ def _box(robot: Robot, box: RestingBox | None) -> list[str]:
 
     attitude = "in its home attitude"
     if box is None and robot.fixed_lengths is not None:
-        return ["  no box of positions is known at which it can rest"]
+        return ["  no box of positions at which it can rest is known"]
     if box is None:
         movable = any(carrier.moves for carrier in robot.carriers)
         hint = ["    (in a plan with `base: {kind: free}` the carriers can move too)"] if movable else []

@@ -179,7 +179,7 @@ def simulate(
 def _check_model(robot: Robot, controller: Controller) -> None:
     """Check that a controller is for as many cables, carriers and actuators, and for lengths that cables can have.
 
-    Its numbers may differ, but commands for cables that stretch are no lengths of cables that do not.
+    Values may differ, but lengths that are commanded for elastic cables are wrong for cables that do not stretch.
     """
     inner = getattr(controller, "controller", controller)
     model = getattr(inner, "robot", None)
@@ -194,8 +194,8 @@ def _check_model(robot: Robot, controller: Controller) -> None:
         undamped = [i for i, cable in enumerate(robot.cables) if cable.stiffness and not cable.damping]
         if undamped and inner.corrects:
             warn(
-                f"cables[{undamped[0]}].damping is missing in the robot file of {robot.name!r}: oscillations on cables "
-                "without damping grow by the corrections of LengthControl",
+                f"cables[{undamped[0]}].damping is missing in the robot file of {robot.name!r}: the corrections "
+                "of LengthControl make oscillations on cables without damping grow",
                 stacklevel=3,
             )
         for i, (cable, taken) in enumerate(zip(robot.cables, inner.stiffness.tolist(), strict=True)):

@@ -91,7 +91,7 @@ def _factors(line: np.ndarray, needed: np.ndarray, lift: np.ndarray) -> np.ndarr
 
 
 def notes_of_tilts(robot: Robot, directions: np.ndarray, pulls: np.ndarray) -> Iterator[str]:
-    """Yield a line for each cable whose direction differs from the pull by thrust, both (N, m, 3), in the mean."""
+    """Yield a line for each cable whose direction differs on average from the pull by thrust, both (N, m, 3)."""
     for cable, index in enumerate(robot.carrier_of_cable):
         d, pull = directions[:, cable], -pulls[:, cable]
         turns = np.cross(pull / np.linalg.norm(pull, axis=1, keepdims=True), d)
@@ -105,8 +105,8 @@ def notes_of_tilts(robot: Robot, directions: np.ndarray, pulls: np.ndarray) -> I
             name = robot.carriers[index].name
             size = quantity(np.degrees(tilt), "deg", 2)
             yield (
-                f"the direction of cables[{cable}] differs by {size} (mean) from the pull that thrust, weight and "
-                f"motion of {name} need; one of them is wrong, so lengths and mass may be too"
+                f"the direction of cables[{cable}] differs by {size} (mean) from the pull that follows from thrust, "
+                f"weight and motion of {name}; one of them is wrong, so lengths and mass may be too"
             )
 
 

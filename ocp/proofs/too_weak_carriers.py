@@ -1,6 +1,6 @@
 """Prove that flying carriers are too weak for a motion of the platform that the task gives: `too_weak_carriers`.
 
-The cables give the platform what the thrusts and weights of the carriers are more than what accelerates the carriers:
+The force of the cables on the platform is what thrusts and weights of the carriers leave after accelerating them:
 
     A t = F = sum of (thrust + m g - m a)      forces in {G}
 
@@ -45,7 +45,7 @@ def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, c
     gravity = np.array(robot.gravity)
 
     def missing(longer: float) -> float:
-        """Return the most that is missing [N] in so many times the duration."""
+        """Return the largest missing force [N] if the duration is multiplied by `longer`."""
         slower = Motion(platform.pose, platform.velocity / longer, platform.acceleration / longer**2)
         forces = scenario.required_wrench(times, slower, carriers)[:, :3]
         return float((_along(forces) - _most(forces, known, gravity)).max())
@@ -56,13 +56,13 @@ def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, c
     low, high = 1.0, 2.0
     while missing(high) > enough and high < 2.0**HALVINGS:
         low, high = high, 2 * high
-    if missing(high) > enough:  # not for lack of time
+    if missing(high) > enough:  # a longer duration does not help
         return []
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if missing(middle) > enough else (low, middle)
     short = quantity(missing(1.0), "N")
-    why = f"the largest thrusts and accelerations of all carriers together miss {short} of the force on the platform"
+    why = f"even the largest thrusts of all carriers together are {short} too small for the force on the platform"
     return [Excess(OF_DURATION, "motion", None, scenario.duration, low * scenario.duration, "s", "at least", why)]
 
 
@@ -90,12 +90,12 @@ def _directions(forces: np.ndarray) -> np.ndarray:
 
 
 def _along(forces: np.ndarray) -> np.ndarray:
-    """Return what forces (n, 3) are along each direction, (n, k)."""
+    """Return the components of forces (n, 3) along each direction, (n, k)."""
     return np.einsum("nkj,nj->nk", _directions(forces), forces)
 
 
 def _most(forces: np.ndarray, carriers: list[_Carrier], gravity: np.ndarray) -> np.ndarray:
-    """Return the most that carriers give along each direction, (n, k)."""
+    """Return the largest force that all carriers can give along each direction, (n, k)."""
     directions = _directions(forces)
     from_vertical = np.arccos(np.clip(directions[..., 2], -1, 1))
     most = np.zeros(directions.shape[:2])
