@@ -7,9 +7,9 @@ from ..models.elasticity import whitening
 from ..models.robot import Robot
 from ..statics.distribution import tensions as tensions_at
 
-SLOW = 0.01  # [1/s]: growth that rounding, and motions that no cable damps, may have
-MARGIN = 1.25  # over the gain at which oscillations no longer decay
-LEAST = 1e-3  # of the usual gain, below which there is none
+SLOW = 0.01  # [1/s]: accepted growth, which rounding or motions that no cable damps may cause
+MARGIN = 1.25  # factor by which the gain stays below the one at which oscillations no longer decay
+LEAST = 1e-3  # of the usual gain; a smaller gain is replaced by 0
 
 
 def calm_integral(
@@ -22,8 +22,8 @@ def calm_integral(
 
         x'' = -G x - E ((1 + P) x + I z) - D ((1 + P) x' + I x),   z' = x
 
-    per unit of mass, with the stiffness G of constant tensions, and E and D of elasticity and damping. Platforms that
-    turn slowly, since their attachments are close to each other, need a small I.
+    per unit of mass, where G is the stiffness due to constant tensions, E that due to elasticity, and D the
+    damping. Platforms that turn slowly, since their attachments are close to each other, need a small I.
 
     Args:
         robot: The robot.

@@ -55,7 +55,7 @@ class LengthControl(Controller):
             cable, which stretches about as much. At this value the integral stops, and the status is "hold".
 
     Attributes:
-        stiffness: E A that it takes for each cable, (m,) [N]; infinity for one that does not stretch.
+        stiffness: E A that the controller assumes for each cable, (m,) [N]; infinity for one that does not stretch.
         corrects: Whether it corrects lengths by the measured pose.
 
     Raises:

@@ -81,7 +81,7 @@ class Moves:
         return self._symmetric(rng.uniform(self._low, self._high))
 
     def neighbour(self, y: np.ndarray, rng: np.random.Generator, limits: bool = True) -> np.ndarray:
-        """Return a layout with two points swapped, one or two or a coordinate redrawn, or a small step, (p,).
+        """Return a layout after a move, (p,): two points swapped, one, two or a coordinate redrawn, or a small step.
 
         Without `limits`, tension limits are only swapped, unless nothing else is free: linear programs find them best.
         """

@@ -31,7 +31,7 @@ _ANNEALING, _IMPROVING = 0.3, 0.4  # of the time at most, for each start and eac
 _STARTING, _SEARCHING = 0.45, 0.9  # of the time: when new starts end, and when only audits are left
 _DRAWN, _MOST_MOVES, _FEW_PROGRAMS = 4, 3, 15  # layouts near the best one, moves to each, programs from one of them
 _FIRST_STEP, _LATER_STEP = 0.1, 0.02  # longest steps of the first linear program, of the ranges
-_REPAIRS, _BY_POINTS = 4, 2  # of a layout that an audit refutes: at most, and those that may move points
+_REPAIRS, _BY_POINTS = 4, 2  # of a layout that an audit refutes: at most, and how many of them may move points
 _SAME = 1e-3  # of the margin: what an audit may find less
 _SPARE, _FEW_SPARE = 0.002, 0.3  # of the clearance: what is searched for more than is asked, and at few poses
 
@@ -195,7 +195,7 @@ class _Search:
     def _take(self, y: np.ndarray) -> Outcome | None:
         """Audit a layout, add the worst poses to the rows, and keep it if it is the best.
 
-        Return its outcome if it is not the best, or does not meet the requirements, only at poses of the audit.
+        Return its outcome if only poses of the audit make it worse than the best one or miss the requirements.
         """
         found = self.found
         promised = Evaluation(self._variables, found.rows, self._room).outcome(y, found.goal)

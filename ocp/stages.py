@@ -67,8 +67,8 @@ def _fixed_motion(search: Search) -> Plan:
     """Plan a task with free tensions only: each instant is a separate tension-distribution problem.
 
     If only limits on tension rates or on the forces at carriers are exceeded, the program searches for tensions
-    that keep them. If more costs than the sum of squared tensions, such as a soft limit that they exceed, it also
-    searches for cheaper ones.
+    that keep them. If anything other than the sum of squared tensions adds to the cost, such as an exceeded soft
+    limit, it also searches for cheaper ones.
     """
     start = time.perf_counter()
     audit = search.audit_motion(search.scenario, None)

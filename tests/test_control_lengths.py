@@ -237,7 +237,7 @@ def test_cables_that_do_not_yield_are_corrected_by_less_than_the_error(name, sti
 
 
 def test_a_platform_that_turns_slowly_comes_to_rest():
-    """ipanema-1's attachments are 85 mm from its centre: it turns at 1 Hz, which an I of 10 doubles every second."""
+    """ipanema-1's attachments are 85 mm from its centre: it turns at 1 Hz, and I = 10 doubles this every second."""
     robot = elastic("ipanema-1", 2e5)
     push = {"kind": "push", "at": 0.1, "duration": 0.1, "force": [0, 0, 0], "moment": [1, 1, 1]}
     run = simulate(robot, robot.home, LengthControl(robot), duration=1.6, events=[push])
@@ -247,7 +247,7 @@ def test_a_platform_that_turns_slowly_comes_to_rest():
 
 @pytest.mark.parametrize("factor", [0.8, 1.2])
 def test_a_small_platform_on_long_cables_has_room_for_their_stretch(factor):
-    """5 % of ipanema-1's length are 4 mm, less than a wrong stiffness makes of 2.6 m under 700 N."""
+    """5 % of ipanema-1's length is 4 mm, less than the error by a wrong stiffness in 2.6 m of cable under 700 N."""
     controller = LengthControl(elastic("ipanema-1", 1e5))
     assert controller._most > abs(1 - 1 / factor) * 2.6 * 700 / 1e5
 

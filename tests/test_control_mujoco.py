@@ -212,8 +212,8 @@ def test_an_attitude_loop_is_slowed_down_before_late_rotors_make_it_unstable():
 def test_quadrotors_without_a_state_turn_as_they_were_about_to_and_stop(name):
     """0.3 s without a state, 20 ms after a turn of 0.1 rad is ordered; measured rates have a noise of 0.02 rad/s.
 
-    Angular accelerations that stay are 2 x 40 x 0.02 rad/s^2 by the noise alone, 4 degrees after 0.3 s, and 17 rad/s^2,
-    43 degrees, by the turn. An attitude that is predicted with the noise of the last rate is 0.3 degrees off.
+    If the last angular acceleration stayed, noise alone would give 2 x 40 x 0.02 rad/s^2, 4 degrees after 0.3 s, and
+    the turn 17 rad/s^2, 43 degrees. An attitude that is predicted with the noise of the last rate is 0.3 degrees off.
     """
     pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
     robot, rng, found = load(name), np.random.default_rng(2), []

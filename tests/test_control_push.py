@@ -11,7 +11,7 @@ from .slung_load import slung
 
 @pytest.mark.parametrize("name", ["multi-quadrotor-3", "multi-quadrotor-4", "slung"])
 def test_a_load_returns_after_a_push(name):
-    """Carriers kept what they had moved along their cables, and the load hung too high by 70 to 90 mm for good."""
+    """Carriers once stayed where the push had moved them along their cables, and the load hung 70 to 90 mm too high."""
     robot = slung(dof=["x", "y", "z"]) if name == "slung" else load(name)
     push = f"push {0.2 * robot.weight} 0 0 at 0.2 for 0.5"
     flown = simulate(robot, robot.home, events=[push], duration=6, period=0.002)

@@ -94,7 +94,7 @@ def test_a_layout_is_never_worse_than_the_robots_own(monkeypatch):
 
 
 def test_more_freedom_needs_no_stronger_winches(monkeypatch):
-    """What audits take away from a layout with moved anchors is restored: weaker winches suffice than without it."""
+    """The margin that moved anchors lose in audits is restored, so free anchors need no stronger winches."""
     monkeypatch.setattr(search, "_SEARCHING", 0.0)  # from the robot's own layout alone
     monkeypatch.setattr(search, "AUDITED", 3000)
     text = (TEMPLATES / "frame.yaml").read_text().replace("$name", "crane")

@@ -91,7 +91,7 @@ def test_the_mass_by_load_cells_with_zeros(decided, tmp_path):
 
 
 def test_the_mass_by_load_cells_with_small_zeros(tmp_path):
-    """Zeros of 0.5 N, less than a hundredth of the tensions, are five standard deviations of a mass without them."""
+    """Zeros of 0.5 N, less than a hundredth of the tensions, shift the mass by five sigma if they are not estimated."""
     robot = user.robot_file(
         tmp_path / "r.yaml", ANCHORS, ATTACHMENTS, [0, 0, 1.1, 0, 0, 0], 5.0, extra="  dof: [x, z, pitch]\n"
     )

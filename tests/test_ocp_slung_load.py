@@ -16,8 +16,9 @@ START, END = np.array([0.0, 0.0, 1.0]), np.array([2.0, 0.0, 1.5])
 
 
 def largest_acceleration(seconds):
-    """Return that of a quadrotor above a load on a straight line: the cable has the direction of the load's force.
+    """Return the largest acceleration of a quadrotor above a load on a straight line.
 
+    The cable has the direction of the load's force.
     The least smooth polynomial law after which the quadrotor, too, starts and ends at rest has degree 11.
     """
     powers = [comb(5 + k, k) * comb(11, 5 - k) * (-1) ** k for k in range(6)]
@@ -40,7 +41,7 @@ def carried(steps, **objective):
 
 
 def test_the_least_time_is_that_of_the_quadrotors_acceleration():
-    """No tension exerts a moment on the load: those rows are 0 = 0, with which there were too many equations."""
+    """No tension exerts a moment on the load: those rows are 0 = 0, and with them there were too many equations."""
     load = slung(inertia=[1e-3, 1e-3, 1e-3, 0, 0, 0])
     found = plan(load, carried(40, time=1e-3, jerk=1e3, carrier_acceleration=1e3))  # nearly nothing but time costs
     assert found.feasible, found.report()

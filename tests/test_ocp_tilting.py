@@ -57,7 +57,7 @@ def test_it_is_offered_also_where_its_first_program_is_too_coarse():
 
 
 def test_it_is_not_offered_where_ipopt_takes_no_program():
-    """On three cables and a closed path there are more equations than unknowns: zeros are no solution of them."""
+    """On three cables and a closed path there are more equations than unknowns, and zeros do not solve them."""
     path = {"kind": "circle", "centre": [0, 0, 1.2], "radius": 0.3, "rate": 2}
     refused = plan(suspended(3), {"path": path, "tube": {"ends": "periodic"}, "steps": 20})
     assert not refused.feasible

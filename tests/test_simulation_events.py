@@ -114,7 +114,7 @@ def test_the_viewer_reads_cuts_and_events(failed, tmp_path):
 
 
 def test_a_shortfall_is_not_that_of_angles_without_meaning():
-    """A load on two of three cables pitches to 90 degrees, where it turns slowly, and roll and yaw race."""
+    """A load on two of three cables pitches to 90 degrees, where it turns slowly, but roll and yaw change fast."""
     text = Template((TEMPLATES / "towing.yaml").read_text()).substitute(name="tugs")
     robot = Robot.model_validate(YAML(typ="safe").load(text))
     run = simulate(robot, robot.home, duration=1.2, events=["cut 1 at 0.05"])
@@ -122,7 +122,7 @@ def test_a_shortfall_is_not_that_of_angles_without_meaning():
     turned = Rotation.from_euler("ZYX", poses[:, [5, 4, 3]])
     speed = np.linalg.norm((turned[1:] * turned[:-1].inv()).as_rotvec(), axis=1) / run.period
     weight = 9.81 * robot.platform.mass
-    assert np.nanmax(shortfall) > 20 * weight  # of the controller, without this
+    assert np.nanmax(shortfall) > 20 * weight  # as the controller records it
     assert np.abs(run.record.motions[:, 0, 9]).max() > 20 * speed.max()
     merit = run.figures_of_merit()["shortfall_max"]
     assert 0.1 * weight < merit < 2 * weight

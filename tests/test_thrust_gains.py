@@ -47,7 +47,7 @@ def test_gains_drift_and_tilt_of_thrusts(gains, end, tilt, said, recorded, tmp_p
 
 @pytest.mark.parametrize("tilt", [0.0, 3.0])
 def test_directions_that_contradict_thrusts_are_named(tilt, recorded, tmp_path):
-    """Without the load nothing tells which of them is wrong, and by 3 degrees cables seem 6 cm longer."""
+    """Without the load nothing shows which of them is wrong, and 3 degrees make cables seem 6 cm longer."""
     turned = user.directions_of(recorded[2]) @ Rotation.from_euler("x", tilt, degrees=True).as_matrix()
     path = user.flight(tmp_path / "flight.csv", recorded, turned, NAMES, load=False)
     notes = [note for note in read_log(path, robot=user.team_robot(tmp_path)).notes if "one of them is wrong" in note]

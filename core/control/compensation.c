@@ -12,8 +12,9 @@
  *
  * With as many cables as degrees of freedom or more, dw = -d, the disturbance: the carriers take over what is steady,
  * and the tensions correct errors. With fewer the carriers have to correct them too: dw = w - A t_ref where they are now,
- * and dp adds to the offset that they have. Of that offset only the part is kept that changes the wrench, of least norm:
- * along a single cable, whose length is constant, another would lift the platform for good.
+ * and dp adds to the offset that they have. Of that offset only the part of least norm
+ * with the same change of the wrench is kept, because an offset along a single cable of constant length would leave the
+ * platform too high.
  */
 #include "control/equations.h"
 #include "control/internal.h"
@@ -22,7 +23,7 @@
 static const double SHARE = 0.05;
 /* and for those that correct errors, which leave to the tensions what tensions can give. */
 static const double ALONG = 1;
-/* Added to the gram matrix, of its largest entry: for a change of the wrench, and for what is kept of an offset. */
+/* Added to the Gram matrix, as a share of its largest entry: for a change of the wrench, and for the kept offset. */
 static const double DAMPED = 1e-4, NEARLY_NONE = 1e-9;
 
 enum { CARRIERS = TOWLINE_MOST_CARRIERS };

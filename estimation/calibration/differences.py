@@ -1,6 +1,7 @@
 """`LogPart`: samples of a log, and the differences between cable lengths and readings that offsets do not explain.
 
-The ends of cables may be displaced from the file's: what this explains is no difference, but it costs something.
+The ends of cables may be displaced from those in the file. What a displacement explains is not counted as a difference,
+but a penalty on displacements is.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from ...models.robot import Robot
 from .geometry import runs
 from .interpretations import Interpretation
 
-FEWEST = 12, 24  # samples of which anchors, and attachments, are taken into account
+FEWEST = 12, 24  # samples with which displaced anchors, and displaced attachments, are taken into account
 PLAUSIBLE = 0.03  # of a cable's length, by which its ends may be displaced
-STRIDE = 5  # of samples of which the roughness is a median
+STRIDE = 5  # between the samples that the roughness is computed from
 WRONG, MOST_WRONG = 6.0, 0.2  # median sizes, beyond which samples are left out, and how many may be
 MOST_ROUNDS = 4  # of leaving out samples
 AS_GIVEN = Interpretation("")
@@ -43,7 +44,7 @@ class LogPart(NamedTuple):
         return self._replace(**parts, carriers=None if self.carriers is None else self.carriers[~samples])
 
     def at(self, way: Interpretation) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-        """Return positions, rotations and poses of carriers as another way means them."""
+        """Return positions, rotations and poses of carriers as another interpretation reads them."""
         turned = self.rotation if way.turned is None else way.turned(self.rotation, self.angles)
         carriers = None if self.carriers is None else self.carriers.copy()
         for one in () if carriers is None else np.swapaxes(carriers, 0, 1):
@@ -56,7 +57,7 @@ class LogPart(NamedTuple):
         """Return the parts of lengths (m, N + c) and readings (m, m, N + c) that cables do not explain [m].
 
         Cable i explains part of its own lengths and of the reading of each cable j, by an offset and, with enough
-        samples, by displaced anchors and attachments. The last c columns are what these cost.
+        samples, by displaced anchors and attachments. The last c columns are the penalties for these.
         """
         run = runs(self.robot, self.table, *self.at(way))
         explained = [np.ones((*run.lengths.shape, 1))]
@@ -98,5 +99,5 @@ class LogPart(NamedTuple):
 
 
 def medians(left: np.ndarray, count: int) -> np.ndarray:
-    """Return sizes of what is left (..., N + c): the medians over N samples, and the penalties for displacements."""
+    """Return sizes of unexplained parts (..., N + c): medians over N samples, and penalties for displacements."""
     return np.hypot(np.median(np.abs(left[..., :count]), axis=-1), np.linalg.norm(left[..., count:], axis=-1))

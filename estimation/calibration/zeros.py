@@ -1,6 +1,6 @@
 """`has_zeros`: whether load cells have constant errors (zeros) that the other parameters depend on.
 
-One step of the fit with zeros as further parameters shows how large they are, and whether the log decides them.
+One step of the fit with zeros as further parameters shows how large they are, and whether the log determines them.
 """
 
 from dataclasses import replace
@@ -17,9 +17,9 @@ from .parameters import COLUMNS
 from .solving import Solved, inflation_of, noise_of
 
 USUAL = 0.1  # of the mean tension, standard deviation of zeros
-CERTAIN = 1e-6  # probability that errors of the tensions look like zeros
-SMALLEST = 1e-3  # of the mean tension, of zeros that are estimated
-DECIDED = 0.3  # of their prior's standard deviation, below which a log decides zeros
+CERTAIN = 1e-6  # probability that random errors of the tensions look like zeros
+SMALLEST = 1e-3  # of the mean tension: smaller zeros are not estimated
+DECIDED = 0.3  # of the prior standard deviation of zeros: with a smaller one a log determines them
 
 
 def with_zeros(
@@ -33,9 +33,9 @@ def with_zeros(
 def has_zeros(solved: Solved) -> bool:
     """Return whether a fit of tensions should estimate the zeros of their load cells.
 
-    It should if the log shows zeros. If the log does not decide them at measured poses, it should too, because standard
-    deviations then include them. It should not if accelerations are unknown, because these may look like zeros, or if
-    carriers have thrusts, because their tensions follow from these.
+    It should if the log shows zeros. It also should if poses are measured and the log does not determine zeros, because
+    standard deviations then include them. It should not if accelerations are unknown, because these may look
+    like zeros, or if carriers have thrusts, because their tensions follow from these.
     """
     of, state = solved.model, solved.fit.state
     measured, groups, forces = of.measurements, of.parameters.groups, of.balanced

@@ -147,10 +147,10 @@ def _missing_and_reached(
     rows: np.ndarray,
     doubtful: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return what tensions between t (n, m) of two instants miss at most, and what cables make up for, (n - 1,) [N].
+    """Return the most that tensions between t (n, m) of two instants miss, and what cables can make up for, (n - 1,).
 
-    The second derivatives are those at `rows`. The second value is known between the instants that are `doubtful`,
-    where the first is more than is tolerated.
+    Both are in [N]. The second derivatives are those at `rows`. The second value is known between the
+    instants that are `doubtful`, where the first is more than is tolerated.
     """
     times, A, w, robot = seen.times, seen.A, seen.w, seen.scenario.robot
     h, dA, dw, product = np.diff(times), np.diff(A, axis=0), np.diff(w, axis=0), "nij,nj->ni"

@@ -33,8 +33,8 @@ MOST_ITERATIONS = 400
 # permutation that scales it would take another tenth less, but short motions of teams are then not found.
 TEAM = {"mumps_pivtol": 1e-4, "mumps_pivot_order": 5}
 # What IPOPT adds to constraints where MUMPS calls their Jacobian singular. The motion of a quadrotor with a slung load
-# follows from that of the load, and the nodes' accelerations alone are left, times the square of a step: much less than
-# IPOPT's default, 1e-8, which then makes each iteration miss its aim. A minimum time took 300 iterations, and takes 36.
+# follows from that of the load. Only accelerations of the nodes remain, times the square of a step: much less than
+# IPOPT's default, 1e-8, with which each step is far from Newton's. A minimum time took 300 iterations; it takes 36.
 NEARLY_SINGULAR = {"jacobian_regularization_value": 1e-13}
 TIME_LIMIT, SETTLED = "time limit", f"no better by {BETTER:.1%} in {PATIENCE} iterations"  # messages of ours
 Progress = Callable[[int, float, float], None]  # iteration, objective, infeasibility
@@ -172,7 +172,7 @@ class Solver:
         x, iterations = result["x"].full().ravel(), int(statistics["iter_count"])
         objective = float(result["f"])
         message = statistics["return_status"]
-        # IPOPT did not start on more equations than unknowns, and what it returns of them is zeros.
+        # With more equations than unknowns IPOPT does not start, and returns zeros.
         met = watch.iteration > 0 and program.violation(x, result["g"].full().ravel()) <= MET
         if watch.settled or watch.late:
             message = TIME_LIMIT if watch.late else SETTLED

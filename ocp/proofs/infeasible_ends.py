@@ -110,12 +110,12 @@ def _freedom(scenario: Scenario, end: int | None) -> np.ndarray:
 
 
 def _kinds(count: int) -> np.ndarray:
-    """Return which entry of `freedom` each of so many times has: start, end, or between."""
+    """Return which entry of `freedom` each of `count` times has: start, end, or between."""
     return np.array([0, 1] + [2] * (count - 2))
 
 
 def _given(freedom: list[np.ndarray], count: int) -> np.ndarray:
-    """Return at which of so many times the whole motion of the platform is given."""
+    """Return at which of `count` times the whole motion of the platform is given."""
     return ~np.array([each[0].any() for each in freedom])[_kinds(count)]
 
 

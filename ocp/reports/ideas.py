@@ -1,6 +1,7 @@
 """What may help a plan for which no feasible change was found: `ideas`, rows of its report.
 
-None of them is planned: a relaxation is. With it, only ways past obstacles, moving carriers and stronger ones remain.
+None of them is planned, unlike relaxations. If there is a relaxation, only ways past obstacles, moving carriers and
+stronger ones remain.
 Positions are checked at rest.
 """
 

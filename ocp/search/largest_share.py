@@ -17,7 +17,7 @@ from .search import Search
 INSTANTS = 120  # at which tensions must exist before a motion is audited
 HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
-OF_PROGRAMS = *RESERVES[1:], 0.5, 0.25, 0.1  # likewise, of what is only not proven infeasible; the last one first
+OF_PROGRAMS = *RESERVES[1:], 0.5, 0.25, 0.1  # likewise, if programs decide: the last one is tried first
 
 Variation: TypeAlias = tuple[Scenario, float, str]
 """The scenario of a varied task, the value in which it differs, and a text that follows the value in reports."""

@@ -26,7 +26,7 @@ YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
 
 
 def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the farthest end of a straight line, as far from its start, up to which it is feasible."""
+    """Return the farthest end up to which a straight line from the same start is feasible."""
     path = scenario.task.path
     if not isinstance(path, LinePath):
         return []
@@ -50,7 +50,7 @@ def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
 
 
 def smaller_circle(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest radius of a circle, at its angular velocity, with which it is feasible."""
+    """Return the largest radius with which a circle is feasible at its angular velocity."""
     path = scenario.task.path
     if not isinstance(path, CirclePath) or any(carrier.moves for carrier in scenario.robot.carriers):
         return []  # carriers that move with the platform may make all of it feasible
@@ -92,7 +92,7 @@ def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
 def near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the largest path of the same form, drawn in towards the platform's home, that is feasible.
 
-    Its attitudes come nearer to that of home in proportion. It is what remains where both ends cannot be reached.
+    Its attitudes come nearer to that of home in proportion. It helps where neither end can be reached.
     """
     path, home = scenario.task.path, scenario.robot.home
     if not isinstance(path, LinePath | WaypointPath | CirclePath) or scenario.relative:

@@ -59,7 +59,7 @@ def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None
 def near_motion(
     search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit, span: tuple[float, float]
 ) -> list[Relaxed]:
-    """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one.
+    """Return what would make a motion that the planner chooses feasible; `audit` is that of the closest one.
 
     A longer duration is searched for in a `span` [s], unless its ends are equal.
     """
@@ -265,8 +265,8 @@ def solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Me
 def _beside(search: Search, scenario: Scenario) -> Search:
     """Return the search for a motion of another scenario, in the time that the task's limit left.
 
-    Each program may take a few seconds' iterations, or as many as the search took: unlike of seconds, a busy machine
-    has as many.
+    Each program may take as many iterations as usually fit into a few seconds, or as many as the search took: with a
+    limit in seconds, a busy machine would find other results.
     """
     affordable = int(WORK / (max(scenario.count, 1) * scenario.task.steps))
     most = min(max(affordable, search.iterations, LEAST_ITERATIONS), MOST_ITERATIONS)

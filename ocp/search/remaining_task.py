@@ -45,8 +45,8 @@ def remainder(
     """Lay out what is left of the motion of `whole` at `time` [s] for a robot in the state `initial`.
 
     `final` is how it ends, beside what its task requires, and `last` the plan that the robot followed, which `begun` at
-    that time [s]. The way back to the path takes `settle` [s] at most. The second result is the last plan, with what
-    the carriers are off it decaying; None if the task fixes the motion.
+    that time [s]. The way back to the path takes `settle` [s] at most. The second result is the last plan, with the
+    carriers' deviations from it decaying; None if the task fixes the motion.
     """
     left = whole.duration - time
     at = np.array([time - begun])

@@ -33,7 +33,7 @@ STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stron
 
 
 def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
-    """Return what would make a motion feasible that the planner chooses; `audit` is that of the closest one.
+    """Return what would make a motion that the planner chooses feasible; `audit` is that of the closest one.
 
     If no duration and no limit of the task does, it is what the platform could do exactly on its path. A longer
     duration is only tried if nothing proves it infeasible.
@@ -93,7 +93,7 @@ def _at_ease_near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
 
 
 def _one_of_a_team(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the first change with which free carriers are found to hold the platform: each solves programs."""
+    """Return the first change with which free carriers can hold the platform; only one, since each solves programs."""
     changes = (_less_wind, _lighter_load, _lighter_platform, nearer_end, near_home)
     return next((found for make in changes if (found := make(search, scenario))), [])
 

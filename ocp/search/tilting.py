@@ -14,7 +14,7 @@ SPARE = 1.01  # times the largest tilt at the nodes
 
 
 def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the tube in which the platform may tilt, without which too few cables do not hold it on its path.
+    """Return the tube in which the platform must be allowed to tilt, so that few cables can hold it on its path.
 
     Cables fewer than the degrees of freedom balance the weight in few attitudes, which change from place to place.
     """

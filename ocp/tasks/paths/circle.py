@@ -11,7 +11,7 @@ from ....models.part import Direction, Finite, NonNegative, Vector3, optional
 from .base import PathBase
 from .motion import Motion
 
-ALONG_X = 1e-6  # length of what an axis leaves of the x axis, below which its direction is rounding
+ALONG_X = 1e-6  # the part of the x axis across the circle's axis has no reliable direction if it is shorter
 
 
 class CirclePath(PathBase):
