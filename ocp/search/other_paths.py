@@ -40,7 +40,7 @@ def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
         varied = _along(scenario, nearer)
         if turns:
             return varied, 100 * share, f"of it, to roll, pitch, yaw ({place}) degrees"
-        return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place})"
+        return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place}) m"
 
     return (
         largest_share(search, to, "part of the rotation", "%")
