@@ -49,9 +49,9 @@ typedef struct {
 } towline_flight;
 
 /*
- * Write the commands of all actuators inside their limits; of a state that is none, those with which carriers turn as they
- * were about to. Carriers that turn too late turn more slowly from the next step on. Return the most that the thrust of a
- * carrier lacks [N].
+ * Write the commands of all actuators inside their limits; if the state is missing, those with which carriers finish their
+ * turn. Carriers that turn too late turn more slowly from the next step on. Return the most that the thrust of a carrier
+ * lacks [N].
  */
 double towline_write_thrusts(const towline_robot *robot, const towline_controller *controller, double dt,
                              towline_flight flight);

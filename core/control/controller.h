@@ -56,11 +56,11 @@ typedef struct {
     int64_t silent;        /* steps in which tensions were commanded and no sensor reported one; from 2 on it matters */
 } towline_platform_memory;
 
-/* How a carrier turns, in its own axes: measured, and predicted while no state is. */
+/* How a carrier turns, in its own axes: measured, or predicted while no state is measured. */
 typedef struct {
     double steady[6]; /* force [N], and moment [N m] with which it turns as its reference does */
     double away[3];   /* e of thrusts.c [rad] */
-    double rate[3];   /* with which e changes [rad/s] */
+    double rate[3];   /* rate of change of e [rad/s] */
 } towline_turn;
 
 /* What is remembered of a carrier. */
