@@ -187,8 +187,9 @@ class Page(HTMLParser):
 
     def handle_data(self, data):
         self.text += data
-        if self.stack[-1:] in (["th"], ["td"]):
-            self.rows[-1][self.stack[-1] == "td"] += data
+        cells = [tag for tag in self.stack if tag in ("th", "td")]  # which may have code inside
+        if cells:
+            self.rows[-1][cells[-1] == "td"] += data
 
 
 def test_html_tells_the_same_facts_and_loads_nothing(free, impossible, tmp_path):

@@ -68,7 +68,8 @@ def test_text_page_and_data_say_the_same(result, tmp_path):
     assert len(said) > 5
     for piece in said:
         assert piece in text
-        assert html.unescape(re.sub(r"<[^>]*>", "", typeset(html.escape(piece)))) in shown
+        without_marks = piece.replace("`", "")  # code has a font instead
+        assert html.unescape(re.sub(r"<[^>]*>", "", typeset(html.escape(without_marks)))) in shown
     assert "<script" not in page
     assert "data:image/svg+xml" in page or "shortest duration" in text  # of a time law alone there is no figure
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "report.json", "report.txt"]
