@@ -86,3 +86,13 @@ def track_of(times: np.ndarray, poses: np.ndarray) -> tuple[PoseTrack, int]:
     turning = np.hstack([poses[known, :3], np.unwrap(poses[known, 3:], axis=0)])
     neighbours, filled = widest_parabola(times[known], turning), np.where(known[:, None], poses, 0.0)
     return PoseTrack(times, filled[:, :3], points.rotations(filled[:, 3:]), known, neighbours), neighbours
+
+
+def unit_quaternions(values: np.ndarray) -> np.ndarray:
+    """Return quaternions (N, 4) of unit length, of quaternions or of angles (N, 3) [rad]; nan where not measured."""
+    known = np.isfinite(values).all(axis=1)
+    result = np.full((len(values), 4), np.nan)
+    given = values[known]
+    result[known] = given if values.shape[1] == 4 else Rotation.from_matrix(points.rotations(given)).as_quat()
+    size = np.linalg.norm(result, axis=1, keepdims=True)
+    return np.where(np.abs(size - 1) < 0.1, result / np.where(size > 0, size, 1.0), np.nan)

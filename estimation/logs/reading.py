@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from ...base.errors import InputError
 from ...base.text import quantity
-from ...models import points
 from ...models.files import AnyRobot, as_robot
 from ...models.robot import Robot
 from .alignment import Clock
@@ -23,7 +22,7 @@ from .mapping import Field, Fields, LogMap, carrier_fields, fields_of, free_axes
 from .measurements import Measurements, changed
 from .north_east_down import FROM_FRD, FROM_NED, carriers_from_ned, ned_frame, note_of, platform_from_ned
 from .opening import recordings
-from .pose_track import PoseTrack
+from .pose_track import PoseTrack, unit_quaternions
 from .recording import COUNTED, Recording, Samples
 from .streams import Reader, at_times, interpolated, like_time
 from .thrust_gains import notes_of_tilts
@@ -291,7 +290,7 @@ def measurements_of(
                 f"lengths and poses of several files or topics must have times, got none for {lost}; a map "
                 "(--fields) may name them, as in 'time: clock [ms]'"
             )
-        quaternions = None if orientation is None else _quaternions(orientation.values)
+        quaternions = None if orientation is None else unit_quaternions(orientation.values)
         places = np.full((len(pose.values), 3), np.nan) if position is None else position.values
         clock = clock_of_poses(lengths, Samples(pose.times, places), quaternions, source, main, robot, given, from_)
         lengths, tensions, places, quaternions = _merged(
@@ -382,16 +381,6 @@ def _merged(
     forces = None if forces is None else Samples(at[kept], forces[kept])
     turned = None if quaternions is None else quaternions[kept]
     return Samples(at[kept], moved[kept]), forces, places[kept], turned
-
-
-def _quaternions(values: np.ndarray) -> np.ndarray:
-    """Return quaternions (N, 4) of unit length, of quaternions or of angles (N, 3) [rad]; nan where not measured."""
-    known = np.isfinite(values).all(axis=1)
-    result = np.full((len(values), 4), np.nan)
-    given = values[known]
-    result[known] = given if values.shape[1] == 4 else Rotation.from_matrix(points.rotations(given)).as_quat()
-    size = np.linalg.norm(result, axis=1, keepdims=True)
-    return np.where(np.abs(size - 1) < 0.1, result / np.where(size > 0, size, 1.0), np.nan)
 
 
 def _kept(values: np.ndarray, fields: Sequence[Field]) -> np.ndarray:

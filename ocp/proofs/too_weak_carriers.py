@@ -21,6 +21,7 @@ from .too_fast import OF_DURATION
 
 DIRECTIONS = np.linspace(-np.pi / 2, np.pi / 2, 181)  # above the horizontal, in the vertical plane of the force
 CERTAIN = 1e-6  # of the weight
+TINY = 1e-300  # [N]: a vertical force has no direction ahead; shorter vectors in its place bound no less
 HALVINGS = 30  # of the range of durations
 
 
@@ -48,7 +49,7 @@ def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, c
         """Return the largest missing force [N] if the duration is multiplied by `longer`."""
         slower = Motion(platform.pose, platform.velocity / longer, platform.acceleration / longer**2)
         forces = scenario.required_wrench(times, slower, carriers)[:, :3]
-        return float((_along(forces) - _most(forces, known, gravity)).max())
+        return _missing(forces, known, gravity)
 
     enough = CERTAIN * robot.force_scale
     if missing(1.0) <= enough:
@@ -82,24 +83,14 @@ def _carriers(scenario: Scenario) -> list[_Carrier] | None:
     return found
 
 
-def _directions(forces: np.ndarray) -> np.ndarray:
-    """Return unit vectors in the vertical planes of forces (n, 3), (n, k, 3)."""
-    ahead = forces[:, :2] / np.maximum(np.linalg.norm(forces[:, :2], axis=1, keepdims=True), 1e-300)
+def _missing(forces: np.ndarray, carriers: list[_Carrier], gravity: np.ndarray) -> float:
+    """Return by how much forces (n, 3) exceed at most what all carriers can give along any direction [N]."""
+    ahead = forces[:, :2] / np.maximum(np.linalg.norm(forces[:, :2], axis=1, keepdims=True), TINY)
     flat, up = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
-    return np.concatenate([ahead[:, None] * flat[:, None], np.tile(up[:, None], (len(forces), 1, 1))], axis=2)
-
-
-def _along(forces: np.ndarray) -> np.ndarray:
-    """Return the components of forces (n, 3) along each direction, (n, k)."""
-    return np.einsum("nkj,nj->nk", _directions(forces), forces)
-
-
-def _most(forces: np.ndarray, carriers: list[_Carrier], gravity: np.ndarray) -> np.ndarray:
-    """Return the largest force that all carriers can give along each direction, (n, k)."""
-    directions = _directions(forces)
+    directions = np.concatenate([ahead[:, None] * flat[:, None], np.tile(up[:, None], (len(forces), 1, 1))], axis=2)
     from_vertical = np.arccos(np.clip(directions[..., 2], -1, 1))
-    most = np.zeros(directions.shape[:2])
+    missing = np.einsum("nkj,nj->nk", directions, forces)
     for carrier in carriers:
         beyond = np.clip(from_vertical - carrier.tilt, 0, np.pi / 2)
-        most += carrier.thrust * np.cos(beyond) + carrier.mass * (directions @ gravity + carrier.acceleration)
-    return most
+        missing -= carrier.thrust * np.cos(beyond) + carrier.mass * (directions @ gravity + carrier.acceleration)
+    return float(missing.max())
