@@ -5,9 +5,9 @@ from towline.models import Robot
 MASS, LENGTH, ACCELERATION = 0.5, 1.0, 5.0
 
 
-def slung(**platform):
+def slung(thrust=40, **platform):
     quadrotor = {"mass": 1.5, "inertia": [0.02, 0.02, 0.04, 0, 0, 0], "home": [0, 0, 2, 0, 0, 0], "radius": 0.3}
-    limits = {"thrust_max": 40, "torque_max": [3, 3, 0.6], "tilt_max": 0.6, "speed_max": 8}
+    limits = {"thrust_max": thrust, "torque_max": [3, 3, 0.6], "tilt_max": 0.6, "speed_max": 8}
     cable = {"anchor": [0, 0, 0], "attachment": [0, 0, 0], "t_min": 0.5, "t_max": 30}
     return Robot.model_validate(
         {
