@@ -166,6 +166,36 @@ class _ThisProcess(Executor):
         return future
 
 
+class _Cluster(Executor):
+    """Evaluate jobs by the workers of a Dask scheduler.
+
+    Dask's own executor takes the result of a job whose worker is killed just then for an exception.
+    """
+
+    def __init__(self, client: Any):
+        self._client = client
+
+    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+        future: Future[Result] = Future()
+
+        def finish(task: Any) -> None:
+            """Give the result on; of a job whose worker was killed, when another worker has done it."""
+            if not future.set_running_or_notify_cancel():
+                return
+            try:
+                result = task.result()
+            except BaseException as error:
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+
+        # Not pure: Dask would take a hash of the job instead of a name of its own.
+        task = self._client.submit(fn, *args, pure=False, **kwargs)
+        task.add_done_callback(finish)
+        future.add_done_callback(lambda ended: task.cancel() if ended.cancelled() else None)
+        return future
+
+
 @contextmanager
 def _cluster(address: str) -> Iterator[Workers]:
     try:
@@ -207,8 +237,6 @@ def _cluster(address: str) -> Iterator[Workers]:
                 client.wait_for_workers(1, timeout=WORKERS_WITHIN)
             except TimeoutError:
                 raise InputError(f"scheduler must have at least one worker, got {shown(address)} without any") from None
-            # Not pure: Dask would take a hash of the job instead of a name of its own.
-            executor = client.get_executor(pure=False)
-            yield Workers(executor, lambda: AHEAD * max(sum(client.nthreads().values()), 1), failures, look)
+            yield Workers(_Cluster(client), lambda: AHEAD * max(sum(client.nthreads().values()), 1), failures, look)
         finally:
             client.close(timeout=CONNECT_WITHIN)
