@@ -125,7 +125,8 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
     from ..workspace.volume import share_interval  # of 95 %; its package takes longer to load than a short run
 
     worst, passes, count = dataset["error_max"].values, dataset["passed"].values, int(dataset.sizes["seed"])
-    likely = dict(zip(("low", "high"), share_interval(int(passes.sum()), count), strict=True))
+    independent = 1 if _all_same(dataset) else count
+    likely = dict(zip(("low", "high"), share_interval(int(passes[:independent].sum()), independent), strict=True))
     return {
         "runs": count,
         "passed": int(passes.sum()),
@@ -139,6 +140,11 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
         "worst_seed": int(dataset["seed"].values[int(np.where(passes & ~passes.all(), -1.0, worst).argmax())]),
         "worst_cause": dataset.attrs.get("worst"),
     }
+
+
+def _all_same(dataset: xr.Dataset) -> bool:
+    """Return whether all runs are the same run, as they are where nothing is random."""
+    return not np.ptp(dataset["error_rms"].values)
 
 
 def _failed(dataset: xr.Dataset) -> dict[str, int]:
@@ -164,6 +170,8 @@ def report(dataset: xr.Dataset) -> Report:
     doubt = dataset.attrs.get("reference")
     likely, failed = short["share_passed"], {FAILED[name]: n for name, n in short["failed"].items() if n}
     rows = {"reference": doubt} if doubt else {}
+    if short["runs"] > 1 and _all_same(dataset):
+        rows["runs"] = "all the same: nothing is random (see --gusts, --noise and --mismatch), so they count as one"
     rows["probability of a pass"] = f"{100 * likely['low']:.3g} to {100 * likely['high']:.3g} % (95 % confidence)"
     if failed:
         rows["failed"] = ", ".join(f"{quantity(n)} by {name}" for name, n in failed.items())

@@ -117,6 +117,7 @@ def test_a_flight_of_many_is_the_flight_alone():
     assert bool(many["passed"].values[2]) == alone.passed
     assert many["answered"].values[2].tolist() == list(alone.answered.values())
     assert len(set(many["error_max"].values)) == 3
+    assert "all the same" not in report(many).text()
 
 
 def test_slack_cables_count_in_many_flights_as_alone_and_cut_ones_never():
@@ -132,6 +133,8 @@ def test_slack_cables_count_in_many_flights_as_alone_and_cut_ones_never():
     assert alone.slack_s == pytest.approx(slack_s)
     many = simulate("wang-flying", load("wang-flying").home, **task, runs=2)
     np.testing.assert_allclose(many["slack_s"].values, slack_s)
+    assert "all the same: nothing is random" in report(many).text()
+    assert "0 to 97.5 % (95 % confidence)" in report(many).text()  # one run that failed: p <= 1 - 0.025
 
 
 def test_the_drag_of_a_steady_wind_is_what_the_observer_reports():
