@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from towline import load, plan, read_task
 from towline.base.errors import InputError
 from towline.ocp.tasks.paths import LinePath, WaypointPath
+from towline.ocp.warnings.outside_frame import leaves_its_points
 
 LISTS = 60
 SHARES = np.linspace(0.0, 1.0, 2001)
@@ -272,6 +273,15 @@ def test_a_low_lift_stays_low():
     assert "the path leaves the box of its points by up to" in high.report()
     assert "along z; the shape legs stays inside" in high.report()
     assert high.audit.motion.pose[:, 2].max() > 2.1
+
+
+def test_a_spline_that_leaves_the_box_of_its_points_by_micrometres_has_no_warning():
+    """A figure eight of 0.4 x 0.2 m through 41 points: its largest y lies between two of them."""
+    turns = np.linspace(0, 2 * np.pi, 41)
+    points = [[0.2 * np.sin(turn), 0.1 * np.sin(2 * turn), 2] for turn in turns]
+    path = path_of(points, shape="spline")
+    assert 1e-6 < path.outside().max() < 1e-5
+    assert leaves_its_points(path) == []
 
 
 def test_splines_go_through_their_points_from_rest_to_rest():

@@ -11,7 +11,7 @@ from .instants import Instants
 LEAST = 1e-3  # [m], and of the size of the frame, whichever is less: nearer than this it is inside
 FLAT = 0.1  # of the largest span of the anchors: an axis along which they span less has no sides
 AXES = "xyz"
-LEFT = 1e-6  # [m]
+LEFT = 1e-3  # of the span of the points
 LEAVES = "the platform leaves the frame of the robot"
 
 
@@ -88,7 +88,7 @@ def leaves_its_points(path: PathBase) -> list[str]:
         return []
     far = path.outside()
     worst = int(far.argmax())
-    if far[worst] < LEFT:
+    if far[worst] < LEFT * np.linalg.norm(np.ptp(np.array(path.points)[:, :3], axis=0)):
         return []
     text = f"the path leaves the box of its points by up to {quantity(far[worst], 'm')} along {'xyz'[worst]}"
     return [f"{text}; the shape legs stays inside"]
