@@ -112,6 +112,13 @@ def test_every_fence_is_a_block():
         assert all(block.language == "sh" for block in known if block.reason), page
 
 
+def test_frames_do_not_end_cells_or_headings():
+    """Of the site: its Markdown takes {G} at the end of a cell or a heading for attributes, and drops it."""
+    lost = re.compile(r"^(#.*\{\w+\}|\|.*\{\w+\} *\|.*)$", re.MULTILINE)
+    assert lost.search("| pose | in {G} |") and lost.search("# The frame {G}") and not lost.search("| {G} is | b |")
+    assert [(page, line) for page, text in PAGES.items() for line in lost.findall(text)] == []
+
+
 def test_indented_commands_are_patterns():
     """A command that can be run as it stands must be in a block that is run."""
     for page, text in PAGES.items():
