@@ -1,7 +1,10 @@
-"""Ends that are in the way of an obstacle at every attitude that the tube permits, against sampled attitudes."""
+"""Ends at which every attitude that the tube permits touches an obstacle or has no tensions, against sampled ones."""
+
+from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from towline import load
@@ -20,6 +23,7 @@ def clearance(robot, pose, turns, centre, radius):
     return np.linalg.norm(at - centre, axis=2).min(axis=1) - radius
 
 
+@cache
 def case(seed):
     """Return the proof of a random task if a ball is its reason, and the best clearance of each end [arms]."""
     rng = np.random.default_rng(seed)
@@ -57,3 +61,40 @@ def test_proofs_are_those_of_sampled_attitudes(seed):
 def test_the_reason_is_stated():
     proofs = [proof.describe() for proof in (case(seed)[0] for seed in range(24)) if proof is not None]
     assert sum("no attitude in the tube keeps all distances" in proof for proof in proofs) >= 2
+
+
+def short_at(robot, pose, turns):
+    """Return the least largest wrench error of tensions inside their limits at rest, in weights, by linear programs."""
+    arms, com, m = robot.attachments, np.array(robot.platform.com), robot.m
+    w = np.array([0, 0, 1, 0, 0, 0])
+    found = []
+    for R in Rotation.from_euler("ZYX", (pose[3:] + turns)[:, ::-1]).as_matrix():
+        way = robot.home_anchors - pose[:3] - arms @ R.T
+        way /= np.linalg.norm(way, axis=1)[:, None]
+        A = np.hstack([way, np.cross((arms - com) @ R.T, way) / robot.length]).T / robot.weight
+        error = np.full((6, 1), -1.0)
+        rows, right = np.block([[A, error], [-A, error]]), np.concatenate([w, -w])
+        limits = [*zip(robot.t_min, robot.t_max, strict=True), (0, None)]
+        found.append(linprog([0.0] * m + [1.0], A_ub=rows, b_ub=right, bounds=limits).fun)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_ends_without_tensions_at_any_attitude_are_proven(seed):
+    rng = np.random.default_rng([29, seed])
+    robot = load("cogiro" if seed % 2 else "ipanema-1")
+    end, turn = robot.home.copy(), float(rng.uniform(0.02, 0.3))
+    far = np.abs(robot.home_anchors[:, :2]).max(axis=0) * rng.uniform(0.6, 1.05)
+    end[:2] = far * rng.choice([-1, 1], 2)
+    task = {
+        "path": {"kind": "line", "start": robot.home.tolist(), "end": end.tolist()},
+        "duration": 9,
+        "tube": {"position": "free", "attitude": turn},
+    }
+    proof = infeasible_ends(Planner(robot, task).scenario)
+    least = short_at(robot, end, np.vstack([np.zeros(3), rng.uniform(-turn, turn, (24, 3))])).min()
+    if least < 1e-9:
+        assert proof is None
+    elif least > 0.02:  # so few samples come nearer than that to the best attitude
+        assert proof is not None
+        assert "no attitude in the tube has feasible tensions at rest" in proof.describe()

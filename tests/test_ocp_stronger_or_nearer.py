@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from towline import Robot, Task, load, plan, tensions
+from towline.ocp.planner import Planner
 from towline.ocp.reports.report import sections
+from towline.ocp.search.other_paths import other_yaws
+from towline.ocp.search.search import Search
 from towline.ocp.tasks.paths.shifted import shifted
 
 WAYS = {
@@ -450,3 +453,12 @@ def test_a_disc_of_winds_is_offered_a_speed_that_is_feasible_from_every_side():
     for side in np.linspace(0, 2 * np.pi, 5):
         wind = offer.possible * np.array([np.cos(side), np.sin(side), 0])
         assert plan("wang-flying", task | {"wind": wind.tolist()}).feasible
+
+
+def test_a_variation_that_the_task_refuses_is_not_offered():
+    """With other yaws the rounded legs turn, and miss exact waypoints by more than an attitude tube of 0 permits."""
+    points = [[0, 0, 2, 0, 0, 1], [5, 3, 1.5, 0, 0, 1], [0, 2, 2, 0, 0, 1]]
+    task = {"path": {"kind": "waypoints", "points": points}, "duration": 8}
+    for tube, names in (({}, ["yaw at path.points[1]"]), ({"position": 0.3, "waypoints": "exact"}, [])):
+        scenario = Planner("cogiro", task | {"tube": tube}).scenario
+        assert [each.name for each in other_yaws(Search(scenario, {}, None), scenario)] == names

@@ -102,7 +102,7 @@ class Distribution:
             singly += rows[~solved & ~proven].tolist()
             if proven.any():
                 impossible = rows[proven]
-                closest, away = _nearest(scaled_A[impossible], scaled_w[impossible], low, high)
+                closest, away = nearest(scaled_A[impossible], scaled_w[impossible], low, high)
                 violation[impossible] = np.fmax(away, batch.shortfall[proven])
                 tensions[impossible] = np.where((few | (away <= tolerance))[:, None], closest, np.nan)
                 short = violation[impossible]
@@ -220,7 +220,7 @@ def _worse(some: AuditedTensions, other: AuditedTensions, about: Callable[[int],
     return worst._replace(violation=violation, beyond=beyond)
 
 
-def _nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return tensions inside the limits whose wrenches are nearest to w, (n, m), and their distances, (n,) [N]."""
     nearest = solve_batch(A, w, low, high, rho=NEAREST)
     return nearest.tensions, nearest.residual
@@ -230,7 +230,7 @@ def _short_in_range(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndar
     """Return how far the part of w in the span of A's columns is from what they give inside the limits, (n,) [N]."""
     within = _in_span(A, w)
     short = ~solve_batch(A, within, low, high).feasible
-    return np.where(short, _nearest(A, within, low, high)[1], 0.0)
+    return np.where(short, nearest(A, within, low, high)[1], 0.0)
 
 
 def _in_span(A: np.ndarray, w: np.ndarray) -> np.ndarray:

@@ -174,7 +174,9 @@ def _at_no_attitude(
         if angles and (freedom[end][0, 0, :3] == GIVEN).all():
             usable = ~_dependent(scenario, freedom[end])[0]
             pose, places = platform.pose[end], carriers.pose[end]
-            if proven := no_attitude(scenario, float(times[end]), angles, pose, places, usable):
+            moves = np.abs([platform.velocity[end], platform.acceleration[end]]).max() > AT_REST
+            rests = not moves and (freedom[end][0, 1:] == GIVEN).all() and (freedom[end][1:, 0] == GIVEN).all()
+            if proven := no_attitude(scenario, float(times[end]), angles, pose, places, usable, bool(rests)):
                 return proven
     return []
 

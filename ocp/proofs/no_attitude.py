@@ -1,28 +1,45 @@
-"""Prove that an end of a motion collides with an obstacle at every attitude that the tube permits: `no_attitude`.
+"""Prove that at an end of a motion every attitude that the tube permits violates a limit: `no_attitude`.
 
 Where the tube leaves a platform its attitude, but the task fixes the position where it rests, the attitudes are a box
-of angles. A distance changes by at most what points of the platform move, so one value proves all of a small box. Boxes
-that it does not prove are halved along each angle, until all are proven or an attitude keeps all distances.
+of angles. A distance changes by at most what points of the platform move, so one value proves all of a small box. So
+does one direction along which the cables cannot give the weight, because attachments and the directions of cables
+change by at most as much. Boxes that are not proven are halved along each angle, until all are proven or an attitude
+keeps all distances and has tensions.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 
-from ..audits.excess import Excess
+from ..audits.excess import TENSIONS, Excess
+from ..audits.tensions import nearest, scaled, tolerance_of
 from ..tasks.scenario import ATTITUDE, Scenario
 
 MOST = 30_000  # boxes
 CERTAIN = 1e-5  # [m], of distances, whose formulas are rounded where things touch
+CERTAIN_FORCE = 1e-6  # of the weight, likewise
+
+Tensions = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
+"""Takes poses (n, 6) and an angle [rad]; returns by what tensions are short at each (n,), and of how much of that it is
+certain at every pose that is turned by at most the angle (n,) [N]."""
 
 
 def no_attitude(
-    scenario: Scenario, time: float, angles: list[int], platform: np.ndarray, carriers: np.ndarray, usable: np.ndarray
+    scenario: Scenario,
+    time: float,
+    angles: list[int],
+    platform: np.ndarray,
+    carriers: np.ndarray,
+    usable: np.ndarray,
+    rests: bool,
 ) -> list[Excess]:
-    """Return the largest violation at the reference attitude if there is one at every attitude, else nothing.
+    """Return the violation at the reference attitude if there is one at every attitude, else nothing.
 
     - `time`: when the platform is there [s].
     - `angles`: the coordinates of the attitude that the tube leaves free, of 3 to 5.
     - `platform`, `carriers`: their poses there, (6,) and (c, 6).
     - `usable`: which of the values of all limits depend on the platform's pose alone, (k,).
+    - `rests`: whether the platform is at rest there and the poses of the carriers are given.
     """
     robot, turn = scenario.robot, scenario.task.tube.turn
     points = np.vstack([robot.attachments, robot.platform.com, scenario.body_corners])
@@ -35,31 +52,76 @@ def no_attitude(
         and usable[place].all()
         and scenario.in_force(limit, np.array([time])).all()
     ]
-    if not limits or not set(angles) <= set(ATTITUDE) or not np.isfinite(turn):
+    tensions = _tensions_at_rest(scenario, time, carriers) if rests else None
+    if not (limits or tensions) or not set(angles) <= set(ATTITUDE) or not np.isfinite(turn):
         return []
+
+    def turned(offsets: np.ndarray) -> np.ndarray:
+        pose = np.repeat(platform[None], len(offsets), axis=0)
+        pose[:, angles] += offsets
+        return pose
 
     def exceeded(offsets: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """Return by how many metres of movement limits are exceeded (n, limits), and all values."""
-        pose = np.repeat(platform[None], len(offsets), axis=0)
-        pose[:, angles] += offsets
-        values = scenario.limits.at_rest(pose, np.repeat(carriers[None], len(offsets), axis=0))
-        over = [np.maximum(limit.low - values[k], values[k] - limit.high).max(axis=1) for k, limit in limits]
-        rates = [limit.per_metre for _, limit in limits]
+        values = scenario.limits.at_rest(turned(offsets), np.repeat(carriers[None], len(offsets), axis=0))
+        over = [np.full(len(offsets), -np.inf)] * (not limits)
+        over += [np.maximum(limit.low - values[k], values[k] - limit.high).max(axis=1) for k, limit in limits]
+        rates = [limit.per_metre for _, limit in limits] or [1.0]
         return np.stack(over, axis=1) / rates, values
 
-    middle, values = exceeded(np.zeros((1, len(angles))))
-    if middle.max() <= CERTAIN:
-        return []
     centres, half, count = np.zeros((1, len(angles))), turn, 0
     corners = np.stack(np.meshgrid(*[[-0.5, 0.5]] * len(angles)), axis=-1).reshape(-1, len(angles))
+    reasons: set[str] = set()
     while len(centres):
         count += len(centres)
         worst = exceeded(centres)[0].max(axis=1)
-        if count > MOST or (worst <= CERTAIN).any():
+        kept, unproven = worst <= CERTAIN, worst <= arm * half * len(angles) + CERTAIN
+        reasons |= {"keeps all distances"} if not unproven.all() else set()
+        if tensions is not None and unproven.any():
+            short, certain = tensions(turned(centres[unproven]), half * len(angles))
+            kept[unproven] &= short <= 0
+            unproven[unproven] = certain <= 0
+            reasons |= {"has feasible tensions at rest"} if (certain > 0).any() else set()
+        if count > MOST or kept.any():
             return []
-        unproven = centres[worst <= arm * half * len(angles) + CERTAIN]
-        centres = (unproven[:, None] + half * corners).reshape(-1, len(angles))
+        centres = (centres[unproven][:, None] + half * corners).reshape(-1, len(angles))
         half /= 2
+    middle, values = exceeded(np.zeros((1, len(angles))))
+    why = f"no attitude in the tube {' and '.join(sorted(reasons, reverse=True))}"
+    if middle.max() <= CERTAIN and tensions is not None:
+        short, _ = tensions(platform[None], 0.0)
+        return [Excess(TENSIONS, "platform", time, float(short[0]), 0.0, "N", "at most", why)]
     k, limit = limits[int(middle[0].argmax())]
     which = int(np.maximum(limit.low - values[k][0], values[k][0] - limit.high).argmax())
-    return [Excess.of(limit, which, time, values[k][0, which], "no attitude in the tube keeps all distances")]
+    return [Excess.of(limit, which, time, values[k][0, which], why)]
+
+
+def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray) -> Tensions | None:
+    """Return what tells by how much tensions at rest are short; None where more than the weight has to be held.
+
+    Along a direction d = (f, c) of wrenches, cable i gives its tension times u_i . (f + c x r_i), u_i its direction and
+    r_i its arm about the CoM. A rotation by an angle moves its attachment by at most the angle times the distance from
+    the platform's origin, and turns its direction by at most the angle that this has from the anchor.
+    """
+    robot = scenario.robot
+    if scenario.wind is not None or scenario.wind_set is not None or scenario.phases.all or robot.pulley_radii.any():
+        return None
+    low, high = (bound[0] for bound in scenario.bounds_at(np.array([time])))
+    reach, arms = (np.linalg.norm(robot.attachments - at, axis=1) for at in (0.0, np.array(robot.platform.com)))
+    least = max(tolerance_of(robot), CERTAIN_FORCE * robot.force_scale)
+
+    def short(poses: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
+        still, places = np.zeros_like(poses), np.repeat(carriers[None], len(poses), axis=0)
+        A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, places))
+        w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still))
+        closest, away = nearest(A, w, low, high)
+        d = (w - np.einsum("nij,nj->ni", A, closest)) / np.maximum(away, least)[:, None]
+        f, c = (np.linalg.norm((d * robot.wrench_scale)[:, part], axis=1)[:, None] for part in (slice(3), slice(3, 6)))
+        sine = np.minimum(reach * angle / scenario.dynamics.cable_lengths(poses, places), 1.0)
+        change = np.arcsin(sine) * (f + c * arms) + c * arms * angle
+        change[sine >= 1.0] = np.inf
+        most = np.einsum("nij,ni->nj", A, d) + change
+        certain = np.einsum("ni,ni->n", w, d) - np.maximum(low * most, high * most).sum(axis=1) - least
+        return np.where(away > least, away, 0.0), certain
+
+    return short

@@ -6,6 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...solvers import solve_batch
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
@@ -39,7 +40,8 @@ def largest_share(
     low, high = 0.0, most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if _may_be_feasible(make(middle)[0], rates) else (low, middle)
+        varied = _legal(make, middle)
+        low, high = (middle, high) if varied and _may_be_feasible(varied[0], rates) else (low, middle)
     if low == 0.0:
         return []
     reserves = RESERVES
@@ -47,10 +49,18 @@ def largest_share(
         least = make(OF_PROGRAMS[-1] * low)[0]
         reserves = OF_PROGRAMS if planned(search, least, f"audit, other {name}") is not None else ()
     for reserve in reserves:
-        varied, value, detail = make(reserve * low)
-        if (plan := planned(search, varied, f"audit, other {name}")) is not None:
-            return [Relaxed(name, unit, make(1.0)[1], rounded(value, up), plan, detail)]
+        varied = _legal(make, reserve * low)
+        if varied and (plan := planned(search, varied[0], f"audit, other {name}")) is not None:
+            return [Relaxed(name, unit, make(1.0)[1], rounded(varied[1], up), plan, varied[2])]
     return []
+
+
+def _legal(make: Callable[[float], Variation], share: float) -> Variation | None:
+    """Return a variation, or None if its task is refused: exact waypoints may be outside the tube of other legs."""
+    try:
+        return make(share)
+    except InputError:
+        return None
 
 
 def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
