@@ -174,5 +174,5 @@ def _show(robot: Robot, estimate: PoseEstimate, others: list[PoseEstimate]) -> N
         named = any_of(f"cables[{k}]" for k in cables) if len(cables) < robot.m else "any one cable"
         typer.echo(f"A wrong length of {named} explains this." if named else "No single wrong length explains this.")
     for other in others:
-        held = "" if other.taut else ", which cables cannot hold at rest"
+        held = "" if other.taut else ", at which the cables cannot hold the platform at rest"
         typer.echo(f"Also fits: ({quantity_row(np.round(other.pose, 6))}) [m, rad]{held}")

@@ -116,7 +116,7 @@ def simulate(
     """Simulate a plan in closed loop, with wind, sensor noise and events, or replay a recording.
 
     A run passes if it does not diverge, its position error stays within --tolerance, no tension exceeds t_max by more
-    than 0.1 % of the cable's range, no cable with t_min above zero goes slack, and the platform stays above the floor
+    than 0.1 % of t_max - t_min, no cable with t_min above zero goes slack, and the platform stays above the floor
     and inside the workspace_box of the robot file. A recording is replayed with its commands, in windows that each
     start from the recorded state; it passes if 95 % of the position residuals are within --tolerance. The exit code is
     1 if a run or a recording does not pass.

@@ -91,7 +91,7 @@ def flights(robot: Robot, conditions: Experiment, seeds: Sequence[int], toleranc
         "error_max": over(("seed",), of["error_max"], "m", "largest position error"),
         "tension_min": over(("seed",), of["tension_min"], "N", "smallest tension"),
         "tension_max": over(("seed",), of["tension_max"], "N", "largest tension"),
-        "tension_excess": over(("seed",), of["exceeded"], "1", "largest excess over t_max, of the cable's range"),
+        "tension_excess": over(("seed",), of["exceeded"], "1", "largest excess over t_max, relative to t_max - t_min"),
         "outside": over(("seed",), of["outside"], "m", "largest distance out of the room or below the floor"),
         "slack_s": over(("seed",), of["slack"] * period, "s", "time with a slack cable whose t_min is above zero"),
         "answered": Variable(

@@ -33,7 +33,7 @@ def test_other_poses_are_listed_and_those_that_cannot_be_held():
     robot = load("nist-robocrane")
     done = run("pose", robot.name, "--lengths", text(Dynamics(robot).cable_lengths(robot.home)))
     assert done.stdout.count("Also fits") >= 3
-    assert "which cables cannot hold at rest" in done.stdout
+    assert "at which the cables cannot hold the platform at rest" in done.stdout
 
 
 def test_lengths_that_no_pose_has_give_one():

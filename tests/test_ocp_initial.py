@@ -89,7 +89,7 @@ def test_a_start_outside_the_tube_is_proven_impossible():
     planned = plan(ROBOT, TASK, initial={"pose": [0.4, 0, 1, 0, 0, 0]})
     assert planned.status is MotionStatus.INFEASIBLE
     assert (
-        "tube.position of platform must be at most 0.3 m but is 0.4 m at t = 0.000 s"
+        "tube.position of the platform must be at most 0.3 m but is 0.4 m at t = 0.000 s"
         in planned.report().splitlines()[0]
     )
 

@@ -41,7 +41,7 @@ def test_no_tensions_reach_more_than_the_stiffest(robot):
     )
     beyond = plan(robot, LINE | {"steps": 8, "limits": {"natural_frequency": 1.01 * most}})
     assert not beyond.feasible
-    assert "natural_frequency of platform must be at least" in beyond.report()
+    assert "natural_frequency of the platform must be at least" in beyond.report()
 
 
 def test_a_planar_robot_has_the_frequencies_of_its_plane():

@@ -48,11 +48,11 @@ class Excess(Displayed):
         if self.limit == "keep_out" and region and self.value < 0:
             required = f" (required distance: {quantity(self.bound, self.unit)})" if self.bound > 0 else ""
             depth = quantity(-self.value, self.unit)
-            return f"{body} is {depth} inside the keep-out region {region!r}{at}{required}{why}"
+            return f"{_named(body)} is {depth} inside the keep-out region {region!r}{at}{required}{why}"
         body, _, room = self.about.partition(WITHIN)
         if room and self.value < 0:
             side = "below" if room == "the floor" else "beyond"
-            return f"{body} is {quantity(-self.value, self.unit)} {side} {room}{at}{why}"
+            return f"{_named(body)} is {quantity(-self.value, self.unit)} {side} {room}{at}{why}"
         if self.limit == TENSIONS:
             return f"with tensions inside their limits the wrench is off by {quantity(self.value, self.unit)}{at}{why}"
         side = "" if self.accepted == "exactly" else f"{self.accepted} "
@@ -61,8 +61,14 @@ class Excess(Displayed):
             if value == bound:
                 value, bound = (quantity(number, self.unit, digits=digits) for number in (self.value, self.bound))
         value = "undefined" if np.isnan(self.value) else value
-        return f"{self.limit} of {self.about} must be {side}{bound} but is {value}{at}{why}"
+        owner = "" if self.about == "platform" and self.limit.startswith("platform_") else f" of {_named(self.about)}"
+        return f"{self.limit}{owner} must be {side}{bound} but is {value}{at}{why}"
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fields for JSON, with the sentence as "text"; numbers that do not exist are None."""
         return asdict(self) | {"value": self.value if np.isfinite(self.value) else None, "text": str(self)}
+
+
+def _named(body: str) -> str:
+    """Return the subject of a limit as in a sentence: "cable 3", but "the platform"."""
+    return f"the {body}" if body == "platform" else body

@@ -267,7 +267,7 @@ def _excess(
     if beyond.max() <= limit.tolerance:
         return None
     row, which = np.unravel_index(beyond.argmax(), beyond.shape)
-    changes = f"inside the tube it changes by at most {quantity(room[which], limit.unit, digits=3)}"
+    changes = f"inside the tube this changes by at most {quantity(room[which], limit.unit, digits=3)}"
     excess = Excess.of(limit, int(which), times[row], over[row, which], changes if near[which] else "")
     return float(beyond[row, which]) / limit.scale, excess
 

@@ -24,7 +24,9 @@ def motion_facts(plan: PlanData) -> list[Fact]:
     kind = counted(len(plan.phases), "phase") if plan.phases else task.path.kind
     path, law = plan.scenario.path, ""
     if isinstance(task.path, TimedPath):
-        kind, law = task.path.along.kind, ", with its own time law"
+        kind, law = task.path.along.kind, ", with its own time law" if plan.law is None else ""
+    if plan.law is not None and plan.feasible:
+        law = ", with the fastest time law"
     if isinstance(path, TimedPath) and path is not task.path:
         law = ", with the fastest time law" if path.smoothing is None else ", in a tube about its fastest time law"
     facts = [

@@ -90,7 +90,7 @@ def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
 
 
 def near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest path of the same form, drawn in towards the platform's home, that is feasible.
+    """Return the largest feasible path of the same form, shrunk towards the platform's home.
 
     Its attitudes come nearer to that of home in proportion. It helps where neither end can be reached.
     """
@@ -100,7 +100,7 @@ def near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
 
     def about_home(share: float) -> Variation:
         place = quantity_row(home[:3] + 0.0)
-        return _along(scenario, shrunk(path, home, share)), 100 * share, f"of it, drawn in towards ({place}) m, home"
+        return _along(scenario, shrunk(path, home, share)), 100 * share, f"of it, shrunk towards home, ({place}) m"
 
     return largest_share(search, about_home, "size of the path", "%", rates=True)
 

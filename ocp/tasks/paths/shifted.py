@@ -1,4 +1,4 @@
-"""Another path of the same form: moved in its frame (`shifted`), or drawn in towards a pose (`shrunk`)."""
+"""Another path of the same form: moved in its frame (`shifted`), or shrunk towards a pose (`shrunk`)."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
