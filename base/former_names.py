@@ -50,7 +50,9 @@ def moved_name(package: str | None, name: str) -> Any:
         raise AttributeError(f"module {whole!r} has no attribute {name!r}")
     home, new = MOVED[package, name]
     if new is not None:
-        warn(f"{whole}.{name} is called {new} now; the former name goes with the next release", DeprecationWarning, 3)
+        warn(
+            f"{whole}.{name} is called {new} now; the former name is removed in the next release", DeprecationWarning, 3
+        )
     return getattr(import_module(f"{PACKAGE}.{home}"), new or name)
 
 
@@ -81,7 +83,7 @@ class _Loader:
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         if self.old.split(".")[0] not in SHORT:
             old, new = f"{PACKAGE}.{self.old}", f"{PACKAGE}.{self.new}"
-            warn(f"{old} is called {new} now; the former name goes with the next release", DeprecationWarning, 2)
+            warn(f"{old} is called {new} now; the former name is removed in the next release", DeprecationWarning, 2)
         module = import_module(f"{PACKAGE}.{self.new}")
         self.spec: Any = module.__spec__
         return module

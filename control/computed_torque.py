@@ -46,8 +46,8 @@ class ComputedTorque(Controller):
 
     with d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state gets a
     command: these tensions if they exist (status "as planned"), otherwise those with the closest wrench ("soft
-    wrench"). For a state with nan it is the last command, which moves to the planned tensions as fast as the rate
-    permits, while quadrotors finish their turn ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted;
+    wrench"). While states contain nan, the last command moves to the planned tensions as fast as the rate permits, and
+    quadrotors finish their turn ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted;
     with fewer cables than degrees of freedom, 0.1 % along each cable and 10 % in all. Carriers follow the reference, or
     deviate from it within their `reach` to help the tensions. This damps the swing of loads of towing robots and of
     teams of quadrotors, with fewer cables than degrees of freedom. Quadrotors have separate loops for position and
@@ -60,8 +60,8 @@ class ComputedTorque(Controller):
             see `sensors`. If the first two steps, or three in a row, are more than 0.75 / b apart, the default is
             lowered, because the loop is unstable from 1 / b on, and restored after two steps that are closer together.
             A given bandwidth is kept, with a warning. If carriers fly, all bandwidths are lowered by the same factor,
-            because their attitude loops need the same: steps of at most 0.75 / `attitude`. Carriers that
-            correct errors without flying need steps of at most 0.75 / `carrier_bandwidth`.
+            because their attitude loops need steps of at most 0.75 / `attitude`. Carriers that correct errors without
+            flying need steps of at most 0.75 / `carrier_bandwidth`.
         damping: Damping ratio z: Kd = 2 z b.
         integral: Ki [1/s^3], a number or one for each coordinate. It pauses while the status is not "as planned".
         observer: Bandwidth of the estimates of the disturbance and of forces on flying carriers [rad/s]; 0: no

@@ -51,8 +51,8 @@ class LengthControl(Controller):
             pose without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the
             platform on its cables grow. I is smaller if the platform on cables with the file's damping oscillates so
             slowly that it would never come to rest (control/calm_integral.py).
-        most: Largest correction of a length [m]; default: 5 % of the robot's length, but at least 0.5 % of the longest
-            cable, which stretches about as much. At this value the integral stops, and the status is "hold".
+        most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
+            cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
 
     Attributes:
         stiffness: E A that the controller assumes for each cable, (m,) [N]; infinity for one that does not stretch.

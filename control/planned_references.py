@@ -46,7 +46,7 @@ def references(
     period, start = number("period", period, 1e-6, 1e3), number("start", start, 0.0, 1e9)
     count = max(0.0, np.ceil((trajectory.duration - start) / period - 1e-9))
     if count > MOST:
-        raise InputError(f"period must be such that there are at most {MOST:g} of them, got {period:g} s")
+        raise InputError(f"period must be so long that there are at most {MOST:g} periods, got {period:g} s")
     return references_at(robot, trajectory, start + period * np.arange(int(count) + 1))
 
 

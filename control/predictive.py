@@ -47,10 +47,10 @@ class Predictive(ComputedTorque):
 
         min  sum of |x - x_ref|^2 + |u - u_ref|^2 over the stages     s.t.  the robot's dynamics,  t_min <= t <= t_max
 
-    The controls are the tensions, and the accelerations of the carriers that may leave their reference, so the problem
-    has only bounds and is always feasible. Each step linearises the dynamics about the last solution, shifted in time,
-    and solves one quadratic program (`solvers.horizon`): a real-time iteration. Disturbances are estimated as by
-    `ComputedTorque` and predicted to be constant.
+    The controls are the tensions, and the accelerations of the carriers that may leave their reference. Only they have
+    hard limits, which are bounds, so the problem is always feasible. Each step linearises the dynamics about the last
+    solution, shifted in time, and solves one quadratic program (`solvers.horizon`): a real-time iteration. Disturbances
+    are estimated as by `ComputedTorque` and predicted to be constant.
 
     Each step uses the new solution (status "as planned"), or the last one while it lasts ("shifted plan"), or the
     command of a `ComputedTorque` with its default gains that runs in parallel ("soft wrench", "hold"). A step is also
@@ -71,10 +71,11 @@ class Predictive(ComputedTorque):
             cables than degrees of freedom: 8 for teams with cables of fixed length, 6 for towing robots with winches.
             At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
-            leave their reference, because they are slower; of 0.025 s if carriers correct errors. Stages become as long
-            as the steps, at most 0.21 s, if steps are long: if both the references of `follow` and the first two steps,
-            or three steps in a row, are farther apart than twice the default (with carriers that fly: than the
-            default). A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
+            leave their reference, because they are slower; of 0.025 s if carriers correct errors. In slow
+            loops, stages become as long as the steps, at most 0.21 s. A loop is slow if the references of `follow` are
+            farther apart than twice the default (with carriers that fly: than the default), and so are the first two
+            steps or three in a row. A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth`
+            apart.
         reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
             scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's
             weight. With cables of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables'
@@ -199,7 +200,8 @@ class Predictive(ComputedTorque):
         elif not self._adapts:
             longest = np.inf
             warn(
-                f"stage must be at least {period:.3g} s, since steps are so far apart, or bandwidth lower", stacklevel=2
+                f"stage must be at least {period:.3g} s, the time between steps, or bandwidth must be lower",
+                stacklevel=2,
             )
         elif period <= min(PAUSE, self._preview.period + ROUNDING):
             longest, stage = period + ROUNDING, period

@@ -61,5 +61,5 @@ def longest_stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], peri
     robot, trajectory = planned(plan)
     period = number("period", period, 1e-6, 1e9)
     if (trajectory.duration or 0.0) > MOST * period:
-        raise InputError(f"period must be such that there are at most {MOST} of them, got {period:g} s")
+        raise InputError(f"period must be so long that there are at most {MOST} periods, got {period:g} s")
     return longest_stop_along(robot, trajectory, beginnings(trajectory, period))

@@ -280,8 +280,8 @@ class Plant:
             dt: Period of the commands [s].
             substeps: Runge-Kutta steps in each period.
             keep: Return the first state and every `keep`-th one after it.
-            threads: Number of threads that share the rows of a batch; default: one per processor, at most one per 20
-                000 steps. The result does not depend on it.
+            threads: Number of threads that share the rows of a batch; default: one per processor, at most one per
+                20 000 steps. The result does not depend on it.
 
         Raises:
             InputError: If an argument has a wrong shape or value.
@@ -320,8 +320,8 @@ class Plant:
         processors.in_threads(run_rows, count, max(1, min(threads, count)))
         if not np.isfinite(history[:, -1]).all():
             raise SolverError(
-                f"the motion of {self.robot.name} diverges in steps of {period / substeps:g} s: use "
-                f"more substeps, or a stiffness if cables that do not stretch get lengths that no pose has"
+                f"the motion of {self.robot.name} diverges in steps of {period / substeps:g} s: use more substeps, or "
+                "give the cables a stiffness if no pose has the commanded lengths"
             )
         times = period * keep * np.arange(kept)
         return History(times, history.reshape(*batch, kept, -1), tensions.reshape(*batch, kept, -1))

@@ -147,7 +147,7 @@ def simulate(
     if (former := given.pop("faults", None)) is not None:
         if events:
             raise InputError(f"faults must be left out with events, whose former name it is, got {shown(former)}")
-        warn("faults is called events now; the former name goes with the next release", DeprecationWarning, 2)
+        warn("faults is called events now; the former name is removed in the next release", DeprecationWarning, 2)
         events = former
     happening = None if isinstance(events, tuple) and not events else events
     named = {"wind": wind, "noise": noise, "events": happening, "duration": duration}

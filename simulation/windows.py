@@ -102,7 +102,7 @@ class Windows:
             (self.drive, self._command), self.measured_command = found[0], True
         if drive == "forces" and self.drive != drive:
             raise InputError(
-                "drive forces must have commanded tensions, and the robot a winch for each cable, got others"
+                "drive must be forces only if the log has commanded tensions and every cable of the robot has a winch"
             )
 
     def _carrier_tracks(self) -> dict[int, PoseTrack]:

@@ -59,7 +59,7 @@ class Certificate(Displayed):
         closest: Tensions inside the limits with the wrench closest to w [N], shape (m,).
         length: The characteristic length [m] of the problem.
         time: For a motion: the instant [s] at which w is required. None for a single problem.
-        span: For a motion: start and end [s] of the time around `time` without tensions for the required wrench.
+        span: For a motion: start and end [s] of the interval about `time` in which no tensions give the wrench.
         wind: For a motion in a range of winds: the velocity of the air [m/s] in {G} at which w is required.
         load: For a motion with a load of uncertain mass or CoM: mass [kg] and CoM [m] with which w is required.
     """

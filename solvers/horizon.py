@@ -85,8 +85,8 @@ class Horizon(Displayed):
         multipliers: See `Multipliers`. `solve(warm=True)` starts from these, and from states and controls.
         tolerance, iterations_max: Largest residual of a converged solution, and largest number of iterations. Default:
             1e-8 and 50.
-        converged, iterations: Success of the last solution, and the number of its Newton matrices, except that of a
-            cold start.
+        converged, iterations: Success of the last solution, and the number of Newton matrices that it needed, without
+            that of a cold start.
 
     Raises:
         InputError: If a size is not a whole number in its range.

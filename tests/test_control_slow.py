@@ -125,7 +125,7 @@ def test_all_bandwidths_of_a_team_are_lowered_by_the_same_factor_and_restored():
 
 def test_given_stages_that_are_shorter_than_the_steps_are_warned_of():
     robot = load("planar-4")
-    with pytest.warns(UserWarning, match=r"stage must be at least 0.06 s, since steps are so far apart") as told:
+    with pytest.warns(UserWarning, match=r"stage must be at least 0.06 s, the time between steps") as told:
         pushed(robot, Predictive(robot, stage=0.015), 0.06)
     assert len(told) == 1
     with warnings.catch_warnings():

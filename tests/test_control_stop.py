@@ -93,7 +93,7 @@ def test_no_stop_takes_longer_than_the_longest(made):
     stops = [stop(found, time) for time in np.linspace(0, found.duration, round(np.ceil(found.duration / 0.1)) + 1)]
     assert longest.duration == max(its.duration for its in stops)
     assert longest.begins in [its.begins for its in stops]
-    with pytest.raises(InputError, match="period must be such that there are at most 10000 of them, got 1e-05 s"):
+    with pytest.raises(InputError, match="period must be so long that there are at most 10000 periods, got 1e-05 s"):
         longest_stop(found, 1e-5)
 
 
@@ -313,5 +313,7 @@ def test_a_stop_carries_the_load_of_its_phase(tmp_path):
         assert run.passed
         loaded = run.record.tensions[-1] @ dynamics.wrench_matrix(run.record.motions[-1, 0, :6]).T
         assert loaded[2] == pytest.approx(robot.weight + 9.81 * bag["mass"], rel=0.01)
-    with pytest.raises(InputError, match="reference must begin without a load, which no unit carries, got one of 60"):
+    with pytest.raises(
+        InputError, match="reference must begin without a load, because exported units have none, got one of 60"
+    ):
         export_fmu(robot, tmp_path / "stop.fmu", reference=halt)

@@ -324,7 +324,7 @@ def phase(index, **fields):
         (phase(1, load=None), r"phases\[1\].load must weigh at least as much as that of phases\[2\]"),
         (
             phase(1, ground={"support": [[2, 0, 0], [2, 1, 0]]}),
-            r"phases\[1\].ground.support must have points all round",
+            r"phases\[1\].ground.support must have points on all sides",
         ),
         (phase(1, ground={"suport": []}), "suport is not a known key, did you mean 'support'"),
         (changed(duration=5), "duration must be left out with phases"),
@@ -535,7 +535,7 @@ def test_a_load_within_its_tolerances_is_picked_up_from_the_ground():
             assert linprog(np.zeros(8), A_eq=A, b_eq=own + (1 - share) * its, bounds=limits).success
             assert linprog(np.zeros(4), A_eq=pushes, b_eq=share * its).success
     pick_up["ground"] = {"support": [[0.1 + x, y, -1] for x in (-0.15, 0.15) for y in (-0.15, 0.15)]}
-    with pytest.raises(InputError, match=r"phases\[1\].ground.support must have points all round the centre of mass"):
+    with pytest.raises(InputError, match=r"phases\[1\].ground.support must have points on all sides of the CoM"):
         plan(COGIRO, {"phases": phases})
     surely = UNSURE | {"com_tolerance": [0.05, 0.1, 0]}
     assert plan(COGIRO, {"phases": [phases[0], *(phase | {"load": surely} for phase in phases[1:])]}).feasible

@@ -75,8 +75,9 @@ def _viewing(subject: Subject, host: str, port: int) -> Iterator[tuple[str, Live
 def save_page(subject: Subject, file: str | os.PathLike[str]) -> Path:
     """Write a subject as one HTML file that loads nothing and needs no server; a failure leaves no partial file.
 
-    A plan plays. A robot, with the points of its workspace if there are any, opens at home, or at the feasible pose
-    nearest to it, and its platform and carriers can be dragged: the page computes tensions, margin and certificate.
+    A plan or a simulation is played. A robot, with the points of its workspace if there are any, opens at home, or at
+    the feasible pose nearest to it, and its platform and carriers can be dragged: the page computes tensions, margin
+    and certificate.
 
     Args:
         subject: From `read`.

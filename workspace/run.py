@@ -78,7 +78,7 @@ def sample(
         options: Fields of `Execution` by their names, which replace its own.
 
     Returns:
-        Dataset: Its attributes are the arguments, `samples` and `accepted`, and of this run `seconds` and
+        Dataset: Its attributes are the arguments, `samples` and `accepted`, and the speed of this run, `seconds` and
             `poses_per_s`. Its variables are
 
             - `position` (point, axis) [m]: positions of the samples kept; `attitude` (point, angle) [rad] and

@@ -104,7 +104,7 @@ def _aligned(
         carriers = carriers_at(robot, of_poses, given, seen, len(rows), [])[0]
         kept = np.isfinite(carriers).all(axis=(1, 2))
         if not kept.any():
-            raise InputError(f"poses must have those of the carriers of {robot.name}, to align clocks, got none")
+            raise InputError(f"poses must include those of the carriers of {robot.name} to align clocks, got none")
         rows, poses, carriers = rows[kept], poses[kept], carriers[kept]
         effects = [poses[:, :3], *np.swapaxes(carriers[..., :3], 0, 1)]
     if quaternions is not None:

@@ -22,8 +22,8 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
     robot, few = problem.robot, problem.robot.m < problem.freedoms
     if few and robot.weight == 0.0:
         raise InputError(
-            f"gravity must not be zero if the lengths do not determine the pose, as the {robot.m} cables of robot "
-            f"{robot.name!r} do for {problem.freedoms} coordinates"
+            f"gravity must not be zero for robot {robot.name!r}, because its {robot.m} cable lengths alone do not "
+            f"determine {problem.freedoms} coordinates"
         )
     if few:
         own.converged, own.ambiguous = np.zeros(len(lengths), bool), None

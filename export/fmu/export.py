@@ -96,7 +96,9 @@ def unit_files(robot: Robot, part: str = "plant", drive: str | None = None, refe
     winches = plant.drive if part == "plant" and (drive is not None or is_fixed) else None
     trajectory = read_trajectory(robot, robot.home if reference is None else reference, None)
     if (load := trajectory.load_at(0.0)) is not None:
-        raise InputError(f"reference must begin without a load, which no unit carries, got one of {load.mass:g} kg")
+        raise InputError(
+            f"reference must begin without a load, because exported units have none, got one of {load.mass:g} kg"
+        )
     data = data_at(robot, plant, references_at(robot, trajectory, np.zeros(1))[0])
     variables = variables_of(robot, part, winches, data)
     data |= {"simulates": part != "controller", "controls": part != "plant"}

@@ -134,7 +134,7 @@ class Limit(ABC):
 
     @property
     def is_equation(self) -> bool:
-        """Return whether it is an equation, which holds at the nodes, and between them only nearly."""
+        """Return whether it is an equation, which holds at the nodes, and between them only approximately."""
         return self.low == self.high
 
     @property
@@ -154,7 +154,7 @@ class Limit(ABC):
 
     @property
     def slack_weight(self) -> float:
-        """Return the value of a slack of 1 in the program, in units of `soft`."""
+        """Return the excess, in units of `soft`, to which a slack variable of 1 in the program corresponds."""
         return 0.0 if self.soft is None else self.scale / self.soft
 
     def softened(self, amount: float | None) -> Self:

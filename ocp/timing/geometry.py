@@ -27,13 +27,11 @@ def geometry(path: AnyPath, *, alone: bool) -> Curve:
     sequence, a return or a feed.
     """
     if isinstance(path, SequencePath):
-        raise InputError("path.kind must be that of one path to be timed, got sequence; time its parts one by one")
+        raise InputError("path.kind must not be sequence to time a path; time its parts one by one")
     if isinstance(path, FeedPath):
-        raise InputError(
-            "path.kind must be that of a path without its own speed to be timed, got feed; plan it instead"
-        )
+        raise InputError("path.kind must not be feed to time a path, since it has its own speed; plan it instead")
     if isinstance(path, ReturnPath):
-        raise InputError("path.kind must be that of a whole path to be timed, got return")
+        raise InputError("path.kind must not be return to time a path; time the whole path instead")
     if isinstance(path, TimedPath):
         return path.along
     if isinstance(path, LinePath):

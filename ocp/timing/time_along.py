@@ -49,8 +49,8 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
 
     Only the geometry of the path matters, not its own time law. Straight legs round their corners by up to `blend`. The
     motion stops at reversals, at dwells and, with `blend: 0`, at corners; the dwell times are part of the duration.
-    Circles end after the task's duration at their own rate, or after one turn; any other duration is ignored. Carriers
-    rest or follow given paths with the same parameter s.
+    A circle ends where its own rate leads within the task's duration or, without a duration, after one turn; for all
+    other paths the task's duration is ignored. Carriers rest or follow given paths with the same parameter s.
 
     The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
     limits of mobile carriers that move. The tension limits, reduced by the task's margin, enter as the facets of the
@@ -113,8 +113,8 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             return _shown(task, proven)
         if any(piece.law.unlimited for piece in pieces):
             raise InputError(
-                f"limits must bound the speed along this path, by one of {', '.join(KNOWN_LIMITS)}, since its tensions "
-                "do not, got none that does"
+                f"limits must have one of {', '.join(KNOWN_LIMITS)} that bounds the speed, because the tension limits "
+                "alone do not bound it along this path, got none"
             )
         stuck = next((piece for piece in pieces if piece.law.x is None), None)
         if stuck is not None:
