@@ -2,9 +2,9 @@
 
 Where the tube leaves a platform its attitude, but the task fixes the position where it rests, the attitudes are a box
 of angles. A distance changes by at most what points of the platform move, so one value proves all of a small box. So
-does one direction along which the cables cannot give the weight, because attachments and the directions of cables
-change by at most as much. Boxes that are not proven are halved along each angle, until all are proven or an attitude
-keeps all distances and has tensions.
+does one direction along which the cables cannot give the weight at its corners, if a bound on the curvature between
+them does not help. Boxes that are not proven are halved along each angle, until all are proven or an attitude keeps all
+distances and has tensions.
 """
 
 from collections.abc import Callable
@@ -19,9 +19,11 @@ MOST = 30_000  # boxes
 CERTAIN = 1e-5  # [m], of distances, whose formulas are rounded where things touch
 CERTAIN_FORCE = 1e-6  # of the weight, likewise
 
+Turned = Callable[[np.ndarray], np.ndarray]
+"""Takes offsets from the reference attitude (n, k), and returns poses (n, 6)."""
 Tensions = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
-"""Takes poses (n, 6) and an angle [rad]; returns by what tensions are short at each (n,), and of how much of that it is
-certain at every pose that is turned by at most the angle (n,) [N]."""
+"""Takes the centres of boxes of offsets (n, k) and half their size [rad]; returns by what tensions are short at each
+centre (n,) [N], and by what they are short in the whole box, at least (n,) [N]."""
 
 
 def no_attitude(
@@ -52,14 +54,15 @@ def no_attitude(
         and usable[place].all()
         and scenario.in_force(limit, np.array([time])).all()
     ]
-    tensions = _tensions_at_rest(scenario, time, carriers) if rests else None
-    if not (limits or tensions) or not set(angles) <= set(ATTITUDE) or not np.isfinite(turn):
-        return []
 
     def turned(offsets: np.ndarray) -> np.ndarray:
         pose = np.repeat(platform[None], len(offsets), axis=0)
         pose[:, angles] += offsets
         return pose
+
+    tensions = _tensions_at_rest(scenario, time, carriers, turned) if rests else None
+    if not (limits or tensions) or not set(angles) <= set(ATTITUDE) or not np.isfinite(turn):
+        return []
 
     def exceeded(offsets: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """Return by how many metres of movement limits are exceeded (n, limits), and all values."""
@@ -70,7 +73,6 @@ def no_attitude(
         return np.stack(over, axis=1) / rates, values
 
     centres, half, count = np.zeros((1, len(angles))), turn, 0
-    corners = np.stack(np.meshgrid(*[[-0.5, 0.5]] * len(angles)), axis=-1).reshape(-1, len(angles))
     reasons: set[str] = set()
     while len(centres):
         count += len(centres)
@@ -78,30 +80,37 @@ def no_attitude(
         kept, unproven = worst <= CERTAIN, worst <= arm * half * len(angles) + CERTAIN
         reasons |= {"keeps all distances"} if not unproven.all() else set()
         if tensions is not None and unproven.any():
-            short, certain = tensions(turned(centres[unproven]), half * len(angles))
+            short, certain = tensions(centres[unproven], half)
             kept[unproven] &= short <= 0
             unproven[unproven] = certain <= 0
             reasons |= {"has feasible tensions at rest"} if (certain > 0).any() else set()
         if count > MOST or kept.any():
             return []
-        centres = (centres[unproven][:, None] + half * corners).reshape(-1, len(angles))
+        centres = _corners(centres[unproven], half / 2)
         half /= 2
     middle, values = exceeded(np.zeros((1, len(angles))))
     why = f"no attitude in the tube {' and '.join(sorted(reasons, reverse=True))}"
     if middle.max() <= CERTAIN and tensions is not None:
-        short, _ = tensions(platform[None], 0.0)
+        short, _ = tensions(np.zeros((1, len(angles))), 0.0)
         return [Excess(TENSIONS, "platform", time, float(short[0]), 0.0, "N", "at most", why)]
     k, limit = limits[int(middle[0].argmax())]
     which = int(np.maximum(limit.low - values[k][0], values[k][0] - limit.high).argmax())
     return [Excess.of(limit, which, time, values[k][0, which], why)]
 
 
-def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray) -> Tensions | None:
+def _corners(centres: np.ndarray, half: float) -> np.ndarray:
+    """Return the corners of boxes (n, k), those of each box in turn, (2^k n, k)."""
+    k = centres.shape[1]
+    ways = np.stack(np.meshgrid(*[[-half, half]] * k), axis=-1).reshape(-1, k)
+    return (centres[:, None] + ways).reshape(-1, k)
+
+
+def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, turned: Turned) -> Tensions | None:
     """Return what tells by how much tensions at rest are short; None where more than the weight has to be held.
 
-    Along a direction d = (f, c) of wrenches, cable i gives its tension times u_i . (f + c x r_i), u_i its direction and
-    r_i its arm about the CoM. A rotation by an angle moves its attachment by at most the angle times the distance from
-    the platform's origin, and turns its direction by at most the angle that this has from the anchor.
+    Along a direction d = (f, c) of wrenches, cable i gives at most the larger of its limits times x_i = u_i . (f + c x
+    r_i), u_i its direction and r_i its arm about the CoM. In a box, x_i is a mean of its values at the corners, but for
+    half the square of half the size times its second derivative along each angle, which rotates about a fixed axis.
     """
     robot = scenario.robot
     if scenario.wind is not None or scenario.wind_set is not None or scenario.phases.all or robot.pulley_radii.any():
@@ -110,18 +119,24 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray) -> 
     reach, arms = (np.linalg.norm(robot.attachments - at, axis=1) for at in (0.0, np.array(robot.platform.com)))
     least = max(tolerance_of(robot), CERTAIN_FORCE * robot.force_scale)
 
-    def short(poses: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
-        still, places = np.zeros_like(poses), np.repeat(carriers[None], len(poses), axis=0)
-        A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, places))
-        w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still))
+    def wrenches(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return wrench matrices (n, 6, m), required wrenches (n, 6) and cable lengths (n, m)."""
+        poses, places = turned(offsets), np.repeat(carriers[None], len(offsets), axis=0)
+        still, dynamics = np.zeros_like(poses), scenario.dynamics
+        A, w = dynamics.wrench_matrix(poses, places), dynamics.required_wrench(poses, still, still)
+        return scaled(scenario, A), scaled(scenario, w), dynamics.cable_lengths(poses, places)
+
+    def short(centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
+        A, w, lengths = wrenches(centres)
+        n, k = centres.shape
         closest, away = nearest(A, w, low, high)
         d = (w - np.einsum("nij,nj->ni", A, closest)) / np.maximum(away, least)[:, None]
         f, c = (np.linalg.norm((d * robot.wrench_scale)[:, part], axis=1)[:, None] for part in (slice(3), slice(3, 6)))
-        sine = np.minimum(reach * angle / scenario.dynamics.cable_lengths(poses, places), 1.0)
-        change = np.arcsin(sine) * (f + c * arms) + c * arms * angle
-        change[sine >= 1.0] = np.inf
-        most = np.einsum("nij,ni->nj", A, d) + change
-        certain = np.einsum("ni,ni->n", w, d) - np.maximum(low * most, high * most).sum(axis=1) - least
-        return np.where(away > least, away, 0.0), certain
+        per_length = reach / np.maximum(lengths - reach * half * k, 1e-9)  # of attachments' speeds, at most
+        second = (f + c * arms) * (per_length + 3 * per_length**2) + c * arms * (1 + 2 * per_length)
+        at_corners = wrenches(_corners(centres, half))[0].reshape(n, -1, *A.shape[1:])
+        x = np.einsum("ncij,ni->ncj", at_corners, d) + (k * half**2 / 2 * second)[:, None]
+        given = np.maximum(low * x, high * x).sum(axis=2).max(axis=1)
+        return np.where(away > least, away, 0.0), np.einsum("ni,ni->n", w, d) - given - least
 
     return short
