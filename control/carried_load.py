@@ -27,7 +27,7 @@ class CarriedLoad:
     def reset(self) -> None:
         """Carry nothing."""
         self.load, self._of_both = None, self._robot
-        self._begun = [(-np.inf, self._robot)]  # robots with their loads, as far back as states may be late
+        self._begun = [(-np.inf, record_of(self._robot))]  # with its loads, as far back as states may be late
 
     def change(self, load: Any, time: float) -> np.ndarray:
         """Carry a load from a time on [s], and return the record of the robot with it.
@@ -38,9 +38,9 @@ class CarriedLoad:
             self.load = load  # the same numbers in another object
             return record_of(self._of_both)
         self.load, self._of_both = load, self._robot if load is None else load.on(self._robot)
-        past = sum(ends < time - OLDEST for ends, _ in self._begun[1:])
-        self._begun = [*self._begun[past:], (time, self._of_both)]
-        return record_of(self._of_both)
+        past, record = sum(ends < time - OLDEST for ends, _ in self._begun[1:]), record_of(self._of_both)
+        self._begun = [*self._begun[past:], (time, record)]
+        return record
 
     def record(self, load: RigidLoad | None) -> np.ndarray:
         """Return the record of the robot with any load."""
@@ -52,7 +52,7 @@ class CarriedLoad:
         """Return the records of the robot between two times [s], each with its duration."""
         times = np.clip([*(begins for begins, _ in self._begun), np.inf], start, end)
         spans = zip(self._begun, np.diff(times).tolist(), strict=True)
-        return [(record_of(robot), lasting) for (_, robot), lasting in spans if lasting > ROUNDING]
+        return [(record, lasting) for (_, record), lasting in spans if lasting > ROUNDING]
 
     def is_later(self, time: float) -> bool:
         """Return whether a state of this time [s] was measured with this load."""

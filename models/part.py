@@ -106,7 +106,8 @@ class Part(Displayed, BaseModel):
         """Return whether the other is of the same class with equal fields, whatever either has computed from them."""
         if type(self) is not type(other):
             return NotImplemented
-        return all(getattr(self, name) == getattr(other, name) for name in type(self).model_fields)
+        mine, its = vars(self), vars(other)
+        return all(mine[name] == its[name] for name in type(self).__pydantic_fields__)
 
 
 class Box(Part):
