@@ -5,6 +5,7 @@ in {G} and the pose B of the platform frame in the body. Both are fitted to the 
 and attachments, up to the offsets of the readings, from all turns of the axes by right angles.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ FEW, MANY = 6, 60  # steps of a first and of a last descent
 KEPT = 8  # starts that are worth a last descent
 MOST_SAMPLES = 60
 SIMPLER = 1.3  # times the size of the residuals that one transform instead of two may have
-DAMPING = 1e-3
+DAMPING, ROUNDING = 1e-3, 1e-14
 
 
 class Frames(NamedTuple):
@@ -31,8 +32,7 @@ class Frames(NamedTuple):
 
     def of(self, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the positions (N, 3) and rotations (N, 3, 3) of the platform frame in {G}."""
-        (t, T), (b, B) = self.outer, self.inner
-        return (position + rotation @ b) @ T.T + t, T @ rotation @ B
+        return _placed((*self.outer, *self.inner), position, rotation)
 
     def __str__(self) -> str:
         texts: list[str] = []
@@ -74,9 +74,8 @@ def fitted_frames(robot: Robot, table: np.ndarray, position: np.ndarray, rotatio
     for turn in turns:
         outer = (robot.home[:3] - turn @ middle, turn)
         starts += [Frames(outer, NONE), Frames(outer, (np.zeros(3), (turn @ mean).T @ home))]
-    tried = [_descended(robot, table, *few, one, BOTH, FEW) for one in starts]
-    tried = sorted(tried, key=lambda one: one.size)[:KEPT]
-    both = min((_descended(robot, table, *few, one, BOTH, MANY) for one in tried), key=lambda one: one.size)
+    tried = sorted(_descended(robot, table, *few, starts, BOTH, FEW), key=lambda one: one.size)[:KEPT]
+    both = min(_descended(robot, table, *few, tried, BOTH, MANY), key=lambda one: one.size)
     return _simplest(robot, table, few, both)
 
 
@@ -95,8 +94,8 @@ def displaced_frames(
     """
     rows = np.unique(np.linspace(0, len(y) - 1, min(len(y), MOST_SAMPLES)).astype(int))
     few = position[rows], rotation[rows], y[rows]
-    before = _descended(robot, table, *few, Frames(NONE, NONE), BOTH, 0)
-    both = _descended(robot, table, *few, before, BOTH, MANY)
+    (before,) = _descended(robot, table, *few, [Frames(NONE, NONE)], BOTH, 0)
+    (both,) = _descended(robot, table, *few, [before], BOTH, MANY)
     if before.size < least * max(both.size, noise):
         return None
     frames = _simplest(robot, table, few, both)
@@ -106,9 +105,8 @@ def displaced_frames(
 def _simplest(robot: Robot, table: np.ndarray, few: tuple[np.ndarray, np.ndarray, np.ndarray], both: Frames) -> Frames:
     """Return frames of which one is none if that fits nearly as well."""
     outer = Frames((both.outer[0] + both.outer[1] @ few[1].mean(axis=0) @ both.inner[0], both.outer[1]), NONE)
-    ones = [_descended(robot, table, *few, start, (True, False), MANY) for start in (outer, Frames(NONE, NONE))]
-    inner = Frames(NONE, both.inner), Frames(NONE, NONE)
-    ones += [_descended(robot, table, *few, start, (False, True), MANY) for start in inner]
+    ones = _descended(robot, table, *few, [outer, Frames(NONE, NONE)], (True, False), MANY)
+    ones += _descended(robot, table, *few, [Frames(NONE, both.inner), Frames(NONE, NONE)], (False, True), MANY)
     return min([both, *ones], key=lambda one: one.size * (SIMPLER if one is both else 1.0))
 
 
@@ -118,59 +116,80 @@ def _descended(
     position: np.ndarray,
     rotation: np.ndarray,
     y: np.ndarray,
-    frames: Frames,
+    starts: Sequence[Frames],
     which: tuple[bool, bool],
     steps: int,
-) -> Frames:
-    """Return frames after some Levenberg-Marquardt steps, with the median of the residuals' sizes as their size."""
-    columns = np.repeat(which, 6)
-    damping, now = DAMPING, _residuals(robot, table, position, rotation, y, frames)
+) -> list[Frames]:
+    """Return frames after some Levenberg-Marquardt steps from S starts, all at once.
+
+    Their size is the median of the residuals' sizes.
+    """
+    given = table, position, rotation, y
+    columns, damping = slice(6 * (not which[0]), 12 - 6 * (not which[1])), np.full(len(starts), DAMPING)
+    frames = [np.stack(part) for part in zip(*((*one.outer, *one.inner) for one in starts), strict=True)]
+    now, going = _residuals(robot, *given, frames), np.arange(len(starts))
     for _ in range(steps):
-        e, J = now
-        limit = max(3 * float(np.median(np.abs(e))), 1e-12)
-        weights = np.minimum(1.0, limit / np.maximum(np.abs(e), 1e-300))
-        J = J[:, columns]
-        H = J.T @ (weights[:, None] * J)
-        step = np.zeros(12)
-        step[columns] = -np.linalg.lstsq(H + damping * np.diag(np.diag(H) + 1e-9), J.T @ (weights * e), rcond=None)[0]
-        tried = _moved(frames, step)
-        after = _residuals(robot, table, position, rotation, y, tried)
-        if np.abs(after[0]).mean() < np.abs(e).mean():
-            small = np.abs(step).max() < 1e-7
-            frames, now, damping = tried, after, 0.2 * damping
-            if small:
-                break
-        else:
-            damping *= 10
-            if damping > 1e6:
-                break
-    return frames._replace(size=1.4826 * float(np.median(np.abs(now[0]))))
+        e, J = now[0][going], now[1][going][..., columns]
+        limit = np.maximum(3 * np.median(np.abs(e), axis=1, keepdims=True), 1e-12)
+        weighted = np.minimum(1.0, limit / np.maximum(np.abs(e), 1e-300))[..., None] * J
+        H = J.swapaxes(1, 2) @ weighted
+        H += damping[going, None, None] * np.eye(H.shape[1]) * (H + 1e-9)
+        step = np.zeros((len(going), 12))
+        inverse = np.linalg.pinv(H, ROUNDING, hermitian=True)  # no step where a robot cannot move
+        step[:, columns] = -(inverse @ (e[:, None] @ weighted).swapaxes(1, 2))[..., 0]
+        tried = _moved([part[going] for part in frames], step)
+        after = _residuals(robot, *given, tried)
+        better = np.abs(after[0]).mean(axis=1) < np.abs(e).mean(axis=1)
+        for kept, new in zip((*frames, *now), (*tried, *after), strict=True):
+            kept[going[better]] = new[better]
+        damping[going] *= np.where(better, 0.2, 10.0)
+        going = going[np.where(better, np.abs(step).max(axis=1) >= 1e-7, damping[going] <= 1e6)]
+        if not going.size:
+            break
+    sizes = 1.4826 * np.median(np.abs(now[0]), axis=1)
+    return [Frames((t, T), (b, B), float(size)) for t, T, b, B, size in zip(*frames, sizes, strict=True)]
 
 
-def _moved(frames: Frames, step: np.ndarray) -> Frames:
-    parts = []
-    for (shift, turn), by in zip(frames[:2], (step[:6], step[6:]), strict=True):
-        extra = Rotation.from_rotvec(by[3:] if np.abs(by[3:]).max() < 1 else by[3:] / np.abs(by[3:]).max()).as_matrix()
-        parts.append((shift + by[:3], extra @ turn))
-    return Frames(parts[0], parts[1])
+def _moved(frames: Sequence[np.ndarray], step: np.ndarray) -> list[np.ndarray]:
+    """Return S frames t (S, 3), T (S, 3, 3), b and B, moved by steps (S, 12), whose turns are at most one radian."""
+    parts: list[np.ndarray] = []
+    for shift, turn, by in zip(frames[::2], frames[1::2], (step[:, :6], step[:, 6:]), strict=True):
+        about = by[:, 3:] / np.maximum(np.abs(by[:, 3:]).max(axis=1, keepdims=True), 1.0)
+        parts += [shift + by[:, :3], Rotation.from_rotvec(about).as_matrix() @ turn]
+    return parts
+
+
+def _placed(frames: Sequence[np.ndarray], position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the positions (..., N, 3) and rotations (..., N, 3, 3) of the platform frame for frames (t, T, b, B)."""
+    t, T, b, B = frames
+    inside = position + (rotation @ b[..., None, :, None])[..., 0]
+    return inside @ T.swapaxes(-1, -2) + t[..., None, :], T[..., None, :, :] @ rotation @ B[..., None, :, :]
 
 
 def _residuals(
-    robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray, y: np.ndarray, frames: Frames
+    robot: Robot,
+    table: np.ndarray,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    y: np.ndarray,
+    frames: Sequence[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return lengths less readings up to offsets, (m N,) [m], and the derivatives by shifts and turns, (m N, 12)."""
-    (_, T), (_, B) = frames.outer, frames.inner
-    x, R = frames.of(position, rotation)
-    run = runs(robot, table, x, R)
-    u = run.directions  # (m, N, 3)
-    placed = (position + rotation @ frames.inner[0]) @ T.T
-    arms = np.einsum("nij,mj->mni", R, table[:, 3:6])
-    whole = placed + arms  # of the attachments, about the origin of the measured frame
-    before = T @ rotation  # (N, 3, 3)
-    own = np.einsum("nji,mnj->mni", before, u)  # the directions in the body's frame
-    inside = table[:, 3:6] @ B.T  # attachments in the body's axes
-    J = np.concatenate([u, np.cross(whole, u), own, np.cross(inside[:, None], own)], axis=2)  # (m, N, 12)
-    e = run.lengths - y.T
-    e, J = np.where(np.isfinite(e), e, 1e3), np.where(np.isfinite(J), J, 0.0)
-    e, J = e - np.median(e, axis=1, keepdims=True), J - J.mean(axis=1, keepdims=True)
-    return e.ravel(), J.reshape(-1, 12)
+    """Return lengths less readings up to offsets, (S, m N) [m], and the derivatives by shifts and turns, (S, m N, 12).
+
+    - `frames`: t (S, 3), T (S, 3, 3), b and B.
+    """
+    t, T = frames[:2]
+    x, R = _placed(frames, position, rotation)  # (S, N, 3), (S, N, 3, 3)
+    run = runs(robot, table, x.reshape(-1, 3), R.reshape(-1, 3, 3))
+    shape = (len(y[0]), *x.shape[:2])
+    by_pose = run.by_pose.reshape(*shape, 2, 3).swapaxes(0, 1)  # by shift and turn of the platform, (S, m, N, 2, 3)
+    own = by_pose @ (T[:, None] @ rotation)[:, None]  # likewise in the body's axes
+    # A turn of the measured frame is about its origin.
+    about_frame = by_pose[..., 1, :] + np.cross((x - t[:, None])[:, None], by_pose[..., 0, :])
+    J = np.concatenate([by_pose[..., 0, :], about_frame, own.reshape(*own.shape[:3], 6)], axis=3)  # (S, m, N, 12)
+    e = run.lengths.reshape(shape).swapaxes(0, 1) - y.T
+    unknown = ~np.isfinite(e + J.sum(axis=3))
+    e[unknown], J[unknown] = 1e3, 0.0
+    e -= np.median(e, axis=2, keepdims=True)
+    J -= J.mean(axis=2, keepdims=True)
+    return e.reshape(len(t), -1), J.reshape(len(t), -1, 12)

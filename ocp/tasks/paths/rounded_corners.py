@@ -54,7 +54,9 @@ class RoundedCorners:
         cut = np.where(rounded, np.minimum(tolerance / np.where(rounded, missed, 1.0), room), 0.0)
         offsets = -np.stack([np.ones_like(tip), np.full_like(tip, 1 - NEAR_END), 1 - tip], axis=1) * cut[:, None]
         control = np.concatenate([offsets[:, :, None] * before[:, None], -offsets[:, ::-1, None] * after[:, None]], 1)
-        self._control = points[1:-1, None] + control  # (n - 2, 6, 3)
+        self._control = [points[1:-1, None] + control]  # also of the derivatives, (n - 2, 6 - order, 3)
+        for degree in (5, 4):
+            self._control.append(degree * np.diff(self._control[-1], axis=1))
         self._ends = np.linspace(0.0, 1.0, CELLS + 1)
         inner = (self._ends[:-1, None] + (1 + _NODES) / 2 / CELLS).ravel()
         speed, _ = self._sizes(inner)
@@ -86,7 +88,8 @@ class RoundedCorners:
         position = self._starts[line] + since[:, None] * tangent
         turning = np.flatnonzero((piece % 2 == 1) & (self.edges[piece + 1] > self.edges[piece]))
         corner = line[turning]
-        position[turning], first, second = self._bezier(corner, self._share(corner, since[turning]))
+        share = self._share(corner, since[turning])
+        position[turning], first, second = (self._bezier(corner, share, order) for order in range(3))
         speed = np.linalg.norm(first, axis=1, keepdims=True)
         tangent[turning] = first / speed
         across = second - tangent[turning] * np.sum(second * tangent[turning], axis=1, keepdims=True)
@@ -95,9 +98,10 @@ class RoundedCorners:
 
     def _sizes(self, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the speed of all corners at parameters (k,), and the area of velocity and acceleration, (n - 2, k)."""
-        count, sizes = len(self._control), []
+        count, sizes = len(self._control[0]), []
         for some in np.array_split(np.arange(count), count * len(share) // BLOCK + 1):
-            _, first, second = self._bezier(np.repeat(some, len(share)), np.tile(share, len(some)))
+            at = np.repeat(some, len(share)), np.tile(share, len(some))
+            first, second = self._bezier(*at, 1), self._bezier(*at, 2)
             sizes.append(np.linalg.norm([first, np.cross(first, second)], axis=2))
         speed, crossed = np.concatenate(sizes, axis=1).reshape(2, count, len(share))
         return speed, crossed
@@ -112,17 +116,14 @@ class RoundedCorners:
         for _ in range(3):
             half = (share - start) / 2
             inner = start[:, None] + half[:, None] * (1 + _NODES)  # (n, 5)
-            _, first, _ = self._bezier(np.repeat(corner, len(_NODES)), inner.ravel())
+            first = self._bezier(np.repeat(corner, len(_NODES)), inner.ravel(), 1)
             covered = before + half * (np.linalg.norm(first, axis=1).reshape(inner.shape) @ _WEIGHTS)
-            speed = np.linalg.norm(self._bezier(corner, share)[1], axis=1)
+            speed = np.linalg.norm(self._bezier(corner, share, 1), axis=1)
             share = share - (covered - since) / speed
         return share
 
-    def _bezier(self, corner: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return corners at a parameter from 0 to 1, (n,), and their derivatives by it, (n, 3) each."""
-        control, results = self._control[corner], []
-        for degree in (5, 4, 3):
-            weights = [comb(degree, k) * share**k * (1 - share) ** (degree - k) for k in range(degree + 1)]
-            results.append(np.einsum("kn,nkj->nj", np.array(weights), control))
-            control = degree * np.diff(control, axis=1)
-        return results[0], results[1], results[2]
+    def _bezier(self, corner: np.ndarray, share: np.ndarray, order: int) -> np.ndarray:
+        """Return corners at a parameter from 0 to 1, (n,), or their derivative of an order by it, (n, 3)."""
+        degree = 5 - order
+        weights = [comb(degree, k) * share**k * (1 - share) ** (degree - k) for k in range(degree + 1)]
+        return np.einsum("kn,nkj->nj", np.array(weights), self._control[order][corner])
