@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from ..models.points import rotations
 from ..models.robot import Robot
 from .command import OFF, PLANNED, SHIFTED
 
 FAR, MOST = 0.1, 0.5  # position: of the mean length of the cables at home, and at most [m]
-TURNED = 0.5  # [rad], each of roll, pitch and yaw
+TURNED = 0.5  # [rad], of the rotation between the two
 OFF_TARGET, LEFT = 0.2, 0.5  # of these: errors that have to decrease, and how much of them a prediction may leave
 
 
@@ -23,9 +24,9 @@ class Deviation:
     def are_far(self, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return which poses (..., 6) are away from their references (..., 6)."""
         with np.errstate(over="ignore", invalid="ignore"):
-            off = poses - wanted
-            turned = np.abs((off[..., 3:] + np.pi) % (2 * np.pi) - np.pi).max(axis=-1) > TURNED
-            return np.asarray((np.square(off[..., :3]).sum(axis=-1) > self.most[0] ** 2) | turned)
+            trace = (rotations(poses[..., 3:]) * rotations(wanted[..., 3:])).sum(axis=(-1, -2))
+            away = np.square(poses[..., :3] - wanted[..., :3]).sum(axis=-1)
+            return np.asarray((away > self.most[0] ** 2) | ((trace - 1.0) / 2 < np.cos(TURNED)))
 
     def stays(self, errors: np.ndarray) -> bool:
         """Return whether predicted errors, (K, 6) [m, rad], begin as more than negligible and do not decrease.

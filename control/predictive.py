@@ -96,8 +96,8 @@ class Predictive(ComputedTorque):
         handed_over: Time and reason of a hand-over to computed torque, a `HandOver`; None without one.
 
     Raises:
-        InputError: If an argument has a wrong value, or a carrier has no cable or more than three cables of fixed
-            length.
+        InputError: If an argument has a wrong value, a carrier has no cable or more than three cables of fixed length,
+            or the pitch at home is beyond 1.5 rad.
     """
 
     batches = False

@@ -15,6 +15,7 @@ from .carrier_references import Moved
 from .reference import Reference
 
 ROUNDING = 1e-9  # of a period
+STEEPEST = 1.5  # [rad], at home: near a pitch of 90 degrees roll and yaw change so fast that no linear model is right
 CLOSE = 1e-5  # [m, rad] by which a reference may differ from the one that was announced
 
 
@@ -31,9 +32,14 @@ class Preview:
 
     - `robot`: the robot.
     - `tensions`: tensions for a reference without tensions, (m,) [N].
+
+    Raises `InputError` if the platform pitches so far at home that its angles are no coordinates.
     """
 
     def __init__(self, robot: Robot, tensions: np.ndarray):
+        if not abs(pitch := float(robot.home[4])) <= STEEPEST:
+            must = f"the pitch at home must be at most {STEEPEST} rad for predictive control"
+            raise InputError(f"{must}, got {pitch:g} rad; other axes of the platform's frame avoid it")
         self._robot, self._unknown = robot, tensions
         self.reset()
 

@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RESOLVED = 0.01  # [mm]: the digits of a smaller position error mean nothing
-# [rad], of pitch: beyond it the rates of roll and yaw grow without bound, and with them the moments that a controller
-# requires, while the platform hardly turns.
-STEEP = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +37,7 @@ class Simulation(SimulationData, MotionResult, Reported):
         """Return the result metrics, without wall times: the same seed gives the same metrics."""
         tensions = self.record.tensions[: self._recorded]
         pulling = tensions[~self._cut(1)]  # where no cut falls inside the period
-        shortfall = np.where(self._is_steep, np.nan, self.record.shortfall[: self._recorded])
+        shortfall = self.record.shortfall[: self._recorded]
         return {
             "passed": self.passed,
             "failures": list(self.failures),
@@ -164,15 +161,8 @@ class Simulation(SimulationData, MotionResult, Reported):
         if merit["handed_over"] is not None:
             rows["not as modelled"] = self._why()
         if merit["shortfall_max"] is not None:
-            left = float(self.period * (self._is_steep & ~np.isnan(self.record.shortfall[: self._recorded])).sum())
-            apart = f", not counting {quantity(left, 's')} at a pitch beyond {quantity(STEEP, 'rad')}"
-            rows["wrench shortfall"] = f"up to {quantity(merit['shortfall_max'], 'N')}{apart if left else ''}"
+            rows["wrench shortfall"] = f"up to {quantity(merit['shortfall_max'], 'N')}"
         return list(rows.items())
-
-    @property
-    def _is_steep(self) -> np.ndarray:
-        """Return for each recorded period whether angles have no meaning, (n,)."""
-        return np.abs(self.record.motions[: self._recorded, 0, 4]) > STEEP
 
     def cause(self) -> str:
         """Return what led to the result, in order of time, and how the robot differed from its file."""

@@ -29,9 +29,22 @@ def at_home(robot, rows=None):
     return state, Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, *(0 * robot.carrier_home,) * 2)
 
 
+def turning(angles):
+    """Return P of angles (..., 3), with which rates in the body's axes are P dTheta, (..., 3, 3)."""
+    zero, (sr, sp, _), (cr, cp, _) = 0 * angles[..., 0], *(np.moveaxis(f(angles), -1, 0) for f in (np.sin, np.cos))
+    rows = [1 + zero, zero, -sp], [zero, cr, sr * cp], [zero, -sr, cr * cp]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def in_body(angles, rates, bends):
+    """Return rate and angular acceleration in the body's axes: P dTheta, P ddTheta + dP dTheta (complex step)."""
+    P, dP = turning(angles), turning(angles + 1e-30j * rates).imag / 1e-30
+    return (P @ rates[..., None])[..., 0], (P @ bends[..., None] + dP @ rates[..., None])[..., 0]
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_problem_of_a_step_is_that_of_the_symbolic_dynamics(name):
-    """The kernel goes by bodies with quaternions, `Dynamics` by Euler angles and CasADi."""
+    """The kernel goes by rotation vectors and the body's axes, `Dynamics` by Euler angles and CasADi."""
     robot, rng, rows = load(name), np.random.default_rng(5), 40
     dynamics, c = Dynamics(robot), len(robot.carriers)
     pose = robot.home + rng.normal(scale=0.2, size=(rows, 6)) * robot.dof_mask
@@ -44,7 +57,12 @@ def test_the_problem_of_a_step_is_that_of_the_symbolic_dynamics(name):
     controller.step(
         0.0, State(pose, velocity, carriers, moving), Reference(robot.home, speed, wanted, carriers, still, still)
     )
+    off = Rotation.from_euler("ZYX", pose[:, :2:-1]).inv() * Rotation.from_euler("ZYX", robot.home[:2:-1])
+    planned = [off.apply(part) for part in in_body(robot.home[3:], speed[:, 3:], wanted[:, 3:])]
+    rate, bent = in_body(pose[:, 3:], velocity[:, 3:], 0 * velocity[:, 3:])
+    alpha = planned[1] + 2 * 0.7 * 2.0 * (planned[0] - rate) + 4.0 * off.as_rotvec()
     acceleration = wanted + 2 * 0.7 * 2.0 * (speed - velocity) + 4.0 * (robot.home - pose)
+    acceleration[:, 3:] = np.linalg.solve(turning(pose[:, 3:]), (alpha - bent)[..., None])[..., 0]
     w = (
         dynamics.required_wrench(pose, velocity, acceleration, carriers, moving, np.zeros((rows, c, 6)))
         * robot.dof_mask
@@ -52,6 +70,67 @@ def test_the_problem_of_a_step_is_that_of_the_symbolic_dynamics(name):
     A = dynamics.wrench_matrix(pose, carriers) * robot.dof_mask[:, None]
     np.testing.assert_allclose(controller._problems.A, A, atol=1e-12)
     np.testing.assert_allclose(controller._problems.w, w, rtol=1e-11, atol=1e-11 * np.abs(w).max())
+
+
+def with_frame_turned(robot, angles):
+    """Return a robot that differs in the axes of its platform's frame alone, and its attitude at home: (3,) [rad]."""
+    data = robot.model_dump(mode="json", exclude_none=True)
+    T = (Rotation.from_euler("ZYX", angles[::-1]).inv() * Rotation.from_euler("ZYX", robot.home[:2:-1])).as_matrix()
+    inertia, platform = T @ robot.inertia @ T.T, data["platform"]
+    platform |= {"inertia": [*np.diag(inertia), *inertia[np.triu_indices(3, 1)]], "com": T @ robot.platform.com}
+    platform["home"] = [*robot.home[:3], *angles]
+    platform.pop("shape", None)
+    for cable, attachment in zip(data["cables"], robot.attachments, strict=True):
+        cable["attachment"] = T @ attachment
+    return Robot.model_validate(data), Rotation.from_matrix(T)
+
+
+def frame_turned(pose, velocity, T):
+    """Return pose and velocity of a frame that is turned by T in the platform's axes, (..., 6)."""
+    turned = np.atleast_2d(pose).copy(), np.atleast_2d(velocity).copy()
+    angles, rates = turned[0][:, 3:], turned[1][:, 3:]
+    rate = T.apply(in_body(angles, rates, rates)[0])
+    angles[:] = (Rotation.from_euler("ZYX", angles[:, ::-1]) * T.inv()).as_euler("ZYX")[:, ::-1]
+    rates[:] = np.linalg.solve(turning(angles), rate[..., None])[..., 0]
+    return tuple(part.reshape(np.shape(pose)) for part in turned)
+
+
+@pytest.mark.parametrize("pitch", [0.5 * np.pi, -0.5 * np.pi, 1.56, 1.7])
+def test_the_axes_of_the_platforms_frame_mean_nothing(pitch):
+    """With late states too, near a pitch of 90 degrees and across it: the tensions are those of any other frame."""
+    robot, rng = load("ipanema-2"), np.random.default_rng(3)
+    turned, T = with_frame_turned(robot, np.array([0.3, pitch, -0.2]))
+    one, other = ComputedTorque(robot, integral=30.0), ComputedTorque(turned, integral=30.0)
+    (state, home), size = at_home(robot), np.repeat([0.05, 0.1], 3)
+    for k in range(30):
+        pose, velocity = robot.home + size * rng.normal(size=6), 3 * size * rng.normal(size=6)
+        wanted, speed = robot.home + size * rng.normal(size=6), size * rng.normal(size=6)
+        seen = 2e-3 * k - 0.01 * (k % 2)
+        state = state._replace(pose=pose, velocity=velocity, time=seen)
+        there = state._replace(**dict(zip(("pose", "velocity"), frame_turned(pose, velocity, T), strict=True)))
+        expected = one.step(2e-3 * k, state, home._replace(pose=wanted, velocity=speed))
+        pose, velocity = frame_turned(wanted, speed, T)
+        # That its second derivatives are zero is something else in other angles.
+        bends = in_body(wanted[3:], speed[3:], np.zeros(3))[1]
+        bent = in_body(pose[3:], velocity[3:], np.zeros(3))[1]
+        bend = np.append(np.zeros(3), np.linalg.solve(turning(pose[3:]), T.apply(bends) - bent))
+        found = other.step(2e-3 * k, there, home._replace(pose=pose, velocity=velocity, acceleration=bend))
+        np.testing.assert_allclose(found.tensions, expected.tensions, atol=1e-6 * robot.t_max.max())
+        assert found.answered == expected.answered
+    np.testing.assert_allclose(other.disturbance, one.disturbance, atol=1e-6 * robot.weight)
+
+
+@pytest.mark.parametrize("pitch", [0.5 * np.pi, -0.5 * np.pi, 1.5707])
+def test_a_robot_is_held_at_a_pitch_of_90_degrees_as_at_any_other(pitch):
+    robot = load("ipanema-2")
+    turned, _ = with_frame_turned(robot, np.array([0.3, pitch, -0.2]))
+    push = 0.05 * robot.weight * np.repeat([1.0, robot.length], 3) * [1, -0.6, 0.8, 0.5, 0.4, -0.3]
+    runs = [simulate(each, each.home, duration=0.4, period=2e-3, disturbance=push) for each in (robot, turned)]
+    assert 1e-3 < runs[0].error.max() < 0.01
+    np.testing.assert_allclose(runs[1].error, runs[0].error, atol=1e-7)
+    assert runs[1].answered == runs[0].answered
+    with pytest.raises(InputError, match=r"at home must be at most 1.5 rad for predictive control, got -?1.57"):
+        Predictive(turned)
 
 
 @pytest.mark.parametrize("name", ["cogiro", "ipanema-2", "wang-flying"])

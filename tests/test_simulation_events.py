@@ -8,7 +8,6 @@ import pytest
 import xarray as xr
 from matplotlib import pyplot
 from ruamel.yaml import YAML
-from scipy.spatial.transform import Rotation
 
 from towline import load, simulate
 from towline.cli.new import TEMPLATES
@@ -114,17 +113,13 @@ def test_the_viewer_reads_cuts_and_events(failed, tmp_path):
 
 
 def test_a_shortfall_is_not_that_of_angles_without_meaning():
-    """A load on two of three cables pitches to 90 degrees, where it turns slowly, but roll and yaw change fast."""
+    """A load on two of three cables pitches through 90 degrees, where roll and yaw jump by half a turn."""
     text = Template((TEMPLATES / "towing.yaml").read_text()).substitute(name="tugs")
     robot = Robot.model_validate(YAML(typ="safe").load(text))
     run = simulate(robot, robot.home, duration=1.2, events=["cut 1 at 0.05"])
     poses, shortfall = run.trajectory["pose"].values, run.record.shortfall[: len(run.times)]
-    turned = Rotation.from_euler("ZYX", poses[:, [5, 4, 3]])
-    speed = np.linalg.norm((turned[1:] * turned[:-1].inv()).as_rotvec(), axis=1) / run.period
     weight = 9.81 * robot.platform.mass
-    assert np.nanmax(shortfall) > 20 * weight  # as the controller records it
-    assert np.abs(run.record.motions[:, 0, 9]).max() > 20 * speed.max()
-    merit = run.figures_of_merit()["shortfall_max"]
-    assert 0.1 * weight < merit < 2 * weight
-    assert merit in shortfall
-    assert "at a pitch beyond 1.2 rad" in run.report()
+    assert np.abs(poses[:, 4]).max() > 1.5
+    assert np.abs(np.diff(poses[:, 3])).max() > 3
+    assert 0.1 * weight < np.nanmax(shortfall) < weight
+    assert run.figures_of_merit()["shortfall_max"] == np.nanmax(shortfall)

@@ -8,6 +8,7 @@
 /* These need `num`. */
 #include "mechanics/lines.h"
 #include "mechanics/rigid_body.h"
+#include "mechanics/rotations.h"
 
 enum { MOTION = 12 };                 /* numbers of a body's motion: pose and velocity */
 static const double SHORTEST = 1e-12; /* [m]: of less, a cable has no direction */

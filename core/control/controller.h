@@ -18,7 +18,7 @@ typedef struct {
 
 /* The settings of a controller, which it keeps. */
 typedef struct {
-    double kp[6], kd[6], ki[6]; /* of errors, their rates and integrals, in the coordinates of the pose */
+    double kp[6], kd[6], ki[6]; /* of errors, their rates and integrals, see step.c */
     double observer;            /* bandwidth of the estimated disturbance, and of forces on flying carriers [rad/s] */
     double learning;            /* bandwidth with which tensions are learned that differ from their commands [rad/s] */
     double patience;  /* how long a cable may report no tension where one is commanded until it is taken for cut [s] */

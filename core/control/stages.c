@@ -185,12 +185,16 @@ static void write_stage(const towline_robot *robot, int moved, double dt, const 
 void towline_write_stages(const towline_robot *robot, towline_moved moved, const double *disturbance,
                           const double *carriers, const double *states, const double *controls, towline_stages stages) {
     const int count = towline_moved_count(moved), n = MOTION + 2 * count, m = robot->cables;
+    const double rest[6] = {0, 0, 0, 0, 0, 0};
+    double axes[3][3], needed[6];
     stage it;
     for (int k = 0; k < stages.count; k++) {
         const double *x = states + n * k, *u = controls + (m + count) * k;
         put_stage(robot, moved, carriers + MOTION * robot->carriers * k, x, &it);
-        it.by = mobility_at(robot, &it.at);
-        acceleration_at(robot, &it.by, it.motions, it.A, u, disturbance, it.acceleration);
+        turning_axes(&it.at.platform, axes);
+        it.by = mobility_at(robot, &it.at, (const double (*)[3])axes);
+        required_wrench(robot, it.motions, it.motions + 6, rest, NULL, needed);
+        acceleration_by(robot, &it.by, it.A, u, disturbance, needed, it.acceleration);
         write_slopes(robot, moved, u, &it);
         write_stage(robot, count, stages.steps[k], &it, x, u, stages.A.at + stages.A.stage * k, stages.A.row,
                     stages.B.at + stages.B.stage * k, stages.B.row, stages.c.at + stages.c.stage * k);

@@ -1,9 +1,14 @@
 /*
  * The problem of tension distribution that one step of a controller solves.
  *
- *     a* = a_ref + Kd (v_ref - v) + Kp (x_ref - x) + Ki integral           in the coordinates of the pose
- *     w  = (m (a_c - g), R (J alpha + Omega x J Omega)) - d                 about the CoM
- *     d  = K (p - p_0 - integral of (A t + m g + d))                        the estimated disturbance, p the momentum
+ *     a*     = a_ref + Kd (v_ref - v) + Kp (x_ref - x) + Ki integral        of the frame, in {G}
+ *     alpha* = Q alpha_ref + Kd (Q Omega_ref - Omega) + Kp e + Ki integral  in the platform's axes, Q = R' R_ref
+ *     w      = (m (a_c* - g), R (J alpha* + Omega x J Omega)) - d           about the CoM
+ *     d      = K (p - p_0 - integral of (A t + m g + d))                    the estimated disturbance, p the momentum
+ *
+ * with e the vector of the rotation Q. It is the difference of the angles to first order at small angles, and defined at
+ * any attitude, as its gains are: roll, pitch and yaw have no rates at a pitch of 90 degrees. Source: F. Bullo and R. M.
+ * Murray, "Proportional derivative (PD) control on the Euclidean group", ECC 1995.
  *
  * Carriers take part by their positions alone: what they do moves the anchors, not the platform.
  */
@@ -26,17 +31,43 @@ static void observe_platform(const towline_robot *robot, const towline_controlle
     }
 }
 
-/* Write the acceleration of the pose that is wanted. */
-static void wanted_acceleration(const towline_controller *controller, double dt, const towline_row *row,
-                                double *wanted) {
+/* Write the error of the pose and that of its rate (6), and the accelerations of the reference; angular ones as e. */
+static void compare(const attitude *at, const double *rate, const towline_row *row, double *error, double *slower,
+                    double *wanted) {
     const double *reference = row->reference, *measured = row->measured;
-    towline_platform_memory *memory = row->platform;
-    for (int k = 0; k < 6; k++) {
-        const double error = k < 3 ? reference[k] - measured[k] : turn_between(measured[k], reference[k]);
-        if (memory->integrates) { memory->integral[k] += dt * error; }
-        wanted[k] = reference[12 + k] + controller->kp[k] * error + controller->ki[k] * memory->integral[k] +
-                    controller->kd[k] * (reference[6 + k] - measured[6 + k]);
+    const attitude planned = attitude_of(reference + 3);
+    double Q[9], omega[3], alpha[3], column[3];
+    for (int k = 0; k < 3; k++) {
+        const double axis[3] = {planned.R[k], planned.R[3 + k], planned.R[6 + k]};
+        turn_back(at->R, axis, column);
+        for (int i = 0; i < 3; i++) { Q[3 * i + k] = column[i]; }
     }
+    body_rate(&planned, reference + 9, omega);
+    body_acceleration(&planned, reference + 9, reference + 15, alpha);
+    rotation_vector(Q, error + 3);
+    turn(Q, omega, slower + 3);
+    turn(Q, alpha, wanted + 3);
+    for (int k = 0; k < 3; k++) {
+        error[k] = reference[k] - measured[k];
+        slower[k] = reference[6 + k] - measured[6 + k];
+        slower[3 + k] -= rate[k];
+        wanted[k] = reference[12 + k];
+    }
+}
+
+/* Write the wrench of the acceleration that is wanted. */
+static void wanted_wrench(const towline_robot *robot, const towline_controller *controller, double dt,
+                          const attitude *at, const towline_row *row) {
+    towline_platform_memory *memory = row->platform;
+    double rate[3], error[6], slower[6], wanted[6];
+    body_rate(at, row->measured + 9, rate);
+    compare(at, rate, row, error, slower, wanted);
+    for (int k = 0; k < 6; k++) {
+        if (memory->integrates) { memory->integral[k] += dt * error[k]; }
+        wanted[k] +=
+            controller->kp[k] * error[k] + controller->ki[k] * memory->integral[k] + controller->kd[k] * slower[k];
+    }
+    wrench_of_motion(robot, at->R, row->measured + 6, rate, wanted, wanted + 3, NULL, row->w);
 }
 
 /*
@@ -80,7 +111,6 @@ static void move_carriers(const towline_robot *robot, const towline_controller *
 void towline_write_problem(const towline_robot *robot, const towline_controller *controller, double dt, double since,
                            towline_row row) {
     configuration at;
-    double wanted[6];
     const int silent = towline_write_bounds(robot, controller, dt, row.cables, row.low, row.high);
     row.platform->silent = silent ? row.platform->silent + 1 : 0;
     if (!is_usable(robot, &row)) {
@@ -95,8 +125,7 @@ void towline_write_problem(const towline_robot *robot, const towline_controller 
     }
     configuration_at(robot, row.measured, &at);
     wrench_matrix(robot, &at, row.A);
-    wanted_acceleration(controller, dt, &row, wanted);
-    required_wrench(robot, row.measured, row.measured + 6, wanted, NULL, row.w);
+    wanted_wrench(robot, controller, dt, &at.platform, &row);
     if (!row.late) { observe_platform(robot, controller, since, &at, row.measured + 6, &row); }
     for (int k = 0; k < 6; k++) { row.w[k] = robot->freedom[k] * (row.w[k] - row.platform->disturbance[k]); }
     if (controller->reacts) { move_carriers(robot, controller, dt, &at, &row); }

@@ -13,17 +13,17 @@ INLINE void subtract_air(const towline_robot *robot, const num *wind, const num 
     force[2] -= robot->lift * (x * x + y * y);
 }
 
-/* w (6), force and moment in {G}; pose, velocity, acceleration (6) as in robot.h; wind (3) may be NULL: no air. */
-INLINE void required_wrench(const towline_robot *robot, const num *pose, const num *velocity, const num *acceleration,
-                            const num *wind, num *w) {
+/*
+ * w (6), force and moment in {G}, at an attitude R: velocity and acceleration (3) of the frame in {G}, rate Omega and its
+ * derivative alpha (3) in the body's axes; wind (3) may be NULL: no air.
+ */
+INLINE void wrench_of_motion(const towline_robot *robot, const num *R, const num *velocity, const num *omega,
+                             const num *acceleration, const num *alpha, const num *wind, num *w) {
     const double *inertia = robot->body[0].inertia;
-    const attitude at = attitude_of(pose + 3);
-    num omega[3], alpha[3], rate[3], turning[3], com[3], tangential[3], around[3], centripetal[3];
-    body_rate(&at, velocity + 3, omega);
-    body_acceleration(&at, velocity + 3, acceleration + 3, alpha);
-    turn_constant(at.R, robot->com, com);
-    turn(at.R, omega, rate);
-    turn(at.R, alpha, turning);
+    num rate[3], turning[3], com[3], tangential[3], around[3], centripetal[3];
+    turn_constant(R, robot->com, com);
+    turn(R, omega, rate);
+    turn(R, alpha, turning);
     cross(turning, com, tangential);
     cross(rate, com, around); /* velocity of the CoM about the frame's origin */
     cross(rate, around, centripetal);
@@ -35,11 +35,21 @@ INLINE void required_wrench(const towline_robot *robot, const num *pose, const n
     constant_times(inertia, alpha, moment);
     cross(omega, spin, gyroscopic);
     for (int i = 0; i < 3; i++) { moment[i] += gyroscopic[i]; }
-    turn(at.R, moment, w + 3);
+    turn(R, moment, w + 3);
     if (wind) {
         const num speed[3] = {velocity[0] + around[0], velocity[1] + around[1], velocity[2] + around[2]};
         subtract_air(robot, wind, speed, w);
     }
+}
+
+/* The same for pose, velocity and acceleration (6) as in robot.h. */
+INLINE void required_wrench(const towline_robot *robot, const num *pose, const num *velocity, const num *acceleration,
+                            const num *wind, num *w) {
+    const attitude at = attitude_of(pose + 3);
+    num omega[3], alpha[3];
+    body_rate(&at, velocity + 3, omega);
+    body_acceleration(&at, velocity + 3, acceleration + 3, alpha);
+    wrench_of_motion(robot, at.R, velocity, omega, acceleration, alpha, wind, w);
 }
 
 #endif

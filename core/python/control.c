@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "batch/batch.h"
+#include "control/configuration.h"
 #include "python/arrays.h"
 #include "python/extension.h"
 
@@ -59,11 +60,7 @@ static const Py_ssize_t PER_PLATFORM = sizeof(towline_platform_memory) / sizeof(
 static const Py_ssize_t PER_CARRIER = sizeof(towline_carrier_memory) / sizeof(double);
 static const Py_ssize_t PER_TURNING = sizeof(towline_turning) / sizeof(double);
 
-enum {
-    MOTION = 12,
-    ORDER = 18,
-    MOST_PARTS = 1000000
-}; /* numbers of pose and velocity, and of these and the acceleration */
+enum { ORDER = 18, MOST_PARTS = 1000000 }; /* numbers of pose, velocity and acceleration; and of parts of a time */
 
 enum { TENSIONS_OF_STATE = 4 }; /* place in its tuple */
 
@@ -169,15 +166,15 @@ static Py_ssize_t solve_all(problems at, Py_ssize_t rows, int m, double length, 
     return towline_solve_batch(&batch, rows, in_lanes);
 }
 
-/* Count the rows whose pose may be farther from its reference than a distance [m], or an angle [rad] but for whole turns. */
+/* Count the rows whose pose is farther from its reference than a distance [m] or an angle [rad], or no number. */
 static Py_ssize_t count_far(const double *measured, Py_ssize_t motions, const double *wanted, Py_ssize_t rows,
                             const double most[2]) {
+    const double cosine = cos(most[1]);
     Py_ssize_t near = 0;
     for (Py_ssize_t row = 0; row < rows; row++, measured += motions, wanted += ORDER) {
-        double off[6];
-        for (int i = 0; i < 6; i++) { off[i] = measured[i] - wanted[i]; }
-        near += off[0] * off[0] + off[1] * off[1] + off[2] * off[2] <= most[0] * most[0] && fabs(off[3]) <= most[1] &&
-                fabs(off[4]) <= most[1] && fabs(off[5]) <= most[1];
+        const double off[3] = {measured[0] - wanted[0], measured[1] - wanted[1], measured[2] - wanted[2]};
+        const attitude now = attitude_of(measured + 3), planned = attitude_of(wanted + 3);
+        near += dot(off, off) <= most[0] * most[0] && cosine_between(now.R, planned.R) >= cosine;
     }
     return rows - near;
 }
