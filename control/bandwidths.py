@@ -89,7 +89,7 @@ def bandwidths_for(
     w = None if bandwidth is None else positive("bandwidth", bandwidth, 6)
     K = None if observer is None else number("observer", observer, 0.0, 1e3)
     h = None if attitude is None else number("attitude", attitude, 0.1, 1e3)
-    errors = None if sensors is None else _errors_of(_noise_of(sensors), robot)
+    errors = None if sensors is None else _errors_of(noise_of(sensors), robot)
     lag = min(rotor_lag, ROTORS_KEEP)
     if errors is None:
         h = _attitude_for(robot, None, lag, h)
@@ -146,11 +146,17 @@ def noise_of_velocity(robot: Robot, sensors: Noise | Mapping[str, Any] | None) -
     """
     if sensors is None:
         return 0.0
-    return float(np.linalg.norm(robot.dof_mask * np.repeat(_errors_of(_noise_of(sensors), robot).velocities, 3)))
+    return float(np.linalg.norm(robot.dof_mask * np.repeat(_errors_of(noise_of(sensors), robot).velocities, 3)))
 
 
-def _noise_of(sensors: Any) -> Noise:
+def noise_of(sensors: Any) -> Noise:
+    """Return errors of sensors as `Noise`; raises `InputError` if they have a wrong value."""
     return sensors if isinstance(sensors, Noise) else validate(sensors, Noise, "sensors")
+
+
+def age_of(noise: Noise) -> float:
+    """Return the mean age of states [s]: their delay, and half the time for which a reading is held."""
+    return noise.delay + (0.5 / noise.rate if noise.rate else 0.0)
 
 
 class _Errors(NamedTuple):
@@ -178,10 +184,8 @@ class _Errors(NamedTuple):
 def _errors_of(noise: Noise, robot: Robot) -> _Errors:
     """Return the errors of sensors; angles count by the robot's length."""
     step, size = 1.0 / (noise.rate or READINGS), np.array([1.0, robot.length])
-    age = noise.delay + (step / 2 if noise.rate else 0.0)
+    age, position = age_of(noise), noise.of_pose
     late = 0.0 if noise.stamped else age
-    steps = np.array([noise.resolution, noise.attitude_resolution]) / np.sqrt(12)
-    position = np.hypot(np.array([noise.position, noise.attitude]), steps)
     velocity = np.array([noise.velocity, noise.attitude_rate])
     if noise.differenced:
         late, velocity = late + step / 2, np.hypot(velocity, np.sqrt(2) * position / step)

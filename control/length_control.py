@@ -1,30 +1,32 @@
 """`LengthControl`: for winches that take lengths, as most industrial ones do."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
+from warnings import warn
 
 import numpy as np
 from typing_extensions import override
 
 from ..base.errors import InputError
 from ..base.inputs import number, repeated, required, shown
+from ..base.text import quantity
 from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
 from ..models.trajectory import moved_on
-from ..plant import Plant
-from ..plant.steps import winding_time
 from .as_floats import as_floats, is_time, measured_at, rows_of
-from .calm_integral import calm_integral
+from .bandwidths import age_of, noise_of
 from .command import HOLD, OFF, PLANNED, Command
 from .controller import Controller
 from .deviation import Deviation
+from .length_gains import LengthGains
+from .noise import Noise
 from .open_loop import planned_command
 from .reference import Reference
 from .state import State
 
 SHARE, STRAIN = 0.05, 0.005  # of the robot's length, and of the longest cable: the default of `most`
-CURRENT, LATE = 0.002, 0.02  # ages of a measured pose [s]
-NEVER = -1.0  # [s]: shorter than any step
-USUAL = 4.0, 10.0  # P and I [1/s] of a current pose
+DAMPED = 0.002  # [s]: damping of unknown cables, in terms of their stiffness
+PERIOD = 1e-3  # [s]: taken to be that of the steps at the first one
 
 
 class LengthControl(Controller):
@@ -43,16 +45,19 @@ class LengthControl(Controller):
         stiffness: E A [N], a number or one for each cable, instead of the file's values; infinity for a cable that does
             not stretch (also the default of a cable without a value in the file, if there are no more cables than
             degrees of freedom).
+        damping: C [N s/m], a number or one for each cable, instead of the file's values; 2 ms times the stiffness is
+            assumed for a cable without a value in the file.
         lag: Time constant with which the winches follow their commands [s]: lengths are commanded earlier by this time,
             and their corrections with as much lead.
-        proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default depends on the age
-            of the measured pose: 4 and 10 if it is current, 0.3 and 2 if it is at most 20 ms old, less beyond. It is
-            also 0.3 and 2, or less, if cables do not stretch or are too stiff for the period of the steps. For a late
-            pose without its `time` of measurement, give the gains for its age: with larger ones, oscillations of the
-            platform on its cables grow. I is smaller if the platform on cables with the file's damping oscillates so
-            slowly that it would never come to rest (control/calm_integral.py).
+        proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
+            to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
+            depends on the age of the measured pose, by its `time` or else by `sensors`, and is 0 for cables with a
+            damping of 0. For a late pose without its `time`, give the sensors or the gains: oscillations grow with
+            those of a current pose.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
+        sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default of P
+            is then so small that noise of the pose changes tensions by at most 1 % of their range.
 
     Attributes:
         stiffness: E A that the controller assumes for each cable, (m,) [N]; infinity for one that does not stretch.
@@ -73,6 +78,8 @@ class LengthControl(Controller):
         proportional: float | None = None,
         integral: float | None = None,
         most: float | None = None,
+        sensors: Noise | Mapping[str, Any] | None = None,
+        damping: float | Sequence[float] | np.ndarray | None = None,
     ):
         self.robot = as_robot(robot)
         flying = [carrier.name for carrier in self.robot.carriers if carrier.actuators]
@@ -86,24 +93,30 @@ class LengthControl(Controller):
                 f"degrees of freedom, because its tensions depend on it, got none for {self.robot.name!r}"
             )
         self.stiffness = repeated("stiffness", given, self.robot.m)
-        self._damping = np.array([cable.damping or 0.0 for cable in self.robot.cables])
         if not (self.stiffness > 0).all():
             raise InputError(f"stiffness must be positive, one or one for each cable, got {shown(stiffness)}")
+        unknown = np.where(np.isfinite(self.stiffness), DAMPED * self.stiffness, 0.0)
+        own = [cable.damping or usual for cable, usual in zip(self.robot.cables, unknown, strict=True)]
+        self._damping = repeated("damping", own if damping is None else damping, self.robot.m)
+        if not (self._damping >= 0).all():
+            raise InputError(f"damping must be at least 0, one or one for each cable, got {shown(damping)}")
         lengths = np.linalg.norm(self.robot.home_anchors - self.robot.home_attachments, axis=1)
         usual = max(SHARE * self.robot.length, STRAIN * float(lengths.max()))
-        elastic = bool(np.isfinite(self.stiffness).all())
-        self._yields, self._settling, self._calm = NEVER, np.inf, 1.0
-        if elastic:
-            self._yields = winding_time(Plant(self.robot, stiffness=self.stiffness)) / 2
-            self._settling = float((self._damping * lengths / self.stiffness).min()) or np.inf  # unknown
         self._lag = number("lag", lag, 0.0, 1.0)
         self._proportional = None if proportional is None else number("proportional", proportional, 0.0, 100.0)
         self._integral = None if integral is None else number("integral", integral, 0.0, 1e3)
-        self.corrects = not self._proportional == self._integral == 0
-        if elastic and self._settling < np.inf:
-            proportional = USUAL[0] if self._proportional is None else self._proportional
-            calm = calm_integral(self.robot, self.stiffness, self._damping, proportional, USUAL[1])
-            self._calm = calm / USUAL[1]
+        known = None if sensors is None else noise_of(sensors)
+        self._age = 0.0 if known is None else age_of(known)
+        self._gains = LengthGains(self.robot, self.stiffness, self._damping, self._lag, known)
+        given = [self._proportional, self._integral]
+        self.corrects = any(given) or (None in given and any(self._gains_for(PERIOD, self._age)))
+        if None in given and not self.corrects:
+            least = quantity(float(self._damping.min()), "N s/m")
+            warn(
+                f"lengths of {self.robot.name!r} are not corrected by the measured pose, because its oscillations on "
+                f"cables with a damping of {least} would grow",
+                stacklevel=2,
+            )
         self._most = number("most", usual if most is None else most, 0.0, 1e3)
         self._dynamics, self._deviation = dynamics_of(self.robot), Deviation(self.robot)
         self.reset()
@@ -120,7 +133,7 @@ class LengthControl(Controller):
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
         The correction needs the pose of the state, and with a lag its velocity. A state with a time is compared with
-        the plan of that time.
+        the plan of that time, and one without by the age that `sensors` have.
 
         Raises:
             InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions
@@ -132,7 +145,7 @@ class LengthControl(Controller):
         if not is_time(time) or (self._time is not None and not float(time) > self._time):
             raise InputError(f"time must be a finite number that increases from step to step, got {shown(time)}")
         dt = 0.0 if self._time is None else float(time) - self._time
-        age = 0.0 if state.time is None else time - measured_at(state.time, time)
+        age = self._age if state.time is None else time - measured_at(state.time, time)
         pose, carriers, tensions = self._ahead(dt, reference)
         far = self._dynamics.cable_lengths(pose, carriers)
         strain = self._strained(dt, tensions, far)
@@ -179,10 +192,7 @@ class LengthControl(Controller):
         error, drift = (np.where(known[..., None], one, 0.0) * self.robot.dof_mask for one in (error, drift))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
         J = self._dynamics.length_jacobian(reference.pose, reference.carrier_pose)  # (..., m, 6)
-        proportional, integral = _gains(age, yields := dt <= min(self._yields, self._settling))
-        proportional = proportional if yields else min(proportional, self._settling / (2 * max(dt, 1e-9)))
-        proportional = proportional if self._proportional is None else self._proportional
-        integral = self._calm * integral if self._integral is None else self._integral
+        proportional, integral = self._gains_for(dt or PERIOD, age)
         total = before + dt * error
         with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
             ahead = proportional * (error + self._lag * drift) + integral * (total + self._lag * error)
@@ -191,16 +201,10 @@ class LengthControl(Controller):
         self._sum = np.where(beyond[..., None], before, total)
         return np.clip(np.nan_to_num(wanted), -self._most, self._most), beyond | ~known
 
-
-def _gains(age: float, yields: bool) -> tuple[float, float]:
-    """Return the default gains, P and I [1/s], for a pose of an age [s], on cables that yield to a step or not.
-
-    An oscillation of the platform with the frequency w and the damping d is stable for I < 2 d w (1 + P) without
-    delay, which wants a large P; with one, P and the growth of the delayed phase limit both. Cables that do not yield,
-    since they do not stretch or their dampers tie them, have moved the platform by the next step, x = -P x: P < 1.
-    With lengths that follow h late, the damping is 2 d w (1 + P) - P w^2 h, positive for h up to C L0 / EA = 2 d / w.
-    """
-    if age <= CURRENT and yields:
-        return USUAL
-    share = min(1.0, LATE / max(age, CURRENT))
-    return 0.3 * share, 2.0 * share
+    def _gains_for(self, dt: float, age: float) -> tuple[float, float]:
+        """Return P and I [1/s], given or by default, for a pose of an age [s] with which a length is set for `dt`."""
+        usual = self._gains.at(age + dt)
+        return (
+            usual[0] if self._proportional is None else self._proportional,
+            usual[1] if self._integral is None else self._integral,
+        )

@@ -36,6 +36,12 @@ class Noise(Part):
         return np.repeat([self.position, self.attitude, self.velocity, self.attitude_rate], 3)
 
     @property
+    def of_pose(self) -> np.ndarray:
+        """Return the standard deviations of positions [m] and angles [rad], those of their steps included, (2,)."""
+        steps = np.array([self.resolution, self.attitude_resolution]) / np.sqrt(12)
+        return np.hypot(np.array([self.position, self.attitude]), steps)
+
+    @property
     def bias_of_motion(self) -> np.ndarray:
         """Return the standard deviations of the biases of pose [m, rad] and velocity, (12,)."""
         return np.repeat([self.position_bias, self.attitude_bias, 0.0, 0.0], 3)

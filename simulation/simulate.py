@@ -194,8 +194,8 @@ def _check_model(robot: Robot, controller: Controller) -> None:
         undamped = [i for i, cable in enumerate(robot.cables) if cable.stiffness and not cable.damping]
         if undamped and inner.corrects:
             warn(
-                f"cables[{undamped[0]}].damping is missing in the robot file of {robot.name!r}: the corrections "
-                "of LengthControl make oscillations on cables without damping grow",
+                f"cables[{undamped[0]}].damping is missing in the robot file of {robot.name!r}: the corrections of "
+                "LengthControl make oscillations on cables without damping grow (with damping=0 it does not correct)",
                 stacklevel=3,
             )
         for i, (cable, taken) in enumerate(zip(robot.cables, inner.stiffness.tolist(), strict=True)):
