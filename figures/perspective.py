@@ -54,8 +54,8 @@ class Perspective:
     def fit(self, ax: style.Axes, air: float) -> None:
         """Draw the floor, and show what is shown with some `air` around it, a share of its size; no axes in space."""
         corners = np.array(np.meshgrid(*np.stack([self.low, self.high], axis=1))).reshape(3, -1).T
-        ground = np.column_stack([corners[:, :2], np.full(len(corners), self.floor)])
-        shown = self(corners if self.flat else np.vstack([corners, ground]))
+        grid = floor_grid(self.low, self.high, self.cell, self.floor)
+        shown = self(corners if self.flat else np.vstack([corners, *grid]))
         low, high = shown.min(axis=0), shown.max(axis=0)
         margin = air * float((high - low).max())
         ax.set_aspect("equal", adjustable="box")
@@ -66,7 +66,7 @@ class Perspective:
         ax.set_axis_off()
         ax.set_xticks([])
         ax.set_yticks([])
-        for line in floor_grid(self.low, self.high, self.cell, self.floor):
+        for line in grid:
             ax.plot(*self(line).T, color=FLOOR, linewidth=0.5)
 
 
