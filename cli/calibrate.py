@@ -88,7 +88,7 @@ def calibrate(
     written = {} if refused else {"file": loaded.save(target) if kept else result.save(target)}
     outputs.show(result, written, outputs.write(result, written), notes=notes, file=None)
     if kept:
-        typer.echo("towline: the file has corrected encoders alone, which other parameters do not improve", err=True)
+        typer.echo("towline: only the encoders of the file are corrected: other parameters do not improve it", err=True)
     if refused:
         hint = "; --fix corrects it" if result.doubt and result.mistake and result.mistake.corrected else ""
         typer.echo(f"towline: {target} is not written: {refused}{hint}", err=True)

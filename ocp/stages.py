@@ -41,7 +41,7 @@ from .tasks.status import MotionStatus
 from .tasks.wind_set import WindDisc
 
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
-UNPROVEN = "while the platform moves, no tensions exist in some of the faster winds with which a wind speed is planned"
+UNPROVEN = "while the platform moves, no tensions exist in some of the winds that are faster by its own speed"
 
 
 def climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation] | None) -> Plan:

@@ -115,7 +115,8 @@ class Replay(Drawn, Reported, Displayed):
         if windows.measured_command or not late or not 0.25 * step < late[0] < 0.75 * step:
             return windows.notes
         held = (
-            f"if the controller holds each command until the next, they act half a sample late: --delay {step / 2:.3g}"
+            "if the controller holds each command until the next, commands act half a sample late: try "
+            f"--delay {step / 2:.3g}"
         )
         return [*windows.notes, held]
 

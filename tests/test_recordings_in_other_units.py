@@ -95,7 +95,7 @@ def test_corrected_encoders_are_written_if_nothing_else_is_to_improve(free, tmp_
     header = [*(f"l{i}" for i in range(4)), *"xyz", "roll", "pitch", "yaw"]
     user.write(tmp_path / "mm.csv", header, np.hstack([1e3 * lengths, poses]))
     done = towline("calibrate", path, "mm.csv", "--fix", *free, "--out", "fixed.yaml", cwd=tmp_path)
-    assert "corrected encoders alone" in done.stderr
+    assert "only the encoders of the file are corrected" in done.stderr
     assert [cable.encoder.scale for cable in load(tmp_path / "fixed.yaml").cables] == [1e-3] * 4
     assert load(tmp_path / "fixed.yaml").anchors.tolist() == robot.anchors.tolist()
     # Without --fix, or where it has nothing to correct, no file is written.

@@ -87,7 +87,7 @@ def test_files_without_poses_are_no_poses(tmp_path):
     with pytest.raises(InputError, match="poses must have columns x, y, z or an orientation, got t, p0, p1, p2; a map"):
         read_log(tmp_path / "l.csv", poses=tmp_path / "p.csv")
     user.write(tmp_path / "all.csv", ["t", "l0", "l1", "p0", "p1"], np.column_stack([T, LENGTHS, np.ones((8, 2))]))
-    assert "no positions are read, and of unknown names are p0, p1; a map (--fields) may name them" in (
+    assert "no positions are read; fields with unknown names are p0, p1; a map (--fields) may name them" in (
         read_log(tmp_path / "all.csv").notes
     )
 

@@ -239,7 +239,7 @@ def test_a_motion_capture_that_repeats_the_last_pose(tmp_path):
     user.write(tmp_path / "mocap.csv", ["time_s", "TX", "TY", "TZ", "RX", "RY", "RZ", "RW"], rows)
     files = (robot, "winches.csv", "--poses", "mocap.csv")
     values, told = found(towline("calibrate", *files, "--json", cwd=tmp_path))
-    said = "positions skipped because they repeat the one before until the platform jumps: 99"
+    said = "positions skipped because they repeat the previous one until the platform jumps: 99"
     assert any(said in note for note in told["notes"])
     for i in range(4):
         for k, axis in enumerate("xyz"):

@@ -91,7 +91,7 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
             least = cost
         now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, as_they_are[1]))
         looks = " and ".join(filter(None, (ways[k].text, _said(frame, left * right))))
-        text = f"{looks}: they differ from those by the lengths by {now}, not by {before}"
+        text = f"{looks}: they then differ from those computed from the lengths by {now} instead of {before}"
         likeliest = Misread(text, _turned(given, whole))
     return likeliest
 

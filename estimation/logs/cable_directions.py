@@ -93,8 +93,8 @@ def in_world(
         return world, None
     how = " and ".join(text for text in (meaning, FRAMES[frame], ENDS[sign]) if text)
     angles = quantity(np.degrees(error), "deg", 2), quantity(np.degrees(tried[0][0]), "deg", 2)
-    text = f"cable directions look recorded {how}, and are converted: they differ from the file's by {angles[0]}"
-    return world, f"{text}, not by {angles[1]}"
+    text = f"cable directions look recorded {how}, and are converted: they then differ from the file's by {angles[0]}"
+    return world, f"{text} instead of {angles[1]}"
 
 
 def _turned(turns: np.ndarray, of: np.ndarray) -> np.ndarray:

@@ -30,7 +30,7 @@ def seen(
             orientation = _without(orientation, lost)
             position = _without(position, lost) if together and position is not None else position
     wrong = {
-        "positions skipped because they repeat the one before until the platform jumps: {}": frozen,
+        "positions skipped because they repeat the previous one until the platform jumps: {}": frozen,
         "positions skipped because they are far from those before and after: {}": spikes,
     }
     for note, found in wrong.items():

@@ -114,7 +114,7 @@ def read_log(
         moving = [carrier.name for carrier in known.carriers if carrier.moves] if known else []
         of_carriers = [carrier_fields(everything, given, name) for name in moving]
         if not found.position and (unknown := listed(everything, [found, *of_carriers])):
-            read.notes.append(f"no positions are read, and of unknown names are {unknown}")
+            read.notes.append(f"no positions are read; fields with unknown names are {unknown}")
         if known is not None and len(everything) > 1 and found.position:
             clocks, apart = _clocks(read, known, given)
         read.notes.extend(clocks)
