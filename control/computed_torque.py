@@ -44,7 +44,7 @@ class ComputedTorque(Controller):
         a* = a_ref + Kd (v_ref - v) + Kp (x_ref - x) + Ki integral of (x_ref - x)
         t  = argmin |t - t_ref|^2    s.t.  A t = w(x, v, a*) - d,  t_min <= t <= t_max,  |t - t_last| <= rate dt
 
-    with errors of the attitude as rotation vectors in the platform's axes, so that any attitude is like any other, and
+    with errors of the attitude as rotation vectors in the platform's axes, so that no attitude is special, and
     d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state gets a
     command: these tensions if they exist (status "as planned"), otherwise those with the closest wrench ("soft
     wrench"). While states contain nan, the last command moves to the planned tensions as fast as the rate permits, and

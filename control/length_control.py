@@ -51,9 +51,9 @@ class LengthControl(Controller):
             and their corrections with as much lead.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
-            depends on the age of the measured pose, by its `time` or else by `sensors`, and is 0 for cables with a
-            damping of 0. For a late pose without its `time`, give the sensors or the gains: oscillations grow with
-            those of a current pose.
+            depends on the age of the measured pose (from its `time`, or else from `sensors`), and is 0 for cables with a
+            damping of 0. For a late pose without its `time`, give the sensors or the gains: with the gains for a
+            current pose, oscillations grow.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
         sensors: Errors and delay of the sensors, a `simulation.Noise` or a mapping (default: unknown). The default of P
@@ -132,8 +132,8 @@ class LengthControl(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         """Return the lengths for the time from `time` [s] on, with the planned tensions and motion of the carriers.
 
-        The correction needs the pose of the state, and with a lag its velocity. A state with a time is compared with
-        the plan of that time, and one without by the age that `sensors` have.
+        The correction needs the pose of the state, and with a lag its velocity. A state is compared
+        with the plan at its time; without a time, its age is that of readings of the `sensors`.
 
         Raises:
             InputError: If an argument has a wrong shape or value, the lengths of the reference overflow, or no tensions

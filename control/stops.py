@@ -32,7 +32,7 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
 
     Args:
         plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
-        time: Time in the plan at which the stop begins [s]; a time after the plan's end stands for the end. A plan that
+        time: Time in the plan at which the stop begins [s]; a time after the plan's end means the end. A plan that
             ends while the robot moves is continued with its last acceleration.
 
     Returns:

@@ -308,7 +308,7 @@ class QuadrotorCarrier(Carrier):
     def required_effort(
         self, pose: Matrix, velocity: Matrix, acceleration: Matrix, pull: Matrix, gravity: np.ndarray
     ) -> tuple[Effort, ...]:
-        """Return thrust and torque, and the force across the thrust, of which it has none."""
+        """Return thrust and torque, and the force across the thrust, which it cannot give."""
         import casadi as ca  # as below: robots are read without it, faster
 
         from .rotation import turning

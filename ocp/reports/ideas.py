@@ -35,7 +35,7 @@ def ideas(plan: PlanData) -> list[Fact]:
         return [*_obstacles(plan), *_carriers(plan), *_strength(plan)]
     found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
-    nothing = [("no single change", f"makes it feasible, as far as was tried: no duration, limit, {tried}")]
+    nothing = [("no single change", f"of those tried makes it feasible: no duration, limit, {tried}")]
     return found or (nothing if plan.certificate is not None and not units(plan) else [])
 
 
