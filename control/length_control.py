@@ -51,8 +51,8 @@ class LengthControl(Controller):
             and their corrections with as much lead.
         proportional, integral: P, and I [1/s]; 0 and 0 for lengths without correction. The default is the largest, up
             to 4 and 10, with which no oscillation of the platform on its cables grows (control/length_gains.py). It
-            depends on the age of the measured pose (from its `time`, or else from `sensors`), and is 0 for cables with a
-            damping of 0. For a late pose without its `time`, give the sensors or the gains: with the gains for a
+            depends on the age of the measured pose (from its `time`, or else from `sensors`), and is 0 for cables with
+            no damping. For a late pose without its `time`, give the sensors or the gains: with the gains for a
             current pose, oscillations grow.
         most: Largest correction of a length [m]; default: 5 % of `Robot.length`, but at least 0.5 % of the longest
             cable, about as much as that cable may stretch. At this value the integral stops, and the status is "hold".
