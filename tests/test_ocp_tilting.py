@@ -1,6 +1,7 @@
 """A platform on four cables tilts as it moves: a path that keeps it level is infeasible, and the advice says so."""
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from towline.benchmarks.scenes import carried
@@ -56,8 +57,8 @@ def test_it_is_offered_also_where_its_first_program_is_too_coarse():
     assert plan(suspended(), {**task, "tube": {"attitude": offer.possible}}).feasible
 
 
-def test_it_is_not_offered_where_ipopt_takes_no_program():
-    """On three cables and a closed path there are more equations than unknowns, and zeros do not solve them."""
+def test_it_is_not_offered_on_a_closed_path_on_which_no_tilt_helps():
+    """The CoM is on an edge of the triangle of the three attachments."""
     path = {"kind": "circle", "centre": [0, 0, 1.2], "radius": 0.3, "rate": 2}
     refused = plan(suspended(3), {"path": path, "tube": {"ends": "periodic"}, "steps": 20})
     assert not refused.feasible
@@ -85,3 +86,23 @@ def test_a_point_mass_has_no_attitude_to_change():
     assert refused.status == "infeasible"
     assert refused.certificate is not None
     assert "a tilting platform" not in refused.report()
+
+
+@pytest.mark.parametrize("scheme", ["linear", "hermite"])
+def test_three_cables_hold_a_platform_on_a_closed_path(scheme):
+    """Equal poses, velocities and wrenches at both ends imply equal accelerations: these are no further equations."""
+    azimuths = 2 * np.pi / 3 * np.arange(3) + 0.3
+    ways = np.stack([np.cos(azimuths), np.sin(azimuths), 0 * azimuths], axis=1)
+    data = suspended(3).model_dump()
+    for cable, way in zip(data["cables"], ways, strict=True):
+        cable.update(anchor=(2 * way + [0, 0, 3]).tolist(), attachment=(0.2 * way + [0, 0, 0.05]).tolist())
+    data["platform"].update(com=[0, 0, -0.1], inertia=[0.1, 0.1, 0.15, 0, 0, 0])
+    path = {"kind": "circle", "centre": [0, 0, 1.2], "radius": 0.3, "rate": 1.5}
+    tube = {"ends": "periodic", "attitude": 0.5}
+    found = plan(Robot.model_validate(data), {"path": path, "tube": tube, "steps": 60, "scheme": scheme})
+    assert found.feasible, found.report()
+    assert found.message == "Solve_Succeeded"
+    motion = found.audit.motion
+    assert np.abs(motion.pose[:, 3:]).max() > 0.01  # it tilts
+    for part in motion:
+        np.testing.assert_allclose(part[0], part[-1], atol=1e-5)

@@ -259,7 +259,13 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> li
     words = platform_ends(scenario.task), carrier_ends(scenario.task)
     cyclic = [i for i, (owner, _) in enumerate(scenario.owners()) if words[owner is not None] == "periodic"]
     if cyclic:
-        picked = [block * layout.n + i for block in range(layout.derivatives) for i in cyclic]
+        balanced = _balanced_angles(scenario)
+        picked = [
+            order * layout.n + i
+            for order in range(layout.derivatives)
+            for i in cyclic
+            if order != 2 or i not in balanced
+        ]
         rows: list[Row] = [Row("periodic", 0.0, 0.0)] * len(picked)
         blocks.append(Block(X[picked, 0] - X[picked, -1], rows, np.array([0])))
     if scenario.scheme.smooth and (ending := [i for i in range(layout.n) if i not in cyclic]):
@@ -269,6 +275,16 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> li
             change = (X[layout.snap, k + 1] - X[layout.snap, k])[ending]
             blocks.append(Block(change, rows, np.array([k])))
     return blocks
+
+
+def _balanced_angles(scenario: Scenario) -> list[int]:
+    """Return the free angles of the platform whose accelerations follow from pose, velocity and few cables' balance.
+
+    Rows for these at periodic ends would be equations that the others imply, of which a program may have too many.
+    """
+    missing = len(scenario.robot.platform.dof) - scenario.robot.m
+    angles = [i for i, (owner, axis) in enumerate(scenario.owners()) if owner is None and axis in ATTITUDE]
+    return angles[: max(missing, 0)]
 
 
 def _waypoint_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> list[Block]:
