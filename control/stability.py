@@ -1,5 +1,8 @@
 """`grows`: whether small errors at home grow in the whole closed loop."""
 
+import pickle
+from functools import lru_cache
+
 import numpy as np
 
 from ..models.robot import Robot
@@ -23,13 +26,28 @@ def grows(controller: Controller, robot: Robot, rest: TensionSolution, bandwidth
 
     The loop is closed around `Plant` after a small push in all coordinates, in which unstable modes soon dominate.
     So all states are included: attitudes of carriers, delayed commands, observers. The controller of the robot is reset
-    before and afterwards. `rest` holds the tensions at home; pose errors decay with `bandwidth` [rad/s].
+    before and afterwards. `rest` holds the tensions at home; pose errors decay with `bandwidth` [rad/s]. The result is
+    kept for the next controllers that are equal.
 
     False without a test if the load cannot rest there, for example under a rough formation.
     """
     if not rest.residual <= PUSH * robot.force_scale:
         return False
-    tensions = np.asarray(rest.tensions)
+    given = controller, robot, np.asarray(rest.tensions), bandwidth
+    try:
+        state = pickle.dumps(given)
+    except (AttributeError, TypeError, pickle.PicklingError):  # as of a class that is defined in a function
+        return _simulated(*given)
+    return _kept(type(controller), state)
+
+
+@lru_cache(maxsize=8)
+def _kept(kind: type[Controller], state: bytes) -> bool:
+    """Return what the simulation shows; a class that is defined anew is another `kind`, though its name is the same."""
+    return _simulated(*pickle.loads(state))
+
+
+def _simulated(controller: Controller, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
     plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
     still = np.zeros_like(robot.carrier_home)
     reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)

@@ -2,10 +2,11 @@
 
 import difflib
 import io
+import json
 import os
 import re
 import warnings
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -38,11 +39,16 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
 
 def to_yaml(model: BaseModel) -> str:
     """Return the YAML text of a model, which `parse_yaml` reads back to an equal one."""
+    return _yaml_of(json.dumps(model.model_dump(mode="json", exclude_none=True)))
+
+
+@lru_cache(maxsize=16)  # writing takes milliseconds, and the same robot is in each of its plans and simulations
+def _yaml_of(content: str) -> str:
     stream = io.StringIO()
     yaml = YAML()
     yaml.default_flow_style = None
     yaml.width = 120
-    yaml.dump(model.model_dump(mode="json", exclude_none=True), stream)
+    yaml.dump(json.loads(content), stream)
     return stream.getvalue()
 
 
