@@ -10,14 +10,19 @@ from typing_extensions import override
 
 from ..base.errors import InputError
 from ..base.inputs import required, shown
+from ..core import control_move_on
+from .as_floats import as_floats
+from .carried_load import CarriedLoad
 from .command import Command
 from .controller import Controller
 from .reference import Reference
 from .state import State
 
+SHORT = 1e-5  # [s], in which velocities change by an acceleration
+
 
 class Filter(Protocol):
-    """A filter such as `PoseFilter`, whose estimates have a pose and a velocity, (6,)."""
+    """A filter such as `PoseFilter`, whose estimates have a pose and a velocity, (6,), and a time [s]."""
 
     def reset(self) -> None:
         """Forget all measurements."""
@@ -33,13 +38,19 @@ class Filtered(Controller):
 
     The velocities of measured states are not used. A pose that equals the last one is treated as a held reading.
 
+    A `PoseFilter` is told the acceleration by the robot's dynamics, with the tensions that are measured or were
+    commanded. So it is not late when the controller accelerates the platform, and the loop is stable however slow it
+    is: it only has to follow disturbances. A filter that knows the reference alone must be three times faster than
+    bandwidth and observer together.
+
     Args:
         controller: Controller that receives the estimated states.
-        filter: `estimation.PoseFilter` of the platform's poses, with their standard deviations, or a filter with its
-            methods. It receives the reference, so that it filters deviations from it.
+        filter: `estimation.PoseFilter` of the platform's poses, with their standard deviations and the jerk of
+            disturbances, for gusts `jerk=(0.3, 0.3 / robot.length)`; the `sensors` of the controller are then its
+            `noise`. Or a filter with its methods, which receives the reference instead.
 
     Raises:
-        InputError: If an argument has a wrong type.
+        InputError: If an argument has a wrong type, or the filter is that of another robot.
     """
 
     def __init__(self, controller: Controller, filter: Filter):
@@ -48,11 +59,19 @@ class Filtered(Controller):
             raise InputError(f"filter must be a PoseFilter, or have its methods update and reset, got {shown(filter)}")
         self.filter = filter
         self.drive = self.controller.drive
+        self._robot: Any = getattr(filter, "robot", None)
+        own: Any = getattr(controller, "robot", self._robot)
+        if self._robot is not None and (own.m, len(own.carriers)) != (self._robot.m, len(self._robot.carriers)):
+            raise InputError(f"filter must be one of the controller's robot, {own.name}, got {self._robot.name}")
+        self._carried = None if self._robot is None else CarriedLoad(self._robot)
         self._forget()
 
     def _forget(self) -> None:
         self._pose: np.ndarray | None = None
-        self._references: deque[tuple[float, Reference]] = deque()
+        self._found: Any = None
+        self._steps: deque[tuple[float, Reference, Command]] = deque()
+        if self._carried is not None:
+            self._carried.reset()
 
     @override
     def reset(self) -> None:
@@ -68,11 +87,40 @@ class Filtered(Controller):
     def step(self, time: float, state: State, reference: Reference) -> Command:
         required("state", state, State)
         seen = time if state.time is None else state.time
-        self._references.append((time, reference))
-        while len(self._references) > 1 and self._references[1][0] <= seen:
-            self._references.popleft()
         pose = np.array(state.pose, dtype=float)
         new = self._pose is None or not np.array_equal(pose, self._pose)
         self._pose = pose
-        found = self.filter.update(seen, pose=pose if new else None, reference=self._references[0][1][:3])
-        return self.controller.step(time, state._replace(pose=found.pose, velocity=found.velocity), reference)
+        found = self._found = self._estimate(seen, pose if new else None, state, reference if seen >= time else None)
+        command = self.controller.step(time, state._replace(pose=found.pose, velocity=found.velocity), reference)
+        self._steps.append((time, reference, command))
+        return command
+
+    def _estimate(self, seen: float, pose: np.ndarray | None, state: State, reference: Reference | None) -> Any:
+        """Return the estimate for the time of a measured pose [s], from the references and commands until then."""
+        while len(self._steps) > 1 and self._steps[1][0] <= (seen if self._carried is None else self._found.time):
+            self._steps.popleft()
+        if self._carried is None or not self._steps:
+            planned = self._steps[0][1] if reference is None else reference
+            return self.filter.update(seen, pose=pose, reference=planned[:3])
+        state = as_floats(state, self._robot, None)
+        acting = [step for step in self._steps if step[0] < seen] or [self._steps[0]]
+        excess = 0.0 if state.tensions is None else state.tensions - acting[-1][2].tensions
+        ends = [*(begins for begins, *_ in acting[1:]), seen]
+        for until, (begins, planned, command) in zip(ends, acting, strict=True):
+            motion = planned[:3]
+            if state.tensions is not None or command.lengths is None:
+                motion = self._accelerated(command.tensions + excess, state, planned, begins)
+            self._found = self.filter.update(until, pose=pose if until == seen else None, reference=motion)
+        return self._found
+
+    def _accelerated(self, tensions: np.ndarray, state: State, planned: Reference, time: float) -> Sequence[ArrayLike]:
+        """Return the estimated motion with its acceleration by tensions (m,), or the planned one if it has none."""
+        assert self._carried is not None
+        bodies = np.zeros((1, 1 + len(state.carrier_pose), 12))
+        bodies[0, 0], bodies[0, 1:, :6] = np.append(self._found.pose, self._found.velocity), state.carrier_pose
+        still, pulls = np.zeros((len(state.carrier_pose), 6)), np.ascontiguousarray(tensions)[None, None]
+        control_move_on(SHORT, self._carried.change(planned.load, time), np.zeros((1, 6)), pulls, still, bodies)
+        acceleration = (bodies[0, 0, 6:] - self._found.velocity) / SHORT
+        if not np.isfinite(acceleration).all():
+            return planned[:3]
+        return self._found.pose, self._found.velocity, acceleration

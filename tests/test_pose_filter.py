@@ -159,6 +159,46 @@ def test_poses_without_velocities_control_a_robot():
         assert simulate(robot, motion, controller, noise=noise | sensors).to_dict()["error_rms"] < 5e-3
 
 
+@pytest.mark.parametrize(("jerk", "rate"), [(0.3, 100.0), (10.0, 400.0)])
+def test_the_noise_of_estimates_is_known(jerk, rate):
+    """At rest, where nothing else is in the errors: fourth of the steps are the beginning."""
+    robot, draw, steps, sigma = load("cogiro"), np.random.default_rng(6), 1600, np.repeat([1e-3, 4e-4], 3)
+    follow = PoseFilter(robot, {"position": 1e-3, "rotation": 4e-4}, (jerk, jerk / robot.length))
+    found = [follow.update(k / rate, pose=robot.home + sigma * draw.normal(size=6)) for k in range(steps)]
+    off = np.array([np.append(each.pose - robot.home, each.velocity) for each in found[steps // 4 :]])
+    expected = follow.noise(rate)
+    assert list(expected) == ["position", "attitude", "velocity", "attitude_rate"]
+    np.testing.assert_allclose(
+        np.sqrt(np.square(off).reshape(-1, 4, 3).mean(axis=(0, 2))), list(expected.values()), rtol=0.15
+    )
+
+
+class Alone:
+    """A filter that does not show its robot, so that it is told the reference alone."""
+
+    def __init__(self, follow):
+        self.reset, self.update = follow.reset, follow.update
+
+
+def test_a_filter_that_knows_what_the_tensions_do_may_be_slower_than_the_controller():
+    """Its bandwidth is (0.3 / (1 mm sqrt(2 ms)))^(1/3), 19 rad/s, those of controller and observer are 20 together.
+
+    The loop of a double integrator, an observer, and this filter with the reference alone is unstable below three times
+    that (eigenvalues of its six states).
+    """
+    robot, errors = load("cogiro"), []
+    noise = {"position": 1e-3, "attitude": 2e-4, "differenced": True}
+    push = 0.05 * robot.weight * np.eye(6)[0]
+    for shown in (lambda follow: follow, Alone):
+        follow = shown(PoseFilter(robot, {"rotation": 2e-4}, jerk=(0.3, 0.3 / robot.length)))
+        controller = Filtered(ComputedTorque(robot), follow)
+        run = simulate(robot, robot.home, controller, noise=noise, duration=0.8, period=2e-3, disturbance=push)
+        errors.append(run.error)
+    assert errors[0].max() < 6e-3
+    assert errors[0][-100:].max() < 1e-3
+    assert errors[1].max() > 0.1
+
+
 LENGTHS = np.full(8, 8.0)
 
 
@@ -181,7 +221,9 @@ LENGTHS = np.full(8, 8.0)
         (lambda follow: PoseFilter(follow.robot, {"length": 1}), "must have only the keys lengths, .*, got 'length'"),
         (lambda follow: PoseFilter(follow.robot, {"lengths": 0}), "sigma.lengths must be a number from 1e-09"),
         (lambda follow: PoseFilter(follow.robot, jerk=(-1, 1)), "jerk must be a number from 0"),
+        (lambda follow: follow.noise(0.0), r"rate must be a number from 0.001"),
         (lambda follow: Filtered(None, follow), "controller must be"),
+        (lambda follow: Filtered(ComputedTorque("planar-4"), follow), "the controller's robot, planar-4, got cogiro"),
         (lambda follow: Filtered(ComputedTorque("cogiro"), 1), "filter must be a PoseFilter, or have its methods"),
     ],
 )

@@ -68,8 +68,7 @@ class PoseFilter(Displayed):
             0.01 rad/s, 0.1 m/s^2, 2 %, 2 %, 0.02 rad/s, 0.2 m/s^2.
         jerk: Densities of the white jerk [m/s^2.5] and [rad/s^2.5]: standard deviations of the change of acceleration
             in a second, relative to a reference if there is one. Default: 10 m/s^2.5, and that over the robot's
-            `length`. With less jerk the filter is slower, and its estimates less noisy. The filter must be several
-            times faster than a controller that uses it.
+            `length`. With less jerk the filter is slower, and its estimates less noisy; see `control.Filtered`.
         sensor: Position of the inertial sensor in the platform frame, (3,) [m]; its axes are those of the platform.
 
     Raises:
@@ -104,6 +103,31 @@ class PoseFilter(Displayed):
         self._input: np.ndarray | None = None
         self._left_out: tuple[int, ...] = ()
         self._step: tuple[float, np.ndarray, np.ndarray] | None = None
+
+    def noise(self, rate: float) -> dict[str, float]:
+        """Return the standard deviations of estimates by noise of poses, as `sensors` of controllers.
+
+        They are `position` [m], `attitude` [rad], `velocity` [m/s] and `attitude_rate` [rad/s]. Estimates are also off
+        by the jerk that the filter permits, about as much, but this is slow, and no noise that controllers amplify.
+        With white jerk q, and noise of the density s = sigma / sqrt(rate), the filter is a Butterworth filter of the
+        bandwidth b = (q / s)^(1/3), and by noise its position has the variance 5/3 s^2 b, its velocity 3/2 s^2 b^3.
+
+        Args:
+            rate: Rate of the measured poses [1/s].
+
+        Raises:
+            InputError: If it is no such number.
+        """
+        root = np.sqrt(number("rate", rate, 1e-3, 1e6))
+        density = np.array([self._sigma["position"], self._sigma["rotation"]]) / root
+        band = np.cbrt(np.array(self._jerk) / density)
+        place, speed = density * np.sqrt(5 / 3 * band), density * np.sqrt(1.5 * band**3)
+        names = ("position", "attitude"), ("velocity", "attitude_rate")
+        return {
+            name: float(value)
+            for pair, values in zip(names, (place, speed), strict=True)
+            for name, value in zip(pair, values, strict=True)
+        }
 
     def update(
         self,
