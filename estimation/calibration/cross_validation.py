@@ -260,7 +260,7 @@ def _mean_square(model: Model, state: State) -> float:
     if model.balanced or model.measurements.directions is not None:
         # Of poses that need forces or directions too, lengths cannot absorb more errors than there are of them.
         absorbed = np.minimum(absorbed, model.robot.m - 1)
-    return squares / max(int(used.sum()) - int(absorbed.sum()), 1)
+    return squares / max(int(np.maximum(used.sum(axis=0) - absorbed, 0).sum()), 1)
 
 
 def poses_fitted(model: Model) -> tuple[Model, State]:

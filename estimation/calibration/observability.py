@@ -65,7 +65,7 @@ def observability(
     fixed = values > unobservable_below(values, length)
     N, V, roots = vectors[:, ~fixed], vectors[:, fixed], np.sqrt(values[fixed])
     shares, turn = np.linalg.eigh((V / roots).T @ B @ (V / roots))
-    left = 1 - np.minimum(shares, MOST_NOISE)
+    left = 1 - np.clip(shares, 0.0, MOST_NOISE)  # noise of poses never adds information
     inverse, covariance = (V / values[fixed]) @ V.T, ((V / roots) @ turn / left**2) @ ((V / roots) @ turn).T
     information = ((V * roots) @ turn * left**2) @ ((V * roots) @ turn).T
     true, axes = np.linalg.eigh(S - B)

@@ -13,18 +13,21 @@ import numpy as np
 
 from ...models import points
 from ..logs.measurements import Measurements
+from ..pose.wrong_lengths import TOLD_APART
 from .fit import fit, held
+from .geometry import length_of
 from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import OF_CABLE, Parameters
 from .products import quadratic_forms
 from .sightings import SEEN
 
-LEVEL = 0.005  # of both tests, for all readings together
+LEVEL = 0.005  # of both tests, for all readings together, and share of sound ones among several outliers
 LEAST_THRESHOLD = 5.0  # sigmas; errors have longer tails than the normal distribution
 SMALLEST_REDUNDANCY = 0.02  # a reading with less hardly shows its own errors
 SHORTEST = 5  # samples on each side of a slip
 CLEAR = 3.0  # a slip is at least this many times the other residuals of its cable
+MOST_LEVERAGED = 5000  # samples; of more, each has little influence on the parameters
 NEARLY = 0.3  # of the clearest slip's statistic, of another cable's that may be the true one
 MOST_CANDIDATES = 3
 WINDOW = 25  # samples on each side, over which a slip must be visible as a step
@@ -36,11 +39,15 @@ BY_CHANCE = 0.3  # of which the ratio of variances may exceed 1 where residuals 
 
 
 class Outlier(NamedTuple):
-    """An outlier: cable and sample, from 0, and its error [m]."""
+    """An outlier: cable and sample, from 0, and its error [m].
+
+    With an unknown pose it is the most likely one, and `others` are the cables that may be wrong instead of it.
+    """
 
     cable: int
     sample: int
     error: float
+    others: tuple[int, ...] = ()
 
 
 class Slip(NamedTuple):
@@ -73,6 +80,25 @@ def _threshold(count: int) -> float:
     from scipy.special import ndtri
 
     return max(LEAST_THRESHOLD, float(-ndtri(LEVEL / max(count, 1))))
+
+
+def _limit(sizes: np.ndarray, count: int, known: int) -> float:
+    """Return the size above which the largest error of a sample is no noise, in standard deviations.
+
+    The first outlier must be beyond `_threshold`. Where there are some, errors are not rare, and the limit is lower: so
+    that only `LEVEL` of all outliers are expected to be sound readings (Benjamini and Hochberg).
+
+    - `sizes`: Largest of each sample, (N,), of `count` readings.
+    - `known`: Number of outliers that are already left out.
+    """
+    from scipy.special import ndtri
+
+    first, ranked = _threshold(count), -np.sort(-sizes)
+    if not known and ranked[0] <= first:
+        return first
+    limits = -ndtri(LEVEL * (known + 1 + np.arange(len(ranked))) / (known + count))
+    beyond = np.flatnonzero(ranked > limits)
+    return float(limits[beyond[-1]]) if beyond.size else first
 
 
 def project(model: Model, state: State, derivatives_too: bool = True) -> _Projected:
@@ -183,32 +209,43 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
     return float(factor), tested & (squares > max(noise, 1e-12) * most)
 
 
-def find_outliers(model: Model, state: State) -> list[Outlier]:
-    """Return outliers, at most one per sample."""
-    found = project(model, state, False)
-    seen = found.redundancy > SMALLEST_REDUNDANCY
+def find_outliers(model: Model, state: State) -> tuple[list[Outlier], np.ndarray]:
+    """Return outliers, at most one per sample, and the readings to leave out because of them, (m, N) of bool."""
+    few = len(state.shift) <= MOST_LEVERAGED
+    found = project(model, state, few)
+    if few and found.equations.S.size:  # parameters, too, adapt to a wrong reading
+        inverse = np.linalg.inv(held(found.equations.S, length_of(model.robot)))
+        for i in range(model.robot.m):
+            rows, columns = without_poses(model, found, i)
+            found.redundancy[i] -= quadratic_forms(rows, inverse[np.ix_(columns, columns)])
+    seen, left = found.redundancy > SMALLEST_REDUNDANCY, np.zeros(found.residuals.shape, dtype=bool)
     if not seen.any():
-        return []
+        return [], left
     size = np.zeros_like(found.residuals)
     size[seen] = np.abs(found.residuals[seen]) / np.sqrt(found.redundancy[seen])
-    limit = _threshold(int(seen.sum())) * max(1.0, 1.4826 * float(np.median(size[seen])))
     worst = np.argmax(size, axis=0)
     samples = np.arange(size.shape[1])
+    known = int((model.weights == 0).any(axis=0).sum())
+    noise = max(1.0, 1.4826 * float(np.median(size[seen])))
+    limit = noise * _limit(size[worst, samples] / noise, int(seen.sum()), known)
     # The smaller half may only be the echo of the larger in other samples, through the parameters.
     wrong = samples[size[worst, samples] > max(limit, 0.5 * float(size.max()))]
-    sigma = model.measurements.sigma.lengths
     if np.isinf(model.pose_sigmas[wrong]).any():
-        return [_attributed(model, state, int(k)) for k in wrong]
+        return [_attributed(model, state, int(k), left[:, k]) for k in wrong], left
+    sigma = model.measurements.sigma.lengths
+    left[worst[wrong], wrong] = True
     return [
         Outlier(int(i), int(k), float(-sigma * found.residuals[i, k] / found.redundancy[i, k]))
         for i, k in zip(worst[wrong], wrong, strict=True)
-    ]
+    ], left
 
 
-def _attributed(model: Model, state: State, sample: int) -> Outlier:
-    """Return the wrong reading of a sample: the one whose removal gives the best fit.
+def _attributed(model: Model, state: State, sample: int, left: np.ndarray) -> Outlier:
+    """Return the wrong reading of a sample, and mark the readings to leave out in `left`, (m,) of bool.
 
-    A large error moves an unknown pose so far that the residuals do not show which reading is wrong.
+    It is the one whose removal gives the best fit: a large error moves an unknown pose so far that the residuals do not
+    show which reading is wrong. Others may explain the sample nearly as well. A wrong choice would leave an error that
+    is too small to be seen, so these are left out too, and the whole sample if the rest does not predict them.
     """
     m, parameters = model.robot.m, Parameters(model.robot, ())
     scales = parameters.table(state.x)[:, 7]
@@ -233,8 +270,15 @@ def _attributed(model: Model, state: State, sample: int) -> Outlier:
     costs = (without.residuals(found).readings ** 2).sum(axis=0)
     costs[used[:, 0] == 0] = np.inf
     cable = int(np.argmin(costs))
-    excess = replace(without, weights=np.ones((m, m))).residuals(found).readings[cable, cable]
-    return Outlier(cable, sample, float(-model.measurements.sigma.lengths * excess))
+    residuals, derivatives = replace(without, weights=np.ones((m, m))).linearised(found)
+    left[:] = costs <= costs[cable] + TOLD_APART**2
+    others = np.flatnonzero(left & (np.arange(m) != cable))
+    rest = NormalEquations.at(replace(without, weights=used * ~left[:, None]), found, metric(without))
+    if others.size and rest.inverse_root is not None:
+        by_pose = (derivatives.poses[left, cable] * without.poses_vary[cable]) @ rest.inverse_root[cable].T
+        left |= 1 / (1 + (by_pose**2).sum(axis=1).max()) < SMALLEST_REDUNDANCY
+    error = float(-model.measurements.sigma.lengths * residuals.readings[cable, cable])
+    return Outlier(cable, sample, error, tuple(others.tolist()))
 
 
 def find_slips(model: Model, state: State, length: float) -> list[Slip]:

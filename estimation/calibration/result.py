@@ -240,9 +240,15 @@ class CalibrationData(Displayed):
 
     @cached_property
     def poses(self) -> np.ndarray:
-        """Return the poses of the platform at the times of the lengths, (N, 6) [m, rad], measured or estimated."""
-        position, rotation = self._solved.model.poses(self._solved.fit.state)
-        return np.hstack([position, points.angles(rotation)])
+        """Return the poses of the platform at the times of the lengths, (N, 6) [m, rad], measured or estimated.
+
+        Unknown poses are nan where any of the readings may be wrong, so that all are left out.
+        """
+        model = self._solved.model
+        position, rotation = model.poses(self._solved.fit.state)
+        poses = np.hstack([position, points.angles(rotation)])
+        poses[np.isinf(model.pose_sigmas).any(axis=1) & (model.weights == 0).all(axis=0)] = np.nan
+        return poses
 
     @property
     def outliers(self) -> tuple[Outlier, ...]:

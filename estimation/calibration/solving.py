@@ -86,9 +86,10 @@ def solve(
         model, result, clocks = with_carrier_clocks(model, result, measurements, None, length)
     wrong: dict[tuple[int, int], Outlier] = {}
     slips: list[Slip] = []
+    misled = model.size_is_open
     limit = LARGEST_SHARE * model.weights.size
     for _ in range(ROUNDS if outliers else 0):
-        found = find_outliers(model, result.state)
+        found, left = find_outliers(model, result.state)
         # Where more than a few readings look wrong, something lasts: they are looked at only if it is no slip.
         many = len(found) > max(2, FEW * len(measurements))
         sought = (many or not found) and len(slips) < MOST_SLIPS
@@ -102,15 +103,17 @@ def solve(
             continue
         if not found or len(wrong) + len(found) > limit:
             if np.array_equal(fitted, model.weights):
-                break
+                if not misled or not wrong:
+                    break
+                misled = False
+                result, model = _again(model, result, length, False)
+                fitted = model.weights
+                continue
             # Readings that looked wrong in the beginning are not.
             result, fitted = fit(model, result.state, length), model.weights
             continue
         wrong |= {(one.cable, one.sample): one for one in found}
-        weights = model.weights.copy()
-        for one in found:
-            weights[one.cable, one.sample] = 0.0
-        model = replace(model, weights=weights)
+        model = replace(model, weights=np.where(left, 0.0, model.weights))
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
     if clocks is not None:
@@ -121,26 +124,30 @@ def solve(
 
 
 def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Model, Fit, np.ndarray]:
-    """Return the model with a further slip, its fit, and the weights of the fit.
-
-    Unknown poses, which the slip has moved, are found again.
-    """
+    """Return the model with a further slip, its fit, and the weights of the fit."""
     parameters = replace(model.parameters, slips=(*model.parameters.slips, (slip.cable, slip.sample)))
     kept = None if model.kept is None else np.pad(model.kept, ((0, 0), (0, 1)))
     model = replace(model, parameters=parameters, kept=kept)
     state = result.state._replace(x=np.append(result.state.x, slip.size))
-    near = fit(model, state, length), model.weights
-    if not np.isinf(model.pose_sigmas).any():
-        return model, *near
-    begin = model.begin()
-    begin.x[model.parameters.clock + OF_ROBOT :] = state.x[model.parameters.clock + OF_ROBOT :]
-    again, used = fit_from(model, begin, length, True)
-    return model, *min(near, (again, used.weights), key=lambda one: _surprise(*one))
+    near = fit(model, state, length)
+    result, used = _again(model, near, length, True) if model.size_is_open else (near, model)
+    return model, result, used.weights
+
+
+def _again(model: Model, result: Fit, length: float, outliers: bool) -> tuple[Fit, Model]:
+    """Return the better of a fit and one from the beginning with the same slips and weights, and its model.
+
+    What was wrong with the readings may have left unknown poses in wrong local minima.
+    """
+    begin, slips = model.begin(), slice(model.parameters.clock + OF_ROBOT, None)
+    begin.x[slips] = result.state.x[slips]
+    again = fit_from(model, begin, length, outliers)
+    return min((result, model), again, key=lambda one: _surprise(one[0], one[1].weights))
 
 
 def _surprise(result: Fit, weights: np.ndarray) -> float:
     """Return the sum of squares of a fit, where each reading that is left out adds the least square of such a one."""
-    return result.cost + LEAST_THRESHOLD**2 * float((weights == 0).sum())
+    return result.cost + LEAST_THRESHOLD**2 * float((weights == 0).any(axis=0).sum())
 
 
 def _weighed(model: Model, result: Fit, length: float, stretches: bool) -> tuple[Model, Fit]:
@@ -245,15 +252,14 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     The first is the square root of the sum of squares over the redundancy: number of readings minus number of unknowns.
     """
     model, state = solved.model, solved.fit.state
-    used = int((model.weights * model.inside(state) > 0).sum())
-    sigmas = model.pose_sigmas[model.poses_vary]
+    inside = model.inside(state)
+    spare = (model.weights * inside > 0).sum(axis=0) + sighted(model.measurements) * inside
+    if model.balanced:
+        spare = spare + model.balanced.equations * (inside if model.unbalanced is None else inside & ~model.unbalanced)
+    spare = spare - (np.isinf(model.pose_sigmas)).sum(axis=1)  # a pose with a finite sigma is an equation, too
     priors = np.isfinite(model.prior_sigmas[model.parameters.varies])
     found = solved.observability.rank
-    if model.balanced:
-        rests = model.inside(state) if model.unbalanced is None else model.inside(state) & ~model.unbalanced
-        used += int(model.balanced.equations[rests].sum())
-    used += int(sighted(model.measurements)[model.inside(state)].sum())
-    redundancy = used + int(np.isfinite(sigmas).sum()) - sigmas.size + int(priors.sum()) - found
+    redundancy = int(np.maximum(spare, 0).sum()) + int(priors.sum()) - found
     if redundancy <= 0:
         return np.nan, 1.0, redundancy
     excess = float(np.sqrt(solved.fit.cost / redundancy))

@@ -54,13 +54,10 @@ def fit_from(
     rough, begin = _rough(model, state, length)
     state = fit(rough, begin, length, enough=ENOUGH).state
     for _ in range(MOST_SEARCHES if outliers else 0):
-        found = find_outliers(rough, state)
-        weights = rough.weights.copy()
-        for one in found:
-            weights[one.cable, one.sample] = 0.0
-        if not found or (weights == 0).sum() > LARGEST_SHARE * weights.size:
+        found, left = find_outliers(rough, state)
+        if not found or (left | (rough.weights == 0)).sum() > LARGEST_SHARE * left.size:
             break
-        rough = replace(rough, weights=weights)
+        rough = replace(rough, weights=np.where(left, 0.0, rough.weights))
         state = fit(rough, state, length, enough=ENOUGH).state
     clean = replace(model, weights=rough.weights)
     clean, state = steadied(clean, _elsewhere(clean, state) or state, length)
