@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from ...base.text import quantity, quantity_row
 from ...models import points
-from ...models.robot import Robot
+from .differences import LogPart
 from .geometry import runs
 
 FEW, MANY = 6, 60  # steps of a first and of a last descent
@@ -57,77 +57,57 @@ NONE = (np.zeros(3), np.eye(3))
 BOTH = (True, True)
 
 
-def fitted_frames(robot: Robot, table: np.ndarray, position: np.ndarray, rotation: np.ndarray, y: np.ndarray) -> Frames:
-    """Return the frames that fit lengths best: one if it fits nearly as well as both.
-
-    - `table`: `Parameters.table` of the robot.
-    - `position`, `rotation`: measured positions (N, 3) [m] and rotations (N, 3, 3).
-    - `y`: readings, (N, m) [m].
-    """
-    rows = np.unique(np.linspace(0, len(y) - 1, min(len(y), MOST_SAMPLES)).astype(int))
-    few = position[rows], rotation[rows], y[rows]
-    home = points.rotations(robot.home[3:])
-    middle, mean = few[0].mean(axis=0), Rotation.from_matrix(few[1]).mean().as_matrix()
+def fitted_frames(log: LogPart) -> Frames:
+    """Return the frames that fit the lengths of a log best: one if it fits nearly as well as both."""
+    few, home = _few(log), points.rotations(log.robot.home[3:])
+    middle, mean = few.position.mean(axis=0), Rotation.from_matrix(few.rotation).mean().as_matrix()
     right_angles = Rotation.create_group("O")
     turns = [*right_angles.as_matrix(), *(Rotation.from_euler("z", 45, degrees=True) * right_angles).as_matrix()]
     starts = [Frames(NONE, NONE)]
     for turn in turns:
-        outer = (robot.home[:3] - turn @ middle, turn)
+        outer = (log.robot.home[:3] - turn @ middle, turn)
         starts += [Frames(outer, NONE), Frames(outer, (np.zeros(3), (turn @ mean).T @ home))]
-    tried = sorted(_descended(robot, table, *few, starts, BOTH, FEW), key=lambda one: one.size)[:KEPT]
-    both = min(_descended(robot, table, *few, tried, BOTH, MANY), key=lambda one: one.size)
-    return _simplest(robot, table, few, both)
+    tried = sorted(_descended(few, starts, BOTH, FEW), key=lambda one: one.size)[:KEPT]
+    return _simplest(few, min(_descended(few, tried, BOTH, MANY), key=lambda one: one.size))
 
 
-def displaced_frames(
-    robot: Robot,
-    table: np.ndarray,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    y: np.ndarray,
-    least: float,
-    noise: float,
-) -> tuple[Frames, float] | None:
+def displaced_frames(log: LogPart, least: float, noise: float) -> tuple[Frames, float] | None:
     """Return the frames near those of the file that fit lengths best, and what is left without them [m].
 
     None if that is not `least` times as much as with them, or as the noise.
     """
-    rows = np.unique(np.linspace(0, len(y) - 1, min(len(y), MOST_SAMPLES)).astype(int))
-    few = position[rows], rotation[rows], y[rows]
-    (before,) = _descended(robot, table, *few, [Frames(NONE, NONE)], BOTH, 0)
-    (both,) = _descended(robot, table, *few, [before], BOTH, MANY)
+    few = _few(log)
+    (before,) = _descended(few, [Frames(NONE, NONE)], BOTH, 0)
+    (both,) = _descended(few, [before], BOTH, MANY)
     if before.size < least * max(both.size, noise):
         return None
-    frames = _simplest(robot, table, few, both)
+    frames = _simplest(few, both)
     return (frames, before.size) if before.size >= least * frames.size else None
 
 
-def _simplest(robot: Robot, table: np.ndarray, few: tuple[np.ndarray, np.ndarray, np.ndarray], both: Frames) -> Frames:
+def _few(log: LogPart) -> LogPart:
+    """Return some samples of a log."""
+    omitted = np.ones(len(log.y), dtype=bool)
+    omitted[np.linspace(0, len(log.y) - 1, min(len(log.y), MOST_SAMPLES)).astype(int)] = False
+    return log.without(omitted)
+
+
+def _simplest(log: LogPart, both: Frames) -> Frames:
     """Return frames of which one is none if that fits nearly as well."""
-    outer = Frames((both.outer[0] + both.outer[1] @ few[1].mean(axis=0) @ both.inner[0], both.outer[1]), NONE)
-    ones = _descended(robot, table, *few, [outer, Frames(NONE, NONE)], (True, False), MANY)
-    ones += _descended(robot, table, *few, [Frames(NONE, both.inner), Frames(NONE, NONE)], (False, True), MANY)
+    outer = Frames((both.outer[0] + both.outer[1] @ log.rotation.mean(axis=0) @ both.inner[0], both.outer[1]), NONE)
+    ones = _descended(log, [outer, Frames(NONE, NONE)], (True, False), MANY)
+    ones += _descended(log, [Frames(NONE, both.inner), Frames(NONE, NONE)], (False, True), MANY)
     return min([both, *ones], key=lambda one: one.size * (SIMPLER if one is both else 1.0))
 
 
-def _descended(
-    robot: Robot,
-    table: np.ndarray,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    y: np.ndarray,
-    starts: Sequence[Frames],
-    which: tuple[bool, bool],
-    steps: int,
-) -> list[Frames]:
+def _descended(log: LogPart, starts: Sequence[Frames], which: tuple[bool, bool], steps: int) -> list[Frames]:
     """Return frames after some Levenberg-Marquardt steps from S starts, all at once.
 
     Their size is the median of the residuals' sizes.
     """
-    given = table, position, rotation, y
     columns, damping = slice(6 * (not which[0]), 12 - 6 * (not which[1])), np.full(len(starts), DAMPING)
     frames = [np.stack(part) for part in zip(*((*one.outer, *one.inner) for one in starts), strict=True)]
-    now, going = _residuals(robot, *given, frames), np.arange(len(starts))
+    now, going = _residuals(log, frames), np.arange(len(starts))
     for _ in range(steps):
         e, J = now[0][going], now[1][going][..., columns]
         limit = np.maximum(3 * np.median(np.abs(e), axis=1, keepdims=True), 1e-12)
@@ -138,7 +118,7 @@ def _descended(
         inverse = np.linalg.pinv(H, ROUNDING, hermitian=True)  # no step where a robot cannot move
         step[:, columns] = -(inverse @ (e[:, None] @ weighted).swapaxes(1, 2))[..., 0]
         tried = _moved([part[going] for part in frames], step)
-        after = _residuals(robot, *given, tried)
+        after = _residuals(log, tried)
         better = np.abs(after[0]).mean(axis=1) < np.abs(e).mean(axis=1)
         for kept, new in zip((*frames, *now), (*tried, *after), strict=True):
             kept[going[better]] = new[better]
@@ -166,28 +146,21 @@ def _placed(frames: Sequence[np.ndarray], position: np.ndarray, rotation: np.nda
     return inside @ T.swapaxes(-1, -2) + t[..., None, :], T[..., None, :, :] @ rotation @ B[..., None, :, :]
 
 
-def _residuals(
-    robot: Robot,
-    table: np.ndarray,
-    position: np.ndarray,
-    rotation: np.ndarray,
-    y: np.ndarray,
-    frames: Sequence[np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
+def _residuals(log: LogPart, frames: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Return lengths less readings up to offsets, (S, m N) [m], and the derivatives by shifts and turns, (S, m N, 12).
 
     - `frames`: t (S, 3), T (S, 3, 3), b and B.
     """
     t, T = frames[:2]
-    x, R = _placed(frames, position, rotation)  # (S, N, 3), (S, N, 3, 3)
-    run = runs(robot, table, x.reshape(-1, 3), R.reshape(-1, 3, 3))
-    shape = (len(y[0]), *x.shape[:2])
+    x, R = _placed(frames, log.position, log.rotation)  # (S, N, 3), (S, N, 3, 3)
+    run = runs(log.robot, log.table, x.reshape(-1, 3), R.reshape(-1, 3, 3))
+    shape = (log.robot.m, *x.shape[:2])
     by_pose = run.by_pose.reshape(*shape, 2, 3).swapaxes(0, 1)  # by shift and turn of the platform, (S, m, N, 2, 3)
-    own = by_pose @ (T[:, None] @ rotation)[:, None]  # likewise in the body's axes
+    own = by_pose @ (T[:, None] @ log.rotation)[:, None]  # likewise in the body's axes
     # A turn of the measured frame is about its origin.
     about_frame = by_pose[..., 1, :] + np.cross((x - t[:, None])[:, None], by_pose[..., 0, :])
     J = np.concatenate([by_pose[..., 0, :], about_frame, own.reshape(*own.shape[:3], 6)], axis=3)  # (S, m, N, 12)
-    e = run.lengths.reshape(shape).swapaxes(0, 1) - y.T
+    e = run.lengths.reshape(shape).swapaxes(0, 1) - log.y.T
     unknown = ~np.isfinite(e + J.sum(axis=3))
     e[unknown], J[unknown] = 1e3, 0.0
     e -= np.median(e, axis=2, keepdims=True)

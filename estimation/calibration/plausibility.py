@@ -115,7 +115,7 @@ def mistake(robot: Robot, measurements: Measurements) -> Mistake | None:
     named = best.weighted < as_given and best.size < EXPLAINED * change
     far = best.size * best.way.factor > FAR * noise if named else as_given > EXPLAINED * change
     if far and framed and len(log.y) >= FEWEST[1]:
-        frames = fitted_frames(robot, table, log.position, log.rotation, log.y)
+        frames = fitted_frames(log)
         moved = frames.of(position, rotation)
         placed = frames.of(log.position, log.rotation)
         there, left = log._replace(position=placed[0], rotation=placed[1]).sound()
@@ -162,7 +162,7 @@ def _displaced(log: LogPart, given: Measurements, noise: float) -> Mistake | Non
     if log.robot.m < MANY_CABLES or len(log.y) < FEWEST[1] or log.robot.dof_mask.sum() < 6:
         return None
     least = DISPLACED if log.robot.m > MANY_CABLES else 3 * DISPLACED
-    found = displaced_frames(log.robot, log.table, log.position, log.rotation, log.y, least, noise)
+    found = displaced_frames(log, least, noise)
     if found is None:
         return None
     frames, before = found
