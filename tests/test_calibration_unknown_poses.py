@@ -140,6 +140,20 @@ def test_a_wrong_reading_that_could_be_of_any_cable_tells_nothing(seed):
     assert lost == set(np.flatnonzero(np.isnan(result.poses[:, 0])).tolist()) != set()
 
 
+@pytest.mark.parametrize(("name", "seed"), [("cogiro", 15), ("planar-4", 1)])
+def test_wrong_readings_are_no_slip(name, seed):
+    """Before they are left out, wrong readings near an end of the record look like a slip there."""
+    robot = load(name)
+    _, _, poses, readings = a_log(robot, seed, 0.3)
+    draw, shape = np.random.default_rng([seed, 1]), readings.shape
+    wrong = (draw.random(shape) < 0.03) * draw.choice([-1, 1], shape) * draw.uniform(0.01, 0.3, shape)
+    poses = poses + draw.normal(0, 1e-3, poses.shape) * robot.dof_mask
+    sigma = {"lengths": NOISE, "position": 1e-3, "rotation": 1e-3}
+    result = calibrate(robot, Measurements((readings + wrong)[:60], poses[:60], sigma=sigma), prior=PRIOR)
+    assert result.outliers
+    assert not result.slips
+
+
 def test_the_winch_that_slipped_is_named():
     """A slip moves the unknown poses, so that the residuals of another cable may show it more clearly."""
     robot = load("caroca")

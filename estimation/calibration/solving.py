@@ -15,10 +15,10 @@ from .balance import Balance
 from .carrier_clocks import CarrierClocks, has_carrier_clocks, with_carrier_clocks
 from .carrier_motion import CarrierMotion
 from .clock import CLOCK_RANGE, begin_with_clock, moves_smoothly
-from .fit import Fit, fit
+from .fit import Fit, fit, held
 from .geometry import length_of
 from .model import Model, State
-from .normal_equations import metric
+from .normal_equations import NormalEquations, metric
 from .observability import Observability
 from .outliers import LEAST_THRESHOLD, Outlier, Slip, autocorrelation, find_outliers, find_slips, find_unbalanced
 from .parameters import IN_BALANCE, OF_ROBOT, Parameters
@@ -103,6 +103,11 @@ def solve(
             continue
         if not found or len(wrong) + len(found) > limit:
             if np.array_equal(fitted, model.weights):
+                doubtful = _doubtful_slip(model, result.state, length)
+                if doubtful is not None:
+                    del slips[doubtful]
+                    model, result = _without_slip(model, result, doubtful, length)
+                    continue
                 if not misled or not wrong:
                     break
                 misled = False
@@ -132,6 +137,25 @@ def _with_slip(model: Model, result: Fit, slip: Slip, length: float) -> tuple[Mo
     near = fit(model, state, length)
     result, used = _again(model, near, length, True) if model.size_is_open else (near, model)
     return model, result, used.weights
+
+
+def _doubtful_slip(model: Model, state: State, length: float) -> int | None:
+    """Return the index of the least certain slip if wrong readings that are left out by now had caused it, or None."""
+    count = len(model.parameters.slips)
+    if not count:
+        return None
+    inverse = np.linalg.inv(held(NormalEquations.at(model, state, metric(model)).S, length))
+    sizes = np.abs(state.x[-count:]) / np.sqrt(np.diag(inverse)[-count:])
+    return int(np.argmin(sizes)) if sizes.min() < LEAST_THRESHOLD else None
+
+
+def _without_slip(model: Model, result: Fit, index: int, length: float) -> tuple[Model, Fit]:
+    """Return the model without one of its slips, and its fit."""
+    slips, column = list(model.parameters.slips), model.parameters.clock + OF_ROBOT + index
+    del slips[index]
+    kept = None if model.kept is None else np.delete(model.kept, column, axis=1)
+    model = replace(model, parameters=replace(model.parameters, slips=tuple(slips)), kept=kept)
+    return model, fit(model, result.state._replace(x=np.delete(result.state.x, column)), length)
 
 
 def _again(model: Model, result: Fit, length: float, outliers: bool) -> tuple[Fit, Model]:
