@@ -22,6 +22,7 @@ from .tasks.scenario import Scenario
 from .tasks.status import MotionStatus
 from .warnings.inside_bodies import between_points, into_each_other, into_places
 from .warnings.instants import Instants
+from .warnings.long_turns import long_turns
 from .warnings.outside_frame import leaves_its_points, outside_frame
 from .warnings.short_cables import short_cables
 from .warnings.slipped_units import slipped_units
@@ -183,7 +184,8 @@ class PlanData(Displayed):
         inside += between_points(seen, scenario.limits.all, limited)
         others = (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))
         units = slipped_units(scenario.robot, scenario.task)
-        return (*units, *leaves_its_points(scenario.task.path), *inside, *others)
+        path = scenario.task.path
+        return (*units, *long_turns(path), *leaves_its_points(path), *inside, *others)
 
     @cached_property
     def infeasible_spans(self) -> tuple[Certificate, ...]:

@@ -10,7 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from towline import Task, available, load, plan, time_along
 from towline.errors import InputError
+from towline.ocp.tasks.paths import LinePath
 from towline.ocp.tasks.task import read_task
+from towline.ocp.warnings.long_turns import long_turns
 from towline.ocp.warnings.slipped_units import slipped_units
 
 from .framed import framed
@@ -172,3 +174,17 @@ def test_a_wind_in_kilometres_per_hour_is_named_in_the_report():
     assert "are these kilometres per hour?" in " ".join(slipped_units(load("wang-flying"), task))
     found = plan("cogiro", {"path": SLIPPED["millimetres"][0]["path"], "duration": 6})
     assert "are these millimetres? towline reads metres" in found.report()
+
+
+def test_a_line_across_the_seam_of_yaw_has_a_shorter_way():
+    """From 3.05 to -3.05 rad a line turns by 6.1 rad, the longer way: to -3.05 + 2 pi it would turn by 0.18 rad."""
+    start, end = [0, 0, 1.2, 0, 0, 3.05], [0.3, 0.2, 1.2, 0, 0, -3.05]
+    refused = plan("ipanema-1", {"path": {"kind": "line", "start": start, "end": end}, "duration": 4})
+    assert not refused.feasible
+    assert "to a yaw of 3.23319 rad" in refused.report()
+    shorter = {"kind": "line", "start": start, "end": [*end[:5], -3.05 + 2 * np.pi]}
+    found = plan("ipanema-1", {"path": shorter, "duration": 4})
+    assert found.feasible
+    assert not found.warnings
+    whole = {"kind": "line", "start": [0, 0, 1.2], "end": [0, 0, 1.2, 0, 0, 2 * np.pi]}  # a whole turn is meant
+    assert long_turns(LinePath.model_validate(whole)) == []

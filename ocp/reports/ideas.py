@@ -17,6 +17,7 @@ from ..tasks.paths import LinePath
 from ..tasks.scenario import ATTITUDE, POSITION, Scenario
 from ..tasks.task_limits import OF_BODY
 from ..tasks.wind_set import WindBox, WindDisc
+from ..warnings.long_turns import OTHER_WAY
 from ..warnings.outside_frame import LEAVES
 from ..warnings.slipped_units import TOO_LARGE
 
@@ -32,7 +33,7 @@ def ideas(plan: PlanData) -> list[Fact]:
     if plan.feasible:
         return []
     if plan.relaxations:
-        return [*_obstacles(plan), *_carriers(plan), *_strength(plan)]
+        return [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan)]
     found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"of those tried makes it feasible: no duration, limit, {tried}")]
@@ -47,9 +48,11 @@ def units(plan: PlanData) -> list[Fact]:
 
 
 def _directions(plan: PlanData) -> list[Fact]:
-    """Return which coordinates of the path must not change, for a path outside the robot's degrees of freedom."""
+    """Return the shorter ways of lines to their attitudes, and which coordinates must not change without `dof`."""
+    shorter = [("another path", sentence) for sentence in plan.warnings if OTHER_WAY in sentence]
     names = [excess.about.removeprefix("platform ") for excess in plan.audit.excess if excess.limit == "dof"]
-    return [("another path", f"one that keeps {', '.join(names)} as at home, outside `platform.dof`")] if names else []
+    kept = [("another path", f"one that keeps {', '.join(names)} as at home, outside `platform.dof`")] if names else []
+    return shorter + kept
 
 
 def _obstacles(plan: PlanData) -> list[Fact]:
