@@ -1,6 +1,7 @@
 """Past obstacles without a guess from the user: a team of quadrotors takes its load through a slot and back."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -118,7 +119,7 @@ def test_a_time_limit_ends_a_search():
         assert found.reason.startswith("the time limit of")
         assert found.audit.excess or found.audit.violation.max() > found.audit.tolerance  # of the best attempt
     assert took[1] < 1.0 + 2 * took[0]
-    assert found.reason in found.report()
+    assert found.reason in replace(found, offers=tuple).report()  # what is offered takes three times as long
 
 
 def test_quadrotors_go_through_a_slot_and_back():
