@@ -12,7 +12,9 @@ the plan need in addition to c: r = 1 and u = 0 are the plan itself. Each facet 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -26,7 +28,7 @@ from ..models.parsing import to_yaml
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory, moved_on
-from ..solvers import Certificate, certify, solve_batch
+from ..solvers import Certificate, TensionProblem, certify, solve_batch
 from ..solvers.available_wrench import facets
 from ..solvers.in_place import RHO
 from .distribution import wrench_problem
@@ -138,17 +140,18 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
     if any(carrier.efforts for carrier in robot.carriers):
         return _of_team(robot, team_stop_along(robot, _continued(trajectory, end), begins))
     trajectory = _continued(trajectory, end)
-    best: tuple[tuple[int, float], Stop] | None = None
+    best: tuple[tuple[int, float], Stop, TensionProblem] | None = None
+    instants = cache(lambda first: _instants(robot, trajectory, first))  # which all attempts have in common
     for reserve, goes_on in ATTEMPTS:
-        law = _refined(_braking(_Limits(robot, trajectory, begins, reserve, goes_on)))
-        missing, found = _audited(robot, trajectory, law)
-        if found.feasible:
+        law = _refined(_braking(_Limits(instants, begins, end, reserve, goes_on)))
+        found, missing, worst = _audited(robot, trajectory, law)
+        if missing <= MISSING * robot.force_scale:
             return found
         # Of two that miss little, or nearly the same, the shorter one.
         rank = (round(missing / (LITTLE * robot.force_scale)), found.duration)
-        best = (rank, found) if best is None or rank < best[0] else best
+        best = (rank, found, worst) if best is None or rank < best[0] else best
     assert best is not None
-    return best[1]
+    return replace(best[1], certificate=certify(best[2]))
 
 
 def _of_team(robot: Robot, found: TeamStop) -> Stop:
@@ -196,10 +199,11 @@ class _Law(NamedTuple):
 class _Limits:
     """The range of u at times of a plan, from the limits of tensions and of the accelerations of carriers."""
 
-    def __init__(self, robot: Robot, trajectory: Trajectory, begins: float, reserve: float, goes_on: bool):
-        self.begins, self._apart, self._goes_on = begins, WINDOW / INSTANTS, goes_on
-        self._end = trajectory.duration or 0.0
-        self._bounds = lambda first: _bounds(robot, trajectory, first + self._apart * np.arange(INSTANTS), reserve)
+    def __init__(
+        self, instants: Callable[[float], _Instants], begins: float, end: float, reserve: float, goes_on: bool
+    ):
+        self.begins, self._apart, self._goes_on, self._end = begins, WINDOW / INSTANTS, goes_on, end
+        self._bounds = lambda first: instants(first).bounds(reserve)
         self._rows = self._bounds(begins)
         self._extend(0)
 
@@ -281,9 +285,29 @@ class _Bounds(NamedTuple):
         return least, most
 
 
-def _bounds(robot: Robot, trajectory: Trajectory, tau: np.ndarray, reserve: float) -> _Bounds:
-    """Return the bounds of u at times of a plan (n,) [s]; tensions keep the share `reserve` of their range."""
-    platform, carriers = trajectory.at(tau)
+class _Instants(NamedTuple):
+    """What n instants have in common for any reserve: wrenches a u + b x + c along the normals of k facets, (n, k)."""
+
+    a: np.ndarray  # nan where a facet bounds nothing
+    b: np.ndarray
+    c: np.ndarray
+    low: np.ndarray  # of what the cables can give
+    high: np.ndarray
+    carriers: tuple[np.ndarray, np.ndarray, np.ndarray]  # vv, vg and gg of `_Bounds`
+
+    def bounds(self, reserve: float) -> _Bounds:
+        """Return the bounds of u; tensions keep the share `reserve` of their range."""
+        inside, now = reserve * (self.high - self.low), self.b + self.c
+        # At most half of what the plan itself keeps, so that it stays possible and can be left.
+        low = self.low + np.clip((now - self.low) / 2, 0.0, inside)
+        high = self.high - np.clip((self.high - now) / 2, 0.0, inside)
+        low, high = np.minimum(low, now) - self.c, np.maximum(high, now) - self.c
+        return _Bounds(self.a, self.b, low, high, *self.carriers)
+
+
+def _instants(robot: Robot, trajectory: Trajectory, first: float) -> _Instants:
+    """Return the instants of a window of a plan that begins at `first` [s]."""
+    platform, carriers = trajectory.at(first + WINDOW / INSTANTS * np.arange(INSTANTS))
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     scale, still = robot.wrench_scale[rows], np.zeros_like(platform[0])
     whole = dynamics.wrench_matrix(platform[0], carriers[0])
@@ -295,16 +319,11 @@ def _bounds(robot: Robot, trajectory: Trajectory, tau: np.ndarray, reserve: floa
     available = facets(whole[:, rows] * scale[:, None], robot.t_min, robot.t_max)
     a, b, c = (np.einsum("nki,ni->nk", available.normals, part[:, rows] * scale) for part in (a, b, c))
     a[np.abs(a) < FLAT * robot.force_scale] = np.nan
-    inside, now = reserve * (available.high - available.low), b + c
-    # At most half of what the plan itself keeps, so that it stays possible and can be left.
-    low = available.low + np.clip((now - available.low) / 2, 0.0, inside)
-    high = available.high - np.clip((available.high - now) / 2, 0.0, inside)
-    low, high = np.minimum(low, now) - c, np.maximum(high, now) - c
     limited = [k for k, carrier in enumerate(robot.carriers) if carrier.motion_limits.acceleration is not None]
     largest = np.array([robot.carriers[k].motion_limits.acceleration for k in limited], dtype=float)
     v, g = (part[:, limited, :3] / largest[:, None] for part in carriers[1:])
     vv, vg, gg = (np.einsum("nci,nci->nc", *two) for two in ((v, v), (v, g), (g, g)))
-    return _Bounds(a, b, low, high, np.where(vv > STILL, vv, np.nan), vg, gg)
+    return _Instants(a, b, c, available.low, available.high, (np.where(vv > STILL, vv, np.nan), vg, gg))
 
 
 def _braking(limits: _Limits) -> _Law:
@@ -347,8 +366,8 @@ def _slowed(motion: Motion, law: _Law) -> Motion:
     return pose, rate * velocity, rate**2 * acceleration + slope * velocity
 
 
-def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[float, Stop]:
-    """Return how much of the wrench the tensions of a stop miss most [N], and the stop."""
+def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[Stop, float, TensionProblem]:
+    """Return a stop, how much of the wrench its tensions miss most [N], and the problem of that instant."""
     platform, carriers = trajectory.at(law.tau)
     slowed, dynamics, mask = _slowed(platform, law), dynamics_of(robot), robot.dof_mask
     A = dynamics.wrench_matrix(platform[0], carriers[0])
@@ -358,8 +377,7 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[float, St
     tensions = solve_batch(A, w, robot.t_min, robot.t_max, t_ref=near, length=robot.length, rho=RHO).tensions
     missing = np.linalg.norm((w - (A @ tensions[:, :, None])[..., 0]) * robot.wrench_scale, axis=1)
     worst = int(np.argmax(missing))
-    broken = missing[worst] > MISSING * robot.force_scale
-    return float(missing[worst]), Stop(
+    found = Stop(
         robot=robot,
         begins=float(law.tau[0]),
         ends=float(law.tau[-1]),
@@ -368,5 +386,6 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[float, St
         carriers=_slowed(carriers, law),
         tensions=tensions,
         distance=float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum()),
-        certificate=certify(wrench_problem(robot, A[worst], w[worst])) if broken else None,
+        certificate=None,
     )
+    return found, float(missing[worst]), wrench_problem(robot, A[worst], w[worst])

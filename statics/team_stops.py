@@ -127,6 +127,12 @@ def _pull(robot: Robot, index: int, forces: np.ndarray) -> tuple[np.ndarray, np.
     return robot.anchors[cables[0]], -forces[:, :, cables].sum(axis=2)
 
 
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the cross products (..., 3), as `np.cross` does, in a quarter of its time."""
+    before, after = [2, 0, 1], [1, 2, 0]
+    return a[..., after] * b[..., before] - a[..., before] * b[..., after]
+
+
 def _least(square: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return the solution of square systems; if they are singular, nearly that of least norm."""
     size = np.trace(square, axis1=1, axis2=2)[:, None, None]
@@ -201,7 +207,10 @@ class _Stops:
         return result[1], result[2]
 
     def _slope(self, values: np.ndarray) -> np.ndarray:
-        return np.gradient(values, axis=1) / self.h.reshape(-1, *[1] * (values.ndim - 1))
+        slope = np.empty_like(values)  # `np.gradient`, in a third of the time
+        slope[:, 1:-1] = (values[:, 2:] - values[:, :-2]) / 2
+        slope[:, 0], slope[:, -1] = values[:, 1] - values[:, 0], values[:, -1] - values[:, -2]
+        return slope / self.h.reshape(-1, *[1] * (values.ndim - 1))
 
     def _smooth(self, values: np.ndarray, lands: bool) -> np.ndarray:
         """Smooth a result; the last value stays, or, if it `lands`, the last slope is zero."""
@@ -263,18 +272,20 @@ def _worst(
 
     A `reserve` of the range counts as beyond. Unless a stop should begin inside, so much as it has first is no excess.
     """
+    names, values = [row[0] for row in rows], np.stack([row[1] for row in rows])  # (k, d, n)
+    low, high = np.array([row[2:] for row in rows]).T[..., None, None]  # (k, 1, 1) each
+    room = reserve * (high - low)
+    floor, ceiling = low + room, high - room
+    if not begins_inside:
+        floor, ceiling = np.minimum(floor, values[..., :1]), np.maximum(ceiling, values[..., :1])
+    beyond = np.maximum(floor - values, values - ceiling) / (high - low)
     worst, text = np.zeros(len(times)), [(0.0, "")] * len(times)
-    for name, values, low, high in rows:
-        room = reserve * (high - low)
-        floor, ceiling = np.full((len(times), 1), low + room), np.full((len(times), 1), high - room)
-        if not begins_inside:
-            floor, ceiling = np.minimum(floor, values[:, :1]), np.maximum(ceiling, values[:, :1])
-        beyond = np.maximum(floor - values, values - ceiling) / (high - low)
-        k = np.argmax(beyond, axis=1)
-        for d in np.flatnonzero(beyond[np.arange(len(k)), k] > np.maximum(worst, ACCEPTED)):
-            worst[d], value = beyond[d, k[d]], values[d, k[d]]
-            bound = low if value < low else high
-            text[d] = worst[d], f"{name}: {quantity(value)} of {bound:g} at {quantity(times[d, k[d]], 's')}"
+    for d, excess in enumerate(beyond.max(axis=(0, 2)).tolist()):
+        if excess > ACCEPTED:
+            k, at = np.unravel_index(np.argmax(beyond[:, d]), beyond[:, d].shape)
+            worst[d], value = excess, values[k, d, at]
+            bound = float(low[k, 0, 0] if value < low[k, 0, 0] else high[k, 0, 0])
+            text[d] = excess, f"{names[k]}: {quantity(value)} of {bound:g} at {quantity(times[d, at], 's')}"
     return worst, text
 
 
@@ -304,7 +315,7 @@ def _limits(
     spin, spun = (points.axial(down @ part) for part in turning[1:])
     force = (down @ (body.mass * (acceleration[..., :3] - gravity) - pull)[..., None])[..., 0]
     J = inertia_matrix(body.inertia)
-    moment = spun @ J + np.cross(spin, spin @ J) - np.cross(anchor, (down @ pull[..., None])[..., 0])
+    moment = spun @ J + _cross(spin, spin @ J) - _cross(anchor, (down @ pull[..., None])[..., 0])
     wrench, of_commands = np.concatenate([force, moment], axis=-1), np.array([a.wrench for a in carrier.actuators])
     commands, name, own = wrench @ np.linalg.pinv(of_commands), carrier.name, carrier.motion_limits
     rows = [(f"{a.name} of {name}", commands[..., k], a.low, a.high) for k, a in enumerate(carrier.actuators)]
