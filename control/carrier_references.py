@@ -16,6 +16,8 @@ from .records import MOST_TETHERS, TETHER
 
 LEAST_REACH = 0.02  # of the mean length of cables of fixed length: with less, errors of the load are not corrected
 SHARE = 0.95  # of the radius of a carrier's motion: beyond, its coordinates are taken to be there
+LEAVES = 0.8  # of that: references beyond it get other coordinates
+SOME = 40  # references of which one becomes the centre of coordinates
 
 
 class Moved(ABC):
@@ -24,6 +26,7 @@ class Moved(ABC):
     freed: np.ndarray  # carrier and coordinate of each one that may leave the reference, (f, 2) or (0, 2)
     tethers: np.ndarray  # carriers held by cables of fixed length, (k,) of `TETHER`
     count: int  # number of coordinates, f
+    recentred = False  # whether the coordinates are others than when this was last set to False
 
     @abstractmethod
     def reset(self) -> None:
@@ -32,6 +35,10 @@ class Moved(ABC):
     @abstractmethod
     def along(self, platform: np.ndarray, carriers: np.ndarray) -> np.ndarray:
         """Return the coordinates and two derivatives, (K, 3, f), for motions (K, 3, 6) and (K, c, 3, 6)."""
+
+    def recentre(self, platform: np.ndarray, carriers: np.ndarray) -> None:
+        """Take other coordinates, and set `recentred`, where those of motions as in `along` are near their bounds."""
+        return None
 
     @abstractmethod
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -182,14 +189,16 @@ class Tethered(Late):
 
     def __init__(self, robot: Robot, delay: float, stage: float):
         self.freed = np.zeros((0, 2), dtype=np.int64)
-        self.tethers = _tethers(robot)
-        self.count, self._robot = int((MOST_TETHERS - self.tethers["cables"]).sum()), record_of(robot)
+        self._model, self._robot = robot, record_of(robot)
+        self._at_home = _tethers(robot, robot.home[None], robot.carrier_home[None])
+        self.count = int((MOST_TETHERS - self._at_home["cables"]).sum())
         self._wait_for(delay, stage)
         self.reset()
 
     @override
     def reset(self) -> None:
         self._now, self._measured = np.zeros((1, 3, self.count)), np.zeros((0, 12))
+        self.tethers, self.recentred = self._at_home, True
         self._pending.reset(self.count)
 
     @override
@@ -198,6 +207,15 @@ class Tethered(Late):
         motions = np.ascontiguousarray(np.concatenate([platform[:, None], carriers], axis=1))
         control_coordinates(self._robot, self.tethers, motions, result)
         return result
+
+    @override
+    def recentre(self, platform: np.ndarray, carriers: np.ndarray) -> None:
+        places = np.split(
+            self.along(platform, carriers)[:, 0] ** 2, np.cumsum(MOST_TETHERS - self.tethers["cables"]), 1
+        )
+        far = np.array([place.sum(axis=1).max() for place in places[:-1]])
+        if (far > (LEAVES * self.tethers["farthest"]) ** 2).any():
+            self.tethers, self.recentred = _tethers(self._model, platform[:, 0], carriers[:, :, 0]), True
 
     @override
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:
@@ -242,15 +260,19 @@ def moved_coordinates(
     return moved, np.full(moved.count, max(far.max(), LEAST_REACH * float(robot.fixed_lengths.mean())))
 
 
-def _tethers(robot: Robot) -> np.ndarray:
-    """Return the carriers held by cables of fixed length, (c,) of `TETHER`.
+def _tethers(robot: Robot, poses: np.ndarray, carriers: np.ndarray) -> np.ndarray:
+    """Return the carriers held by cables of fixed length, (c,) of `TETHER`, with coordinates for these references.
+
+    The coordinates of a carrier are zero in the middle of the directions that it has seen from the platform.
+
+    - `poses`, `carriers`: poses of platform, (K, 6), and carriers, (K, c, 6).
 
     Raises `InputError` if a carrier has no cable or more than three of them.
     """
     lengths: Any = robot.fixed_lengths
-    anchors, attachments = dynamics_of(robot).points(robot.home, robot.carrier_home)
-    cy, sy = np.cos(robot.home[5]), np.sin(robot.home[5])
-    level = np.array([[cy, sy, 0], [-sy, cy, 0], [0, 0, 1]])
+    anchors, attachments = dynamics_of(robot).points(poses, carriers)
+    cy, sy, no, one = np.cos(poses[:, 5]), np.sin(poses[:, 5]), np.zeros(len(poses)), np.ones(len(poses))
+    level = np.stack([cy, sy, no, -sy, cy, no, no, no, one], axis=1).reshape(-1, 3, 3)
     result = np.zeros(len(robot.carriers), TETHER)
     for index, (row, carrier) in enumerate(zip(result, robot.carriers, strict=True)):
         which = np.flatnonzero(robot.carrier_of_cable == index)
@@ -259,14 +281,22 @@ def _tethers(robot: Robot) -> np.ndarray:
                 f"robot must have one to three cables of fixed length on each carrier, got {robot.name!r} with "
                 f"{len(which)} on {carrier.name!r}"
             )
-        held = (anchors - attachments)[which] @ level.T
-        axes = np.linalg.svd(held)[2]  # the first span what the cables hold at home, and go behind the free ones
+        places = (level @ (carriers[:, index, :3] - attachments[:, which].mean(axis=1))[..., None])[..., 0]
+        k = _middle_of(places)
+        axes = np.linalg.svd((anchors - attachments)[k, which] @ level[k].T)[2]
+        # The first span what the cables hold there, and go behind the free ones.
         axes = np.concatenate([axes[len(which) :], axes[: len(which)]])
-        place = level @ (robot.carrier_home[index, :3] - attachments[which].mean(axis=0))
-        at_home = axes @ place
+        at_home = axes @ places[k]
         row["carrier"], row["cables"], row["cable"][: len(which)] = index, len(which), which
         row["length"][: len(which)], row["at_home"], row["axes"] = lengths[which], at_home, axes
-        baseline = np.ptp(attachments[which], axis=0)
+        baseline = np.ptp(attachments[k, which], axis=0)
         radius = lengths[which].mean() ** 2 - (baseline @ baseline) / 4
         row["farthest"] = SHARE * np.sqrt(max(radius, 0.0))
     return result
+
+
+def _middle_of(places: np.ndarray) -> int:
+    """Return the index of the one of some places (K, 3) whose direction is closest to the most different one."""
+    some = np.unique(np.linspace(0, len(places) - 1, SOME).astype(int))
+    directions = places / np.maximum(np.linalg.norm(places, axis=1, keepdims=True), 1e-300)
+    return int(some[(directions[some] @ directions.T).min(axis=1).argmax()])

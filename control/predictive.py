@@ -321,6 +321,8 @@ class Predictive(ComputedTorque):
     def _predict(self, time: float, dt: float, reference: Reference) -> np.ndarray | None:
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
         bounds, now = self._problems.bounds[:, 0], self._preview.rows([reference])
+        if self._preview.recentred:  # the last solution has other coordinates
+            self._solved, self._preview.recentred = np.nan, False
         placed = self._moved.now(dt, self._measured[0], self._preview.moved_of(now))
         if not all(np.isfinite(part).all() for part in (self._problems.w, *now[:2])):
             self._solved = np.nan

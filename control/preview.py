@@ -41,6 +41,7 @@ class Preview:
             must = f"the pitch at home must be at most {STEEPEST} rad for predictive control"
             raise InputError(f"{must}, got {pitch:g} rad; other axes of the platform's frame avoid it")
         self._robot, self._unknown = robot, tensions
+        self.recentred = False  # whether the moved coordinates are others than when this was last set to False
         self.reset()
 
     def lay_out(self, steps: np.ndarray, moved: Moved) -> None:
@@ -83,9 +84,19 @@ class Preview:
             platform[:, 0, 3:] = np.unwrap(platform[:, 0, 3:], axis=0)
             of_carriers[:, 0, :, 3:] = np.unwrap(of_carriers[:, 0, :, 3:], axis=0)
             motions[:, 0, 6 : 6 + carriers] = of_carriers[:, 0].reshape(count, -1)
-        motions[..., 6 + carriers :] = self._moved.along(platform, of_carriers.swapaxes(1, 2))
+        self._moved.recentre(platform, of_carriers.swapaxes(1, 2))
+        if self._moved.recentred:
+            self.recentred, self._moved.recentred = True, False
+            if self._announced is not None:
+                self._set_moved(self._announced[2].motions)
+        self._set_moved(motions)
         tensions = [self._unknown if each.tensions is None else each.tensions for each in references]
         return Rows(motions, np.array(tensions, dtype=float), [each.load for each in references])
+
+    def _set_moved(self, motions: np.ndarray) -> None:
+        """Write the moved coordinates of motions, (K, 3, 6 + 6 c + f)."""
+        bodies = motions[..., : motions.shape[2] - self._moved.count].reshape(len(motions), 3, -1, 6).swapaxes(1, 2)
+        motions[..., motions.shape[2] - self._moved.count :] = self._moved.along(bodies[:, 0], bodies[:, 1:])
 
     def moved_of(self, rows: Rows) -> np.ndarray:
         """Return position, rate and acceleration of the moved coordinates in the first row, (3, f)."""

@@ -594,3 +594,41 @@ def test_carriers_come_to_rest_no_harder_than_they_can():
         assert np.abs(orders[0, 2, :3]).max() <= strongest
         moved.now(stage, np.zeros((2, 12)), np.zeros((3, 3)))
     np.testing.assert_allclose(moved.now(stage, np.zeros((2, 12)), np.zeros((3, 3)))[1], 0, atol=1e-12)
+
+
+def test_carriers_turn_far_about_a_load_at_rest():
+    """Three carriers 50 degrees off the vertical turn by 150 degrees: up to 95 degrees between directions of a cable.
+
+    By statics each tension is weight / (3 cos 50 degrees). Coordinates about the directions at home end at 72 degrees.
+    """
+    far, lean, turned, T = 2.0, np.radians(50), np.radians(150), 1.8
+    share = np.linspace(0, 1, 26)
+    law = share**3 * (10 - 15 * share + 6 * share**2)
+    carriers, cables, paths = [], [], {}
+    for i, start in enumerate(2 * np.pi * np.arange(3) / 3):
+        name, angle = f"r{i}", start + turned * law
+        places = np.zeros((26, 6))
+        places[:, 0], places[:, 1] = far * np.sin(lean) * np.array([np.cos(angle), np.sin(angle)])
+        places[:, 2] = 1.0 + far * np.cos(lean)
+        paths[name] = {"kind": "samples", "times": (T * share).tolist(), "poses": places.tolist()}
+        reach = {"min": [-3, -3, 0], "max": [3, 3, 4]}
+        limits = {"speed_max": 5, "acceleration_max": 20, "reach": reach}
+        carriers.append({"name": name, "kind": "mobile", "home": places[0].tolist()} | limits)
+        cables.append({"carrier": name, "anchor": [0, 0, 0], "attachment": [0, 0, 0], "t_min": 1, "t_max": 200})
+    robot = Robot.model_validate(
+        {
+            "name": "turning",
+            "source": "a test",
+            "platform": {"mass": 10, "dof": ["x", "y", "z"], "home": [0, 0, 1, 0, 0, 0]},
+            "carriers": carriers,
+            "drive": "fixed-length",
+            "cables": cables,
+        }
+    )
+    task = {"path": {"kind": "rest", "pose": [0, 0, 1]}, "duration": T, "base": {"kind": "given", "paths": paths}}
+    found = plan(robot, task)
+    assert found.feasible
+    run = simulate(robot, found, Predictive(robot), period=0.004)
+    assert run.answered["as planned"] == len(run.error)
+    assert run.error.max() < 5e-4
+    assert run.record.tensions.min() > 0.99 * 10 * 9.81 / (3 * np.cos(lean))
