@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -15,15 +15,15 @@ ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "°": math.pi / 180}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 MOST_FIELDS = 2_000_000  # some microseconds each; NetCDF may have more
 MOST_COLUMNS = 1000
-BLOCK = 20_000  # lines
+BLOCK = 2_000_000  # characters
 ENDS = "\n\r\v\f\x1c\x1d\x1e\x85\u2028\u2029"  # of lines, for `str.splitlines`
 Rows = list[tuple[int, str]]  # some lines of a file, with their numbers from 1
 
 
 def read_columns(
     text: str, factor: Callable[[str, str], float], gaps: bool = False, most: int = MOST_FIELDS
-) -> tuple[dict[str, np.ndarray], list[int]]:
-    """Return columns in SI units by their names, (N,), and the numbers of their lines, from 1.
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Return columns in SI units by their names, (N,), and the numbers of their lines, from 1, (N,) of int.
 
     The header is such as `x [mm], yaw [deg]`; columns are separated by commas, semicolons or tabs. Empty lines and
     those that begin with # are left out. `factor` returns the factor to SI units for a name and a unit, see
@@ -31,32 +31,35 @@ def read_columns(
 
     Raises `InputError` that names line and column, but not the file.
     """
-    lines = _lines(text, most)
-    numbers = [k for k, line in enumerate(lines, 1) if (begin := line.lstrip()[:1]) and begin != "#"] or [1]
-    lines = lines or [""]
-    mark = max(",;\t", key=lines[numbers[0] - 1].count)
-    for number in numbers:
-        if (count := 1 + lines[number - 1].count(mark)) > MOST_COLUMNS:
-            raise InputError(f"line {number} must have at most {MOST_COLUMNS} columns, got {count}")
+    _check_size(text, most)
+    first = [row for _, row in zip(range(2), (row for block in _blocks(text) for row in block), strict=False)]
+    header = first[0][1] if first else ""
+    mark = max(",;\t", key=header.count)
     factors: dict[str, float] = {}
     try:
-        titles = [printable(cell.strip()) for cell in _split(lines[numbers[0] - 1], mark)]
-        below = numbers[1:]
-        begin = _split(lines[below[0] - 1], mark) if gaps and below else []
+        _check_width(first[:1], mark)
+        titles = [printable(cell.strip()) for cell in _split(header, mark)]
+        begin = _split(first[1][1], mark) if gaps and len(first) > 1 else []
         used = [k for k in range(len(titles)) if len(begin) != len(titles) or not _is_text(begin[k])]
         for name, unit in _names_and_units([titles[k] for k in used]):
             if name in factors:
                 raise InputError(f"must have each column once, got {name} twice")
             factors[name] = factor(name, unit)
-        table = np.empty((len(below), len(used)))
-        for first in range(0, len(below), BLOCK):
-            rows = [(number, lines[number - 1]) for number in below[first : first + BLOCK]]
-            table[first : first + BLOCK] = _numbers(rows, mark, titles, used, gaps)
+        count = max(sum(map(len, _blocks(text))) - 1, 0)
+        table, numbers = np.empty((count, len(used))), np.empty(count, dtype=int)
+        done = -1  # of the rows, the header among them
+        for block in _blocks(text):
+            rows = block[1:] if done < 0 else block
+            done += len(block)
+            _check_width(rows, mark)
+            if rows:
+                table[done - len(rows) : done] = _numbers(rows, mark, titles, used, gaps)
+                numbers[done - len(rows) : done] = [number for number, _ in rows]
     except csv.Error as error:  # a field of more than 131 072 characters
         raise InputError(f"must be CSV that can be read, got {error}") from None
     for column, scale in zip(table.T, factors.values(), strict=True):
         column *= scale
-    return dict(zip(factors, table.T, strict=True)), below
+    return dict(zip(factors, table.T, strict=True)), numbers
 
 
 def unit_factor(name: str, unit: str, units: Mapping[str, float] | None, names: str) -> float:
@@ -68,12 +71,27 @@ def unit_factor(name: str, unit: str, units: Mapping[str, float] | None, names: 
     return units[unit]
 
 
-def _lines(text: str, most: int) -> list[str]:
-    """Return the lines of a text, or raise InputError if there are so many fields that reading takes too long."""
+def _check_size(text: str, most: int) -> None:
+    """Raise InputError if a text has so many fields that reading takes too long."""
     fields = sum(text.count(end) for end in ENDS) - text.count("\r\n") + max(text.count(mark) for mark in ",;\t")
     if fields > most:
         raise InputError(f"must have at most {most} fields, got {fields}")
-    return text.splitlines()
+
+
+def _check_width(rows: Rows, mark: str) -> None:
+    for number, line in rows:
+        if (count := 1 + line.count(mark)) > MOST_COLUMNS:
+            raise InputError(f"line {number} must have at most {MOST_COLUMNS} columns, got {count}")
+
+
+def _blocks(text: str) -> Iterator[Rows]:
+    """Yield the lines of a text that are neither empty nor comments, some at a time: all would need more memory."""
+    begin, before = 0, 0
+    while begin < len(text):
+        end = text.find("\n", begin + BLOCK) + 1 or len(text)
+        lines = text[begin:end].splitlines()
+        yield [(k, line) for k, line in enumerate(lines, before + 1) if (sign := line.lstrip()[:1]) and sign != "#"]
+        begin, before = end, before + len(lines)
 
 
 def _split(line: str, mark: str) -> list[str]:

@@ -205,13 +205,17 @@ def test_scores_of_blocks_are_the_same_in_parts(monkeypatch):
     assert autocorrelation(model, model.begin(), np.eye(p), p, 1.0) == pytest.approx(whole, rel=1e-9)
 
 
-def test_memory_of_a_long_log():
-    """At most 1 kB a sample of eight cables, so that a million samples need 1 GB."""
-    built = as_built(40_000, 1)
-    log = built.measurements()
-    del built
+@pytest.mark.parametrize("clock", [(), ("clock",)])
+def test_memory_of_a_long_log(clock):
+    """At most 0.75 kB a sample of eight cables: a million samples need 1 GB with the log and all that is imported."""
+    robot, draw, times, count = load("cogiro"), np.random.default_rng(1), 1e-3 * np.arange(30_000), 30_000
+    swing = np.outer([1.1, 0.7, 0.9, 0.6, 0.8, 0.5], [times, times + 0.02]).reshape(6, 2, count)
+    poses, later = (robot.home + [1, 0.8, 0.4, 0.1, 0.1, 0.2] * np.sin(one.T) for one in swing.swapaxes(0, 1))
+    lengths = Dynamics(robot).cable_lengths(later) + draw.normal(0, 1e-3, (count, robot.m))
+    log = Measurements(lengths, poses, times=times)
     tracemalloc.start()
-    calibrate("cogiro", log)
+    found = calibrate(robot, log, free=("anchors", "offsets", *clock))
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert peak < 1000 * 40_000 + 60e6  # of the derivatives of a part
+    assert found.clock == pytest.approx(0.02 * bool(clock), abs=1e-4)
+    assert peak < 750 * count + 20e6  # of the derivatives of a part

@@ -187,7 +187,7 @@ def _compare(solved: Solved, sets: list[tuple[str, ...]], prior: dict[str, float
     of = solved.model
     wholes = {}
     for clock in {"clock" in one for one in sets} | {False}:
-        whole = model_of(of.robot, measurements, ("clock",) if clock else (), {})
+        whole = model_of(of.robot, measurements, ("clock",) if clock else (), {}, of.track)
         of_forces = {name: getattr(of, name) for name in ("noise", "unbalanced", "ahead", "felt")}
         wholes[clock] = replace(whole, weights=weights, weighs=weighs, **of_forces)
     if len(measurements) > MOST_COMPARED:
@@ -253,7 +253,7 @@ def _unbalanced(model: Model, state: State) -> float:
 
 def _mean_square(model: Model, state: State) -> float:
     """Return the mean square of the lengths' residuals [m^2], corrected for the part that unknown poses absorb."""
-    used = model.weights * model.inside(state) > 0
+    used = model.weights & model.inside(state)
     squares = float((lengths_of(model, state).T[used] ** 2).sum())
     unknown = np.isinf(model.pose_sigmas)
     absorbed = unknown.sum(axis=1)

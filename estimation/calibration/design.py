@@ -14,8 +14,8 @@ from ..logs.measurements import Measurements
 from .calibration import Calibration
 from .geometry import length_of
 from .model import Model
-from .outliers import project, without_poses
 from .parameters import Parameters, check_free
+from .projection import equations_of, parts
 
 DRAWN = 8192  # random poses, of which those at which the robot can rest are candidates
 KEPT = 600
@@ -73,7 +73,9 @@ def next_poses(
 def _rows(robot: Robot, groups: tuple[str, ...], poses: np.ndarray, measured: bool) -> np.ndarray:
     """Return the derivatives of lengths by parameters, minus the part that unknown poses absorb, (k, m, p) [1/m]."""
     lengths = np.ones((len(poses), robot.m))
-    model = Model(Parameters(robot, groups), Measurements(lengths, poses), {}, np.ones((robot.m, len(poses))))
+    model = Model(
+        Parameters(robot, groups), Measurements(lengths, poses), {}, np.ones((robot.m, len(poses)), dtype=bool)
+    )
     state = model.begin()
     # Of scales: the readings of these poses.
     readings = -model.residuals(state).readings.T * model.measurements.sigma.lengths
@@ -82,11 +84,11 @@ def _rows(robot: Robot, groups: tuple[str, ...], poses: np.ndarray, measured: bo
     if not np.isfinite(readings).all():
         raise InputError("candidates must be poses at which every cable has a length, got one inside a pulley")
     model = replace(model, measurements=Measurements(readings, poses if measured else None), start=poses)
-    found = project(model, state)
     rows = np.zeros((len(poses), robot.m, int(model.parameters.varies.sum())))
-    for cable in range(robot.m):
-        own, columns = without_poses(model, found, cable)
-        rows[:, cable, columns] = own
+    for part in parts(model, state, equations_of(model, state)):
+        for cable in range(robot.m):
+            own, columns = part.without_poses(cable)
+            rows[part.rows, cable][:, columns] = own
     return rows
 
 

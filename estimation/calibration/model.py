@@ -108,7 +108,7 @@ class Model(Displayed):
     parameters: Parameters
     measurements: Measurements
     prior: dict[str, float]
-    weights: np.ndarray  # 1 for each reading that is used, 0 for one that is left out, (m, N)
+    weights: np.ndarray  # which readings are used, not left out, (m, N) of bool
     start: np.ndarray | None = None  # initial poses where none was measured, (N, 6) [m, rad]; default: home
     track: PoseTrack | None = None  # measured poses over time; default: the clock offset is 0
     upright: float = np.inf  # standard deviation of unmeasured orientations about their initial values [rad]; inf: none
@@ -199,17 +199,18 @@ class Model(Displayed):
             carriers=None if self.carriers is None else self.carriers.at_samples(rows),
         )
 
-    def parts(self, state: State) -> Iterator[tuple[slice, Model, State]]:
-        """Yield the model and the state by samples few enough for all their derivatives."""
+    def parts(self, state: State, backwards: bool = False) -> Iterator[tuple[slice, Model, State]]:
+        """Yield the model and the state by samples few enough for all their derivatives, or the last ones first."""
         count = len(self.measurements)
         if count <= PART:
             yield slice(None), self, state
             return
-        for rows in (slice(first, first + PART) for first in range(0, count, PART)):
-            part = self.only(rows)
+        known = {name: getattr(self, name) for name in ("size_is_open", "prior_sigmas", "kept_rows")}
+        for first in sorted(range(0, count, PART), reverse=backwards):
+            part = self.only(rows := slice(first, first + PART))
             balanced = None if self.balanced is None else part.forces
             # Which poses are known anywhere says how all samples count.
-            vars(part).update(pose_sigmas=self.pose_sigmas[rows], size_is_open=self.size_is_open, balanced=balanced)
+            vars(part).update(known, pose_sigmas=self.pose_sigmas[rows], balanced=balanced)
             yield rows, part, State(state.x, *(one[rows] for one in state[1:]))
 
     @cached_property

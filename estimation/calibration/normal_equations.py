@@ -45,9 +45,7 @@ def metric(model: Model) -> np.ndarray:
     spread = np.maximum(lengths, 1e-3 * max(lengths.max(), 1e-6))
     table = np.ones((model.robot.m, OF_CABLE))
     table[:, 7] = spread * np.sign(scale0) * np.where(scale0 < 0, -1.0, 1.0)
-    speed = SLOWEST
-    if model.track is not None:
-        speed = max(SLOWEST, float(np.sqrt((model.track.at(0.0)[2] ** 2).sum(axis=1).mean())))
+    speed = SLOWEST if model.track is None else max(SLOWEST, model.track.speed)
     strong = measurements.tensions
     force = max(float(np.sqrt((strong**2).mean())) if strong is not None else model.robot.force_scale, 1e-9)
     length = length_of(model.robot)

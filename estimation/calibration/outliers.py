@@ -20,6 +20,7 @@ from .model import Model, State
 from .normal_equations import NormalEquations, metric
 from .parameters import OF_CABLE, Parameters
 from .products import quadratic_forms
+from .projection import Part, Projected, equations_of, parts, project
 from .sightings import SEEN
 
 LEVEL = 0.005  # of both tests, for all readings together, and share of sound ones among several outliers
@@ -59,23 +60,6 @@ class Slip(NamedTuple):
     sigma: float
 
 
-class _Projected(NamedTuple):
-    """Residuals and their redundancies, (m, N), with derivatives by what varies, in metres.
-
-    - `own`: by the cable's own parameters, (m, N, k), those at `columns` (k,) of its 15.
-    - `others`: by the robot's parameters and slips that vary, (m, N, d).
-    - `root`: L^-1 G of each reading, (m, N, 6), if poses vary.
-    """
-
-    residuals: np.ndarray
-    redundancy: np.ndarray
-    columns: np.ndarray
-    own: np.ndarray
-    others: np.ndarray
-    equations: NormalEquations
-    root: np.ndarray | None
-
-
 def _threshold(count: int) -> float:
     from scipy.special import ndtri
 
@@ -101,32 +85,6 @@ def _limit(sizes: np.ndarray, count: int, known: int) -> float:
     return float(limits[beyond[-1]]) if beyond.size else first
 
 
-def project(model: Model, state: State, derivatives_too: bool = True) -> _Projected:
-    """Return residuals and, unless these are not wanted, derivatives at a state, and what unknown poses absorb."""
-    parameters, scale = model.parameters, metric(model)
-    varies, factors = parameters.table(parameters.varies), parameters.table(scale)
-    columns, last = np.flatnonzero(varies.any(axis=0)), slice(parameters.clock, parameters.count)
-    free = parameters.varies[last]
-    if not derivatives_too:
-        columns, free = columns[:0], np.zeros_like(free)
-    equations = NormalEquations.at(model, state, scale)
-    shape = model.weights.shape
-    residuals, redundancy = np.empty(shape), np.where(model.weights * model.inside(state) > 0, 1.0, 0.0)
-    own, others = np.empty((*shape, len(columns))), np.empty((*shape, int(free.sum())))
-    root = None if equations.inverse_root is None else np.empty((*shape, equations.inverse_root.shape[1]))
-    for rows, part, placed in model.parts(state):
-        values, derivatives = part.linearised(placed)
-        residuals[:, rows] = values.readings
-        own[:, rows] = derivatives.cables[..., columns] / factors[:, None, columns]
-        others[:, rows] = derivatives.others[..., free] / scale[last][free]
-        if root is not None and equations.inverse_root is not None:
-            G = derivatives.poses * part.poses_vary
-            root[:, rows] = np.einsum("nab,mnb->mna", equations.inverse_root[rows], G)  # L^-1 g of each reading
-    if root is not None:
-        redundancy = redundancy - np.einsum("mna,mna->mn", root, root)
-    return _Projected(residuals, redundancy, columns, own, others, equations, root)
-
-
 def autocorrelation(model: Model, state: State, covariance: np.ndarray, rank: int, excess: float) -> float:
     """Return the factor by which autocorrelation increases the variances of the parameters; at least 1.
 
@@ -134,31 +92,29 @@ def autocorrelation(model: Model, state: State, covariance: np.ndarray, rank: in
     any correlation inside blocks, and excess^2 S^-1 for independent residuals. The result is the ratio of the two as a
     mean over all directions, because single directions would need many more blocks.
     """
-    found = project(model, state)
-    count = found.residuals.shape[1]
+    count = len(model.measurements)
     if count < BLOCKS * SHORTEST_BLOCK or not rank:
         return 1.0
     edges = np.arange(BLOCKS) * count // BLOCKS
     block = np.searchsorted(edges, np.arange(count), side="right") - 1  # of each sample
     total = np.zeros((BLOCKS, len(covariance)))
-    for i, row in enumerate(found.residuals):
-        J, columns = without_poses(model, found, i)
-        total[:, columns] += np.add.reduceat(J * row[:, None], edges, axis=0)
-    for rows, part, own in model.parts(state):
-        np.add.at(total, block[rows], _of_samples(part, own, found.equations, rows, metric(model)))
+    for part in parts(model, state, equations_of(model, state)):
+        blocks = block[part.rows]
+        first = np.flatnonzero(np.diff(blocks, prepend=-1))  # sample of each block
+        of_samples = _of_samples(part)
+        for i, row in enumerate(part.residuals):
+            J, columns = part.without_poses(i)
+            of_samples[:, columns] += J * row[:, None]
+        total[blocks[first]] += np.add.reduceat(of_samples, first, axis=0)
     # The sums add up to 0 in a minimum, which takes one of them away.
     ratio = float(((total @ covariance) * total).sum()) / (rank * (1 - 1 / BLOCKS) * excess**2)
     return ratio if ratio > 1 + BY_CHANCE else 1.0
 
 
-def _of_samples(model: Model, state: State, equations: NormalEquations, rows: slice, scale: np.ndarray) -> np.ndarray:
-    """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (n, p) [1/m].
-
-    The samples are `rows` of the `equations`, whose `scale` is that of the whole log.
-    """
-    derivatives = model.linearised(state)[1]
-    varies, forces, seen = model.parameters.varies, derivatives.balance, derivatives.directions
-    inverse_root, Y = (None if of is None else of[rows] for of in (equations.inverse_root, equations.Y))
+def _of_samples(part: Part) -> np.ndarray:
+    """Return J'e of each sample's balance of forces and directions, minus the part of its pose, (n, p) [1/m]."""
+    model, scale, inverse_root, Y = part.model, part.scale, part.inverse_root, part.Y
+    varies, forces, seen = model.parameters.varies, part.derivatives.balance, part.derivatives.directions
     total = np.zeros((len(model.measurements), int(varies.sum())))
     if forces is not None and forces.by_parameters is not None and forces.by_pose is not None:
         H = forces.by_parameters[..., varies] / scale[varies]
@@ -211,13 +167,15 @@ def find_unbalanced(model: Model, state: State) -> tuple[float, np.ndarray] | No
 
 def find_outliers(model: Model, state: State) -> tuple[list[Outlier], np.ndarray]:
     """Return outliers, at most one per sample, and the readings to leave out because of them, (m, N) of bool."""
-    few = len(state.shift) <= MOST_LEVERAGED
-    found = project(model, state, few)
-    if few and found.equations.S.size:  # parameters, too, adapt to a wrong reading
-        inverse = np.linalg.inv(held(found.equations.S, length_of(model.robot)))
-        for i in range(model.robot.m):
-            rows, columns = without_poses(model, found, i)
-            found.redundancy[i] -= quadratic_forms(rows, inverse[np.ix_(columns, columns)])
+    found = project(model, state)
+    if (
+        len(state.shift) <= MOST_LEVERAGED and model.parameters.varies.any()
+    ):  # parameters, too, adapt to a wrong reading
+        inverse = _inverse(model, state, found.equations, length_of(model.robot))
+        for part in parts(model, state, found.equations):
+            for i in range(model.robot.m):
+                rows, columns = part.without_poses(i)
+                found.redundancy[i, part.rows] -= quadratic_forms(rows, inverse[np.ix_(columns, columns)])
     seen, left = found.redundancy > SMALLEST_REDUNDANCY, np.zeros(found.residuals.shape, dtype=bool)
     if not seen.any():
         return [], left
@@ -225,7 +183,7 @@ def find_outliers(model: Model, state: State) -> tuple[list[Outlier], np.ndarray
     size[seen] = np.abs(found.residuals[seen]) / np.sqrt(found.redundancy[seen])
     worst = np.argmax(size, axis=0)
     samples = np.arange(size.shape[1])
-    known = int((model.weights == 0).any(axis=0).sum())
+    known = int((~model.weights).any(axis=0).sum())
     noise = max(1.0, 1.4826 * float(np.median(size[seen])))
     limit = noise * _limit(size[worst, samples] / noise, int(seen.sum()), known)
     # The smaller half may only be the echo of the larger in other samples, through the parameters.
@@ -264,16 +222,16 @@ def _attributed(model: Model, state: State, sample: int, left: np.ndarray) -> Ou
     )
     used = np.tile(model.weights[:, sample, None], (1, m))
     felt = model.felt and model.felt.only(np.full(m, sample))
-    without = Model(parameters, copies, {}, used * (1 - np.eye(m)), np.tile(pose, (m, 1)), felt=felt)
+    without = Model(parameters, copies, {}, used & ~np.eye(m, dtype=bool), np.tile(pose, (m, 1)), felt=felt)
     begin = without.begin()._replace(x=state.x[: parameters.count].copy())
     found = fit(without, begin, 1.0).state
     costs = (without.residuals(found).readings ** 2).sum(axis=0)
-    costs[used[:, 0] == 0] = np.inf
+    costs[~used[:, 0]] = np.inf
     cable = int(np.argmin(costs))
-    residuals, derivatives = replace(without, weights=np.ones((m, m))).linearised(found)
+    residuals, derivatives = replace(without, weights=np.ones((m, m), dtype=bool)).linearised(found)
     left[:] = costs <= costs[cable] + TOLD_APART**2
     others = np.flatnonzero(left & (np.arange(m) != cable))
-    rest = NormalEquations.at(replace(without, weights=used * ~left[:, None]), found, metric(without))
+    rest = NormalEquations.at(replace(without, weights=used & ~left[:, None]), found, metric(without))
     if others.size and rest.inverse_root is not None:
         by_pose = (derivatives.poses[left, cable] * without.poses_vary[cable]) @ rest.inverse_root[cable].T
         left |= 1 / (1 + (by_pose**2).sum(axis=1).max()) < SMALLEST_REDUNDANCY
@@ -296,11 +254,7 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     spread = 1.4826 * float(np.median(np.abs(found.residuals[seen] / np.sqrt(found.redundancy[seen]))))
     limit = _threshold(m * count) * max(1.0, spread)
     candidates: list[tuple[float, int, int, float, float]] = []
-    inverse = np.linalg.inv(held(found.equations.S, length))
-    for i in range(m):
-        rows, columns = without_poses(model, found, i)
-        np.cumsum(rows[::-1], axis=0, out=rows[::-1])  # of all samples from one on
-        absorbed = quadratic_forms(rows, inverse[np.ix_(columns, columns)])
+    for i, absorbed in enumerate(_absorbed(model, state, found.equations, length)):
         total = np.cumsum(found.redundancy[i, ::-1])[::-1]
         information = np.maximum(total - absorbed, 1e-9 * max(float(total[0]), 1e-9))
         sums = np.cumsum(found.residuals[i, ::-1])[::-1]
@@ -324,6 +278,26 @@ def find_slips(model: Model, state: State, length: float) -> list[Slip]:
     return slips
 
 
+def _inverse(model: Model, state: State, equations: NormalEquations | None, length: float) -> np.ndarray:
+    """Return the inverse of the normal matrix, (p, p), with the weak prior of `held`."""
+    whole = equations or NormalEquations.at(model, state, metric(model))
+    return np.linalg.inv(held(whole.S, length))
+
+
+def _absorbed(model: Model, state: State, equations: NormalEquations | None, length: float) -> np.ndarray:
+    """Return the part of a step of each cable's residuals, from each sample on, that parameters absorb, (m, N)."""
+    inverse = _inverse(model, state, equations, length)
+    sums, result = np.zeros((model.robot.m, len(inverse))), np.empty(model.weights.shape)
+    for part in parts(model, state, equations, backwards=True):
+        for i, total in enumerate(sums):
+            rows, columns = part.without_poses(i)
+            rows[-1] += total[columns]
+            np.cumsum(rows[::-1], axis=0, out=rows[::-1])  # of all samples from one on
+            total[columns] = rows[0]
+            result[i, part.rows] = quadratic_forms(rows, inverse[np.ix_(columns, columns)])
+    return result
+
+
 def _correlation(residuals: np.ndarray) -> float:
     """Return the correlation length of residuals (N,) in samples: 1 + 2 times the sum of autocorrelations."""
     count = len(residuals)
@@ -335,7 +309,7 @@ def _correlation(residuals: np.ndarray) -> float:
     return 1.0 + 2.0 * float(lags[: ends[0] if ends.size else len(lags)].sum())
 
 
-def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
+def _is_a_step(found: Projected, cable: int, sample: int, size: float) -> bool:
     """Return whether residuals change at the sample by a large part of `size`, compared with their scatter."""
     window = slice(max(sample - WINDOW, 0), sample), slice(sample, sample + WINDOW)
     before, after = (np.median(found.residuals[cable, part]) for part in window)
@@ -344,20 +318,3 @@ def _is_a_step(found: _Projected, cable: int, sample: int, size: float) -> bool:
     scatter = 1.4826 * float(np.median(np.abs(around)))
     step = (after - before) / max(kept, SMALLEST_REDUNDANCY)
     return bool(step * size > VISIBLE * size**2 and abs(step) * np.sqrt(max(kept, 0.0)) > CLEAR * min(scatter, 1e9))
-
-
-def without_poses(model: Model, found: _Projected, cable: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives of one cable's residuals by some parameters, minus the poses' part, (N, k) [1/m].
-
-    And which of the parameters that vary these are, (k,); the derivatives by all others are zero.
-    """
-    parameters = model.parameters
-    where, first = np.flatnonzero(parameters.varies), cable * OF_CABLE
-    mine, rest = np.isin(where, first + found.columns), where >= parameters.clock
-    own = found.own[cable][:, np.isin(found.columns, where[mine] - first)]
-    rows, columns = np.hstack([own, found.others[cable]]), np.flatnonzero(mine | rest)
-    if found.root is None or found.equations.Y is None:
-        return rows, columns
-    whole = -np.einsum("na,nap->np", found.root[cable], found.equations.Y)
-    whole[:, columns] += rows
-    return whole, np.arange(len(where))

@@ -235,7 +235,7 @@ class CalibrationData(Displayed):
 
     def _rms(self, residuals: np.ndarray) -> float:
         model = self._solved.model
-        used = residuals.T[model.weights * model.inside(self._solved.fit.state) > 0]
+        used = residuals.T[model.weights & model.inside(self._solved.fit.state)]
         return float(np.sqrt((used**2).mean())) if used.size else np.nan
 
     @cached_property
@@ -247,7 +247,7 @@ class CalibrationData(Displayed):
         model = self._solved.model
         position, rotation = model.poses(self._solved.fit.state)
         poses = np.hstack([position, points.angles(rotation)])
-        poses[np.isinf(model.pose_sigmas).any(axis=1) & (model.weights == 0).all(axis=0)] = np.nan
+        poses[np.isinf(model.pose_sigmas).any(axis=1) & ~model.weights.any(axis=0)] = np.nan
         return poses
 
     @property

@@ -118,7 +118,7 @@ def solve(
             result, fitted = fit(model, result.state, length), model.weights
             continue
         wrong |= {(one.cable, one.sample): one for one in found}
-        model = replace(model, weights=np.where(left, 0.0, model.weights))
+        model = replace(model, weights=model.weights & ~left)
         result, fitted = fit(model, result.state, length), model.weights
     model, result = _weighed(model, result, length, True)
     if clocks is not None:
@@ -171,7 +171,7 @@ def _again(model: Model, result: Fit, length: float, outliers: bool) -> tuple[Fi
 
 def _surprise(result: Fit, weights: np.ndarray) -> float:
     """Return the sum of squares of a fit, where each reading that is left out adds the least square of such a one."""
-    return result.cost + LEAST_THRESHOLD**2 * float((weights == 0).any(axis=0).sum())
+    return result.cost + LEAST_THRESHOLD**2 * float((~weights).any(axis=0).sum())
 
 
 def _weighed(model: Model, result: Fit, length: float, stretches: bool) -> tuple[Model, Fit]:
@@ -212,15 +212,25 @@ def _stretched(model: Model, state: State, length: float) -> Model:
     return model if same else replace(model, felt=felt)
 
 
-def model_of(robot: Robot, measurements: Measurements, groups: tuple[str, ...], prior: dict[str, float]) -> Model:
-    """Return the model of checked arguments, which starts with level poses where none are measured."""
+def model_of(
+    robot: Robot,
+    measurements: Measurements,
+    groups: tuple[str, ...],
+    prior: dict[str, float],
+    track: PoseTrack | None = None,
+) -> Model:
+    """Return the model of checked arguments, which starts with level poses where none are measured.
+
+    `track` is that of a model with the same poses, which needs as much memory as the log.
+    """
     parameters = Parameters(robot, groups)
-    weights = np.ones((robot.m, len(measurements)))
+    weights = np.ones((robot.m, len(measurements)), dtype=bool)
     model = Model(parameters, measurements, prior, weights, forces=Balance(robot, measurements))
     if "clock" in groups:
-        position, rotation, _ = measured_poses(robot, measurements)
-        assert measurements.times is not None
-        track = PoseTrack(measurements.times, position, rotation, tracked(robot, measurements))
+        if track is None:
+            position, rotation, _ = measured_poses(robot, measurements)
+            assert measurements.times is not None
+            track = PoseTrack(measurements.times, position, rotation, tracked(robot, measurements))
         carriers = None if measurements.carrier_poses is None else CarrierMotion(robot, measurements)
         model = replace(model, track=track, carriers=carriers)
     elif np.isinf(model.pose_sigmas[:, :3]).any():
@@ -252,7 +262,7 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
         flies = any(carrier.actuators for carrier in robot.carriers)
         hint = " (or thrusts, attitudes and times of the carriers in a log)" if flies else ""
         raise InputError(f"measurements.tensions must be given to estimate {', '.join(of_forces)}{hint}, got none")
-    model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements))))
+    model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements)), dtype=bool))
     model = replace(model, interpolates="clock" in groups)
     if not set(IN_BALANCE).isdisjoint(groups) and (robot.weight == 0.0 or model.balanced is None):
         needed = "gravity" if robot.weight == 0.0 else "fewer cables than coordinates, or tensions"
@@ -277,7 +287,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
     """
     model, state = solved.model, solved.fit.state
     inside = model.inside(state)
-    spare = (model.weights * inside > 0).sum(axis=0) + sighted(model.measurements) * inside
+    spare = (model.weights & inside).sum(axis=0) + sighted(model.measurements) * inside
     if model.balanced:
         spare = spare + model.balanced.equations * (inside if model.unbalanced is None else inside & ~model.unbalanced)
     spare = spare - (np.isinf(model.pose_sigmas)).sum(axis=1)  # a pose with a finite sigma is an equation, too
@@ -291,7 +301,7 @@ def noise_of(solved: Solved) -> tuple[float, float, int]:
 
 
 def cleaned(solved: Solved) -> tuple[Measurements, np.ndarray]:
-    """Return the measurements without their slips, and the weights (m, N): 0 for outliers."""
+    """Return the measurements without their slips, and which readings are no outliers, (m, N) of bool."""
     model, x = solved.model, solved.fit.state.x
     given = model.measurements
     lengths = given.lengths + (model.slips(x) / model.parameters.table(x)[:, 7:8]).T

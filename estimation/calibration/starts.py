@@ -55,9 +55,9 @@ def fit_from(
     state = fit(rough, begin, length, enough=ENOUGH).state
     for _ in range(MOST_SEARCHES if outliers else 0):
         found, left = find_outliers(rough, state)
-        if not found or (left | (rough.weights == 0)).sum() > LARGEST_SHARE * left.size:
+        if not found or (left | ~rough.weights).sum() > LARGEST_SHARE * left.size:
             break
-        rough = replace(rough, weights=np.where(left, 0.0, rough.weights))
+        rough = replace(rough, weights=rough.weights & ~left)
         state = fit(rough, state, length, enough=ENOUGH).state
     clean = replace(model, weights=rough.weights)
     clean, state = steadied(clean, _elsewhere(clean, state) or state, length)
@@ -127,7 +127,7 @@ def _rough(model: Model, state: State, length: float) -> tuple[Model, State]:
 def _elsewhere(model: Model, state: State) -> State | None:
     """Return the state with clearly better poses for samples that fit badly, or None without such poses."""
     unknown = np.isinf(model.pose_sigmas[:, np.flatnonzero(model.robot.dof_mask)]).all(axis=1)
-    spare = (model.weights > 0).sum(axis=0) - int((model.robot.dof_mask > 0).sum())
+    spare = model.weights.sum(axis=0) - int((model.robot.dof_mask > 0).sum())
     squares = (model.residuals(state).readings ** 2).sum(axis=0)
     tested = unknown & (spare > 0)
     if not tested.any():

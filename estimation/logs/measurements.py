@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from copy import copy
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -97,12 +97,13 @@ class Measurements(Displayed):
             raise InputError(f"lengths must have 1 to {MOST} rows, got {count}")
         if poses is None and orientations is not None:
             poses = np.full((count, 3), np.nan)
+        shape = self.lengths.shape
         self.poses = None if poses is None else _poses(poses, orientations, count)  # (N, 6)
-        self.tensions = None if tensions is None else _table("tensions", tensions, self.lengths.shape)  # (N, m)
-        self.times = None if times is None else _rising(times, count)  # (N,)
+        self.tensions = CHECKS["tensions"](tensions, shape)  # (N, m)
+        self.times = CHECKS["times"](times, shape)  # (N,)
         self.sigma = _sigma(sigma)
-        self.carrier_poses = None if carrier_poses is None else _of_carriers(carrier_poses, count)  # (N, c, 6)
-        self.directions = None if directions is None else _directions(directions, self.lengths.shape)  # (N, m, 3)
+        self.carrier_poses = CHECKS["carrier_poses"](carrier_poses, shape)  # (N, c, 6)
+        self.directions = CHECKS["directions"](directions, shape)  # (N, m, 3)
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -200,9 +201,14 @@ class Measurements(Displayed):
 
 def changed(measurements: Measurements, **new: Any) -> Measurements:
     """Return measurements with other arguments; raise InputError as the class does."""
-    given: dict[str, Any] = {name: getattr(measurements, name) for name in ARRAYS}
-    given |= {"sigma": measurements.sigma._asdict(), **new}
-    return Measurements(**given)
+    shape = measurements.lengths.shape
+    if np.shape(new.get("lengths", measurements.lengths)) != shape:
+        given: dict[str, Any] = {name: getattr(measurements, name) for name in ARRAYS}
+        return Measurements(**given | {"sigma": measurements.sigma._asdict(), **new})
+    result = copy(measurements)  # which shares the arrays that stay: those of a long log are large
+    for name, value in new.items():
+        setattr(result, name, CHECKS[name](value, shape))
+    return result
 
 
 def check_measurements(robot: Robot, measurements: object) -> Measurements:
@@ -355,3 +361,14 @@ def _sigma(sigma: Any) -> Sigma:
         for name, value in given.items()
     }
     return Sigma(**values)
+
+
+CHECKS: dict[str, Callable[[Any, tuple[int, ...]], Any]] = {
+    "lengths": lambda given, shape: _table("lengths", given, shape),
+    "poses": lambda given, shape: None if given is None else _poses(given, None, shape[0]),
+    "tensions": lambda given, shape: None if given is None else _table("tensions", given, shape),
+    "times": lambda given, shape: None if given is None else _rising(given, shape[0]),
+    "carrier_poses": lambda given, shape: None if given is None else _of_carriers(given, shape[0]),
+    "directions": lambda given, shape: None if given is None else _directions(given, shape),
+    "sigma": lambda given, _: _sigma(given),
+}

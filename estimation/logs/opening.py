@@ -75,10 +75,9 @@ def _recording(file: Path) -> Recording:
             return from_mcap(file, where)
         if kind.startswith("a bag"):
             return from_bag(file, where, kind)
-        content = read_bytes(file, WHAT, LARGEST_LOG if kind == "NetCDF" else LARGEST_CSV)
-        if not content.strip():
-            raise InputError(f"must be {WHAT}, got an empty file")
-        return from_netcdf(content, where) if kind == "NetCDF" else from_csv(content, where)
+        if kind == "NetCDF":
+            return from_netcdf(read_bytes(file, WHAT, LARGEST_LOG), where)
+        return from_csv(read_bytes(file, WHAT, LARGEST_CSV), where)  # which drops the bytes before it reads the text
     except InputError as error:
         text = str(error)
         raise InputError(text if text.startswith(where) else f"{where}: {text}") from None

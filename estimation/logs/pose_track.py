@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...models import points
-from .smoothing import NEIGHBOURS, continuous, smooth, widest_parabola
+from .smoothing import NEIGHBOURS, PART, continuous, smooth, widest_parabola
 
+SHARED = 100  # samples of a part of a spline: the effect of one on another falls to a quarter from sample to sample
 WIDEST = 5.0  # median times between measured poses; the motion inside a longer gap is not known
 
 
@@ -33,14 +34,14 @@ class PoseTrack:
         known: np.ndarray,
         neighbours: int = NEIGHBOURS,
     ):
-        from scipy.interpolate import CubicSpline
-
         self._times, self._measured = times, times[known]
         measured = self._measured
         self._widest = WIDEST * float(np.median(np.diff(measured)))
         self._span = measured[0], measured[-1]
         quaternions = continuous(Rotation.from_matrix(rotation[known]).as_quat())
-        self._curve = CubicSpline(measured, smooth(measured, np.hstack([position[known], quaternions]), neighbours))
+        self._values = smooth(measured, np.hstack([position[known], quaternions]), neighbours)
+        self._slopes = slopes_of_spline(measured, self._values)
+        self.speed = float(np.sqrt((self._slopes[:, :3] ** 2).sum(axis=1).mean()))  # root mean square [m/s]
         self._last: tuple[float, tuple[np.ndarray, ...]] | None = None
 
     def at_samples(self, rows: np.ndarray | slice) -> PoseTrack:
@@ -71,13 +72,42 @@ class PoseTrack:
         return position, rotation, velocity, rate
 
     def _at(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
-        values, slopes = self._curve(times), self._curve(times, 1)
+        values, slopes = self._curve(times)
         q, dq = values[:, 3:], slopes[:, 3:]
         length = np.linalg.norm(q, axis=1, keepdims=True)
         q, dq = q / length, dq / length
         v, w, dv, dw = q[:, :3], q[:, 3:], dq[:, :3], dq[:, 3:]
         rate = 2 * (w * dv - dw * v + np.cross(v, dv))  # the vector part of 2 dq q*, for rates in {G}
         return values[:, :3], Rotation.from_quat(q).as_matrix(), slopes[:, :3], rate
+
+    def _curve(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return positions and quaternions at times (N,) [s], and their derivatives, (N, 7)."""
+        before = np.clip(np.searchsorted(self._measured, times, side="right") - 1, 0, len(self._measured) - 2)
+        begin, step = self._measured[before], (self._measured[before + 1] - self._measured[before])[:, None]
+        u = (times - begin)[:, None] / step
+        first, last = self._values[before], self._values[before + 1]
+        begin_slope, end_slope = self._slopes[before], self._slopes[before + 1]
+        chord = (last - first) / step
+        square, cube = 3 * chord - 2 * begin_slope - end_slope, begin_slope + end_slope - 2 * chord
+        values = first + step * u * (begin_slope + u * (square + u * cube))
+        return values, begin_slope + u * (2 * square + 3 * u * cube)
+
+
+def slopes_of_spline(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the derivatives of the cubic spline through values (n, d) at their times (n,), not-a-knot at its ends.
+
+    The spline is made of parts, because its coefficients need four times the memory of the values. What they do not
+    share with their neighbours changes their derivatives by less than rounding.
+    """
+    from scipy.interpolate import CubicSpline
+
+    count, result = len(times), np.empty(values.shape)
+    for first in range(0, count, PART):
+        last = min(first + PART, count)
+        begin, end = max(min(first, count - SHARED) - SHARED, 0), min(last + SHARED, count)
+        curve = CubicSpline(times[begin:end], values[begin:end])
+        result[first:last] = curve(times[first:last], 1)
+    return result
 
 
 def track_of(times: np.ndarray, poses: np.ndarray) -> tuple[PoseTrack, int]:

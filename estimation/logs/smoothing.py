@@ -10,6 +10,7 @@ MOST = 25
 NEIGHBOURS = 5  # samples of a parabola
 LEFT = 17 / 35  # of the variance of noise, by parabolas through five samples
 LONGEST = 0.5  # [s] of a parabola
+PART = 20_000  # samples that are smoothed together
 ROUGHER = 1.1  # times their noise: what samples may deviate from the smooth curve through them
 
 
@@ -66,7 +67,16 @@ def within(times: np.ndarray, span: float = SPAN) -> int:
 
 def smooth(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
     """Smooth values (n, d) by least-squares parabolas through each and its nearest neighbours."""
-    return values if len(times) < neighbours else Parabolas(times, neighbours).values(values[None])[0]
+    count = len(times)
+    if count < neighbours:
+        return values
+    result = np.empty(values.shape)
+    for first in range(0, count, PART):  # parabolas of all samples at once would need much memory
+        last = min(first + PART, count)
+        begin, end = max(min(first, count - neighbours) - neighbours, 0), min(last + neighbours, count)
+        part = Parabolas(times[begin:end], neighbours).values(values[None, begin:end])[0]
+        result[first:last] = part[first - begin : last - begin]
+    return result
 
 
 def noise_of(times: np.ndarray, values: np.ndarray) -> float:

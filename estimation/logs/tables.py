@@ -29,6 +29,8 @@ WRITTEN = {"cable_lengths": ("l", LENGTHS), "tensions": ("tension", FORCES), "ti
 
 def from_csv(content: bytes, where: str) -> Recording:
     """Return the columns of a CSV file."""
+    if not content or content.isspace():
+        raise InputError("must be a CSV, NetCDF or MCAP file or a ROS bag, got an empty file")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -43,7 +45,7 @@ def from_csv(content: bytes, where: str) -> Recording:
         return 1.0
 
     columns, lines = read_columns(plain_csv(text), note, gaps=True, most=MOST_FIELDS)
-    if not lines:
+    if not lines.size:
         raise InputError("must have a line for each sample below its header, got none")
     _with_whole_stamps(columns)
     return Recording(where, "CSV", {"": _table(columns, {name: units.get(name, "") for name in columns})})

@@ -63,7 +63,7 @@ def read_csv(text: str) -> dict[str, Any]:
     return fields
 
 
-def _check_times(times: list[float], lines: list[int]) -> None:
+def _check_times(times: list[float], lines: np.ndarray) -> None:
     if times and times[0] != 0:
         raise InputError(f"line {lines[0]}, column t must start at 0 s, got {times[0]:g} s")
     for before, after, number in zip(times, times[1:], lines[1:], strict=False):

@@ -1,0 +1,87 @@
+"""Residuals, and their derivatives minus the part that unknown poses absorb, by parts of a log."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from .model import Derivatives, Model, State
+from .normal_equations import NormalEquations, metric
+from .parameters import OF_CABLE
+
+
+class Projected(NamedTuple):
+    """Residuals of the readings and their redundancies, (m, N), and the normal equations, None if no pose varies."""
+
+    residuals: np.ndarray
+    redundancy: np.ndarray
+    equations: NormalEquations | None
+
+
+class Part(NamedTuple):
+    """Some samples of a log: residuals of their readings, (m, n), and derivatives.
+
+    - `scale`: `metric` of the whole log, (P,).
+    - `inverse_root`, `Y`: those of the `NormalEquations`, (n, 6, 6) and (n, 6, p), or None if no pose varies.
+    """
+
+    rows: slice
+    model: Model
+    residuals: np.ndarray
+    derivatives: Derivatives
+    scale: np.ndarray
+    inverse_root: np.ndarray | None
+    Y: np.ndarray | None
+
+    def root(self, cable: int) -> np.ndarray:
+        """Return L^-1 g of each reading of a cable, (n, 6), where poses vary."""
+        assert self.inverse_root is not None
+        G = self.derivatives.poses[cable] * self.model.poses_vary
+        return np.einsum("nab,nb->na", self.inverse_root, G)
+
+    def without_poses(self, cable: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivatives of one cable's residuals by some parameters, minus the poses' part, (n, k) [1/m].
+
+        And which of the parameters that vary these are, (k,); the derivatives by all others are zero.
+        """
+        parameters = self.model.parameters
+        where, first = np.flatnonzero(parameters.varies), cable * OF_CABLE
+        mine, rest = (where >= first) & (where < first + OF_CABLE), where >= parameters.clock
+        own = self.derivatives.cables[cable][:, where[mine] - first]
+        rows = np.hstack([own, self.derivatives.others[cable][:, where[rest] - parameters.clock]])
+        rows, columns = rows / self.scale[where[mine | rest]], np.flatnonzero(mine | rest)
+        if self.Y is None:
+            return rows, columns
+        whole = -np.einsum("na,nap->np", self.root(cable), self.Y)
+        whole[:, columns] += rows
+        return whole, np.arange(len(where))
+
+
+def equations_of(model: Model, state: State) -> NormalEquations | None:
+    """Return the normal equations at a state if any pose varies, which its `parts` then need."""
+    return NormalEquations.at(model, state, metric(model)) if model.poses_vary.any() else None
+
+
+def parts(model: Model, state: State, equations: NormalEquations | None, backwards: bool = False) -> Iterator[Part]:
+    """Yield the parts of a log, the last one first if `backwards`; all derivatives at once would need much memory."""
+    scale = metric(model)
+    for rows, part, own in model.parts(state, backwards):
+        residuals, derivatives = part.linearised(own)
+        solved = (None, None) if equations is None else (equations.inverse_root, equations.Y)
+        inverse_root, Y = (None if of is None else of[rows] for of in solved)
+        yield Part(rows, part, residuals.readings, derivatives, scale, inverse_root, Y)
+
+
+def project(model: Model, state: State) -> Projected:
+    """Return residuals, and the share of each that stays where poses adapt to the readings."""
+    used = (model.weights & model.inside(state)).astype(float)
+    equations = equations_of(model, state)
+    if equations is None:
+        return Projected(model.residuals(state).readings, used, None)
+    residuals = np.empty(model.weights.shape)
+    for part in parts(model, state, equations):
+        residuals[:, part.rows] = part.residuals
+        for i in range(model.robot.m):
+            root = part.root(i)
+            used[i, part.rows] -= np.einsum("na,na->n", root, root)
+    return Projected(residuals, used, equations)
