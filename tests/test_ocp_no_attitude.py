@@ -63,15 +63,18 @@ def test_the_reason_is_stated():
     assert sum("no attitude in the tube keeps all distances" in proof for proof in proofs) >= 2
 
 
-def short_at(robot, pose, turns):
-    """Return the least largest wrench error of tensions inside their limits at rest, in weights, by linear programs."""
+def short_at(robot, pose, turns, mass=0.0, load_com=(0, 0, 0)):
+    """Return the least largest wrench error of tensions inside their limits at rest, in weights, by linear programs.
+
+    A load has its `mass` [kg] and its CoM in the platform frame [m].
+    """
     arms, com, m = robot.attachments, np.array(robot.platform.com), robot.m
-    w = np.array([0, 0, 1, 0, 0, 0])
-    found = []
+    ratio, up, found = mass / robot.platform.mass, np.array([0.0, 0.0, 1.0]), []
     for R in Rotation.from_euler("ZYX", (pose[3:] + turns)[:, ::-1]).as_matrix():
         way = robot.home_anchors - pose[:3] - arms @ R.T
         way /= np.linalg.norm(way, axis=1)[:, None]
         A = np.hstack([way, np.cross((arms - com) @ R.T, way) / robot.length]).T / robot.weight
+        w = np.append((1 + ratio) * up, np.cross(R @ (load_com - com), ratio * up) / robot.length)
         error = np.full((6, 1), -1.0)
         rows, right = np.block([[A, error], [-A, error]]), np.concatenate([w, -w])
         limits = [*zip(robot.t_min, robot.t_max, strict=True), (0, None)]
@@ -86,13 +89,17 @@ def test_ends_without_tensions_at_any_attitude_are_proven(seed):
     end, turn = robot.home.copy(), float(rng.uniform(0.02, 0.3))
     far = np.abs(robot.home_anchors[:, :2]).max(axis=0) * rng.uniform(0.6, 1.05)
     end[:2] = far * rng.choice([-1, 1], 2)
-    task = {
-        "path": {"kind": "line", "start": robot.home.tolist(), "end": end.tolist()},
-        "duration": 9,
-        "tube": {"position": "free", "attitude": turn},
-    }
+    carried = {"mass": robot.platform.mass * (seed % 3) / 4, "com": (robot.length * rng.uniform(-1, 1, 3)).tolist()}
+    phase = {"path": {"kind": "line", "start": robot.home.tolist(), "end": end.tolist()}, "duration": 9}
+    task = {"tube": {"position": "free", "attitude": turn}} | phase
+    if seed % 3:
+        task = {
+            "tube": task["tube"],
+            "phases": [{"name": "carry", "load": {**carried, "inertia": [1, 1, 1, 0, 0, 0]}} | phase],
+        }
     proof = infeasible_ends(Planner(robot, task).scenario)
-    least = short_at(robot, end, np.vstack([np.zeros(3), rng.uniform(-turn, turn, (24, 3))])).min()
+    turns = np.vstack([np.zeros(3), rng.uniform(-turn, turn, (24, 3))])
+    least = short_at(robot, end, turns, *carried.values()).min()
     if least < 1e-9:
         assert proof is None
     elif least > 0.02:  # so few samples come nearer than that to the best attitude

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..audits.excess import TENSIONS, Excess
 from ..audits.tensions import nearest, scaled, tolerance_of
+from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 
 MOST = 30_000  # boxes
@@ -110,12 +111,16 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
 
     Along a direction d = (f, c) of wrenches, cable i gives at most the larger of its limits times x_i = u_i . (f + c x
     r_i), u_i its direction and r_i its arm about the CoM. In a box, x_i is a mean of its values at the corners, but for
-    half the square of half the size times its second derivative along each angle, which rotates about a fixed axis.
+    half the square of half the size times its second derivative along each angle, which rotates about a fixed axis. So
+    is the part of the weight along d, if a load turns with the platform.
     """
-    robot = scenario.robot
-    if scenario.wind is not None or scenario.wind_set is not None or scenario.phases.all or robot.pulley_radii.any():
+    robot, at = scenario.robot, np.array([time])
+    grounded = scenario.phases.resting(at).any()
+    if scenario.wind is not None or scenario.wind_set is not None or grounded or robot.pulley_radii.any():
         return None
-    low, high = (bound[0] for bound in scenario.bounds_at(np.array([time])))
+    mass, *com = scenario.phases.loads_at(at)[0, :4] if scenario.phases.carry else np.zeros(4)
+    turning = mass * np.linalg.norm(robot.gravity) * np.linalg.norm(np.array(com) - robot.platform.com)  # [N m]
+    low, high = (bound[0] for bound in scenario.bounds_at(at))
     reach, arms = (np.linalg.norm(robot.attachments - at, axis=1) for at in (0.0, np.array(robot.platform.com)))
     least = max(tolerance_of(robot), CERTAIN_FORCE * robot.force_scale)
 
@@ -123,8 +128,13 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
         """Return wrench matrices (n, 6, m), required wrenches (n, 6) and cable lengths (n, m)."""
         poses, places = turned(offsets), np.repeat(carriers[None], len(offsets), axis=0)
         still, dynamics = np.zeros_like(poses), scenario.dynamics
-        A, w = dynamics.wrench_matrix(poses, places), dynamics.required_wrench(poses, still, still)
-        return scaled(scenario, A), scaled(scenario, w), dynamics.cable_lengths(poses, places)
+        bodies = Motion(poses, still, still), Motion(places, np.zeros_like(places), np.zeros_like(places))
+        w = scenario.required_wrench(np.full(len(poses), time), *bodies, None)
+        return (
+            scaled(scenario, dynamics.wrench_matrix(poses, places)),
+            scaled(scenario, w),
+            dynamics.cable_lengths(poses, places),
+        )
 
     def short(centres: np.ndarray, half: float) -> tuple[np.ndarray, np.ndarray]:
         A, w, lengths = wrenches(centres)
@@ -134,9 +144,10 @@ def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, tur
         f, c = (np.linalg.norm((d * robot.wrench_scale)[:, part], axis=1)[:, None] for part in (slice(3), slice(3, 6)))
         per_length = reach / np.maximum(lengths - reach * half * k, 1e-9)  # of attachments' speeds, at most
         second = (f + c * arms) * (per_length + 3 * per_length**2) + c * arms * (1 + 2 * per_length)
-        at_corners = wrenches(_corners(centres, half))[0].reshape(n, -1, *A.shape[1:])
-        x = np.einsum("ncij,ni->ncj", at_corners, d) + (k * half**2 / 2 * second)[:, None]
-        given = np.maximum(low * x, high * x).sum(axis=2).max(axis=1)
-        return np.where(away > least, away, 0.0), np.einsum("ni,ni->n", w, d) - given - least
+        between = k * half**2 / 2
+        A, w = (part.reshape(n, -1, *part.shape[1:]) for part in wrenches(_corners(centres, half))[:2])
+        x = np.einsum("ncij,ni->ncj", A, d) + (between * second)[:, None]
+        lacking = np.einsum("nci,ni->nc", w, d) - np.maximum(low * x, high * x).sum(axis=2)
+        return np.where(away > least, away, 0.0), lacking.min(axis=1) - between * turning * c[:, 0] - least
 
     return short
