@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...models import points
-from ..logs.measurements import Measurements
+from ..logs.measurements import ARRAYS, changed
 from ..pose.wrong_lengths import TOLD_APART
 from .fit import fit, held
 from .geometry import length_of
@@ -210,23 +210,18 @@ def _attributed(model: Model, state: State, sample: int, left: np.ndarray) -> Ou
     lengths = model.measurements.lengths[sample] + model.slips(state.x)[:, sample] / scales
     position, rotation = model.poses(state)
     pose = np.concatenate([position[sample], points.angles(rotation[sample])])
-    given, carriers = model.measurements.poses, model.measurements.carrier_poses
-    directions = model.measurements.directions
-    copies = Measurements(
-        np.tile(lengths, (m, 1)),
-        None if given is None else np.tile(given[sample], (m, 1)),
-        tensions=None if model.measurements.tensions is None else np.tile(model.measurements.tensions[sample], (m, 1)),
-        sigma=model.measurements.sigma._asdict(),
-        carrier_poses=None if carriers is None else np.tile(carriers[sample], (m, 1, 1)),
-        directions=None if directions is None else np.tile(directions[sample], (m, 1, 1)),
-    )
+    given, copied = model.measurements, np.full(m, sample)
+    of_sample = {name: getattr(given, name) for name in ARRAYS}
+    of_sample = {name: None if of is None else of[copied] for name, of in of_sample.items()}
+    copies = changed(given, **of_sample | {"lengths": np.tile(lengths, (m, 1)), "times": None})
     used = np.tile(model.weights[:, sample, None], (1, m))
-    felt = model.felt and model.felt.only(np.full(m, sample))
+    felt = model.felt and model.felt.only(copied)
     without = Model(parameters, copies, {}, used & ~np.eye(m, dtype=bool), np.tile(pose, (m, 1)), felt=felt)
     begin = without.begin()._replace(x=state.x[: parameters.count].copy())
     found = fit(without, begin, 1.0).state
-    costs = (without.residuals(found).readings ** 2).sum(axis=0)
-    costs[~used[:, 0]] = np.inf
+    of = without.residuals(found)
+    costs = of.of_samples - (of.balance**2).sum(axis=1)  # forces are far less certain in motion
+    costs[~np.isfinite(costs) | ~used[:, 0]] = np.inf
     cable = int(np.argmin(costs))
     residuals, derivatives = replace(without, weights=np.ones((m, m), dtype=bool)).linearised(found)
     left[:] = costs <= costs[cable] + TOLD_APART**2
