@@ -173,7 +173,9 @@ class Matching:
 
 def applicable(windows: Windows) -> Sequence[str]:
     """Return the parameters on which a simulation with such commands depends."""
-    names = {"delay": windows.commanded, "friction": windows.drive != "lengths", "mass": True}
+    recorded = windows.recorded
+    felt = windows.drive != "lengths" or (recorded.tensions is not None and recorded.robot.fixed_lengths is None)
+    names = {"delay": windows.commanded, "friction": felt, "mass": True}
     return [name for name, depends in (names | {"stiffness": windows.drive != "tensions"}).items() if depends]
 
 

@@ -59,6 +59,8 @@ class Windows:
         self.assumed = any(cable.stiffness is None for cable in robot.cables)
         if self.assumed and self.drive != "tensions":
             self.notes.append("cables without a stiffness in the file are given one: 0.1 % of elongation at t_max")
+        if self.drive == "lengths" and recorded.tensions is None and robot.fixed_lengths is None:
+            self.notes.append("lengths do not show friction of the winches: record tensions or motor currents for that")
         self.usual = Parameters(friction=friction_of(self.robot))  # parameters of the file
         self._known = np.asarray(np.isfinite(recorded.pose).all(axis=1))
         if self._known.sum() < FEWEST:
@@ -308,7 +310,8 @@ class Windows:
                     ends = [part.reshape(count, W, 2, -1)[:, w] for part in (history, tensions)]
                     out[:, w, s] = _seen(plant, *((1 - share) * one[:, :, 0] + share * one[:, :, 1] for one in ends))
                 states[:] = history[:, 1]
-        residuals = self._residuals(out, plant)
+        speeds = np.take_along_axis(self._cable_speed, number[..., None], axis=1)  # (W, S, m)
+        residuals = self._residuals(out, plant, with_.friction * np.tanh(speeds / SLOW))
         residuals[1:] = (residuals[1:] - residuals[0]) / self._steps_of_start[:, None, None] if nudged else 0.0
         return residuals
 
@@ -329,8 +332,12 @@ class Windows:
             actuation[:, :, index, 0] = np.interp(middle, self.recorded.times, self.recorded.thrusts[:, index])
         return plant.command(np.ones(self.robot.m), actuation, *self._carried), cables
 
-    def _residuals(self, out: np.ndarray, plant: Plant) -> np.ndarray:
-        """Return measured minus simulated over noise, (V, W, R), from what `_seen` returns, (V, W, S, 7 + 2 m)."""
+    def _residuals(self, out: np.ndarray, plant: Plant, friction: np.ndarray) -> np.ndarray:
+        """Return measured minus simulated over noise, (V, W, R), from what `_seen` returns, (V, W, S, 7 + 2 m).
+
+        Winches that follow lengths overcome their friction (W, S, m) [N]: it shows only in tensions that are measured
+        behind it, as by motor currents.
+        """
         of, rows, inside, parts = self.recorded, self.rows, self.inside[..., None], {}
         position, quaternion, tensions, lengths = np.split(out, [3, 7, 7 + self.robot.m], axis=-1)
         known = inside & self._known[rows][..., None]
@@ -342,7 +349,8 @@ class Windows:
             moves = known & (of.robot.dof_mask[3:] > 0)
             parts["rotation"] = np.where(moves, away.as_rotvec().reshape(position.shape), 0.0)
         if "tensions" in self.noise and of.tensions is not None:
-            parts["tensions"] = np.where(inside, of.tensions[rows] - tensions, 0.0)
+            behind = (tensions - friction).clip(0.0) if self.drive == "lengths" else tensions
+            parts["tensions"] = np.where(inside, of.tensions[rows] - behind, 0.0)
         if "lengths" in self.noise and of.lengths is not None:
             stretches = not (self.drive == "tensions" and self.assumed)
             stretch = 1 + stretches * tensions / plant.record["cable"]["stiffness"][: self.robot.m]

@@ -204,6 +204,21 @@ def test_what_a_recording_does_not_show_is_not_named(tmp_path):
     assert result.passed
 
 
+def test_friction_of_winches_that_follow_lengths_shows_in_motor_currents_only(tmp_path):
+    """Motors feel less than the cables that they pay out, and more than those that they wind up."""
+    found = columns("lengths", every("lengths"))
+    speeds = [np.gradient(found[f"l{i} [m]"], found["t [s]"]) for i in range(4)]
+    for i, speed in enumerate(speeds):
+        found[f"tension_{i} [N]"] = found[f"tension_{i} [N]"] - 5.0 * np.sign(speed)
+    result = replay(PLANAR, written(tmp_path / "motors.csv", found))
+    assert result.named[0] == "friction"
+    assert result.found[0].value == pytest.approx(5.0, rel=0.06)
+    bare = {name: values for name, values in found.items() if "tension" not in name}
+    result = replay(PLANAR, written(tmp_path / "bare.csv", bare))
+    assert "friction" not in [one.name for one in result.found]
+    assert any("lengths do not show friction" in note for note in result.notes)
+
+
 def test_irregular_samples_gaps_and_missing_poses(tmp_path):
     draw = np.random.default_rng(3)
     count = len(motion("lengths")[1]["time"])
