@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -44,6 +44,13 @@ class PlannerStep(NamedTuple):
     seconds: float  # wall time [s]
 
 
+class Offers(NamedTuple):
+    """The relaxations of a plan, and whether the search for them stopped before all were tried."""
+
+    found: Sequence[Relaxed] = ()
+    cut_short: bool = False
+
+
 @dataclass(frozen=True)
 class PlanData(Displayed):
     """A planned motion and its audit, without figures, files and reports.
@@ -82,12 +89,12 @@ class PlanData(Displayed):
     objective: float | None = None
     robust: RobustMargin | None = None
     stop: Stop | None = None
-    offers: Callable[[], Iterable[Relaxed]] = field(default=tuple, repr=False, compare=False)
+    offers: Callable[[], Offers] = field(default=Offers, repr=False, compare=False)
     law: FastestLaw | None = field(default=None, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state for a pickle, with computed relaxations."""
-        return {**self.__dict__, "offers": partial(tuple, self.relaxations)}
+        return {**self.__dict__, "offers": partial(Offers, *self._offered)}
 
     def _picture(self) -> str:
         robot, audit = self.scenario.robot, self.audit
@@ -157,13 +164,23 @@ class PlanData(Displayed):
         return None if self.feasible else self.audit.certificate
 
     @cached_property
+    def _offered(self) -> Offers:
+        return self.offers()
+
+    @property
     def relaxations(self) -> tuple[Relaxed, ...]:
         """Return feasible variations of an infeasible task; may be empty.
 
         Relaxations with the same plan apply only together. They are computed on first use, which can take longer than
-        the plan: programs are solved for them in the time that remains of `time_limit`.
+        the plan: programs with a limited number of iterations are solved for them, in the time that remains of
+        `time_limit`.
         """
-        return tuple(self.offers())
+        return tuple(self._offered.found)
+
+    @property
+    def cut_short(self) -> bool:
+        """Return whether the search for relaxations stopped before all were tried, at its number of iterations."""
+        return self._offered.cut_short
 
     @property
     def relaxed(self) -> Relaxed | None:
@@ -238,6 +255,7 @@ class PlanData(Displayed):
             "certificate": None if self.certificate is None else self.certificate.to_dict(),
             "infeasible_spans": [certificate.to_dict() for certificate in self.infeasible_spans],
             "relaxations": [relaxed.to_dict() for relaxed in self.relaxations],
+            "relaxations_cut_short": self.cut_short,
             "phases": [phase._asdict() for phase in self.phases],
             "stages": [stage._asdict() for stage in self.stages],
             **({} if self.law is None else self.law.to_dict()),

@@ -12,8 +12,10 @@
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from ..base.text import quantity
 from .audits.audit import Audit, audit, other_tensions_exist, other_tensions_may_pass
@@ -24,7 +26,7 @@ from .plan import Plan
 from .proofs.durations import Durations, durations
 from .proofs.infeasible_ends import infeasible_ends
 from .proofs.too_little_power import too_little_power
-from .result import Relaxed
+from .result import Offers, Relaxed
 from .search.homotopy import from_easier
 from .search.longer_phases import longer_phases
 from .search.other_paths import slower_path
@@ -78,7 +80,7 @@ def _fixed_motion(search: Search) -> Plan:
         if proven := too_little_power(search.scenario):
             audit = replace(audit, excess=proven)
             left = _durations(search, search.scenario)
-            offers = partial(_offers, search, search.scenario, left, audit)
+            offers = partial(_offered, _near_fixed, search, search.scenario, left, audit)
             return Plan(search.scenario, status, None, audit, build_s=0.0, solve_s=spent, offers=offers)
         chosen = _free_motion(search, None)
         if relative_violation(chosen.scenario, chosen.audit) < relative_violation(search.scenario, audit):
@@ -96,10 +98,15 @@ def _fixed_motion(search: Search) -> Plan:
     if isinstance(search.scenario.wind_set, WindDisc) and audit.certificate is None and not audit.excess:
         return replace(plan, status=MotionStatus.NOT_FOUND, reason=UNPROVEN)
     left = _durations(search, search.scenario)
-    return replace(plan, offers=partial(_offers, search, search.scenario, left, audit))
+    return replace(plan, offers=partial(_offered, _near_fixed, search, search.scenario, left, audit))
 
 
-def _offers(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
+def _offered(find: Callable[..., list[Relaxed]], search: Search, *about: Any) -> Offers:
+    """Return the relaxations that `find` finds, and whether it had to stop."""
+    return Offers(find(search, *about), search.cut_short)
+
+
+def _near_fixed(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of a task that fixes the motion, or else of where it ends and of the robot."""
     near = near_fixed_motion(search, scenario, left, audit)
     others = slower_path(search, scenario, audit) + near if near else stronger_or_nearer(search, scenario, audit)
@@ -127,8 +134,8 @@ def _blocked(search: Search) -> Plan | None:
     motion = between_fixed_values(slowest)
     audited = audit(slowest, motion, to_show=True)
     seconds = time.perf_counter() - start
-    near = partial(near_chosen_motion, search, slowest, motion, audited)
-    offers = partial(stronger_or_nearer, search, slowest, audited) if proof.by_weight else near
+    near = partial(_offered, near_chosen_motion, search, slowest, motion, audited)
+    offers = partial(_offered, stronger_or_nearer, search, slowest, audited) if proof.by_weight else near
     return Plan(slowest, MotionStatus.INFEASIBLE, motion, proof.of(audited), 0.0, seconds, offers=offers)
 
 
@@ -160,7 +167,7 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
     if audit.passed:
         return None, True
-    offers = partial(near_fixed_motion, search, slowest, left, audit)
+    offers = partial(_offered, near_fixed_motion, search, slowest, left, audit)
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 
@@ -198,5 +205,5 @@ def _again(search: Search, mesh: Mesh, motion: Deviation) -> Plan | None:
 def _closest(search: Search, reason: str) -> Plan:
     """Return the best plan or a direct motion that is feasible, or else the best plan with its relaxations."""
     plan = search.best(reason)
-    offers = partial(near_chosen_motion, search, plan.scenario, plan.deviation, plan.audit)
+    offers = partial(_offered, near_chosen_motion, search, plan.scenario, plan.deviation, plan.audit)
     return plan if plan.feasible else search.audit_direct() or replace(plan, offers=offers)

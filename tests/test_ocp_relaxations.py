@@ -245,3 +245,25 @@ def test_the_jerk_of_cables_is_kept_by_a_longer_duration():
     assert longer.name == "duration"
     assert (longer.possible / 2) ** 3 == pytest.approx(limit.possible / 0.1, rel=0.02)
     assert given_again(longer).feasible
+
+
+def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
+    """Six walls around the end: the fewest that go leave a way, which planning finds; the others stay."""
+    robot, end, h = load("point-mass-3"), np.array([0.4, 0.2, 1.0]), 0.2
+    walls = []
+    for axis, sign in ((axis, sign) for axis in range(3) for sign in (1, -1)):
+        low, high = end - h, end + h
+        (low if sign > 0 else high)[axis] = end[axis] + sign * 0.9 * h
+        box = {"min": low.tolist(), "max": high.tolist(), "cables": None}
+        walls.append({"kind": "box", "name": f"wall {'xyz'[axis]}{sign:+d}", **box})
+    task = {"path": {"kind": "line", "start": [-0.5, 0.2, 1], "end": end.tolist()}, "duration": 6, "steps": 20}
+    task |= {"tube": {"position": "free"}}
+    found = plan(robot, task | {"limits": {"keep_out": walls}})
+    (offer,) = (each for each in found.relaxations if each.name == "number of keep-out regions")
+    kept = [wall for wall in walls if repr(wall["name"]) not in offer.detail]
+    assert offer.possible == len(kept) < len(walls)
+    assert plan(robot, task | {"limits": {"keep_out": kept}}).feasible
+    monkeypatch.setattr(relaxations, "MOST_EFFORT", 0.0)
+    stopped = plan(robot, task | {"limits": {"keep_out": walls}})
+    assert not stopped.relaxations
+    assert "the search for changes was cut short" in stopped.report()

@@ -151,3 +151,18 @@ def test_a_power_that_no_tensions_need_is_the_least_that_is_feasible(name):
     assert enough.feasible
     row = int(np.abs(enough.audit.times - moment).argmin())
     assert (np.abs(after - before) / (2 * rate) * enough.audit.tensions[row]).max() <= 1.03 * least * (1 + 1e-3)
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_a_duration_is_too_short_for_the_thrusts_of_all_carriers_whatever_the_attitude(share):
+    """The CoM is on a level line in any attitude: thrusts tilted by 0.6 rad, and 5 m/s^2 of the carriers, pull it."""
+    robot = load("multi-quadrotor-4")
+    most = (4 * 40 * np.sin(0.6) + 4 * 1.5 * 5) / robot.platform.mass
+    seconds = share * 2 * np.sqrt(1.0 / most)
+    task = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0.6, 0.8, 0]}, "duration": seconds, "steps": 20}
+    task |= {"base": {"kind": "free", "ends": "rest"}, "tube": {"attitude": 0.15}}
+    proof = infeasible_ends(lay_out(robot, read_task(task)))
+    assert (proof is not None) == (share < 1)
+    if proof is not None:
+        (excess,) = proof.excess
+        assert (excess.limit, excess.bound) == ("duration", pytest.approx(seconds / share))

@@ -25,9 +25,9 @@ from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 from .no_attitude import CERTAIN, no_attitude
 from .out_of_reach import out_of_reach
-from .too_fast import OF_DURATION, too_fast
+from .too_fast import too_fast
 from .too_heavy import OF_WEIGHT, too_heavy
-from .too_weak_carriers import too_weak_carriers
+from .too_weak_carriers import OF_DURATION, too_weak_carriers
 
 PLACES = 41  # along the path
 GIVEN, NEAR, FREE = range(3)  # of a value: no freedom, freedom inside the tube, chosen by the planner
@@ -131,10 +131,11 @@ def _at_places(scenario: Scenario, times: np.ndarray, freedom: list[np.ndarray])
     return platform, carriers
 
 
-def _reach(scenario: Scenario, freedom: np.ndarray) -> float:
-    """Return how far a point of the platform can be from where the reference has it [m]."""
+def _reach(scenario: Scenario, freedom: np.ndarray, points: np.ndarray | None = None) -> float:
+    """Return how far points of the platform (k, 3) can be from where the reference has them [m]; default: any."""
     robot, tube = scenario.robot, scenario.task.tube
-    points = np.vstack([robot.attachments, robot.platform.com, scenario.body_corners])
+    if points is None:
+        points = np.vstack([robot.attachments, robot.platform.com, scenario.body_corners])
     turns = tube.turn * (freedom[0, 0, list(ATTITUDE)] == NEAR).sum()
     moves = tube.radius if (freedom[0, 0, :3] == NEAR).any() else 0.0
     return float(moves + turns * np.linalg.norm(points, axis=1).max())
@@ -225,12 +226,14 @@ def _hurried(
     order = np.argsort(times)
     which = np.minimum(np.arange(len(times)), 2)  # of `freedom`: start, end, between
     poses = np.concatenate([platform.pose[None], carriers.pose.swapaxes(0, 1)])[:, order]
-    spread = np.zeros((len(poses), 3))
+    spread, centres = np.zeros((len(poses), 3)), np.zeros((2, 3))
     for kind, its in enumerate(freedom):
         spread[:, kind] = np.where((its[:, 0] == FREE).any(axis=1), np.inf, 0.0)
+        for k, point in enumerate((np.zeros(3), np.array(scenario.robot.platform.com))):
+            centres[k, kind] = spread[0, kind] + _reach(scenario, its, point[None])
         spread[0, kind] += _reach(scenario, its)
     resting = [np.all(_resting(freedom, platform, carriers, count), axis=0) for count in (3, 6)]
-    return too_fast(scenario, times[order], poses, spread[:, which[order]], *resting)
+    return too_fast(scenario, times[order], poses, spread[:, which[order]], *resting, centres[:, which[order]])
 
 
 def _resting(freedom: list[np.ndarray], platform: Motion, carriers: Motion, count: int = 6) -> np.ndarray:

@@ -18,8 +18,8 @@ from ..limits.cables import CableSpeed
 from ..limits.carriers import CarrierAcceleration, CarrierSpeed
 from ..limits.platform import PlatformAcceleration, PlatformSpeed
 from ..tasks.scenario import Scenario
+from .too_weak_carriers import OF_DURATION, carriers_of, strongest
 
-OF_DURATION = "duration"
 CERTAIN = 1e-6  # of the duration
 
 
@@ -30,6 +30,7 @@ def too_fast(
     spread: np.ndarray,
     resting: np.ndarray,
     still: np.ndarray,
+    centres: np.ndarray | None = None,
 ) -> Iterator[Excess]:
     """Yield each limit that is exceeded, where it is exceeded by most.
 
@@ -39,14 +40,16 @@ def too_fast(
     - `spread`: how far each of them, and every point of the platform, may be from its place, (1 + c, n) [m].
     - `resting`, `still`: of which of them the origin is at rest at both ends, and which do not turn there either,
       (1 + c,) of bool.
+    - `centres`: how far origin and CoM of the platform may be from their places, (2, n) [m]; default: as every point.
     """
-    yield from _too_short(scenario, times, places[0], spread[0], bool(still[0]))
+    of_origin, of_com = spread[[0, 0]] if centres is None else centres
+    yield from _too_short(scenario, times, places[0], of_com, bool(still[0]))
     lengths = None
     for limit in scenario.limits:
         if limit.soft is not None:
             continue
         body = 0 if limit.hull is None or limit.hull.carrier is None else 1 + limit.hull.carrier
-        x, off = places[body, :, None, :3], spread[body, :, None]
+        x, off = places[body, :, None, :3], (spread[body] if body else of_origin)[:, None]
         if isinstance(limit, PlatformSpeed | CarrierSpeed):
             yield from _mean_rate(limit, times, x, off)
         elif isinstance(limit, CableSpeed):
@@ -63,18 +66,26 @@ def _too_short(
 ) -> Iterator[Excess]:
     """Yield a duration that is too short for all cables together to accelerate the platform's CoM and stop it again.
 
-    The acceleration at some time is at least four times the distance divided by the square of the duration. No cable
-    gives more than its largest tension, and the weight helps by at most itself.
+    The acceleration at some time is at least four times the distance divided by the square of the duration, along the
+    way or against it. No cable gives more than its largest tension, flying carriers no more than their thrusts, and the
+    weight helps by at most itself.
     """
     robot = scenario.robot
     if not still or scenario.wind is not None or scenario.phases.all:
         return
     ends = placed(poses[[0, -1]], np.array([robot.platform.com]))[:, 0]
-    moved = float(np.linalg.norm(ends[1] - ends[0]) - off[-1] - off[0])
-    most = float(robot.t_max.sum()) / robot.platform.mass + float(np.linalg.norm(robot.gravity))
-    whole, least = float(times[-1] - times[0]), 2 * np.sqrt(max(moved, 0.0) / most)
+    way, gravity = ends[1] - ends[0], np.array(robot.gravity)
+    moved = float(np.linalg.norm(way) - off[-1] - off[0])
+    if moved <= 0.0:
+        return
+    most, what = float(robot.t_max.sum()) / robot.platform.mass + float(np.linalg.norm(gravity)), "cables at t_max"
+    if (known := carriers_of(scenario)) is not None and robot.dof_mask[:3].all():
+        both = np.outer((1, -1), way / np.linalg.norm(way))
+        pushed = float((strongest(known, both, gravity) / robot.platform.mass + both @ gravity).max())
+        most, what = min((most, what), (pushed, "carriers at their largest thrusts"))
+    whole, least = float(times[-1] - times[0]), 2 * np.sqrt(moved / most)
     if whole < (1 - CERTAIN) * least:
-        why = f"all cables at t_max, and gravity, accelerate the platform by at most {quantity(most, 'm/s^2')}"
+        why = f"all {what}, and gravity, accelerate the platform by at most {quantity(most, 'm/s^2')}"
         yield Excess(OF_DURATION, "motion", None, whole, float(least), "s", "at least", why)
 
 

@@ -17,15 +17,15 @@ from ..audits.excess import Excess
 from ..limits.carriers import CarrierAcceleration, CarrierTilt
 from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
-from .too_fast import OF_DURATION
 
+OF_DURATION = "duration"
 DIRECTIONS = np.linspace(-np.pi / 2, np.pi / 2, 181)  # above the horizontal, in the vertical plane of the force
 CERTAIN = 1e-6  # of the weight
 TINY = 1e-300  # [N]: a vertical force has no direction ahead; shorter vectors in its place bound no less
 HALVINGS = 30  # of the range of durations
 
 
-class _Carrier(NamedTuple):
+class Carrier(NamedTuple):
     """Bounds of the force of a carrier."""
 
     thrust: float  # largest [N]
@@ -39,7 +39,7 @@ def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, c
 
     `platform` and `carriers` have a given motion of the platform at `times` (n,) [s]; that of the carriers is free.
     """
-    robot, known = scenario.robot, _carriers(scenario)
+    robot, known = scenario.robot, carriers_of(scenario)
     fixed = scenario.relative or scenario.phases.all or scenario.task.wind is not None or not scenario.stretches
     if known is None or fixed or not robot.dof_mask[:3].all() or not len(times):
         return []
@@ -67,7 +67,7 @@ def too_weak_carriers(scenario: Scenario, times: np.ndarray, platform: Motion, c
     return [Excess(OF_DURATION, "motion", None, scenario.duration, low * scenario.duration, "s", "at least", why)]
 
 
-def _carriers(scenario: Scenario) -> list[_Carrier] | None:
+def carriers_of(scenario: Scenario) -> list[Carrier] | None:
     """Return what bounds the forces of all carriers; None if that of one is not known."""
     found = []
     for carrier in scenario.robot.carriers:
@@ -79,18 +79,23 @@ def _carriers(scenario: Scenario) -> list[_Carrier] | None:
         thrusts = [one for one in carrier.actuators if any(one.wrench[:3])]
         upward = all(one.low >= 0 and one.wrench[2] >= 0 and not any(one.wrench[:2]) for one in thrusts)
         tilt = min((limit.high for limit in tilts), default=np.pi) if upward else np.pi
-        found.append(_Carrier(carrier.force_max, tilt, carrier.body.mass, fastest))
+        found.append(Carrier(carrier.force_max, tilt, carrier.body.mass, fastest))
     return found
 
 
-def _missing(forces: np.ndarray, carriers: list[_Carrier], gravity: np.ndarray) -> float:
+def _missing(forces: np.ndarray, carriers: list[Carrier], gravity: np.ndarray) -> float:
     """Return by how much forces (n, 3) exceed at most what all carriers can give along any direction [N]."""
     ahead = forces[:, :2] / np.maximum(np.linalg.norm(forces[:, :2], axis=1, keepdims=True), TINY)
     flat, up = np.cos(DIRECTIONS), np.sin(DIRECTIONS)
     directions = np.concatenate([ahead[:, None] * flat[:, None], np.tile(up[:, None], (len(forces), 1, 1))], axis=2)
+    return float((np.einsum("nkj,nj->nk", directions, forces) - strongest(carriers, directions, gravity)).max())
+
+
+def strongest(carriers: list[Carrier], directions: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+    """Return the largest force of all carriers on the platform along directions (..., 3), (...) [N]."""
     from_vertical = np.arccos(np.clip(directions[..., 2], -1, 1))
-    missing = np.einsum("nkj,nj->nk", directions, forces)
+    most = np.zeros(directions.shape[:-1])
     for carrier in carriers:
         beyond = np.clip(from_vertical - carrier.tilt, 0, np.pi / 2)
-        missing -= carrier.thrust * np.cos(beyond) + carrier.mass * (directions @ gravity + carrier.acceleration)
-    return float(missing.max())
+        most += carrier.thrust * np.cos(beyond) + carrier.mass * (directions @ gravity + carrier.acceleration)
+    return most

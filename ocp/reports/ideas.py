@@ -32,12 +32,13 @@ def ideas(plan: PlanData) -> list[Fact]:
     """Return what may help, the most likely first; empty for a feasible plan, or if nothing is known to."""
     if plan.feasible:
         return []
+    more = [("more", "may be feasible: the search for changes was cut short")] * plan.cut_short
     if plan.relaxations:
-        return [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan)]
+        return [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *more]
     found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"of those tried makes it feasible: no duration, limit, {tried}")]
-    return found or (nothing if plan.certificate is not None and not units(plan) else [])
+    return found + more or (nothing if plan.certificate is not None and not units(plan) else [])
 
 
 def units(plan: PlanData) -> list[Fact]:

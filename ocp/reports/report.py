@@ -181,7 +181,8 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
         side = "shortest" if longer else "longest"
         timed = longer and can_be_timed(plan.scenario.robot, plan.scenario.task)
         other = "; `towline time` computes the fastest time law" if timed else ""
-        return "feasible duration", f"{fact}, close to the {side} feasible one for this time law{other}"
+        close = "" if relaxed.detail else f", close to the {side} feasible one for this time law"
+        return "feasible duration", f"{fact}{close}{other}"
     others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]
     return f"feasible {relaxed.name}", fact + (f", together with {', '.join(others)}" if others else "")
 

@@ -10,7 +10,7 @@ from ...base.errors import InputError
 from ...solvers import solve_batch
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
-from ..tasks.scenario import Scenario
+from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.wind_set import possible_winds_at
 from .relaxations import ORDERS, planned, rounded
 from .search import Search
@@ -18,7 +18,8 @@ from .search import Search
 INSTANTS = 120  # at which tensions must exist before a motion is audited
 HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
-OF_PROGRAMS = *RESERVES[1:], 0.5, 0.25, 0.1  # likewise, if programs decide: the last one is tried first
+OF_PROGRAMS = 0.25, 0.5, 0.75, 0.9  # of it, if programs decide: in order until one has no solution
+LEAST = 0.1  # of it, if the first one has none
 
 Variation: TypeAlias = tuple[Scenario, float, str]
 """The scenario of a varied task, the value in which it differs, and a text that follows the value in reports."""
@@ -37,6 +38,13 @@ def largest_share(
 
     With `rates` the share decides about speeds and accelerations too, as that of a duration does.
     """
+
+    def tried(reserve: float, near: list[Relaxed] | None = None) -> list[Relaxed]:
+        varied = _legal(make, reserve * low)
+        guess = near[0].plan.deviation if near else None
+        plan = varied and planned(search, varied[0], f"audit, other {name}", guess)
+        return [Relaxed(name, unit, make(1.0)[1], rounded(varied[1], up), plan, varied[2])] if varied and plan else []
+
     low, high = 0.0, most
     for _ in range(HALVINGS):
         middle = (low + high) / 2
@@ -44,15 +52,24 @@ def largest_share(
         low, high = (middle, high) if varied and _may_be_feasible(varied[0], rates) else (low, middle)
     if low == 0.0:
         return []
-    reserves = RESERVES
-    if make(low)[0].carrier_free:
-        least = make(OF_PROGRAMS[-1] * low)[0]
-        reserves = OF_PROGRAMS if planned(search, least, f"audit, other {name}") is not None else ()
-    for reserve in reserves:
-        varied = _legal(make, reserve * low)
-        if varied and (plan := planned(search, varied[0], f"audit, other {name}")) is not None:
-            return [Relaxed(name, unit, make(1.0)[1], rounded(varied[1], up), plan, varied[2])]
-    return []
+    if not by_programs(make(low)[0]):
+        return next(filter(None, map(tried, RESERVES)), [])
+    best: list[Relaxed] = []
+    for reserve in OF_PROGRAMS:
+        if not (larger := tried(reserve, best)):
+            break
+        best = larger
+    return best or tried(LEAST)
+
+
+def by_programs(scenario: Scenario) -> bool:
+    """Return whether only a program shows if a motion is feasible: carriers are free, or few cables let it tilt."""
+    return bool(scenario.carrier_free) or _tilts(scenario)
+
+
+def _tilts(scenario: Scenario) -> bool:
+    """Return whether the tube leaves the planner an attitude, which too few cables for all of them determine."""
+    return scenario.robot.m < scenario.robot.dof_mask.sum() and bool(scenario.task.tube.turn)
 
 
 def _legal(make: Callable[[float], Variation], share: float) -> Variation | None:
@@ -66,7 +83,8 @@ def _legal(make: Callable[[float], Variation], share: float) -> Variation | None
 def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
     """Return whether limits and tensions permit some instants of a fixed motion, tensions only off the ground.
 
-    If carriers are free, return whether nothing proves that they cannot hold the platform.
+    If carriers are free, return whether nothing proves that they cannot hold the platform. If it tilts, tensions need
+    only exert the force.
     """
     if scenario.carrier_free:
         return infeasible_ends(scenario) is None
@@ -75,7 +93,9 @@ def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
         return False
     times = times[~scenario.phases.resting(times)]
     platform, carriers = scenario.motion(times, None)
-    mask = scenario.robot.dof_mask
+    mask = scenario.robot.dof_mask.copy()
+    if _tilts(scenario):
+        mask[list(ATTITUDE)] = 0
     A = scenario.dynamics.wrench_matrix(platform.pose, carriers.pose) * mask[:, None]
     low, high = scenario.bounds_at(times)
     winds = [scenario.wind]

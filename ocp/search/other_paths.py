@@ -35,12 +35,13 @@ def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
 
     def to(share: float) -> Variation:
         end = start + share * way
-        nearer = path.model_copy(update={"end": tuple(end.tolist())})
-        place = ", ".join(f"{value:.4g}" for value in (np.rad2deg(end[3:]) if turns else end[:3]))
-        varied = _along(scenario, nearer)
+        end[:3] = [rounded(to, up=to < since) for to, since in zip(end[:3], start[:3], strict=True)]  # as it is printed
+        varied = _along(scenario, path.model_copy(update={"end": tuple(end.tolist())}))
+        attitude = f"to roll, pitch, yaw ({quantity_row(np.rad2deg(end[3:]) + 0.0)}) degrees" * bool(way[3:].any())
         if turns:
-            return varied, 100 * share, f"of it, to roll, pitch, yaw ({place}) degrees"
-        return varied, share * whole, f"of {quantity(whole, 'm')}, to ({place}) m"
+            return varied, 100 * share, f"of it, {attitude}"
+        place = f"of {quantity(whole, 'm')}, to ({quantity_row(end[:3] + 0.0)}) m"
+        return varied, float(np.linalg.norm(end[:3] - start[:3])), ", ".join(filter(None, [place, attitude]))
 
     return (
         largest_share(search, to, "part of the rotation", "%")

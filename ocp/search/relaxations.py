@@ -1,5 +1,7 @@
 """Search for feasible tasks near an infeasible one, by another duration or looser limits, and audit each."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -11,7 +13,7 @@ from ...models.part import PositiveRange
 from ..audits.audit import Audit, other_tensions_may_pass
 from ..audits.excess import Excess
 from ..limits.bodies import LOAD, PLATFORM
-from ..nlp.rows import MANY, Mesh
+from ..nlp.rows import Mesh
 from ..nlp.solver import MOST_ITERATIONS, Outcome
 from ..plan import Plan
 from ..proofs.durations import Durations
@@ -31,14 +33,21 @@ TRIES = 3  # of a duration: not all that is exceeded falls as speeds and acceler
 DIGITS = 4  # of what is offered: reports print no more
 HALVINGS = 12  # of a margin, and of the ratio of two durations
 PREFERRED = 1e-3  # of a limit's scale: an excess that costs one, so that other costs hardly matter
-TIME_COUNTS = 1e-2  # of the requested duration: it adds one to the objective, so that other costs hardly matter
+TIME_COUNTS = 1e-4  # of a feasible duration: it adds one to the objective, so that other costs hardly matter
 ORDERS = {"/s": 1, "W": 1, "/s^2": 2, "/s^3": 3}  # of the rates with such units, which fall with 1/T to that power
-LONGEST_CHOSEN = 20.0  # times the shortest duration: the program starts at the geometric mean of both
-LONGER_CHOSEN = 1.05  # than the shortest duration, at which almost nothing is left to choose
+LONGEST_CHOSEN = 20.0  # times the shortest duration
+SHORTER = "(shorter ones may be feasible)"
+EASE = 0.1  # of the acceleration of gravity, along the path
+PLACES = 61  # of it
+LONGER_CHOSEN = 1.1  # than the shortest duration, at which almost nothing is left to choose
 BEYOND = 0.05  # of the change of a limit, more than the least, at which almost nothing is left to choose
 SHRINK = 5e-3  # of the limits, for what happens between the nodes
-WORK = 5e4  # of the program of a relaxation, as iterations times free coordinates at its nodes: a few seconds
-LEAST_ITERATIONS = 40  # of the largest programs too
+# Of all programs of relaxations, as iterations times free coordinates at their nodes: as much as the plan took, within
+# these bounds, of a few seconds.
+LEAST_EFFORT, MOST_EFFORT = 8e4, 1.2e5
+PART = 0.6  # of what is left of it, for one program
+LEAST_ITERATIONS = 15  # fewer find nothing
+LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 
 
 class Change(NamedTuple):
@@ -63,8 +72,13 @@ def near_motion(
 
     A longer duration is searched for in a `span` [s], unless its ends are equal.
     """
+    open_ended = span[0] < span[1]
+    fast = at_ease(scenario) > span[0] or any(slower(excess) > 1 for excess in audit.excess)
+    longer = _longer_duration(search, audit, *span) if open_ended and fast else []
     limits = _soft_limits(search, deviation) or _other_limits(search, scenario, deviation, audit)
-    return (_longer_duration(search, *span) if span[0] < span[1] else []) + limits
+    if open_ended and not (fast or limits):  # it hardly helps where nothing is fast
+        longer = _longer_duration(search, audit, *span)
+    return longer + limits
 
 
 def other_duration(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
@@ -167,56 +181,52 @@ def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
     if not soft:
         return []
     softer = scenario.task.model_copy(update={"limits": limits.model_copy(update={"soft": limits.soft | soft})})
-    outcome = solved(
-        search, replace(lay_out(scenario.robot, softer), path=scenario.path), start, Mesh(scenario.task.steps)
-    )
-    if not outcome.success:
+    softened = replace(lay_out(scenario.robot, softer), path=scenario.path)
+    if infeasible_ends(softened) is not None:  # by what is not soft
+        return []
+    outcome = solved(search, softened, start)
+    if outcome is None:
         return []
     lasting = scenario.lasting(outcome.duration)
     audit = search.audit_motion(lasting, outcome.deviation)
     return _other_limits(search, lasting, outcome.deviation, audit, BEYOND)
 
 
-def _longer_duration(search: Search, shortest: float, longest: float) -> list[Relaxed]:
-    """Return a longer duration at which a scenario's motion, which the planner chooses, is possible, if it is shown."""
+def _longer_duration(search: Search, audit: Audit, shortest: float, longest: float) -> list[Relaxed]:
+    """Return a longer duration at which a scenario's motion, which the planner chooses, is possible, if it is shown.
+
+    A motion at ease is found most easily; from there the program with a free duration looks for a shorter one.
+    """
     scenario, task = search.scenario, search.scenario.task
     requested = scenario.duration_range.max if scenario.duration_range is not None else scenario.duration
     if LONGER_CHOSEN * shortest > longest:
         return []
-    plan = None
-    if scenario.count <= MANY:
-        objective = task.objective.model_copy(update={"time": TIME_COUNTS * requested})
-        open_task = {"duration": PositiveRange(min=shortest, max=longest), "objective": objective}
-        outcome = solved(search, lay_out(scenario.robot, task.model_copy(update=open_task)), None, Mesh(task.steps))
-        if outcome.success:
-            near = LONGER_CHOSEN * max(outcome.duration, requested)
-            plan = _ever_shorter(search, near, shortest, np.sqrt(2), outcome)
-    plan = plan or _ever_shorter(search, longest, shortest, 3.0)
-    return [] if plan is None else [Relaxed("duration", "s", requested, plan.scenario.duration, plan)]
+    ease = at_ease(scenario)
+    slowest = max(ease, 2 * shortest, *(slower(excess) * requested for excess in audit.excess))
+    plan = _lasting(search, min(slowest, max(ease, longest), scenario.longest), None)
+    if plan is None:
+        return []
+    objective = task.objective.model_copy(update={"time": TIME_COUNTS * plan.duration})
+    open_task = {"duration": PositiveRange(min=shortest, max=plan.duration), "objective": objective}
+    outcome = solved(search, lay_out(scenario.robot, task.model_copy(update=open_task)), plan.deviation)
+    near = None if outcome is None else _lasting(search, LONGER_CHOSEN * max(outcome.duration, requested), outcome)
+    found = near or plan
+    return [Relaxed("duration", "s", requested, found.duration, found, "" if near else SHORTER)]
 
 
-def _ever_shorter(
-    search: Search, seconds: float, shortest: float, factor: float, near: Outcome | None = None
-) -> Plan | None:
-    """Return the plan with the last feasible of some durations, each a `factor` less than the one before.
-
-    Each program starts from the motion with the longer duration, the first one from a motion that is `near`.
-    """
-    best = None
-    while seconds > LONGER_CHOSEN * shortest:
-        plan = _lasting(search, seconds, best or near)
-        if plan is None:
-            break
-        best, seconds = plan, plan.scenario.duration / factor
-    return best
+def at_ease(scenario: Scenario) -> float:
+    """Return the duration in which the platform's acceleration on its path is at most `EASE` of gravity's [s]."""
+    times = np.linspace(0.0, scenario.duration, PLACES)
+    fastest = np.linalg.norm(scenario.motion(times, None)[0].acceleration[:, :3], axis=1).max()
+    of_weight = scenario.robot.force_scale / scenario.robot.platform.mass
+    return float(scenario.duration * np.sqrt(fastest / (EASE * of_weight)))
 
 
-def _lasting(search: Search, seconds: float, near: Plan | Outcome | None) -> Plan | None:
+def _lasting(search: Search, seconds: float, near: Outcome | None) -> Plan | None:
     """Return the plan of the search's task with another duration, from a motion that is `near`."""
     scenario, seconds = search.scenario, rounded(seconds, up=True)
     longer = lay_out(scenario.robot, scenario.task.model_copy(update={"duration": seconds}))
-    deviation = None if near is None else near.deviation
-    guess = deviation and deviation.stretched(seconds / deviation.nodes[-1])
+    guess = None if near is None else near.deviation.stretched(seconds / near.deviation.nodes[-1])
     return planned(search, longer, "audit, longer duration", guess)
 
 
@@ -228,12 +238,14 @@ def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | No
     if not scenario.count:
         audit = search.audit_motion(scenario, None, name)
         return Plan(scenario, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None
-    beside = _beside(search, scenario)
-    outcome = beside.solve("program of a relaxation", Mesh(scenario.task.steps), guess)
-    if not outcome.success:
-        return None
-    refine(beside, outcome)
-    plan = beside.best()
+    with _beside(search, scenario) as beside:
+        if beside is None:
+            return None
+        outcome = beside.solve("program of a relaxation", _mesh(scenario), guess)
+        if not outcome.success:
+            return None
+        refine(beside, outcome)
+        plan = beside.best()
     return plan if plan.feasible else None
 
 
@@ -257,20 +269,38 @@ def longer_durations(scenario: Scenario) -> tuple[float, float]:
     return shortest, min(LONGEST_CHOSEN * shortest, longest)
 
 
-def solved(search: Search, scenario: Scenario, guess: Deviation | None, mesh: Mesh) -> Outcome:
-    """Solve another scenario's program."""
-    return _beside(search, scenario).solve("program of a relaxation", mesh, guess)
+def solved(search: Search, scenario: Scenario, guess: Deviation | None) -> Outcome | None:
+    """Return the solution of another scenario's program; None if there is none."""
+    with _beside(search, scenario) as beside:
+        if beside is None:
+            return None
+        outcome = beside.solve("program of a relaxation", _mesh(scenario), guess)
+    return outcome if outcome.success else None
 
 
-def _beside(search: Search, scenario: Scenario) -> Search:
-    """Return the search for a motion of another scenario, in the time that the task's limit left.
+def _mesh(scenario: Scenario) -> Mesh:
+    """Return the mesh of a relaxation's program: of fewer steps where they are many, since the refinement adds some."""
+    steps = scenario.task.steps
+    return Mesh(steps if scenario.phases.all else min(steps, max(LARGE // max(scenario.count, 1), FEWEST)))
 
-    Each program may take as many iterations as usually fit into a few seconds, or as many as the search took: with a
-    limit in seconds, a busy machine would find other results.
+
+@contextmanager
+def _beside(search: Search, scenario: Scenario) -> Iterator[Search | None]:
+    """Yield the search for a motion of another scenario, in the time that the task's limit left.
+
+    Its programs may take a part of the iterations that are left for offers: with a limit in seconds, a busy machine
+    would find other results. None if too few are left; then the search for offers is cut short.
     """
-    affordable = int(WORK / (max(scenario.count, 1) * scenario.task.steps))
-    most = min(max(affordable, search.iterations, LEAST_ITERATIONS), MOST_ITERATIONS)
-    return Search(scenario, {}, search.progress, scenario.task.time_limit - search.solve_s, most)
+    left = min(max(search.effort, LEAST_EFFORT), MOST_EFFORT) - search.offers_effort
+    most = int(PART * left / (max(scenario.count, 1) * scenario.task.steps))
+    if most < LEAST_ITERATIONS:
+        search.cut_short = True
+        yield None
+        return
+    most = min(most, MOST_ITERATIONS)
+    beside = Search(scenario, {}, search.progress, scenario.task.time_limit - search.solve_s, most)
+    yield beside
+    search.offers_effort += beside.effort
 
 
 def rounded(value: float, up: bool) -> float:

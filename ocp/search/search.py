@@ -76,6 +76,8 @@ class Search:
         self._iterates: list[tuple[int, float, float]] = []
         self._audited: list[tuple[float, Outcome, Audit]] = []
         self._interrupted: Outcome | None = None
+        self.effort = 0.0  # of all runs of solvers: iterations times free coordinates at all nodes
+        self.offers_effort, self.cut_short = 0.0, False  # of the search for offers, and whether it had to stop
 
     def take(self, scenario: Scenario) -> None:
         """Go on with another scenario, without what is known of the one before."""
@@ -255,6 +257,7 @@ class Search:
             raise
         self.build_s += built - start
         self.solve_s += time.perf_counter() - built
+        self.effort += outcome.iterations * mesh.steps * max(self.scenario.count, 1)
         return outcome
 
     def _built(self, mesh: Mesh, guess: Deviation | None, reach: float) -> Program:

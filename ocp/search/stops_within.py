@@ -5,7 +5,7 @@ first longer by as much as the stop is too long, then between one that is too sh
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -19,7 +19,7 @@ from ...statics.stops import beginnings, longest_stop_along
 from ..audits.audit import audit
 from ..audits.excess import Excess
 from ..plan import Plan
-from ..result import PlannerStep, Relaxed
+from ..result import Offers, PlannerStep, Relaxed
 from ..tasks.deviation import Deviation
 from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
@@ -126,17 +126,17 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
     excess = Excess("stop_within", "platform", its.begins, its.duration, seconds, "s", "at most", why)
     status = MotionStatus.INFEASIBLE if scenario.is_fixed else MotionStatus.NOT_FOUND
     audit = replace(plan.audit, excess=[*plan.audit.excess, excess])
-    offers: Callable[[], Sequence[Relaxed]] = partial(_longer_stop, plan, seconds) if its.feasible else tuple
+    offers = partial(_longer_stop, plan, seconds) if its.feasible else Offers
     return replace(plan, status=status, audit=audit, offers=offers)
 
 
-def _longer_stop(plan: Plan, seconds: float) -> list[Relaxed]:
+def _longer_stop(plan: Plan, seconds: float) -> Offers:
     """Return the shortest `stop_within` that the plan keeps, as an alternative to a limit of so many seconds."""
     assert plan.stop is not None
     enough = rounded(plan.stop.duration, up=True)
     task = plan.scenario.task.model_copy(update={"stop_within": enough})
     as_slow = replace(plan, scenario=replace(plan.scenario, task=task))
-    return [Relaxed("stop_within", "s", seconds, enough, as_slow)]
+    return Offers([Relaxed("stop_within", "s", seconds, enough, as_slow)])
 
 
 def _trajectory(plan: Plan, extreme: int | None = None) -> Trajectory:

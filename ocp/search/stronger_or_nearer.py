@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,15 @@ from ..tasks.scenario import Scenario
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
 from .given_states import near_given_states
-from .largest_share import Variation, exceeds, largest_share
+from .largest_share import Variation, by_programs, exceeds, largest_share
 from .longer_phases import longer_phases
 from .other_paths import near_home, nearer_end, other_yaws, shifted_path, slower_path, smaller_circle
-from .relaxations import LONGER, longer_durations, near_motion, other_duration, rounded, slower
+from .relaxations import LONGER, longer_durations, near_motion, other_duration, planned, rounded, slower
 from .search import Search
 from .tilting import tilting_platform
 
 AT_EASE = 10.0  # times the time in which a force like the platform's weight moves it across the robot
+LIGHTEST = 0.01  # of the platform's mass, of one that is tried near home
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 
 
@@ -41,11 +43,15 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
     span = longer_durations(scenario)
     slower_helps = span[0] < span[1] or not scenario.stretches
     longer = longer_phases(search, scenario, audit) if slower_helps else []
-    found = near_motion(search, scenario, deviation, audit, span) or near_given_states(search, scenario, audit)
+    found = (
+        _fewer_regions(search, scenario, deviation, audit)
+        or near_motion(search, scenario, deviation, audit, span)
+        or near_given_states(search, scenario, audit)
+    )
     if found:
         return longer + found
-    if scenario.carrier_free:
-        return longer + _one_of_a_team(search, scenario)
+    if by_programs(scenario):
+        return longer + _by_a_program(search, scenario)
     if np.abs([fixed.value for fixed in fixed_values(scenario)]).max(initial=0.0) > 0:
         return []  # no motion is exactly on the path
     along = search.audit_motion(scenario, None, "audit of the path")
@@ -65,12 +71,30 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     task = scenario.task
     if task.robust is not None:
         return []
-    if scenario.carrier_free:
-        return _one_of_a_team(search, scenario)
+    if by_programs(scenario):
+        return _by_a_program(search, scenario)
     found = _changes(search, scenario, audit)
     if found or _blocked(audit):
         return found
     return near_home(search, scenario) or _at_ease_near_home(search, scenario)
+
+
+def _fewer_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
+    """Return how many regions may stay, without those through which the closest motion passes where it may go round."""
+    limits = scenario.task.limits
+    through = {
+        excess.about.partition(" outside ")[2]
+        for excess in audit.excess
+        if excess.limit == "keep_out" and excess.value < 0
+    }
+    kept = tuple(region for region in limits.keep_out if region.name not in through)
+    if len(kept) == len(limits.keep_out) or scenario.task.tube.position != "free":
+        return []
+    task = scenario.task.model_copy(update={"limits": limits.model_copy(update={"keep_out": kept})})
+    without, name = lay_out(scenario.robot, task), "number of keep-out regions"
+    plan = planned(search, without.lasting(scenario.duration), f"audit, other {name}", deviation)
+    detail = f"of {len(limits.keep_out)}, without {', '.join(map(repr, sorted(through)))}"
+    return [] if plan is None else [Relaxed(name, "", len(limits.keep_out), len(kept), plan, detail)]
 
 
 def _blocked(audit: Audit) -> bool:
@@ -78,7 +102,10 @@ def _blocked(audit: Audit) -> bool:
 
 
 def _at_ease_near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest feasible path near the platform's home without margin and wind, and with a longer duration."""
+    """Return the largest feasible path near the platform's home without margin and wind, and with a longer duration.
+
+    If there is none, it is one of a lighter platform.
+    """
     eased: dict[str, object] = {"margin": 0.0, "wind": None}
     conditions = ["a margin of 0 N"] * bool(scenario.hard_margin) + ["no wind"] * (scenario.task.wind is not None)
     robot, size = scenario.robot, float(np.linalg.norm(np.ptp(scenario.robot.home_anchors, axis=0)))
@@ -86,14 +113,18 @@ def _at_ease_near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
     if scenario.stretches and scenario.duration < seconds <= scenario.longest:
         eased["duration"] = seconds
         conditions.append(f"a duration of {quantity(seconds, 's')}")
-    if not conditions:
-        return []
-    calm = lay_out(scenario.robot, scenario.task.model_copy(update=eased))
-    return [replace(each, detail=f"{each.detail}, with {', '.join(conditions)}") for each in near_home(search, calm)]
+    calm = lay_out(robot, scenario.task.model_copy(update=eased))
+    found = near_home(search, calm) if conditions else []
+    mass = robot.platform.mass
+    while not found and mass > LIGHTEST * robot.platform.mass:  # it is too heavy even there
+        mass = rounded(mass / 2, up=False)
+        found = near_home(search, _weighing(calm, mass))
+    conditions += [f"a platform of {quantity(mass, 'kg')}"] * (mass < robot.platform.mass)
+    return [replace(each, detail=f"{each.detail}, with {', '.join(conditions)}") for each in found]
 
 
-def _one_of_a_team(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the first change with which free carriers can hold the platform; only one, since each solves programs."""
+def _by_a_program(search: Search, scenario: Scenario) -> list[Relaxed]:
+    """Return the first change with which a program finds a motion; only one, since each solves programs."""
     changes = (_less_wind, _lighter_load, _lighter_platform, nearer_end, near_home)
     return next((found for make in changes if (found := make(search, scenario))), [])
 
@@ -120,8 +151,8 @@ def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
         _lighter_load,
         _surer_load,
         _lighter_platform,
-        _stronger_cables,
-        _slacker_cables,
+        partial(_other_limits_of_cables, limit="t_max"),
+        partial(_other_limits_of_cables, limit="t_min"),
     ):
         its = make(search, scenario)
         if not its and others and seconds <= scenario.longest:
@@ -205,42 +236,36 @@ def _carrying(scenario: Scenario, change: Callable[[Load], Load]) -> Scenario:
 
 def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the heaviest platform that is feasible, with the moments of inertia that go with its mass."""
-    data, mass = scenario.robot.model_dump(), scenario.robot.platform.mass
+    mass = scenario.robot.platform.mass
 
     def with_mass(share: float) -> Variation:
-        platform = data["platform"] | {"mass": share * mass}
-        if platform["inertia"] is not None:
-            platform["inertia"] = [share * value for value in platform["inertia"]]
-        lighter = Robot.model_validate(data | {"platform": platform})
-        return lay_out(lighter, scenario.task), share * mass, f"instead of {quantity(mass, 'kg')}"
+        return _weighing(scenario, share * mass), share * mass, f"instead of {quantity(mass, 'kg')}"
 
     return largest_share(search, with_mass, "platform.mass", "kg")
 
 
-def _stronger_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the smallest factor of all t_max that is feasible, as the largest t_max."""
-    data, t_max = scenario.robot.model_dump(), scenario.robot.t_max
-    largest, others = float(t_max.max()), "" if np.ptp(t_max) == 0 else ", the others by the same factor"
-
-    def with_limits(share: float) -> Variation:
-        factor = 1 + (STRONGEST - 1) * (1 - share) ** 4  # fine steps near one
-        cables = [cable | {"t_max": factor * cable["t_max"]} for cable in data["cables"]]
-        stronger = Robot.model_validate(data | {"cables": cables})
-        return lay_out(stronger, scenario.task), factor * largest, f"instead of {quantity(largest, 'N')}{others}"
-
-    return largest_share(search, with_limits, "cables.t_max", "N", up=True)
+def _weighing(scenario: Scenario, mass: float) -> Scenario:
+    """Return the scenario with a platform of another mass [kg], with moments of inertia in proportion."""
+    data = scenario.robot.model_dump()
+    platform = data["platform"] | {"mass": mass}
+    if platform["inertia"] is not None:
+        share = mass / scenario.robot.platform.mass
+        platform["inertia"] = [share * value for value in platform["inertia"]]
+    return lay_out(Robot.model_validate(data | {"platform": platform}), scenario.task)
 
 
-def _slacker_cables(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest factor of all t_min that is feasible, as the largest t_min."""
-    data, t_min = scenario.robot.model_dump(), scenario.robot.t_min
-    largest, others = float(t_min.max()), "" if np.ptp(t_min) == 0 else ", the others by the same factor"
+def _other_limits_of_cables(search: Search, scenario: Scenario, limit: str) -> list[Relaxed]:
+    """Return the smallest factor of all t_max, or the largest of all t_min, that is feasible, as the largest limit."""
+    data, values = scenario.robot.model_dump(), getattr(scenario.robot, limit)
+    largest, others = float(values.max()), "" if np.ptp(values) == 0 else ", the others by the same factor"
+    stronger = limit == "t_max"
     if largest == 0.0:
         return []
 
     def with_limits(share: float) -> Variation:
-        cables = [cable | {"t_min": share * cable["t_min"]} for cable in data["cables"]]
-        slacker = Robot.model_validate(data | {"cables": cables})
-        return lay_out(slacker, scenario.task), share * largest, f"instead of {quantity(largest, 'N')}{others}"
+        factor = 1 + (STRONGEST - 1) * (1 - share) ** 4 if stronger else share  # fine steps near one
+        cables = [cable | {limit: factor * cable[limit]} for cable in data["cables"]]
+        varied = lay_out(Robot.model_validate(data | {"cables": cables}), scenario.task)
+        return varied, factor * largest, f"instead of {quantity(largest, 'N')}{others}"
 
-    return largest_share(search, with_limits, "cables.t_min", "N")
+    return largest_share(search, with_limits, f"cables.{limit}", "N", up=stronger)

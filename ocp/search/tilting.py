@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from ..nlp.rows import Mesh
 from ..result import Relaxed
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import ATTITUDE, Scenario
@@ -27,10 +26,12 @@ def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
         return lay_out(robot, task.model_copy(update={"tube": task.tube.model_copy(update={"attitude": most})}))
 
     free = with_tilt(MOST)
-    outcome = solved(search, free, None, Mesh(task.steps))
+    outcome = solved(search, free, None)
+    if outcome is None:
+        return []
     turns = [column for column, (owner, axis) in enumerate(free.owners()) if owner is None and axis in angles]
     tilt = min(rounded(SPARE * float(np.abs(outcome.deviation.q[:, turns]).max()), up=True), MOST)
-    if not outcome.success or not tilt:
+    if not tilt:
         return []
     plan = planned(search, with_tilt(tilt), "audit, tilting platform", outcome.deviation)
     return [] if plan is None else [Relaxed("tube.attitude", "rad", task.tube.turn, tilt, plan, "about each axis")]

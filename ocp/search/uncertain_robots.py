@@ -18,7 +18,7 @@ from ..audits.excess import Excess
 from ..audits.robust_margin import RobustMargin
 from ..audits.tensions import tolerance_of
 from ..plan import Plan
-from ..result import PlannerStep
+from ..result import Offers, PlannerStep
 from ..tasks.deviation import Deviation
 from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
@@ -77,7 +77,7 @@ def judged(plan: Plan, robot: Robot, share: float) -> Plan:
     task = scenario.task.model_copy(update={"robust": share})
     own = lay_out(robot, task)
     scenario = replace(scenario, robot=robot, task=task, dynamics=own.dynamics, limits=own.limits, tightened=tightened)
-    plan = replace(plan, scenario=scenario, offers=tuple)
+    plan = replace(plan, scenario=scenario, offers=Offers)
     if not np.isfinite(audit.tensions).all():
         return plan
     margin = _margin(scenario, plan, share)
