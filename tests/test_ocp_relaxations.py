@@ -1,6 +1,8 @@
 """What a report offers in place of an infeasible task is feasible when it is planned, and little less is not."""
 
 import pickle
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -8,8 +10,14 @@ import pytest
 from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, plan
 from towline.ocp.limits import Limit
+from towline.ocp.result import Offers
 from towline.ocp.search import relaxations
+from towline.ocp.search.search import Search
+from towline.ocp.search.stronger_or_nearer import near_chosen_motion
 from towline.ocp.tasks import scenario, task_checks
+from towline.ocp.tasks.ends import between_fixed_values
+from towline.ocp.tasks.lay_out import lay_out
+from towline.ocp.tasks.task import read_task
 
 ROBOT = load("ipanema-1")
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
@@ -258,12 +266,20 @@ def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
         walls.append({"kind": "box", "name": f"wall {'xyz'[axis]}{sign:+d}", **box})
     task = {"path": {"kind": "line", "start": [-0.5, 0.2, 1], "end": end.tolist()}, "duration": 6, "steps": 20}
     task |= {"tube": {"position": "free"}}
-    found = plan(robot, task | {"limits": {"keep_out": walls}})
-    (offer,) = (each for each in found.relaxations if each.name == "number of keep-out regions")
+    scenario = lay_out(robot, read_task(task | {"limits": {"keep_out": walls}}))
+    through = between_fixed_values(scenario)
+
+    def offers():
+        search = Search(scenario, {}, None)
+        return search, near_chosen_motion(search, scenario, through, search.audit_motion(scenario, through))
+
+    (offer,) = (each for each in offers()[1] if each.name == "number of keep-out regions")
     kept = [wall for wall in walls if repr(wall["name"]) not in offer.detail]
     assert offer.possible == len(kept) < len(walls)
     assert plan(robot, task | {"limits": {"keep_out": kept}}).feasible
     monkeypatch.setattr(relaxations, "MOST_EFFORT", 0.0)
-    stopped = plan(robot, task | {"limits": {"keep_out": walls}})
-    assert not stopped.relaxations
+    search, none = offers()
+    assert search.cut_short
+    assert not none
+    stopped = replace(plan(ROBOT, TASK | {"limits": {"platform_speed": 0.3}}), offers=partial(Offers, (), True))
     assert "the search for changes was cut short" in stopped.report()

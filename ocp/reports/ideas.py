@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.display import Fact
 from ...base.text import quantity, quantity_row
+from ..audits.excess import TENSIONS
 from ..global_path.at_rest import AtRest
 from ..global_path.space import Space
 from ..proofs.too_heavy import OF_WEIGHT
@@ -38,7 +39,12 @@ def ideas(plan: PlanData) -> list[Fact]:
     found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"of those tried makes it feasible: no duration, limit, {tried}")]
-    return found + more or (nothing if plan.certificate is not None and not units(plan) else [])
+    return found + more or (nothing if _lacks_tensions(plan) and not units(plan) else [])
+
+
+def _lacks_tensions(plan: PlanData) -> bool:
+    """Return whether tensions are missing: at an instant, or proven so in every attitude at an end."""
+    return plan.certificate is not None or any(excess.limit == TENSIONS for excess in plan.audit.excess)
 
 
 def units(plan: PlanData) -> list[Fact]:
@@ -156,7 +162,7 @@ def _slack(kept: AtRest, space: Space, pose: np.ndarray, carriers: np.ndarray, m
 def _carriers(plan: PlanData) -> list[Fact]:
     """Suggest moving carriers, or else a tilting platform, if the task forbids them and no tensions exist."""
     robot, task = plan.scenario.robot, plan.scenario.task
-    if plan.certificate is None:
+    if not _lacks_tensions(plan):
         return []
     if task.base.kind == "hold" and any(carrier.free_coordinates(robot.drive) for carrier in robot.carriers):
         return [("moving carriers", "`base: {kind: free}`: the planner then chooses how the carriers move")]
