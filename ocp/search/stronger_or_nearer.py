@@ -12,6 +12,7 @@ from ...models import Robot
 from ...models.part import Vector3
 from ..audits.audit import Audit
 from ..audits.excess import TENSIONS
+from ..plan import Plan
 from ..proofs.durations import durations
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
@@ -19,6 +20,7 @@ from ..tasks.ends import fixed_values
 from ..tasks.lay_out import lay_out
 from ..tasks.phase import Load
 from ..tasks.scenario import Scenario
+from ..tasks.status import MotionStatus
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
 from .given_states import near_given_states
@@ -92,7 +94,10 @@ def _fewer_regions(search: Search, scenario: Scenario, deviation: Deviation | No
         return []
     task = scenario.task.model_copy(update={"limits": limits.model_copy(update={"keep_out": kept})})
     without, name = lay_out(scenario.robot, task), "number of keep-out regions"
-    plan = planned(search, without.lasting(scenario.duration), f"audit, other {name}", deviation)
+    without = without.lasting(scenario.duration)
+    closest = search.audit_motion(without, deviation, f"audit, other {name}")
+    plan = Plan(without, MotionStatus.FEASIBLE, deviation, closest, 0.0, 0.0) if closest.passed else None
+    plan = plan or planned(search, without, f"audit, other {name}", deviation)
     detail = f"of {len(limits.keep_out)}, without {', '.join(map(repr, sorted(through)))}"
     return [] if plan is None else [Relaxed(name, "", len(limits.keep_out), len(kept), plan, detail)]
 
