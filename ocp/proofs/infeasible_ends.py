@@ -233,7 +233,8 @@ def _hurried(
             centres[k, kind] = spread[0, kind] + _reach(scenario, its, point[None])
         spread[0, kind] += _reach(scenario, its)
     resting = [np.all(_resting(freedom, platform, carriers, count), axis=0) for count in (3, 6)]
-    return too_fast(scenario, times[order], poses, spread[:, which[order]], *resting, centres[:, which[order]])
+    centres = centres[:, which[order]]
+    return too_fast(scenario, times[order], poses, spread[:, which[order]], *resting, centres=centres)
 
 
 def _resting(freedom: list[np.ndarray], platform: Motion, carriers: Motion, count: int = 6) -> np.ndarray:
