@@ -26,6 +26,7 @@ from .warnings.long_turns import long_turns
 from .warnings.outside_frame import leaves_its_points, outside_frame
 from .warnings.short_cables import short_cables
 from .warnings.slipped_units import slipped_units
+from .warnings.weak_formation import weak_formation
 
 if TYPE_CHECKING:
     from ..statics.stops import Stop
@@ -200,6 +201,8 @@ class PlanData(Displayed):
         inside = into_places(seen, scenario.limits.all, limited)
         inside += between_points(seen, scenario.limits.all, limited)
         others = (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))
+        if scenario.task.base.kind == "free":
+            others = (*others, *weak_formation(seen))
         units = slipped_units(scenario.robot, scenario.task)
         path = scenario.task.path
         return (*units, *long_turns(path), *leaves_its_points(path), *inside, *others)

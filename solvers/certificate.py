@@ -41,6 +41,12 @@ class CertificateText(NamedTuple):
     limits: str
 
 
+def direction_text(unit: Array) -> str:
+    """Return a unit wrench direction (6,), moments divided by the length, as text: "force (0, 0, 1)"."""
+    parts = zip(("force", "moment"), (unit[:3], unit[3:]), strict=True)
+    return ", ".join(f"{name} {_vector(part)}" for name, part in parts if float(np.linalg.norm(part)) >= _LEAST_PART)
+
+
 @dataclass(frozen=True, eq=False)
 class Certificate(Displayed):
     """A wrench direction along which the required wrench exceeds everything that the cables can give.
@@ -177,8 +183,7 @@ class Certificate(Displayed):
             return f"the wrench direction {_vector(self.direction)}"
         unit = self.direction * np.repeat([1.0, self.length], 3)
         unit /= np.linalg.norm(unit)
-        force, moment = (float(np.linalg.norm(part)) >= _LEAST_PART for part in (unit[:3], unit[3:]))
-        text = ", ".join([f"force {_vector(unit[:3])}"] * force + [f"moment {_vector(unit[3:])}"] * moment)
+        text, moment = direction_text(unit), float(np.linalg.norm(unit[3:])) >= _LEAST_PART
         if up is not None and float(np.linalg.norm(up)) > 0.0:
             upright = float(unit[:3] @ up) / float(np.linalg.norm(up))
             text += f", {'up' if upright > 0.0 else 'down'}" if abs(upright) > _VERTICAL else ""

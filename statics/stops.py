@@ -286,7 +286,7 @@ class _Bounds(NamedTuple):
 
 
 class _Instants(NamedTuple):
-    """What n instants have in common for any reserve: wrenches a u + b x + c along the normals of k facets, (n, k)."""
+    """Coefficients of n instants for any reserve: wrenches a u + b x + c along the normals of k facets, (n, k)."""
 
     a: np.ndarray  # nan where a facet bounds nothing
     b: np.ndarray

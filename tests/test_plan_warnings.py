@@ -2,18 +2,22 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from towline import Task, available, load, plan, time_along
+from towline import Robot, Task, available, load, plan, time_along
 from towline.errors import InputError
+from towline.models import Dynamics
 from towline.ocp.tasks.paths import LinePath
 from towline.ocp.tasks.task import read_task
+from towline.ocp.warnings.instants import Instants
 from towline.ocp.warnings.long_turns import long_turns
 from towline.ocp.warnings.slipped_units import slipped_units
+from towline.ocp.warnings.weak_formation import weak_formation
 
 from .framed import framed
 from .warm import towline as run
@@ -188,3 +192,38 @@ def test_a_line_across_the_seam_of_yaw_has_a_shorter_way():
     assert not found.warnings
     whole = {"kind": "line", "start": [0, 0, 1.2], "end": [0, 0, 1.2, 0, 0, 2 * np.pi]}  # a whole turn is meant
     assert long_turns(LinePath.model_validate(whole)) == []
+
+
+@pytest.mark.parametrize("out", [0.0, 0.02, 0.2])
+def test_three_cables_nearly_in_one_plane_are_warned_of(out):
+    """Carriers above a line along (0.6, 0.8, 0), the middle one off it by `out`: across it the cables hardly pull.
+
+    At home, with unit vectors (s cos a, s sin a, c) at 120 degrees, the smaller singular value is s sqrt(3 / 2).
+    """
+    lean = np.arctan2(2.0, 2.0)
+    carriers, cables = [], []
+    for i, angle in enumerate(np.radians([0, 120, 240])):
+        home = [2 * np.cos(angle), 2 * np.sin(angle), 3, 0, 0, 0]
+        limits = {"reach": {"min": [-5] * 3, "max": [5] * 3}, "speed_max": 1, "acceleration_max": 1}
+        carriers.append({"name": f"r{i}", "kind": "mobile", "home": home, **limits})
+        cables.append({"carrier": f"r{i}", "anchor": [0] * 3, "attachment": [0] * 3, "t_min": 0, "t_max": 99})
+    platform = {"mass": 2, "dof": ["x", "y", "z"], "home": [0, 0, 1, 0, 0, 0]}
+    robot = Robot.model_validate(
+        {"name": "three", "source": "a test", "platform": platform, "carriers": carriers, "cables": cables}
+    )
+    along, across, up = np.array([[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]])
+    places = np.zeros((1, 3, 6))
+    places[0, :, :3] = [1.5 * along + 3 * up, out * across + 3 * up, -1.5 * along + 3 * up]
+    seen = Instants(Dynamics(robot), np.array([1.25]), robot.home[None], robot.carrier_home[None])
+    assert weak_formation(seen) == []
+    found = weak_formation(replace(seen, carriers=places))
+    pulls = places[0, :, :3] - [0, 0, 1]
+    pulls /= np.linalg.norm(pulls, axis=1, keepdims=True)
+    share = np.sqrt(np.linalg.eigvalsh(pulls.T @ pulls)[0].clip(0)) / (np.sin(lean) * np.sqrt(1.5))
+    assert (share > 0.05) == (found == []) == (out == 0.2)
+    if found:
+        said = re.search(
+            r"at t = 1\.250 s, the cables pull along force \((.+), (.+), (.+)\) with (less than )?([\d.]+) %", found[0]
+        )
+        assert abs(np.array([float(said[k]) for k in (1, 2, 3)]) @ across) > 0.99
+        assert 100 * share <= 0.01 if said[4] else float(said[5]) == pytest.approx(100 * share, rel=0.05)
