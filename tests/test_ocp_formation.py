@@ -10,6 +10,7 @@ from towline.models import load
 from towline.ocp import plan
 from towline.ocp.nlp.formation import clear_formation
 from towline.ocp.nlp.guess import initial_guess
+from towline.ocp.result import Offers
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 
@@ -119,7 +120,7 @@ def test_a_time_limit_ends_a_search():
         assert found.reason.startswith("the time limit of")
         assert found.audit.excess or found.audit.violation.max() > found.audit.tolerance  # of the best attempt
     assert took[1] < 1.0 + 2 * took[0]
-    assert found.reason in replace(found, offers=tuple).report()  # what is offered takes three times as long
+    assert found.reason in replace(found, offers=Offers).report()  # what is offered takes three times as long
 
 
 def test_quadrotors_go_through_a_slot_and_back():

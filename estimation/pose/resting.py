@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.text import counted
 from ...models import points
 from ...models.robot import Robot
 from ...statics.equilibria import Equilibrium, equilibria, per_length, rest_near
@@ -22,8 +23,8 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
     robot, few = problem.robot, problem.robot.m < problem.freedoms
     if few and robot.weight == 0.0:
         raise InputError(
-            f"gravity must not be zero for robot {robot.name!r}, because its {robot.m} cable lengths alone do not "
-            f"determine {problem.freedoms} coordinates"
+            "gravity must not be zero if the lengths do not determine the pose, got none for robot "
+            f"{robot.name!r}, which has {counted(robot.m, 'cable')} for {problem.freedoms} coordinates"
         )
     if few:
         own.converged, own.ambiguous = np.zeros(len(lengths), bool), None
