@@ -11,7 +11,7 @@ from typing_extensions import override
 from ..base.errors import InputError
 from ..base.inputs import required, shown
 from ..core import control_move_on
-from .as_floats import as_floats
+from .as_floats import as_floats, measured_at
 from .carried_load import CarriedLoad
 from .command import Command
 from .controller import Controller
@@ -86,29 +86,30 @@ class Filtered(Controller):
     @override
     def step(self, time: float, state: State, reference: Reference) -> Command:
         required("state", state, State)
-        seen = time if state.time is None else state.time
+        seen = time if state.time is None else measured_at(state.time, time)
         pose = np.array(state.pose, dtype=float)
         new = self._pose is None or not np.array_equal(pose, self._pose)
         self._pose = pose
-        found = self._found = self._estimate(seen, pose if new else None, state, reference if seen >= time else None)
+        found = self._found = self._estimate(seen, pose if new else None, state, time, reference)
         command = self.controller.step(time, state._replace(pose=found.pose, velocity=found.velocity), reference)
         self._steps.append((time, reference, command))
         return command
 
-    def _estimate(self, seen: float, pose: np.ndarray | None, state: State, reference: Reference | None) -> Any:
-        """Return the estimate for the time of a measured pose [s], from the references and commands until then."""
+    def _estimate(self, seen: float, pose: np.ndarray | None, state: State, time: float, reference: Reference) -> Any:
+        """Return the estimate for when a pose was `seen` [s], from the commands until then and the step's reference."""
         while len(self._steps) > 1 and self._steps[1][0] <= (seen if self._carried is None else self._found.time):
             self._steps.popleft()
         if self._carried is None or not self._steps:
-            planned = self._steps[0][1] if reference is None else reference
+            planned = self._steps[0][1] if self._steps and seen < time else reference
             return self.filter.update(seen, pose=pose, reference=planned[:3])
         state = as_floats(state, self._robot, None)
         acting = [step for step in self._steps if step[0] < seen] or [self._steps[0]]
-        excess = 0.0 if state.tensions is None else state.tensions - acting[-1][2].tensions
+        measured = state.tensions is not None and bool(np.isfinite(state.tensions).all())
+        excess = state.tensions - acting[-1][2].tensions if measured else 0.0
         ends = [*(begins for begins, *_ in acting[1:]), seen]
         for until, (begins, planned, command) in zip(ends, acting, strict=True):
             motion = planned[:3]
-            if state.tensions is not None or command.lengths is None:
+            if measured or command.lengths is None:
                 motion = self._accelerated(command.tensions + excess, state, planned, begins)
             self._found = self.filter.update(until, pose=pose if until == seen else None, reference=motion)
         return self._found

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from towline import InputError, load, plan, simulate
-from towline.control import ComputedTorque, Filtered, Reference
+from towline.control import ComputedTorque, Filtered, Reference, State
 from towline.estimation import PoseFilter
 
 PARTS, SENSOR = 10, np.array([0.1, 0.0, 0.05])
@@ -197,6 +197,45 @@ def test_a_filter_that_knows_what_the_tensions_do_may_be_slower_than_the_control
     assert errors[0].max() < 6e-3
     assert errors[0][-100:].max() < 1e-3
     assert errors[1].max() > 0.1
+
+
+def rests(pose, time, pulls=None):
+    """A state and a reference of cogiro at home."""
+    robot, still = load("cogiro"), np.zeros((1, 6))
+    middle = (robot.t_min + robot.t_max) / 4
+    planned = Reference(robot.home, still[0], still[0], robot.carrier_home, still, still, middle)
+    return State(pose, still[0], robot.carrier_home, still, pulls, time), planned
+
+
+def test_a_late_first_pose_and_a_state_from_the_future_leave_a_controller_usable():
+    robot = load("cogiro")
+    late, known = Filtered(ComputedTorque(robot), PoseFilter(robot)), ComputedTorque(robot)
+    state, planned = rests(robot.home, 0.99)
+    np.testing.assert_allclose(
+        late.step(1.0, state, planned).tensions, known.step(1.0, state, planned).tensions, atol=1e-6
+    )
+    for time in (5.0, np.nan):
+        with pytest.raises(InputError, match=r"state.time must be a number up to the step's time"):
+            late.step(1.01, *rests(robot.home, time))
+    assert late.step(1.01, *rests(robot.home, 1.0)).answered == 0
+
+
+class Blind(ComputedTorque):
+    """A controller that does not use measured tensions itself."""
+
+    def step(self, time, state, reference):
+        return super().step(time, state._replace(tensions=None), reference)
+
+
+def test_without_a_value_of_a_force_sensor_the_commanded_tensions_count():
+    robot, found = load("cogiro"), []
+    for pulls in (None, np.append(np.full(7, 1000.0), np.nan)):
+        controller = Filtered(Blind(robot), PoseFilter(robot))
+        for k in range(20):
+            pose = robot.home + 1e-3 * min(k, 10) * np.eye(6)[0]
+            command = controller.step(0.01 * k, *rests(pose, 0.01 * k, pulls))
+        found.append(command.tensions)
+    np.testing.assert_array_equal(*found)
 
 
 LENGTHS = np.full(8, 8.0)
