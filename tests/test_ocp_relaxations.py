@@ -176,6 +176,14 @@ def test_nothing_is_offered_inside_an_obstacle_and_only_a_nearer_end_without_ten
     assert [offer.name for offer in offered] == ["length of the line"]  # no strength holds it beyond the frame
 
 
+def test_a_nearer_end_keeps_the_coordinates_that_do_not_change():
+    line = {"kind": "line", "start": [0.0123456, -0.1234567, 1.0234567]}
+    offered = plan(ROBOT, {"path": {**line, "end": [9.0, -0.1234567, 1.0234567]}, "duration": 2}).relaxations
+    nearer = next(offer for offer in offered if offer.name == "length of the line").plan.scenario.task.path
+    assert nearer.end[1:3] == (-0.1234567, 1.0234567)
+    assert float(f"{nearer.end[0]:.4g}") == nearer.end[0]
+
+
 def test_the_closest_motion_of_a_tube_offers_what_it_keeps():
     """In a tube of 1 cm about the line the clearance of 1 m cannot be kept; what is offered can, with the same tube."""
     task = TASK | {"tube": {"position": 0.01}, "steps": 20}

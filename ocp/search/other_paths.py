@@ -35,7 +35,9 @@ def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
 
     def to(share: float) -> Variation:
         end = start + share * way
-        end[:3] = [rounded(to, up=to < since) for to, since in zip(end[:3], start[:3], strict=True)]  # as it is printed
+        printed = np.array([rounded(to, up=back) for to, back in zip(end[:3], way[:3] < 0, strict=True)])
+        # No coordinate goes beyond the start, so that those that are equal at both ends stay.
+        end[:3] = np.where(way[:3] < 0, np.minimum(printed, start[:3]), np.maximum(printed, start[:3]))
         varied = _along(scenario, path.model_copy(update={"end": tuple(end.tolist())}))
         attitude = f"to roll, pitch, yaw ({quantity_row(np.rad2deg(end[3:]) + 0.0)}) degrees" * bool(way[3:].any())
         if turns:
