@@ -169,7 +169,7 @@ class _ThisProcess(Executor):
 class _Cluster(Executor):
     """Evaluate jobs by the workers of a Dask scheduler.
 
-    Dask's own executor takes the result of a job whose worker is killed just then for an exception.
+    If the worker of a finished job is killed before its result arrives, Dask's own executor raises an exception.
     """
 
     def __init__(self, client: Any):
@@ -179,7 +179,7 @@ class _Cluster(Executor):
         future: Future[Result] = Future()
 
         def finish(task: Any) -> None:
-            """Give the result on; of a job whose worker was killed, when another worker has done it."""
+            """Pass the result on; if the worker was killed, wait until another worker has done the job."""
             if not future.set_running_or_notify_cancel():
                 return
             try:

@@ -37,7 +37,7 @@ class Moved(ABC):
         """Return the coordinates and two derivatives, (K, 3, f), for motions (K, 3, 6) and (K, c, 3, 6)."""
 
     def recentre(self, platform: np.ndarray, carriers: np.ndarray) -> None:
-        """Take other coordinates, and set `recentred`, where those of motions as in `along` are near their bounds."""
+        """Change the coordinates, and set `recentred`, if motions as in `along` come near their bounds."""
         return None
 
     @abstractmethod
@@ -263,7 +263,7 @@ def moved_coordinates(
 def _tethers(robot: Robot, poses: np.ndarray, carriers: np.ndarray) -> np.ndarray:
     """Return the carriers held by cables of fixed length, (c,) of `TETHER`, with coordinates for these references.
 
-    The coordinates of a carrier are zero in the middle of the directions that it has seen from the platform.
+    The coordinates of a carrier are zero near the middle of its directions as seen from the platform.
 
     - `poses`, `carriers`: poses of platform, (K, 6), and carriers, (K, c, 6).
 
@@ -296,7 +296,7 @@ def _tethers(robot: Robot, poses: np.ndarray, carriers: np.ndarray) -> np.ndarra
 
 
 def _middle_of(places: np.ndarray) -> int:
-    """Return the index of the one of some places (K, 3) whose direction is closest to the most different one."""
+    """Return the index of the one of some places (K, 3) whose largest angle to the direction of any other is least."""
     some = np.unique(np.linspace(0, len(places) - 1, SOME).astype(int))
     directions = places / np.maximum(np.linalg.norm(places, axis=1, keepdims=True), 1e-300)
     return int(some[(directions[some] @ directions.T).min(axis=1).argmax()])

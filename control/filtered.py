@@ -38,16 +38,16 @@ class Filtered(Controller):
 
     The velocities of measured states are not used. A pose that equals the last one is treated as a held reading.
 
-    A `PoseFilter` is told the acceleration by the robot's dynamics, with the tensions that are measured or were
-    commanded. So it is not late when the controller accelerates the platform, and the loop is stable however slow it
-    is: it only has to follow disturbances. A filter that knows the reference alone must be three times faster than
-    bandwidth and observer together.
+    A `PoseFilter` receives the acceleration that the measured or commanded tensions cause by the robot's dynamics. Its
+    estimates are therefore not late when the controller accelerates the platform, and the loop is stable however slow
+    the filter is, because it only has to follow disturbances. A filter that knows only the reference must be faster
+    than three times the sum of the bandwidths of controller and observer.
 
     Args:
         controller: Controller that receives the estimated states.
-        filter: `estimation.PoseFilter` of the platform's poses, with their standard deviations and the jerk of
-            disturbances, for gusts `jerk=(0.3, 0.3 / robot.length)`; the `sensors` of the controller are then its
-            `noise`. Or a filter with its methods, which receives the reference instead.
+        filter: `estimation.PoseFilter` with the standard deviations of the measured poses and the jerk of disturbances
+            (for gusts: `jerk=(0.3, 0.3 / robot.length)`); give the controller its `noise` as `sensors`. Or another
+            object with the methods of `Filter`, which receives the reference instead of the computed acceleration.
 
     Raises:
         InputError: If an argument has a wrong type, or the filter is that of another robot.
@@ -62,7 +62,7 @@ class Filtered(Controller):
         self._robot: Any = getattr(filter, "robot", None)
         own: Any = getattr(controller, "robot", self._robot)
         if self._robot is not None and (own.m, len(own.carriers)) != (self._robot.m, len(self._robot.carriers)):
-            raise InputError(f"filter must be one of the controller's robot, {own.name}, got {self._robot.name}")
+            raise InputError(f"filter must be for the controller's robot, {own.name}, got one for {self._robot.name}")
         self._carried = None if self._robot is None else CarriedLoad(self._robot)
         self._forget()
 
@@ -115,7 +115,7 @@ class Filtered(Controller):
         return self._found
 
     def _accelerated(self, tensions: np.ndarray, state: State, planned: Reference, time: float) -> Sequence[ArrayLike]:
-        """Return the estimated motion with its acceleration by tensions (m,), or the planned one if it has none."""
+        """Return the estimated motion, accelerated by tensions (m,), or the planned motion if that is not finite."""
         assert self._carried is not None
         bodies = np.zeros((1, 1 + len(state.carrier_pose), 12))
         bodies[0, 0], bodies[0, 1:, :6] = np.append(self._found.pose, self._found.velocity), state.carrier_pose

@@ -113,7 +113,7 @@ class LengthControl(Controller):
         if None in given and not self.corrects:
             least = quantity(float(self._damping.min()), "N s/m")
             warn(
-                f"lengths of {self.robot.name!r} are not corrected by the measured pose, because its oscillations on "
+                f"lengths of {self.robot.name!r} are not corrected by the measured pose, because oscillations on "
                 f"cables with a damping of {least} would grow",
                 stacklevel=2,
             )
@@ -202,7 +202,7 @@ class LengthControl(Controller):
         return np.clip(np.nan_to_num(wanted), -self._most, self._most), beyond | ~known
 
     def _gains_for(self, dt: float, age: float) -> tuple[float, float]:
-        """Return P and I [1/s], given or by default, for a pose of an age [s] with which a length is set for `dt`."""
+        """Return P and I [1/s], given or by default, for a pose of an age [s] and lengths held for `dt` [s]."""
         usual = self._gains.at(age + dt)
         return (
             usual[0] if self._proportional is None else self._proportional,

@@ -1,4 +1,4 @@
-"""`LengthGains`: with which gains lengths may be corrected by a measured pose, so that no oscillation grows."""
+"""`LengthGains`: the largest gains of length corrections by a measured pose with which no oscillation grows."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ class LengthGains:
     Args:
         robot: The robot.
         stiffness, damping: E A [N] and C [N s/m] of the cables, (m,); infinite stiffness: cables that do not stretch.
-        lag: Time constant of the winches [s], ahead of which lengths are corrected by the velocity.
+        lag: Time constant of the winches [s]; the velocity is used to correct lengths earlier by this time.
         sensors: Errors of the sensors: P is so small that their noise changes tensions by at most 1 % of their range.
     """
 
@@ -83,7 +83,7 @@ class LengthGains:
     def _loop(self, late: float, proportional: float, integral: float, true: float) -> np.ndarray:
         """Return the matrix of the linear dynamics of x, x', z and the states q of the delay: q' = a (u - q).
 
-        Each part of the delay makes 2 q - u of its input u.
+        Each part of the delay turns its input u into 2 q - u.
         """
         n, rate = len(self._G), 2 * PARTS / late
         x, v, z, *q = np.eye((3 + PARTS) * n).reshape(3 + PARTS, n, -1)

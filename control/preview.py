@@ -38,7 +38,7 @@ class Preview:
 
     def __init__(self, robot: Robot, tensions: np.ndarray):
         if not abs(pitch := float(robot.home[4])) <= STEEPEST:
-            must = f"the pitch at home must be at most {STEEPEST} rad for predictive control"
+            must = f"the pitch at home must be from -{STEEPEST} to {STEEPEST} rad for predictive control"
             raise InputError(f"{must}, got {pitch:g} rad; other axes of the platform's frame avoid it")
         self._robot, self._unknown = robot, tensions
         self.recentred = False  # whether the moved coordinates are others than when this was last set to False

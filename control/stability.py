@@ -27,7 +27,7 @@ def grows(controller: Controller, robot: Robot, rest: TensionSolution, bandwidth
     The loop is closed around `Plant` after a small push in all coordinates, in which unstable modes soon dominate.
     So all states are included: attitudes of carriers, delayed commands, observers. The controller of the robot is reset
     before and afterwards. `rest` holds the tensions at home; pose errors decay with `bandwidth` [rad/s]. The result is
-    kept for the next controllers that are equal.
+    kept for later controllers that are equal to this one.
 
     False without a test if the load cannot rest there, for example under a rough formation.
     """

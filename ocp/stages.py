@@ -43,7 +43,7 @@ from .tasks.status import MotionStatus
 from .tasks.wind_set import WindDisc
 
 NO_SLACK = 1e-3  # of the weight: a motion with less missing at its nodes is a start for another try
-UNPROVEN = "while the platform moves, no tensions exist in some of the winds that are faster by its own speed"
+UNPROVEN = "while the platform moves, its speed is added to the task's winds, and in some of these no tensions exist"
 
 
 def climb(search: Search, start: Deviation | None, last: tuple[Mesh, Deviation] | None) -> Plan:

@@ -128,7 +128,7 @@ def test_wrong_readings_do_not_hide_in_poses_and_parameters():
 
 @pytest.mark.parametrize("seed", [3, 10])
 def test_a_wrong_reading_that_could_be_of_any_cable_tells_nothing(seed):
-    """One redundant length: a wrong choice may leave six lengths that fit no pose, and seem to tell of parameters."""
+    """With one redundant length, a wrong choice may leave six that fit no pose but seem to determine parameters."""
     robot = load("cogiro")
     robot = robot.model_copy(update={"cables": robot.cables[:7]})
     built, offsets, _, readings = (part[:60] if np.ndim(part) == 2 else part for part in a_log(robot, seed, 0.3))

@@ -129,7 +129,7 @@ def test_a_robot_is_held_at_a_pitch_of_90_degrees_as_at_any_other(pitch):
     assert 1e-3 < runs[0].error.max() < 0.01
     np.testing.assert_allclose(runs[1].error, runs[0].error, atol=1e-7)
     assert runs[1].answered == runs[0].answered
-    with pytest.raises(InputError, match=r"at home must be at most 1.5 rad for predictive control, got -?1.57"):
+    with pytest.raises(InputError, match=r"at home must be from -1.5 to 1.5 rad for predictive control, got -?1.57"):
         Predictive(turned)
 
 

@@ -38,7 +38,7 @@ def shorter(task: Task, steps: int) -> Task:
 
 @pytest.fixture(scope="module")
 def error_of_unknown_lag(circle):
-    """The largest error of predictions for winches without the lag of 20 ms that they have [m]."""
+    """The largest error [m] of `Predictive` if it does not know that the winches lag by 20 ms."""
     task = shorter(circle, 800)
     return fly(task, Predictive(task.robot, reach=task.reach), **WINCHES["tension lag 20 ms"]).error.max()
 
@@ -317,7 +317,7 @@ def test_noise_and_pushes_on_a_team_are_no_reason_to_give_predictions_up():
 
 
 def test_a_team_keeps_its_bandwidths_with_a_filter_that_knows_the_dynamics(load_on_three):
-    """Poses of 1 mm and 1 mrad in gusts. With a jerk of 10 m/s^2.5 noise lowers them by half: 0.2 g are unexplained."""
+    """Poses of 1 mm and 1 mrad in gusts; with a jerk of 10 m/s^2.5 in the filter, noise would halve the bandwidths."""
     robot = load_on_three.robot
     follow = PoseFilter(robot, jerk=(0.3, 0.3 / robot.length))
     controller = Predictive(robot, sensors=follow.noise(1000))

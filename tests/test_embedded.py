@@ -61,7 +61,7 @@ def test_a_robot_with_any_source_compiles(tmp_path):
 
 @pytest.mark.parametrize("real", ["double", "float"])
 def test_it_needs_only_sines_and_roots_and_has_no_state(exported, real, tmp_path):
-    """Optimised without a warning, too: some are due only then."""
+    """The optimised build has no warnings either: compilers give some only then."""
     required("cc", "nm")
     suffix, options = ("f", ["-DTOWLINE_FLOAT"]) if real == "float" else ("", [])
     folder = next(path for path in exported if path.name == "wang-flying")

@@ -261,7 +261,7 @@ def test_the_jerk_of_cables_is_kept_by_a_longer_duration():
 
 
 def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
-    """Six walls around the end: the fewest that go leave a way, which planning finds; the others stay."""
+    """Six walls enclose the end: those that the closest motion passes through go, and planning finds the way."""
     robot, end, h = load("point-mass-3"), np.array([0.4, 0.2, 1.0]), 0.2
     walls = []
     for axis, sign in ((axis, sign) for axis in range(3) for sign in (1, -1)):

@@ -161,7 +161,7 @@ def test_poses_without_velocities_control_a_robot():
 
 @pytest.mark.parametrize(("jerk", "rate"), [(0.3, 100.0), (10.0, 400.0)])
 def test_the_noise_of_estimates_is_known(jerk, rate):
-    """At rest, where nothing else is in the errors: fourth of the steps are the beginning."""
+    """At rest the errors are due to noise alone; the first quarter of the steps is not counted."""
     robot, draw, steps, sigma = load("cogiro"), np.random.default_rng(6), 1600, np.repeat([1e-3, 4e-4], 3)
     follow = PoseFilter(robot, {"position": 1e-3, "rotation": 4e-4}, (jerk, jerk / robot.length))
     found = [follow.update(k / rate, pose=robot.home + sigma * draw.normal(size=6)) for k in range(steps)]
@@ -181,7 +181,7 @@ class Alone:
 
 
 def test_a_filter_that_knows_what_the_tensions_do_may_be_slower_than_the_controller():
-    """Its bandwidth is (0.3 / (1 mm sqrt(2 ms)))^(1/3), 19 rad/s, those of controller and observer are 20 together.
+    """Its bandwidth is (0.3 / (1 mm sqrt(2 ms)))^(1/3), 19 rad/s; those of controller and observer add up to 20.
 
     The loop of a double integrator, an observer, and this filter with the reference alone is unstable below three times
     that (eigenvalues of its six states).
@@ -262,7 +262,7 @@ LENGTHS = np.full(8, 8.0)
         (lambda follow: PoseFilter(follow.robot, jerk=(-1, 1)), "jerk must be a number from 0"),
         (lambda follow: follow.noise(0.0), r"rate must be a number from 0.001"),
         (lambda follow: Filtered(None, follow), "controller must be"),
-        (lambda follow: Filtered(ComputedTorque("planar-4"), follow), "the controller's robot, planar-4, got cogiro"),
+        (lambda follow: Filtered(ComputedTorque("planar-4"), follow), "robot, planar-4, got one for cogiro"),
         (lambda follow: Filtered(ComputedTorque("cogiro"), 1), "filter must be a PoseFilter, or have its methods"),
     ],
 )

@@ -113,7 +113,7 @@ def test_every_fence_is_a_block():
 
 
 def test_frames_do_not_end_cells_or_headings():
-    """Of the site: its Markdown takes {G} at the end of a cell or a heading for attributes, and drops it."""
+    """The site's Markdown takes {G} at the end of a cell or a heading for attributes, and drops it."""
     lost = re.compile(r"^(#.*\{\w+\}|\|.*\{\w+\} *\|.*)$", re.MULTILINE)
     found = lost.findall("| pose | in {G} |\n# The frame {G}\n| in {G} now |")
     assert found == ["| pose | in {G} |", "# The frame {G}"]

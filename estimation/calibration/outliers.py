@@ -69,8 +69,8 @@ def _threshold(count: int) -> float:
 def _limit(sizes: np.ndarray, count: int, known: int) -> float:
     """Return the size above which the largest error of a sample is no noise, in standard deviations.
 
-    The first outlier must be beyond `_threshold`. Where there are some, errors are not rare, and the limit is lower: so
-    that only `LEVEL` of all outliers are expected to be sound readings (Benjamini and Hochberg).
+    The first outlier must be beyond `_threshold`. Where there are some, errors are not rare, and the limit is lower, so
+    that only the share `LEVEL` of all outliers is expected to be sound readings (Benjamini and Hochberg).
 
     - `sizes`: Largest of each sample, (N,), of `count` readings.
     - `known`: Number of outliers that are already left out.

@@ -40,9 +40,9 @@ class Part(NamedTuple):
         return np.einsum("nab,nb->na", self.inverse_root, G)
 
     def without_poses(self, cable: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives of one cable's residuals by some parameters, minus the poses' part, (n, k) [1/m].
+        """Return the derivatives of one cable's residuals by k parameters, minus the poses' part, (n, k) [1/m].
 
-        And which of the parameters that vary these are, (k,); the derivatives by all others are zero.
+        The second result has the indices of these among the parameters that vary, (k,). All other derivatives are zero.
         """
         parameters = self.model.parameters
         where, first = np.flatnonzero(parameters.varies), cable * OF_CABLE

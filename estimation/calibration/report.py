@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ...base.display import Fact
-from ...base.text import any_of, counted, quantity
+from ...base.text import counted, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
@@ -162,8 +162,8 @@ def _of_exceptions(result: CalibrationData) -> list[str]:
     ]
     wrong = sorted(result.outliers, key=lambda one: -abs(one.error))
     lines += [
-        f"left out: {any_of(f'cables[{i}]' for i in (one.cable, *one.others))} at sample {one.sample}, off by "
-        f"{_mm(one.error)}{' if it is the first' * bool(one.others)}"
+        f"left out: {', '.join(f'cables[{i}]' for i in (one.cable, *one.others))} at sample {one.sample}, "
+        f"{f'because one of them is wrong; cables[{one.cable}] would be ' * bool(one.others)}off by {_mm(one.error)}"
         for one in wrong[:MOST_LISTED]
     ]
     if len(wrong) > MOST_LISTED:

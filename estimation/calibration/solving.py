@@ -170,7 +170,7 @@ def _again(model: Model, result: Fit, length: float, outliers: bool) -> tuple[Fi
 
 
 def _surprise(result: Fit, weights: np.ndarray) -> float:
-    """Return the sum of squares of a fit, where each reading that is left out adds the least square of such a one."""
+    """Return the sum of squares of a fit, to which each sample with outliers adds the least square of an outlier."""
     return result.cost + LEAST_THRESHOLD**2 * float((~weights).any(axis=0).sum())
 
 

@@ -96,8 +96,8 @@ class PoseTrack:
 def slopes_of_spline(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Return the derivatives of the cubic spline through values (n, d) at their times (n,), not-a-knot at its ends.
 
-    The spline is made of parts, because its coefficients need four times the memory of the values. What they do not
-    share with their neighbours changes their derivatives by less than rounding.
+    The spline is made of overlapping parts, because its coefficients need four times the memory of the values. The
+    samples outside the overlap would change the derivatives by less than rounding.
     """
     from scipy.interpolate import CubicSpline
 

@@ -105,12 +105,13 @@ class PoseFilter(Displayed):
         self._step: tuple[float, np.ndarray, np.ndarray] | None = None
 
     def noise(self, rate: float) -> dict[str, float]:
-        """Return the standard deviations of estimates by noise of poses, as `sensors` of controllers.
+        """Return the standard deviations that noise of the poses causes in the estimates, for `sensors` of controllers.
 
-        They are `position` [m], `attitude` [rad], `velocity` [m/s] and `attitude_rate` [rad/s]. Estimates are also off
-        by the jerk that the filter permits, about as much, but this is slow, and no noise that controllers amplify.
-        With white jerk q, and noise of the density s = sigma / sqrt(rate), the filter is a Butterworth filter of the
-        bandwidth b = (q / s)^(1/3), and by noise its position has the variance 5/3 s^2 b, its velocity 3/2 s^2 b^3.
+        They are `position` [m], `attitude` [rad], `velocity` [m/s] and `attitude_rate` [rad/s]. The jerk that
+        the filter permits causes errors of about the same size. They are not included, because they change slowly, so
+        controllers do not amplify them. With white jerk q and noise of the density s = sigma / sqrt(rate), the filter
+        is a Butterworth filter of the bandwidth b = (q / s)^(1/3). The noise then causes the variance 5/3 s^2 b of its
+        position and 3/2 s^2 b^3 of its velocity.
 
         Args:
             rate: Rate of the measured poses [1/s].

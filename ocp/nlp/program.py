@@ -278,9 +278,9 @@ def _single_rows(scenario: Scenario, layout: Layout, X: ca.MX, grid: Grid) -> li
 
 
 def _balanced_angles(scenario: Scenario) -> list[int]:
-    """Return the free angles of the platform whose accelerations follow from pose, velocity and few cables' balance.
+    """Return the free angles whose accelerations follow from pose, velocity and the balance on too few cables.
 
-    Rows for these at periodic ends would be equations that the others imply, of which a program may have too many.
+    Rows for these at periodic ends would repeat what others imply, and the program could have too many equations.
     """
     missing = len(scenario.robot.platform.dof) - scenario.robot.m
     angles = [i for i, (owner, axis) in enumerate(scenario.owners()) if owner is None and axis in ATTITUDE]

@@ -1,10 +1,10 @@
 """Prove that at an end of a motion every attitude that the tube permits violates a limit: `no_attitude`.
 
 Where the tube leaves a platform its attitude, but the task fixes the position where it rests, the attitudes are a box
-of angles. A distance changes by at most what points of the platform move, so one value proves all of a small box. So
-does one direction along which the cables cannot give the weight at its corners, if a bound on the curvature between
-them does not help. Boxes that are not proven are halved along each angle, until all are proven or an attitude keeps all
-distances and has tensions.
+of angles. A distance changes by no more than points of the platform move, so one that is short enough proves a whole
+small box. So does a direction along which the cables cannot give the weight at any corner of the box, if they lack more
+there than a bound on the curvature between the corners could add. Boxes that are not proven are halved along each
+angle, until all are proven or an attitude keeps all distances and has tensions.
 """
 
 from collections.abc import Callable
@@ -23,8 +23,8 @@ CERTAIN_FORCE = 1e-6  # of the weight, likewise
 Turned = Callable[[np.ndarray], np.ndarray]
 """Takes offsets from the reference attitude (n, k), and returns poses (n, 6)."""
 Tensions = Callable[[np.ndarray, float], tuple[np.ndarray, np.ndarray]]
-"""Takes the centres of boxes of offsets (n, k) and half their size [rad]; returns by what tensions are short at each
-centre (n,) [N], and by what they are short in the whole box, at least (n,) [N]."""
+"""Takes the centres of boxes of offsets (n, k) and half their size [rad]; returns the shortfall of tensions at each
+centre (n,) [N], and a lower bound of their shortfall in the whole box (n,) [N]."""
 
 
 def no_attitude(
@@ -107,12 +107,12 @@ def _corners(centres: np.ndarray, half: float) -> np.ndarray:
 
 
 def _tensions_at_rest(scenario: Scenario, time: float, carriers: np.ndarray, turned: Turned) -> Tensions | None:
-    """Return what tells by how much tensions at rest are short; None where more than the weight has to be held.
+    """Return the function that computes shortfalls at rest; None where more than the weight has to be held.
 
     Along a direction d = (f, c) of wrenches, cable i gives at most the larger of its limits times x_i = u_i . (f + c x
-    r_i), u_i its direction and r_i its arm about the CoM. In a box, x_i is a mean of its values at the corners, but for
-    half the square of half the size times its second derivative along each angle, which rotates about a fixed axis. So
-    is the part of the weight along d, if a load turns with the platform.
+    r_i), u_i its direction and r_i its arm about the CoM. In a box of size 2 h, x_i differs from a mean of those at the
+    corners by at most h^2 / 2 times its second derivative, summed over the angles. The same holds for the part of
+    the weight along d, which varies if a load turns with the platform.
     """
     robot, at = scenario.robot, np.array([time])
     grounded = scenario.phases.resting(at).any()

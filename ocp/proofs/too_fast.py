@@ -40,7 +40,7 @@ def too_fast(
     - `spread`: how far each of them, and every point of the platform, may be from its place, (1 + c, n) [m].
     - `resting`, `still`: of which of them the origin is at rest at both ends, and which do not turn there either,
       (1 + c,) of bool.
-    - `centres`: how far origin and CoM of the platform may be from their places, (2, n) [m]; default: as every point.
+    - `centres`: how far origin and CoM of the platform may be from their places, (2, n) [m]; default: `spread[0]`.
     """
     of_origin, of_com = spread[[0, 0]] if centres is None else centres
     yield from _too_short(scenario, times, places[0], of_com, bool(still[0]))
@@ -68,7 +68,7 @@ def _too_short(
 
     The acceleration at some time is at least four times the distance divided by the square of the duration, along the
     way or against it. No cable gives more than its largest tension, flying carriers no more than their thrusts, and the
-    weight helps by at most itself.
+    weight contributes at most its own magnitude.
     """
     robot = scenario.robot
     if not still or scenario.wind is not None or scenario.phases.all:

@@ -68,7 +68,7 @@ def by_programs(scenario: Scenario) -> bool:
 
 
 def _tilts(scenario: Scenario) -> bool:
-    """Return whether the tube leaves the planner an attitude, which too few cables for all of them determine."""
+    """Return whether the tube frees the attitude of a platform with fewer cables than degrees of freedom."""
     return scenario.robot.m < scenario.robot.dof_mask.sum() and bool(scenario.task.tube.turn)
 
 

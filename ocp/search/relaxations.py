@@ -279,7 +279,7 @@ def solved(search: Search, scenario: Scenario, guess: Deviation | None) -> Outco
 
 
 def _mesh(scenario: Scenario) -> Mesh:
-    """Return the mesh of a relaxation's program: of fewer steps where they are many, since the refinement adds some."""
+    """Return the mesh of a relaxation's program, with fewer steps than a large task, since the refinement adds some."""
     steps = scenario.task.steps
     return Mesh(steps if scenario.phases.all else min(steps, max(LARGE // max(scenario.count, 1), FEWEST)))
 

@@ -82,7 +82,7 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
 
 
 def _fewer_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
-    """Return how many regions may stay, without those through which the closest motion passes where it may go round."""
+    """Return, for a free position, how many regions can stay without those that the closest motion passes through."""
     limits = scenario.task.limits
     through = {
         excess.about.partition(" outside ")[2]
@@ -260,7 +260,7 @@ def _weighing(scenario: Scenario, mass: float) -> Scenario:
 
 
 def _other_limits_of_cables(search: Search, scenario: Scenario, limit: str) -> list[Relaxed]:
-    """Return the smallest factor of all t_max, or the largest of all t_min, that is feasible, as the largest limit."""
+    """Return the largest t_max, or t_min, after all are multiplied by the feasible factor that changes them least."""
     data, values = scenario.robot.model_dump(), getattr(scenario.robot, limit)
     largest, others = float(values.max()), "" if np.ptp(values) == 0 else ", the others by the same factor"
     stronger = limit == "t_max"
