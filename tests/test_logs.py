@@ -130,6 +130,7 @@ NAMES = {
     "quaternion": ["qx", "q_w", "quat_z", "/mocap/pose.orientation.w", "rotation.x", "orientation_y"],
     "angles": ["roll", "Yaw", "/imu/pitch", "roll_gt", "pitch (degrees)", "ry_deg"],
     "thrusts": ["thrust_1", "/uav2/thrust_estimate/data", "quad1.thrust_measured"],
+    "thrust_vectors": ["thrust_x", "uav1/thrust.vector.y", "quad_2_thrust_z"],
     "time": [
         "t",
         "time",

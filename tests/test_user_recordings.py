@@ -254,10 +254,12 @@ def test_a_file_for_each_computer(offsets, tmp_path):
     t, x, drones = user.team()
     load = np.column_stack([user.EPOCH + t, x + draw.normal(0, 5e-4, x.shape)])
     user.write(tmp_path / "load.csv", ["stamp", *"xyz"], load, form="%.14g")
-    header = ["stamp", *"xyz", *(f"q{axis}" for axis in "xyzw"), "thrust", *(f"dir_{axis}" for axis in "xyz")]
     for i, (p, R, thrust, q) in enumerate(drones):
+        named = ["thrust"] if i else [f"thrust_{axis}" for axis in "xyz"]  # a number or a vector in {G}
+        pull = thrust if i else thrust[:, None] * R[:, :, 2]
+        header = ["stamp", *"xyz", *(f"q{axis}" for axis in "xyzw"), *named, *(f"dir_{axis}" for axis in "xyz")]
         seen, turned = p + draw.normal(0, 5e-4, p.shape), Rotation.from_matrix(R).as_quat()
-        table = np.column_stack([user.EPOCH + t + offsets[i], seen, turned, thrust, -q])[100 + 50 * i : -200]
+        table = np.column_stack([user.EPOCH + t + offsets[i], seen, turned, pull, -q])[100 + 50 * i : -200]
         user.write(tmp_path / f"cf{i + 1}.csv", header, table, form="%.14g")
     files = ("load.csv", "cf1.csv", "cf2.csv")
     told = json.loads(towline("calibrate", robot, *files, "--free", "offsets,mass", "--json", cwd=tmp_path).stdout)
@@ -270,6 +272,7 @@ def test_a_file_for_each_computer(offsets, tmp_path):
         if said:
             size, way = re.search(r"is ([\d.]+) s (ahead|behind)", said).groups()
             assert float(size) * (1 if way == "ahead" else -1) == pytest.approx(offsets[i], abs=2e-3)
+    assert "thrusts of cf1 are vectors: their sizes are used, along the z axes of the bodies" in told["notes"]
     logs = [part for file in files for part in ("--log", file)]
     assert "no pose fits" not in towline("pose", robot, *logs, cwd=tmp_path).stdout
 

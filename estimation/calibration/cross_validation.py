@@ -34,6 +34,7 @@ from .solving import (
 )
 from .starts import fit_from
 from .turning import turning
+from .zeros import from_thrusts
 
 REGIONS = 6  # of the workspace
 MOST_COMPARED = 1500  # samples
@@ -158,6 +159,8 @@ def _forces(solved: Solved, free: tuple[str, ...]) -> tuple[str, ...]:
     """Return which of mass, CoM and friction the balance of forces needs beside `free`, if there are forces."""
     given = solved.model.measurements
     words = ("com",) if given.tensions is None else FORCES
+    if from_thrusts(solved.model.robot):
+        words = tuple(word for word in words if word != "zeros")
     model = replace(solved.model, weighs=True)
     has_forces = given.tensions is not None or needs_balance(model.robot, given)
     if not (has_forces and model.robot.weight and model.balanced):

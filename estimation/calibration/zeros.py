@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...models.robot import Robot
 from ..logs.load_cells import unreadable
 from ..logs.measurements import Measurements
 from ..pose.estimate import largest_cost
@@ -30,19 +31,24 @@ def with_zeros(
     return (*groups, "zeros"), prior | {"zeros": USUAL * float(np.abs(measurements.tensions).mean())}
 
 
+def from_thrusts(robot: Robot) -> bool:
+    """Return whether tensions follow from the thrusts of carriers, and so have no load cells with zeros."""
+    return any(carrier.actuators for carrier in robot.carriers)
+
+
 def has_zeros(solved: Solved) -> bool:
     """Return whether a fit of tensions should estimate the zeros of their load cells.
 
     It should if the log shows zeros. It also should if poses are measured and the log does not determine zeros, because
     standard deviations then include them. It should not if accelerations are unknown, because these may look
-    like zeros, or if carriers have thrusts, because their tensions follow from these.
+    like zeros, or if tensions follow from thrusts.
     """
     of, state = solved.model, solved.fit.state
     measured, groups, forces = of.measurements, of.parameters.groups, of.balanced
     if forces is None or measured.tensions is None or not groups or "zeros" in groups:
         return False
-    unknown, flies = of.size_is_open, any(carrier.actuators for carrier in of.robot.carriers)
-    if flies or (unknown and not forces.at_rest):
+    unknown = of.size_is_open
+    if from_thrusts(of.robot) or (unknown and not forces.at_rest):
         return False
     groups, prior = with_zeros(measured, groups, of.prior)
     model = replace(of, parameters=replace(of.parameters, groups=groups), prior=prior)

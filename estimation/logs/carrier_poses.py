@@ -95,7 +95,7 @@ def carriers_at(
     those that the map names, those with the names of carriers, or those with numbers; what is implausible is noted.
     """
     poses = np.tile(robot.carrier_home, (count, 1, 1))
-    thrusts = np.full(poses.shape[:2], np.nan)
+    thrusts, vectors = np.full(poses.shape[:2], np.nan), []
     for index, carrier in enumerate(robot.carriers):
         if not carrier.free_coordinates(robot.drive):
             continue
@@ -112,7 +112,12 @@ def carriers_at(
             poses[:, index, 3:] = np.nan
         if found.thrusts:
             values = filled(times, reader.stream(found.thrusts), found.thrusts[0])
-            thrusts[:, index] = values[:, 0]
+            if len(found.thrusts) == 3:
+                vectors.append(carrier.name)
+            thrusts[:, index] = values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
+    if vectors:
+        names = ", ".join(vectors)
+        notes.append(f"thrusts of {names} are vectors: their sizes are used, along the z axes of the bodies")
     flying = [i for i, carrier in enumerate(robot.carriers) if carrier.actuators]
     if flying and ((given and given.thrusts) or not np.isfinite(thrusts).any()):
         names = [carrier.name for carrier in robot.carriers]

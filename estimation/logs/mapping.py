@@ -19,6 +19,7 @@ from .names import UNITS, Role, measured_name, role, unit_of
 from .recording import Recording, Topic, plain
 
 AXES = {"position": ("x", "y", "z"), "quaternion": ("x", "y", "z", "w"), "angles": ("roll", "pitch", "yaw")}
+AXES["thrust_vectors"] = AXES["position"]
 OF_DIRECTION = ("x", "y", "z", "swivel", "azimuth", "elevation")
 TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
 OF_STRUCTURES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
@@ -146,13 +147,17 @@ def command_fields(
 
 
 def carrier_fields(recordings: Sequence[Recording], given: LogMap | None, carrier: str) -> Fields:
-    """Return the fields of a carrier: its pose and its thrust. Raises `InputError` as `fields_of`."""
+    """Return the fields of a carrier: its pose, its thrust or the vector of it, and directions.
+
+    Raises `InputError` as `fields_of`.
+    """
     prefix = _prefix(given, carrier)
     parts = [one for one in _everything(recordings) if _within(one[1].full(one[2]), prefix)]
     if own := [one for one in recordings if len(recordings) > 1 and _is_of(one, prefix)]:
         parts, prefix = _everything(own), ""
     roles = ("position", "orientation", "thrusts", "directions")
     found = {name: _usual(parts, name, None, (), prefix) for name in roles}
+    found["thrusts"] = found["thrusts"] or _usual(parts, "thrust_vectors", None, (), prefix)
     return Fields(**found, time=_times(recordings, given))
 
 
@@ -237,7 +242,7 @@ def _usual(
             axes = tuple(axis for axis in AXES[kind] if axis in free.split())
             axes = axes if set(axes) == set(by_name) else AXES[kind]
             missing = set(axes) - set(by_name)
-            if missing and not members[0][1].topic.name:
+            if missing and kind != "thrust_vectors" and not members[0][1].topic.name:
                 names = ", ".join(one.full for _, one in members)
                 wanted = ", ".join(_like(members[0], axis) for axis in axes)
                 raise InputError(f"must have all columns {wanted} or none of them, got {names}")

@@ -170,7 +170,7 @@ def _mcap(path: Path, wanted: set[str] | None) -> Iterator[Message]:
                 records: Sequence[Any] = [outer]
                 if isinstance(outer, Chunk):
                     outer.data, outer.compression = _unpacked(outer.compression, outer.data), ""
-                    records = breakup_chunk(outer)
+                    records = breakup_chunk(outer, validate_crc=True)
                 for record in records:
                     if isinstance(record, Schema):
                         schemas[record.id] = record

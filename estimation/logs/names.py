@@ -18,6 +18,7 @@ UNITS = {
     "quaternion": NUMBERS,
     "time": TIMES,
     "thrusts": FORCES,
+    "thrust_vectors": FORCES,
     "commands": {**LENGTHS, **FORCES},
     "directions": NUMBERS,
     "azimuths": ANGLES,
@@ -66,6 +67,7 @@ PATTERNS = {
     ),
     "angles": (rf"{_BEFORE}(roll|pitch|yaw)", r"(?:.*/)?r([xyz])"),  # rx with a unit
     "thrusts": (rf"{_BEFORE}thrusts?{_SENSED}[_ ]?\[?(\d*)\]?{_SENSED}",),
+    "thrust_vectors": (rf"{_BEFORE}thrusts?{_SENSED}{_VECTOR}",),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
     "directions": (
         rf"{_BEFORE}{_OF}(?:{_DIRECTION}|q)[_ ./]?\[?(\d+)\]?{_VECTOR}",

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...base.text import quantity
+from ...models.part import LARGEST
 from .mapping import Field, Fields
 from .names import UNITS, dated_unit, time_unit
 from .recording import GAP, Samples, Topic, check_rising, plain
@@ -27,12 +28,19 @@ class Reader:
             self._of.setdefault(id(one.topic), []).append(one.name)
 
     def stream(self, fields: Sequence[Field]) -> Samples:
-        """Return fields in SI units, those of other topics at the times of the first one's."""
+        """Return fields in SI units, those of other topics at the times of the first one's.
+
+        Raises `InputError` if a number is so large that only damage explains it.
+        """
         parts: list[Samples] = []
         for one in fields:
             whole, names = self._topic(one), self._of[id(one.topic)]
             factor = one.factor * next(units[one.unit] for units in UNITS.values() if one.unit in units)
             column = factor * whole.values[:, names.index(one.name)]
+            beyond = np.flatnonzero((np.abs(column) > LARGEST) & np.isfinite(column))
+            if beyond.size:
+                row = int(beyond[0])
+                raise InputError(f"{one.full} must be at most {LARGEST:g}, got {column[row]:.3g} at sample {row}")
             parts.append(Samples(whole.times, column[:, None]))
         if all(one.topic is fields[0].topic for one in fields):
             return Samples(parts[0].times, np.hstack([part.values for part in parts]))
