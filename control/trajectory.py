@@ -142,16 +142,18 @@ def _of_samples(robot: Robot, samples: Contents) -> Trajectory:
         raise InputError(f"reference must be a plan of robot {robot.name!r}, got one of {name!r}")
     nodes = read("time", (-1,))
     n = len(nodes)
-    platform = [read(part, (n, 6)) for part in _PARTS]
-    carriers = [read(f"carrier_{part}", (n, count, 6)) for part in _PARTS]
-    for poses in (platform[0], carriers[0]):  # those of a flight are measured, and may jump by turns
-        poses[..., 3:] = np.unwrap(poses[..., 3:], axis=0)
+    # The platform first, then the carriers, (n, 1 + c, 6) each.
+    motion = [
+        np.concatenate([read(part, (n, 6))[:, None], read(f"carrier_{part}", (n, count, 6))], axis=1) for part in _PARTS
+    ]
+    motion[0][..., 3:] = np.unwrap(motion[0][..., 3:], axis=0)  # those of a flight are measured, and may jump by turns
     if n < 2 or nodes[0] < 0 or np.diff(nodes).min() < SHORTEST:
         given = f"{n} of them from {nodes[0]:g} s to {nodes[-1]:g} s" if n else "none"
         raise InputError(f"reference must be a plan of two times or more that increase from 0 s on, got {given}")
 
     def at(times: np.ndarray) -> tuple[Motion, Motion]:
-        return _interpolated(nodes, platform, times), _interpolated(nodes, carriers, times)
+        pose, velocity, acceleration = _interpolated(nodes, motion, times)
+        return (pose[:, 0], velocity[:, 0], acceleration[:, 0]), (pose[:, 1:], velocity[:, 1:], acceleration[:, 1:])
 
     air = samples.attributes.get("wind")
     wind = None if air is None or robot.platform.aero is None else finite_array("reference.wind", air, (3,))
@@ -195,9 +197,8 @@ def _interpolated(nodes: np.ndarray, parts: list[np.ndarray], times: np.ndarray)
     """Return the polynomials of degree 5 between nodes that have their poses, velocities and accelerations."""
     inside = np.clip(times, nodes[0], nodes[-1])
     k = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, len(nodes) - 2)
-    shape = (-1, *[1] * (parts[0].ndim - 1))
-    h = np.reshape(nodes[k + 1] - nodes[k], shape)
-    s = np.reshape(inside - nodes[k], shape) / h
+    h = (nodes[k + 1] - nodes[k])[:, None, None]
+    s = (inside - nodes[k])[:, None, None] / h
     (p, q), (u, v), (a, b) = ((part[k], part[k + 1]) for part in parts)
     u, v, a, b = h * u, h * v, h * h * a, h * h * b
     # From the start of the piece on: p + u s + a s^2 / 2 + c3 s^3 + c4 s^4 + c5 s^5.

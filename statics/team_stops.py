@@ -12,6 +12,7 @@ bisection.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from ..base.errors import InputError
 from ..base.text import quantity
 from ..models import points
-from ..models.carriers import Carrier
+from ..models.carriers import Actuator
 from ..models.dynamics import dynamics_of
 from ..models.part import inertia_matrix
 from ..models.robot import Robot
@@ -28,7 +29,7 @@ from ..models.trajectory import Motion, Trajectory
 SHORTEST, LONGEST, ATTEMPTS = 0.1, 30.0, 10  # [s] of a stop, and how many durations are tried at once
 COARSE, APART = 24, 0.01  # instants of an attempt; [s] between those of the result
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
-RESERVE, ACCEPTED = 0.02, 2e-3  # of a limit's range: that attempts keep, and up to which differences are inexact
+ACCEPTED = 2e-3  # of a limit's range, up to which differences are inexact
 LONGER, AGAIN = 1.1, 4  # what broke a limit in between takes longer
 TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
@@ -72,21 +73,21 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     end = trajectory.duration or 0.0
     last = [motion[1] for motion in trajectory.at(np.array([end]))]
     rests = max(np.abs(velocity).max() for velocity in last) < RESTS
-    longest = min(2 * (end - begins), LONGEST) if rests else LONGEST
+    left = end - begins if rests else np.inf
+    durations = np.geomspace(SHORTEST, max(min(2 * left, LONGEST), SHORTEST), ATTEMPTS)
+    durations = durations[durations < left]
     best: TeamStop | None = None
-    if longest > SHORTEST:
-        durations = np.geomspace(SHORTEST, longest, ATTEMPTS)
-        excess = _Stops(robot, trajectory, begins, durations, COARSE).worst(RESERVE)[0]
-        duration = float(durations[np.argmax(excess == 0) if (excess == 0).any() else np.argmin(excess)])
-        for _ in range(AGAIN):
+    if len(durations):
+        excess = [each for each, _ in _Stops(robot, trajectory, begins, durations, COARSE).worst]
+        duration = float(durations[np.argmin(excess)])  # the shortest of those that keep the limits
+        # With more instants more is exceeded: where no attempt keeps the limits, the result does not either.
+        for _ in range(AGAIN if min(excess) == 0 else not rests):
             found = _Stops(robot, trajectory, begins, np.array([duration]), max(int(duration / APART), 10)).only()
             best = found if best is None or found.excess < best.excess else best
-            if best.excess == 0 or LONGER * duration > longest:
-                break
             duration *= LONGER
-    if best is None or (rests and (best.excess > 0 or begins + best.times[-1] >= end)):
-        return _remainder(robot, trajectory, begins)
-    return best
+            if best.excess == 0 or duration >= left:
+                break
+    return _remainder(robot, trajectory, begins) if best is None or (rests and best.excess > 0) else best
 
 
 def _have_one_each(robot: Robot) -> bool:
@@ -95,10 +96,10 @@ def _have_one_each(robot: Robot) -> bool:
 
 def _give_every_wrench(robot: Robot) -> bool:
     """Return whether cables from one point of each carrier give every wrench, so that carriers may keep their paths."""
-    first = [int(np.flatnonzero(robot.carrier_of_cable == owner)[0]) for owner in robot.carrier_of_cable]
+    own = _carriers_of(robot).anchors[robot.carrier_of_cable]
     A = robot.wrench_scale[:, None] * dynamics_of(robot).wrench_matrix(robot.home, robot.carrier_home)
     rows = np.flatnonzero(robot.dof_mask)
-    return bool((robot.anchors == robot.anchors[first]).all() and np.linalg.matrix_rank(A[rows], RANK) == len(rows))
+    return bool((robot.anchors == own).all() and np.linalg.matrix_rank(A[rows], RANK) == len(rows))
 
 
 def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
@@ -107,24 +108,47 @@ def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
     times = np.linspace(0.0, left, max(int(left / APART), 10))
     platform, carriers = trajectory.at(begins + times)
     forces, tensions, _ = _forces(robot, trajectory, np.ones(len(times)), platform, platform, carriers)
-    rows = _limits_of_tensions(robot, tensions[None])
-    for index, carrier in enumerate(robot.carriers):
-        pose, velocity, acceleration = motion = tuple(part[None, :, index] for part in carriers)
-        before, R, after = (
-            points.rotations(pose[..., 3:] + t * velocity[..., 3:] + t**2 / 2 * acceleration[..., 3:])
-            for t in (-INSTANT, 0.0, INSTANT)
-        )
-        turning = R, (after - before) / (2 * INSTANT), (after - 2 * R + before) / INSTANT**2
-        anchor, pull = _pull(robot, index, forces[None])
-        rows += _limits(carrier, motion, pull, anchor, np.array(robot.gravity), turning)  # type: ignore[arg-type]
-    excess, ((_, limit),) = _worst(rows, times[None])
-    return TeamStop(times, begins + times, platform, carriers, tensions, float(excess[0]), limit)
+    pose, velocity, acceleration = motion = tuple(part[None] for part in carriers)
+    before, R, after = (
+        points.rotations(pose[..., 3:] + t * velocity[..., 3:] + t**2 / 2 * acceleration[..., 3:])
+        for t in (-INSTANT, 0.0, INSTANT)
+    )
+    turning = R, (after - before) / (2 * INSTANT), (after - 2 * R + before) / INSTANT**2
+    rows = _limits(robot, motion, forces[None], tensions[None], turning)  # type: ignore[arg-type]
+    return TeamStop(times, begins + times, platform, carriers, tensions, *_worst(rows, times[None])[0])
 
 
-def _pull(robot: Robot, index: int, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the cables of a carrier begin, in its frame (3,) [m], and their pull, (d, n, 3) [N]."""
-    cables = np.flatnonzero(robot.carrier_of_cable == index)
-    return robot.anchors[cables[0]], -forces[:, :, cables].sum(axis=2)
+class _Carriers(NamedTuple):
+    """What the carriers of a team do not change while they move, one row a carrier."""
+
+    first: np.ndarray  # (c,), of its cables
+    holds: np.ndarray  # (c, m), 1 for each of its cables
+    anchors: np.ndarray  # (c, 3), where its cables begin, in its frame [m]
+    mass: np.ndarray  # (c, 1) [kg]
+    inertia: np.ndarray  # (c, 3, 3) [kg m^2]
+    actuators: list[tuple[Actuator, ...]]
+    commands: list[np.ndarray]  # (6, k), the commands of each unit wrench
+
+
+@lru_cache(maxsize=4)
+def _carriers_of(robot: Robot) -> _Carriers:
+    holds = np.arange(len(robot.carriers))[:, None] == robot.carrier_of_cable
+    bodies = [carrier.body for carrier in robot.carriers if carrier.body is not None]
+    actuators = [carrier.actuators for carrier in robot.carriers]
+    return _Carriers(
+        first=(first := holds.argmax(axis=1)),
+        holds=holds.astype(float),
+        anchors=robot.anchors[first],
+        mass=np.array([[body.mass] for body in bodies]),
+        inertia=np.array([inertia_matrix(body.inertia) for body in bodies]),
+        actuators=actuators,
+        commands=[np.linalg.pinv([actuator.wrench for actuator in each]) for each in actuators],
+    )
+
+
+def _pull(robot: Robot, forces: np.ndarray) -> np.ndarray:
+    """Return the pull of the cables of each carrier, (d, n, c, 3) [N], from their forces on the platform."""
+    return -(_carriers_of(robot).holds @ forces)
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -162,41 +186,40 @@ class _Stops:
         lengths = np.linalg.norm(points.anchors(robot, self.planned[0]) - held, axis=-1)
         ends = held + (lengths / tensions)[..., None] * forces
         self._ends = ends.reshape(self._forces.shape)  # of cables on carriers
-        self.carriers, self.rows = [], list[Row]()
-        for index in range(len(robot.carriers)):
-            self._add(index)
-        self.rows += _limits_of_tensions(robot, self.tensions)
+        self.carriers = self._motions()
+        R = points.rotations(self.carriers[0][..., 3:])
+        turning = R, self._slope(R), self._slope(self._slope(R))
+        rows = _limits(robot, self.carriers, self._forces, self.tensions, turning, limits_lacking=True)
+        self.worst = _worst(rows, self.times, begins_inside=False)
 
-    def _add(self, index: int) -> None:
-        """Add the motion of a carrier and its limits."""
-        robot, carrier = self.robot, self.robot.carriers[index]
-        cable, gravity = int(np.flatnonzero(robot.carrier_of_cable == index)[0]), np.array(robot.gravity)
-        anchor, pull = _pull(robot, index, self._forces)
-        pose = self.planned[0][:, index].reshape(*self.tau.shape, 6).copy()
-        starts = [part[0, index] for part in self.planned]
-        at = np.column_stack([np.zeros((self.tau.size, 5)), pose[..., 5].ravel()])
-
-        def tilt(bend: np.ndarray, pull: np.ndarray) -> np.ndarray:
-            return np.asarray(carrier.balanced_tilt(at, bend, pull.reshape(-1, 3), gravity)).reshape(*self.tau.shape, 2)
-
+    def _motions(self) -> Motion:
+        """Return pose, velocity and acceleration of the carriers, (d, n, c, 6) each."""
+        its, turns = _carriers_of(self.robot), bool(self.robot.anchors.any())
+        planned = [part.reshape(*self.tau.shape, -1, 6) for part in self.planned]
+        pose, starts = planned[0].copy(), [part[0] for part in self.planned]
         # The stop begins with the plan's own tilt, which between the plan's nodes is not quite that of balance.
-        planned = pose[..., 3:5].copy()
-        usual = tilt(self.planned[2][:, index, :3], _pull(robot, index, self._before)[1])
-        for attempt in range(TILTS if anchor.any() else 1):
-            pose[..., :3] = self._ends[:, :, cable] - points.rotations(pose[..., 3:]) @ anchor
+        usual = self._tilts(planned[2], self._before)
+        for attempt in range(TILTS if turns else 1):
+            pose[..., :3] = self._ends[:, :, its.first]
+            if turns:
+                pose[..., :3] -= (points.rotations(pose[..., 3:]) @ its.anchors[..., None])[..., 0]
             if attempt == TILTS - 1:
                 break
-            bend = self._slopes(pose[..., :3], [part[:3] for part in starts])[1].reshape(-1, 3)
-            share = self.rate[..., None]
-            pose[..., 3:5] = share * planned + self._smooth(tilt(bend, pull) - share * usual, lands=bool(anchor.any()))
+            bend = self._slopes(pose[..., :3], [part[:, :3] for part in starts])[1]
+            share = self.rate[..., None, None]
+            change = self._tilts(bend, self._forces) - share * usual
+            pose[..., 3:5] = share * planned[0][..., 3:5] + self._smooth(change, lands=turns)
         pose[:, 0] = starts[0]
-        motion = pose, *self._slopes(pose, starts)
-        self.carriers.append(motion)
-        R = points.rotations(pose[..., 3:])
-        turning = R, self._slope(R), self._slope(self._slope(R))
-        # A carrier that turns about another point than its anchor can do so too quickly for its cables to stay taut.
-        most = max(robot.t_min[cable], LACKING * robot.t_max[cable]) if anchor.any() else None
-        self.rows += _limits(carrier, motion, pull, anchor, gravity, turning, most)
+        return pose, *self._slopes(pose, starts)
+
+    def _tilts(self, bends: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Return roll and pitch, (d, n, c, 2) [rad], that balance accelerations of carriers and forces of cables."""
+        bends, pulls = (part.reshape(self.tau.size, -1, part.shape[-1]) for part in (bends, _pull(self.robot, forces)))
+        gravity = np.array(self.robot.gravity)
+        tilts = np.empty((*bends.shape[:2], 2))
+        for k, carrier in enumerate(self.robot.carriers):
+            tilts[:, k] = carrier.balanced_tilt(self.planned[0][:, k], bends[:, k], pulls[:, k], gravity)
+        return tilts.reshape(*self.tau.shape, -1, 2)
 
     def _slopes(self, values: np.ndarray, starts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Return two derivatives by differences, which begin as the plan's do and end at rest."""
@@ -220,16 +243,10 @@ class _Stops:
             values[:, -1] += last if lands else 0.0
         return values
 
-    def worst(self, reserve: float) -> tuple[np.ndarray, list[tuple[float, str]]]:
-        """Return `_worst` of its limits; what the plan has itself at the beginning is no excess."""
-        return _worst(self.rows, self.times, reserve, begins_inside=False)
-
     def only(self) -> TeamStop:
         """Return the only stop."""
-        excess, ((_, limit),) = self.worst(0.0)
-        moved = [np.stack([motion[order][0] for motion in self.carriers], axis=1) for order in range(3)]
-        platform = tuple(part[0] for part in self.platform)
-        return TeamStop(self.times[0], self.tau[0], platform, tuple(moved), self.tensions[0], float(excess[0]), limit)  # type: ignore[arg-type]
+        platform, carriers = (tuple(part[0] for part in motion) for motion in (self.platform, self.carriers))
+        return TeamStop(self.times[0], self.tau[0], platform, carriers, self.tensions[0], *self.worst[0])  # type: ignore[arg-type]
 
 
 def _forces(
@@ -261,70 +278,68 @@ def _wrenches_of_forces(robot: Robot, pose: np.ndarray) -> np.ndarray:
     arms = points.rotations(pose[:, 3:])[:, None] @ (robot.attachments - np.array(robot.platform.com))[..., None]
     turn = np.empty((*arms.shape[:2], 6, 3))
     turn[..., :3, :] = np.eye(3)
-    turn[..., 3:, :] = np.cross(arms.swapaxes(-1, -2), np.eye(3)).swapaxes(-1, -2)
-    return np.concatenate(list(np.moveaxis(turn, 1, 0)), axis=-1)
+    turn[..., 3:, :] = _cross(arms.swapaxes(-1, -2), np.eye(3)).swapaxes(-1, -2)
+    return turn.swapaxes(1, 2).reshape(len(pose), 6, -1)
 
 
-def _worst(
-    rows: list[Row], times: np.ndarray, reserve: float = 0.0, begins_inside: bool = True
-) -> tuple[np.ndarray, list[tuple[float, str]]]:
-    """Return the largest excess of each stop, (d,), relative to a limit's range, and the limit's text.
+def _worst(rows: list[Row], times: np.ndarray, begins_inside: bool = True) -> list[tuple[float, str]]:
+    """Return the largest excess of each stop, relative to a limit's range, and the text of that limit.
 
-    A `reserve` of the range counts as beyond. Unless a stop should begin inside, so much as it has first is no excess.
+    Unless a stop should begin inside, so much as it has first is no excess.
     """
     names, values = [row[0] for row in rows], np.stack([row[1] for row in rows])  # (k, d, n)
     low, high = np.array([row[2:] for row in rows]).T[..., None, None]  # (k, 1, 1) each
-    room = reserve * (high - low)
-    floor, ceiling = low + room, high - room
-    if not begins_inside:
-        floor, ceiling = np.minimum(floor, values[..., :1]), np.maximum(ceiling, values[..., :1])
+    floor = low if begins_inside else np.minimum(low, values[..., :1])
+    ceiling = high if begins_inside else np.maximum(high, values[..., :1])
     beyond = np.maximum(floor - values, values - ceiling) / (high - low)
-    worst, text = np.zeros(len(times)), [(0.0, "")] * len(times)
+    worst = [(0.0, "")] * len(times)
     for d, excess in enumerate(beyond.max(axis=(0, 2)).tolist()):
         if excess > ACCEPTED:
             k, at = np.unravel_index(np.argmax(beyond[:, d]), beyond[:, d].shape)
-            worst[d], value = excess, values[k, d, at]
+            value = values[k, d, at]
             bound = float(low[k, 0, 0] if value < low[k, 0, 0] else high[k, 0, 0])
-            text[d] = excess, f"{names[k]}: {quantity(value)} of {bound:g} at {quantity(times[d, at], 's')}"
-    return worst, text
-
-
-def _limits_of_tensions(robot: Robot, tensions: np.ndarray) -> list[Row]:
-    """Return the limits of tensions (d, n, m) [N]."""
-    limits = zip(robot.t_min, robot.t_max, strict=True)
-    return [(f"tension {i + 1}", tensions[..., i], low, high) for i, (low, high) in enumerate(limits)]
+            worst[d] = excess, f"{names[k]}: {quantity(value)} of {bound:g} at {quantity(times[d, at], 's')}"
+    return worst
 
 
 def _limits(
-    carrier: Carrier,
+    robot: Robot,
     motion: Motion,
-    pull: np.ndarray,
-    anchor: np.ndarray,
-    gravity: np.ndarray,
+    forces: np.ndarray,
+    tensions: np.ndarray,
     turning: tuple[np.ndarray, np.ndarray, np.ndarray],
-    most_lacking: float | None = None,
+    limits_lacking: bool = False,
 ) -> list[Row]:
-    """Return what a motion of a carrier requires, pulled at its anchor by (d, n, 3) [N].
+    """Return what a motion of the carriers, (d, n, c, 6) each, requires, and the tensions, (d, n, m) [N].
 
-    A force of up to `most_lacking` [N] may be missing from its actuators (default: any), by which tensions differ.
-    `turning` has its rotation and the first and second derivative of that, (d, n, 3, 3) each.
+    `forces` are those of the cables on the platform, (d, n, m, 3) [N].
+    `turning` has their rotations and the first and second derivative of these, (d, n, c, 3, 3) each. If
+    `limits_lacking`, a carrier that turns about another point than its anchor has a limit for the force that is missing
+    from its actuators: it can turn too quickly for its cables to stay taut.
     """
-    body, (_, velocity, acceleration), R = carrier.body, motion, turning[0]
-    assert body is not None
+    its, (_, velocity, acceleration), R, pull = _carriers_of(robot), motion, turning[0], _pull(robot, forces)
     down = R.swapaxes(-1, -2)
     spin, spun = (points.axial(down @ part) for part in turning[1:])
-    force = (down @ (body.mass * (acceleration[..., :3] - gravity) - pull)[..., None])[..., 0]
-    J = inertia_matrix(body.inertia)
-    moment = spun @ J + _cross(spin, spin @ J) - _cross(anchor, (down @ pull[..., None])[..., 0])
-    wrench, of_commands = np.concatenate([force, moment], axis=-1), np.array([a.wrench for a in carrier.actuators])
-    commands, name, own = wrench @ np.linalg.pinv(of_commands), carrier.name, carrier.motion_limits
-    rows = [(f"{a.name} of {name}", commands[..., k], a.low, a.high) for k, a in enumerate(carrier.actuators)]
-    lacking = np.linalg.norm((wrench - commands @ of_commands)[..., :3], axis=-1)
-    for what, values, most in (
-        ("force across the thrust", lacking, most_lacking),
-        ("speed", np.linalg.norm(velocity[..., :3], axis=-1), own.speed),
-        ("acceleration", np.linalg.norm(acceleration[..., :3], axis=-1), own.acceleration),
-        ("tilt", np.arccos(np.clip(R[..., 2, 2], -1, 1)), own.tilt),
-    ):
-        rows += [] if most is None else [(f"{what} of {name}", values, 0.0, most)]
+    force = (down @ (its.mass * (acceleration[..., :3] - np.array(robot.gravity)) - pull)[..., None])[..., 0]
+    impulse, change = ((its.inertia @ part[..., None])[..., 0] for part in (spin, spun))
+    moment = change + _cross(spin, impulse) - _cross(its.anchors, (down @ pull[..., None])[..., 0])
+    wrenches = np.concatenate([force, moment], axis=-1)
+    speeds, bends = (np.linalg.norm(part[..., :3], axis=-1) for part in (velocity, acceleration))
+    tilts, ranges = np.arccos(np.clip(R[..., 2, 2], -1, 1)), zip(robot.t_min, robot.t_max, strict=True)
+    rows = [(f"tension {i + 1}", tensions[..., i], low, high) for i, (low, high) in enumerate(ranges)]
+    for k, carrier in enumerate(robot.carriers):
+        wrench, name, own = wrenches[:, :, k], carrier.name, carrier.motion_limits
+        commands = wrench @ its.commands[k]
+        rows += [(f"{a.name} of {name}", commands[..., i], a.low, a.high) for i, a in enumerate(its.actuators[k])]
+        if limits_lacking and its.anchors[k].any():
+            given = commands @ np.array([a.wrench for a in its.actuators[k]])
+            lacking = np.linalg.norm((wrench - given)[..., :3], axis=-1)
+            most = max(robot.t_min[its.first[k]], LACKING * robot.t_max[its.first[k]])
+            rows.append((f"force across the thrust of {name}", lacking, 0.0, most))
+        for what, values, largest in (
+            ("speed", speeds, own.speed),
+            ("acceleration", bends, own.acceleration),
+            ("tilt", tilts, own.tilt),
+        ):
+            rows += [] if largest is None else [(f"{what} of {name}", values[..., k], 0.0, largest)]
     return rows
