@@ -21,10 +21,16 @@ class Deviation:
         lengths = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
         self.most = min(FAR * float(lengths.mean()), MOST), TURNED  # [m, rad]
 
-    def are_far(self, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        """Return which poses (..., 6) are away from their references (..., 6)."""
+    def are_far(self, poses: np.ndarray, wanted: np.ndarray, between: np.ndarray | None = None) -> np.ndarray:
+        """Return which poses (..., 6) are away from their references (..., 6).
+
+        `between` is the rotation from the one to the other, (..., 3, 3), if it is known.
+        """
         with np.errstate(over="ignore", invalid="ignore"):
-            trace = (rotations(poses[..., 3:]) * rotations(wanted[..., 3:])).sum(axis=(-1, -2))
+            if between is None:
+                trace = (rotations(poses[..., 3:]) * rotations(wanted[..., 3:])).sum(axis=(-1, -2))
+            else:
+                trace = between[..., 0, 0] + between[..., 1, 1] + between[..., 2, 2]
             away = np.square(poses[..., :3] - wanted[..., :3]).sum(axis=-1)
             return np.asarray((away > self.most[0] ** 2) | ((trace - 1.0) / 2 < np.cos(TURNED)))
 

@@ -12,6 +12,7 @@ from ..base.inputs import number, repeated, required, shown
 from ..base.text import quantity
 from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
+from ..models.points import axial, rotations
 from ..models.trajectory import moved_on
 from .as_floats import as_floats, is_time, measured_at, rows_of
 from .bandwidths import age_of, noise_of
@@ -35,10 +36,10 @@ class LengthControl(Controller):
         L0 = l(x) / (1 + s) + J (P e + I * integral of e)
 
     where s are the strains at which cables with the stiffness EA and the file's damping have the planned tensions, x is
-    the planned pose, J the Jacobian of the lengths, and e the error of the measured pose. x and the tensions are those
-    planned for the time at which the winches will have followed. The tensions of a robot with more cables than degrees
-    of freedom follow from the lengths; they are not controlled. With a lag, e and its integral are extrapolated to that
-    time, to first order.
+    the planned pose, J the Jacobian of the lengths, and e the error of the measured pose, whose rotation is a vector in
+    {G}, so that no attitude is special. x and the tensions are those planned for the time at which the winches will
+    have followed. The tensions of a robot with more cables than degrees of freedom follow from the lengths; they are
+    not controlled. With a lag, e and its integral are extrapolated to that time, to first order.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file. Its carriers must not fly.
@@ -151,15 +152,11 @@ class LengthControl(Controller):
         strain = self._strained(dt, tensions, far)
         if not (np.isfinite(far).all() and np.isfinite(strain).all()):
             raise InputError(f"reference must have finite lengths of cables, got pose {shown(reference.pose.tolist())}")
-        corrected, held = self._correction(dt, age, state, reference)
+        corrected, status = self._correction(dt, age, state, reference)
         lengths, self._strain = far / (1.0 + strain) + corrected, strain
         self._time, self._tensions = float(time), reference.tensions
         command = planned_command(self.robot, reference, rows)
-        status = np.where(self._deviation.are_far(state.pose, moved_on(reference[:3], -age)[0]), OFF, PLANNED)
-        return command._replace(
-            answered=np.where(held, HOLD, status).astype(np.int8),
-            lengths=np.broadcast_to(lengths, command.tensions.shape),
-        )
+        return command._replace(answered=status, lengths=np.broadcast_to(lengths, command.tensions.shape))
 
     def _ahead(self, dt: float, reference: Reference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the planned pose, poses of carriers and tensions at the time when the winches will have followed."""
@@ -183,23 +180,33 @@ class LengthControl(Controller):
         return strain
 
     def _correction(self, dt: float, age: float, state: State, reference: Reference) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corrections of the lengths [m], (..., m), and where they are held at their bound, (...)."""
+        """Return the corrections of lengths [m], (..., m), and the status (...): "hold" where one is at its bound."""
         pose, velocity, _ = moved_on(reference[:3], -age)
-        error = pose - state.pose
-        error[..., 3:] = (error[..., 3:] + np.pi) % (2 * np.pi) - np.pi
-        drift = velocity - state.velocity if self._lag else np.zeros_like(error)
-        known = np.asarray(np.isfinite(error + drift).all(axis=-1))
-        error, drift = (np.where(known[..., None], one, 0.0) * self.robot.dof_mask for one in (error, drift))
+        carriers, jacobian, free = reference.carrier_pose, self._dynamics.length_jacobian, self.robot.dof_mask
+        with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
+            turned, attitude = (rotations(one[..., 3:]) for one in (pose, state.pose))
+            error, between = pose - state.pose, turned @ attitude.swapaxes(-1, -2)
+            error[..., 3:] = axial(between)
+            behind = np.zeros(1)  # planned minus measured speeds of the cables, (..., m) [m/s]
+            if self._lag:
+                planned, measured = (velocity * free)[..., None], (state.velocity * free)[..., None]
+                behind = (jacobian(pose, carriers) @ planned - jacobian(state.pose, carriers) @ measured)[..., 0]
+            known = np.isfinite(error).all(axis=-1) & np.isfinite(behind).all(axis=-1)
+        error, behind = (np.where(known[..., None], one, 0.0) for one in (error * free, behind))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
-        J = self._dynamics.length_jacobian(reference.pose, reference.carrier_pose)  # (..., m, 6)
+        A = self._dynamics.wrench_matrix(reference.pose, carriers)  # (..., 6, m)
         proportional, integral = self._gains_for(dt or PERIOD, age)
         total = before + dt * error
         with np.errstate(over="ignore", invalid="ignore"):  # of states that overflow
-            ahead = proportional * (error + self._lag * drift) + integral * (total + self._lag * error)
-            wanted = (J @ ahead[..., None])[..., 0]
+            ahead = proportional * error + integral * (total + self._lag * error)
+            if any(com := self.robot.platform.com):  # about which A has the moments
+                ahead[..., :3] += np.cross(ahead[..., 3:], turned @ np.array(com))
+            wanted = proportional * self._lag * behind - (A.swapaxes(-1, -2) @ ahead[..., None])[..., 0]
         beyond = np.asarray(~(np.abs(wanted) <= self._most).all(axis=-1))
         self._sum = np.where(beyond[..., None], before, total)
-        return np.clip(np.nan_to_num(wanted), -self._most, self._most), beyond | ~known
+        status = np.where(self._deviation.are_far(state.pose, pose, between), OFF, PLANNED)
+        status = np.where(beyond | ~known, HOLD, status).astype(np.int8)
+        return np.clip(np.nan_to_num(wanted), -self._most, self._most), status
 
     def _gains_for(self, dt: float, age: float) -> tuple[float, float]:
         """Return P and I [1/s], given or by default, for a pose of an age [s] and lengths held for `dt` [s]."""

@@ -4,11 +4,13 @@ import warnings
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from towline import InputError, load, plan, simulate
 from towline.control import ANSWERS, ComputedTorque, LengthControl, Reference, State, references
 from towline.control.command import HOLD, PLANNED
 from towline.models import Dynamics, Robot
+from towline.models.points import angles
 
 EA = 2e5
 
@@ -209,6 +211,28 @@ def test_a_step_with_huge_numbers_leaves_no_trace(model, huge):
     with pytest.raises(InputError, match="reference must have finite lengths of cables, got pose"):
         controller.step(0.002, state, reference._replace(pose=np.full(6, huge)))
     np.testing.assert_allclose(controller.step(0.003, state, reference).lengths, usual, rtol=1e-12)
+
+
+@pytest.mark.parametrize("pitch", [1.0, np.pi / 2, -np.pi / 2])
+def test_axes_of_the_platform_frame_do_not_change_lengths(pitch):
+    """A platform, whose CoM is off its origin, with two frames: at a pitch of 90 degrees roll and yaw are one angle."""
+    data, com = elastic("cogiro", EA).model_dump(mode="json"), np.array([0.1, 0.2, 0.3])
+    axes = Rotation.from_euler("ZYX", [0.4, pitch, 0.2])
+    error, still = np.array([0.02, -0.01, 0.03, 0.01, 0.02, -0.03]), np.zeros((1, 6))
+    found = []
+    for attitude in (Rotation.identity(), axes):
+        place = [0, 0, 2, *angles(attitude.as_matrix()).tolist()]
+        body = {"com": attitude.inv().apply(com).tolist(), "inertia": [50, 50, 50, 0, 0, 0], "home": place}
+        cables = [one | {"attachment": attitude.inv().apply(one["attachment"]).tolist()} for one in data["cables"]]
+        own = Robot.model_validate(data | {"platform": data["platform"] | body, "cables": cables})
+        turned = (Rotation.from_rotvec(error[3:]) * attitude).as_matrix()
+        where, reference = np.append(error[:3] + own.home[:3], angles(turned)), references_at_rest(own, own.home)
+        controller = LengthControl(own, proportional=1, integral=5, most=1)
+        for time in (0.0, 0.01):
+            command = controller.step(time, State(where, still[0], own.carrier_home, still), reference)
+        assert command.answered == 0
+        found.append(wound(command))
+    np.testing.assert_allclose(*found, atol=1e-9)
 
 
 def test_other_controllers_keep_their_drive(model):
