@@ -64,6 +64,21 @@ def test_locked_winches_have_no_clock(tmp_path):
     assert "lengths do not determine the pose: poses are those at rest" in said
 
 
+def test_locked_winches_and_poses_in_two_files(tmp_path):
+    """Constant lengths show no clock, and need none; nor do they show which of anchors and offsets are wrong."""
+    head = user.locked(tmp_path).read_text().splitlines()[0].split(",")
+    table, robot = np.genfromtxt(tmp_path / "locked.csv", delimiter=",", skip_header=1), user.hanging_robot(tmp_path)
+    user.write(tmp_path / "winches.csv", head[:5], table[:, :5])
+    for ahead in (0.3, 1e6):
+        seen = np.column_stack([table[:, 0] + ahead, table[:, 5:]])
+        user.write(tmp_path / f"camera{ahead:g}.csv", [head[0], *head[5:]], seen, form="%.12g")
+    read = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "camera0.3.csv", robot=robot)
+    np.testing.assert_allclose(read.poses[:, :3], 1e-3 * table[: len(read), 5:8], atol=1e-9)
+    assert "they do not distinguish offsets from anchors" in calibrate(robot, read, ["anchors"]).report()
+    with pytest.raises(InputError, match="lengths must change to align the clocks, got those of locked winches"):
+        read_measurements(tmp_path / "winches.csv", poses=tmp_path / "camera1e+06.csv", robot=robot)
+
+
 def test_rests_with_an_ahrs_and_load_cells(tmp_path):
     robot, offsets = user.hanging_robot(tmp_path), np.array([0.06, 0.006, -0.02, -0.01])
     places = user.statics(tmp_path, offsets)

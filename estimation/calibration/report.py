@@ -9,6 +9,7 @@ from ...base.text import counted, quantity
 from ...figures.drawing import Drawing
 from ...figures.report import Part, Report, Section, Table
 from ...models.parsing import to_yaml
+from ..logs.encoders import locked
 from .geometry import length_of
 from .result import CalibrationData, Parameter
 from .turning import turning
@@ -107,6 +108,12 @@ def _of_noise(result: CalibrationData) -> list[str]:
         )
     if result.noise > LACKS * stated and "scales" not in result.free:
         lines.append("the model is incomplete: --free auto also tries scales, attachments and more")
+    if "anchors" in result.free and "offsets" not in result.free and locked(result.measurements.lengths):
+        lines.append(
+            "the lengths hardly change, so they do not distinguish offsets from anchors: the standard deviations below "
+            "hold only if the file's offsets are exact; with --free anchors,offsets --prior offsets=0.02 they include "
+            "errors of 20 mm"
+        )
     turns = turning(result.file, result.measurements) if "attachments" in result.free else None
     if turns is not None and not turns.enough:
         by = quantity(np.degrees(turns.angle), "deg", 2)

@@ -13,6 +13,7 @@ from ...models.robot import Robot
 from .alignment import Clock, align
 from .cable_directions import vectors
 from .carrier_poses import angles_at, carriers_at
+from .encoders import locked
 from .mapping import Field, LogMap, carrier_fields
 from .north_east_down import from_ned, ned_frame, platform_from_ned
 from .recording import Recording, Samples, check_rising
@@ -51,6 +52,10 @@ def clock_of_poses(
     shared = min(times[-1], pose_times[-1]) - max(times[0], pose_times[0])
     if source.recording is first.recording and shared >= 0.5 * min(np.ptp(times), np.ptp(pose_times)):
         return None if robot is None else _far_apart(lengths, position, quaternions, robot, given, from_)
+    if locked(lengths.values):
+        if shared > 0:
+            return None  # constant readings are the same at all times
+        raise InputError("lengths must change to align the clocks, got those of locked winches")
     if robot is None:
         raise InputError("robot must be given to align the clocks of lengths and poses, got None")
     return _aligned(lengths, position, quaternions, robot, given, [one for one in from_ if one is source.recording])

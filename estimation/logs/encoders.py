@@ -1,8 +1,10 @@
-"""`lengths_of`: cable lengths from readings of the winches."""
+"""`lengths_of`: cable lengths from readings of the winches, and `locked`: whether these hardly change."""
 
 import numpy as np
 
 from ...models.robot import Robot
+
+LOCKED = 1e-4  # of a length, by which noise may change the reading of a locked winch
 
 
 def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None = None) -> np.ndarray:
@@ -14,3 +16,9 @@ def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None =
     stretch = 1.0 if tensions is None else 1 + np.maximum(tensions, 0.0) * by
     build_up = np.array([one.build_up if one else 0.0 for one in encoders])
     return (offset + (scale + build_up * readings) * readings) * stretch
+
+
+def locked(lengths: np.ndarray) -> bool:
+    """Return whether readings (N, m) hardly change, as those of locked winches."""
+    known = lengths[np.isfinite(lengths).all(axis=1)]
+    return len(known) > 1 and bool((np.ptp(known, axis=0) <= LOCKED * np.abs(known).max(axis=0)).all())
