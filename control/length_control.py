@@ -191,7 +191,7 @@ class LengthControl(Controller):
             if self._lag:
                 planned, measured = (velocity * free)[..., None], (state.velocity * free)[..., None]
                 behind = (jacobian(pose, carriers) @ planned - jacobian(state.pose, carriers) @ measured)[..., 0]
-            known = np.isfinite(error).all(axis=-1) & np.isfinite(behind).all(axis=-1)
+            known = np.asarray(np.isfinite(error).all(axis=-1) & np.isfinite(behind).all(axis=-1))
         error, behind = (np.where(known[..., None], one, 0.0) for one in (error * free, behind))
         before = np.zeros_like(error) if self._sum is None or self._sum.shape != error.shape else self._sum
         A = self._dynamics.wrench_matrix(reference.pose, carriers)  # (..., 6, m)
