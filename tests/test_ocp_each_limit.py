@@ -331,7 +331,7 @@ CASES = {
         share=1.01,
         least=True,
         about="robot1 along x",
-        soft=0.05,
+        soft=0.1,
         where="carrier",
     ),
     "thrust": Case(

@@ -3,6 +3,7 @@
 import casadi as ca
 from typing_extensions import override
 
+from ...models.rotation import rotation
 from .cost import Cost, CostState, RateCost
 
 
@@ -44,6 +45,23 @@ class CarrierOffset(Cost):
     @override
     def values(self, state: CostState) -> ca.SX:
         return ca.vertcat(*(offset.pose for offset in state.offsets[1:]))
+
+
+class Formation(Cost):
+    """Penalise the distance of each carrier from its place at home, which moves and yaws with the platform.
+
+    Accelerations alone would choose any formation, such as one in which all cables of a point mass are in one plane.
+    """
+
+    name, unit = "formation", "m"
+
+    @override
+    def values(self, state: CostState) -> ca.SX:
+        robot, platform = state.robot, state.platform.pose
+        turned = rotation(ca.vertcat(0, 0, platform[5] - robot.home[5]))
+        places = turned @ (robot.carrier_home[:, :3] - robot.home[:3]).T
+        moving = [i for i, carrier in enumerate(robot.carriers) if carrier.moves]
+        return ca.vertcat(*(state.carriers[i].position - platform[:3] - places[:, i] for i in moving))
 
 
 class CarrierAcceleration(Cost):

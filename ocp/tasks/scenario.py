@@ -17,14 +17,24 @@ from ...models.body import skeleton
 from ...models.part import Box, PositiveRange, Vector3
 from ..costs.cost import Cost
 from ..costs.costs import Costs
-from ..costs.terms import CarrierAcceleration, CarrierOffset, Jerk, Margin, PathDeviation, Tension, TensionRate, Time
+from ..costs.terms import (
+    CarrierAcceleration,
+    CarrierOffset,
+    Formation,
+    Jerk,
+    Margin,
+    PathDeviation,
+    Tension,
+    TensionRate,
+    Time,
+)
 from ..limits.limit import Hull, Limit
 from ..limits.limits import Limits
 from .deviation import Deviation
 from .paths import AnyPath, Motion, RestPath, TimedPath, WaypointPath
 from .phases import LaidPhase, Phases
 from .scheme import LINEAR, SCHEMES, Scheme
-from .task import Task
+from .task import FreeBase, Task
 from .wind_set import WindBox, WindDisc, WindSet, as_wind, possible_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
@@ -320,7 +330,21 @@ def cost_list(robot: Robot, task: Task) -> Costs:
     deviation = objective.deviation or 0.1 * max(task.tube.radius, robot.length * turn)  # of the tube
     if 0 < deviation < np.inf:
         costs.append(PathDeviation(deviation))
-    for kind, amount in ((TensionRate, objective.tension_rate), (Time, objective.time), (Margin, objective.margin)):
+    formation = objective.formation or _usual_formation(robot, task)
+    for kind, amount in (
+        (Formation, formation),
+        (TensionRate, objective.tension_rate),
+        (Time, objective.time),
+        (Margin, objective.margin),
+    ):
         if amount is not None:
             costs.append(kind(amount))
     return Costs(robot, (*costs, *objective.own))
+
+
+def _usual_formation(robot: Robot, task: Task) -> float | None:
+    """Return the mean length of the cables at home [m] if several carriers are free without `around`, or None."""
+    base = task.base
+    if not isinstance(base, FreeBase) or base.around or sum(carrier.moves for carrier in robot.carriers) < 2:
+        return None
+    return float(np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean())

@@ -130,6 +130,10 @@ class Objective(Part):
     )
     carrier_acceleration: Positive = optional("acceleration of carriers [m/s^2, rad/s^2]", 1.0)
     carrier_offset: Positive = optional("distance of carriers from `around` or home [m, rad]", 10.0)
+    formation: Positive | None = optional(
+        "distance of carriers from their places at home, which move and yaw with the platform [m]; default: the mean "
+        "length of the cables if several carriers are free without `around`, otherwise no cost"
+    )
     jerk: Positive = optional("jerk of every free coordinate [m/s^3, rad/s^3]; keeps motions smooth", 10.0)
     tension_rate: Positive | None = optional("rate of each tension [N/s]; default: no cost")
     time: Positive | None = optional("duration that adds 1 to the cost, not squared [s]; default: no cost")
