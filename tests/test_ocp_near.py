@@ -8,6 +8,7 @@ import pytest
 
 from towline import load, plan, read_task
 from towline.ocp.audits.excess import Excess
+from towline.ocp.nlp import solver
 from towline.ocp.nlp.guess import initial_guess, usual_guess
 from towline.ocp.nlp.linear import LinearDistances
 from towline.ocp.nlp.near import Near, is_local, parts
@@ -127,6 +128,21 @@ def test_a_tightened_program_has_the_bounds_of_its_mesh_and_starts_from_the_last
     low, high = scenario.bounds()
     assert (again.deviation.tensions >= low + 2.0 - 1e-4).all()
     assert (again.deviation.tensions <= high - 2.0 + 1e-4).all()
+
+
+def test_a_solution_that_stopped_improving_is_continued_with_its_multipliers(monkeypatch):
+    scenario, mesh = scenario_of(TASK), Mesh(40)
+    tight, looking, fresh = Mesh(40, 2.0), *(search.Search(scenario, {}, None) for _ in range(2))
+    with monkeypatch.context() as patched:
+        patched.setattr(solver, "PATIENCE", 1)
+        patched.setattr(solver, "BETTER", 0.1)
+        assert looking.solve("first", mesh, None).message == solver.SETTLED
+    looking.tighten(tight)
+    assert looking.has_solution(tight)
+    again, expected = looking.solve("again", tight, None), fresh.solve("fresh", tight, None)
+    assert again.success
+    assert again.objective == pytest.approx(expected.objective, rel=1e-5)
+    assert again.iterations < expected.iterations
 
 
 def test_another_pair_of_one_limit_is_tightened_beyond_what_all_pairs_have():
