@@ -184,6 +184,9 @@ class _Stops:
         self._forces, self._before = (part.reshape(*shape, robot.m, 3) for part in (forces, before))
         held = points.attachments(robot, pose)
         lengths = np.linalg.norm(points.anchors(robot, self.planned[0]) - held, axis=-1)
+        lengths = r * lengths + (1.0 - r) * np.array(
+            robot.fixed_lengths
+        )  # those of a plan that has ended are not exact
         ends = held + (lengths / tensions)[..., None] * forces
         self._ends = ends.reshape(self._forces.shape)  # of cables on carriers
         self.carriers = self._motions()

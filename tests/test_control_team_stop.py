@@ -76,6 +76,15 @@ def test_a_team_goes_on_to_its_end_where_no_stop_is_shorter(made):
     assert longest_stop(found, 0.5).duration >= stop(found, 1.0).duration
 
 
+def test_cables_have_their_lengths_at_the_end_of_a_stop_beyond_a_plan_that_ends_while_the_team_moves(made):
+    robot, found = made
+    motion = found.trajectory.sel(time=slice(0.0, 1.2))
+    its = stop(motion, float(motion.time[-1]))
+    assert its.duration > 0.5
+    lengths = Dynamics(robot).cable_lengths(its.platform[0][-1], its.carriers[0][-1])
+    np.testing.assert_allclose(lengths, robot.fixed_lengths, atol=1e-9)
+
+
 def test_the_rest_of_a_plan_for_stronger_cables_is_no_feasible_stop(made):
     robot, found = made
     begins = found.duration - 0.15
