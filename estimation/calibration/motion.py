@@ -75,16 +75,15 @@ def motion_of(robot: Robot, measurements: Measurements) -> Motion:
             carriers = measurements.carrier_poses[..., :3]
             bends += [np.linalg.norm(local.fitted(one).bends, axis=1) for one in np.swapaxes(carriers, 0, 1)]
         return rest._replace(sigma=np.max(bends, axis=0))
-    placed = local.fitted(position)
     quaternions = continuous(Rotation.from_matrix(rotation).as_quat())
-    turned, inverse = local.fitted(quaternions), quaternions * [-1, -1, -1, 1]
-    rate, spin = (2 * _vector_of_product(part, inverse) for part in (turned.slopes, turned.bends))
-    sigma = np.full(count, placed.noise[2].max())
+    moved, inverse = local.fitted(np.hstack([position, quaternions])), quaternions * [-1, -1, -1, 1]
+    rate, spin = (2 * _vector_of_product(part[:, 3:], inverse) for part in (moved.slopes, moved.bends))
+    sigma = np.full(count, moved.noise[2, :3].max())
     if robot.platform.inertia is not None:
         inertia = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
         momentum, change = (np.einsum("nij,nj->ni", inertia, part) for part in (rate, spin))
         rest = rest._replace(turning=change + np.cross(rate, momentum))
-    return rest._replace(gravity=gravity - placed.bends, rate=rate, spin=spin, sigma=sigma)
+    return rest._replace(gravity=gravity - moved.bends[:, :3], rate=rate, spin=spin, sigma=sigma)
 
 
 def _vector_of_product(p: np.ndarray, q: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Smooth samples by parabolas through neighbours, no wider than their noise allows: `Parabolas`, `widest_parabola`."""
 
+from collections.abc import Iterator
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -29,35 +31,67 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return quaternions * np.cumprod(np.append(1.0, flips))[:, None]
 
 
+class _Part(NamedTuple):
+    """Parabolas about n samples.
+
+    Attributes:
+        rows: Samples of each parabola, (n, w).
+        unit: Unit of time of each, (n, 1) [s].
+        shares: Coefficients per value of a sample, (n, 3, w).
+    """
+
+    rows: np.ndarray
+    unit: np.ndarray
+    shares: np.ndarray
+
+
 class Parabolas:
-    """Parabolas by least squares through `width` neighbours of each sample, at times (N,) [s]."""
+    """Parabolas by least squares through `width` neighbours of each sample, at times (N,) [s].
+
+    They are computed for some samples at a time: those of a million samples would take more than a gigabyte.
+    """
 
     def __init__(self, times: np.ndarray, width: int):
-        count = len(times)
-        first = np.clip(np.arange(count) - width // 2, 0, count - width)
-        self._rows = first[:, None] + np.arange(width)  # (N, width)
-        apart = times[self._rows] - times[:, None]
-        self._unit = np.abs(apart).max(axis=1, keepdims=True)
-        basis = np.stack([np.ones_like(apart), apart / self._unit, (apart / self._unit) ** 2], axis=2)
-        transposed = np.swapaxes(basis, 1, 2)
-        self._shares = np.linalg.solve(transposed @ basis, transposed)  # (N, 3, width)
+        self._times, self._width = times, width
+        self._only = self._part(0) if len(times) <= PART else None
 
-    @property
+    def _part(self, begin: int) -> _Part:
+        count, width = len(self._times), self._width
+        at = np.arange(begin, min(begin + PART, count))
+        rows = np.clip(at - width // 2, 0, count - width)[:, None] + np.arange(width)
+        apart = self._times[rows] - self._times[at, None]
+        unit = np.abs(apart).max(axis=1, keepdims=True)
+        basis = np.stack([np.ones_like(apart), apart / unit, (apart / unit) ** 2], axis=2)
+        transposed = np.swapaxes(basis, 1, 2)
+        return _Part(rows, unit, np.linalg.solve(transposed @ basis, transposed))
+
+    def _parts(self) -> Iterator[_Part]:
+        if self._only is not None:
+            yield self._only
+        else:
+            yield from map(self._part, range(0, len(self._times), PART))
+
+    @cached_property
     def share(self) -> np.ndarray:
         """Return the share of the variance of noise that smoothed values keep, (N,)."""
-        return (self._shares[:, 0] ** 2).sum(axis=1)
+        return np.concatenate([(part.shares[:, 0] ** 2).sum(axis=1) for part in self._parts()])
 
     def values(self, values: np.ndarray) -> np.ndarray:
         """Return smoothed values (k, N, d)."""
-        return np.stack([(self._shares[:, :1] @ one[self._rows])[:, 0] for one in values])
+        parts = [[(part.shares[:, :1] @ one[part.rows])[:, 0] for one in values] for part in self._parts()]
+        return np.concatenate(parts, axis=1)
 
     def fitted(self, values: np.ndarray) -> Fitted:
         """Return values (N, d) as the parabolas have them."""
-        parts = self._shares @ values[self._rows]  # (N, 3, d)
-        noise = np.sqrt(((values - parts[:, 0]) ** 2).mean(axis=0))
-        units = (1.0, self._unit, self._unit**2 / 2)
-        spread = [np.median(np.linalg.norm(self._shares[:, k], axis=1) / np.ravel(units[k])) for k in range(3)]
-        return Fitted(parts[:, 0], parts[:, 1] / units[1], parts[:, 2] / units[2], np.outer(spread, noise))
+        result, spread = np.empty((3, *values.shape)), np.empty((3, len(values)))
+        end = 0
+        for part in self._parts():
+            begin, end = end, end + len(part.rows)
+            units = np.hstack([np.ones_like(part.unit), part.unit, part.unit**2 / 2])  # (n, 3)
+            result[:, begin:end] = np.swapaxes(part.shares @ values[part.rows] / units[:, :, None], 0, 1)
+            spread[:, begin:end] = (np.linalg.norm(part.shares, axis=2) / units).T
+        noise = np.sqrt(((values - result[0]) ** 2).mean(axis=0))
+        return Fitted(result[0], result[1], result[2], np.outer(np.median(spread, axis=1), noise))
 
 
 def within(times: np.ndarray, span: float = SPAN) -> int:
@@ -67,16 +101,7 @@ def within(times: np.ndarray, span: float = SPAN) -> int:
 
 def smooth(times: np.ndarray, values: np.ndarray, neighbours: int = NEIGHBOURS) -> np.ndarray:
     """Smooth values (n, d) by least-squares parabolas through each and its nearest neighbours."""
-    count = len(times)
-    if count < neighbours:
-        return values
-    result = np.empty(values.shape)
-    for first in range(0, count, PART):  # parabolas of all samples at once would need much memory
-        last = min(first + PART, count)
-        begin, end = max(min(first, count - neighbours) - neighbours, 0), min(last + neighbours, count)
-        part = Parabolas(times[begin:end], neighbours).values(values[None, begin:end])[0]
-        result[first:last] = part[first - begin : last - begin]
-    return result
+    return values if len(times) < neighbours else Parabolas(times, neighbours).values(values[None])[0]
 
 
 def noise_of(times: np.ndarray, values: np.ndarray) -> float:
