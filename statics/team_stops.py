@@ -119,7 +119,7 @@ def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
 
 
 class _Carriers(NamedTuple):
-    """What the carriers of a team do not change while they move, one row a carrier."""
+    """Constants of the carriers of a team, one row a carrier."""
 
     first: np.ndarray  # (c,), of its cables
     holds: np.ndarray  # (c, m), 1 for each of its cables
