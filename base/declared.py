@@ -7,8 +7,10 @@ in any other file of this machine, or in a named pipe, from which reading never 
 from __future__ import annotations
 
 import math
+import mmap
 import os
 import stat
+import struct
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -30,6 +32,9 @@ MOST_PARTS = 600  # variables and attributes: a variable takes some milliseconds
 CHARACTER = 4  # [bytes] in memory
 NUMBER = 8  # [bytes] of a number in memory, however short it is in the file
 FIXED = 2**12  # [bytes] by which a chunk that does not compress may grow
+HEAP = b"GCOL\1\0\0\0"  # what a global heap of HDF5 begins with: a list of texts, each with its number and length
+HEADER = struct.Struct("<HHIQ")
+FREE = 0  # the number of a space without a text; its length counts from its header on
 
 
 class _Account:
@@ -71,6 +76,23 @@ class _Account:
         most = MOST_BLOCKS + self.size // STORED_BLOCK
         if self._blocks > most:
             raise InputError(f"must have at most {most} chunks, got more ({_name(name)})")
+
+
+def check_heaps(content: bytes | mmap.mmap) -> None:
+    """Check the lists of texts of a file: HDF5 never comes to the end of one whose free space has no length.
+
+    Raises `InputError` if a list has such a space.
+    """
+    start = content.find(HEAP)
+    while start >= 0 and start + HEADER.size <= len(content):
+        *_, length = HEADER.unpack_from(content, start)
+        place, end = start + HEADER.size, min(start + length, len(content))
+        while place + HEADER.size <= end:
+            number, _, _, length = HEADER.unpack_from(content, place)
+            if number == FREE and length < HEADER.size:
+                raise InputError(f"must have free spaces of at least {HEADER.size} bytes among its texts, got {length}")
+            place += length if number == FREE else HEADER.size + -(-length // 8) * 8
+        start = content.find(HEAP, start + 1)
 
 
 def check_hdf5(

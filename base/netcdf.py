@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import io
+import mmap
 import sys
 import threading
 import warnings
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .declared import check_hdf5
+from .declared import check_hdf5, check_heaps
 from .errors import InputError
 from .inputs import printable, shown
 from .reading import check_file
@@ -122,7 +123,9 @@ def load_netcdf(path: Path, refusal: str) -> xr.Dataset:
         try:
             try:
                 size = check_file(path, "a NetCDF file", LARGEST)
-                with h5py.File(path) as file:
+                with h5py.File(path) as file, open(path, "rb") as stream:
+                    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as content:
+                        check_heaps(content)
                     check_hdf5(file, size)
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")  # of what is unusual in a file; whoever uses it checks what matters

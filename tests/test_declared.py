@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from towline import InputError, load, read_measurements, simulate
-from towline.base.declared import check_hdf5
+from towline.base.declared import check_hdf5, check_heaps
 from towline.base.netcdf import load_netcdf
 from towline.viewer import read
 from towline.workspace import StaticEquilibrium, sample, save
@@ -258,3 +258,28 @@ def test_pipes_devices_and_links_of_a_folder_are_refused(tmp_path):
     chunk.symlink_to(pipe)
     with pytest.raises(InputError, match=r"0\.0 must be a file or a folder, got a link, a device or a pipe"):
         read(tmp_path / "a.zarr")
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_a_list_of_texts_without_end_is_refused(tmp_path, reader):
+    """HDF5 skips a free space among texts by its length: with a length of 0 it stays there for ever."""
+
+    def texts(file):
+        file.attrs["units"] = "m"  # a text of any length, in a global heap of 4 kB
+        file.create_dataset("l0", data=np.zeros(3)).attrs["units"] = "m"
+
+    path = written(tmp_path / "log.nc", texts)
+    content = bytearray(path.read_bytes())
+    place = content.index(b"GCOL") + 16
+    while number := int.from_bytes(content[place : place + 2], "little"):
+        place += 16 + -(-int.from_bytes(content[place + 8 : place + 16], "little") // 8) * 8
+    assert number == 0
+    assert int.from_bytes(content[place + 8 : place + 16], "little") > 3000  # the rest of the heap
+    with h5py.File(path) as file:
+        assert list(check_hdf5(file, len(content))) == ["l0"]
+    check_heaps(bytes(content))
+    content[place + 8 : place + 16] = bytes(8)
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="free spaces of at least 16 bytes among its texts, got 0") as caught:
+        READERS[reader](path)
+    assert "\n" not in str(caught.value)

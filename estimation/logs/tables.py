@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...base.csv_columns import LENGTHS, TIMES, read_columns
-from ...base.declared import check_hdf5
+from ...base.declared import check_hdf5, check_heaps
 from ...base.errors import InputError
 from ...base.inputs import printable
 from ...base.netcdf import check_units
@@ -70,6 +70,7 @@ def from_netcdf(content: bytes, where: str) -> Recording:
     try:
         # NetCDF 4 is HDF5. Of a damaged file, h5netcdf would complain once more on standard error when it is forgotten.
         with h5py.File(io.BytesIO(content), "r") as file:
+            check_heaps(content)
             there = check_hdf5(file, len(content), _is_read, ALWAYS_ACCEPTED)
             arrays = {
                 name: (np.asarray(variable[...]), _attributes(variable))
