@@ -35,6 +35,7 @@ TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
 INSTANT = 1e-4  # [s], for differences of attitudes
+FORGOTTEN = 0.1  # [s] after the end of a plan, from when on nothing of its extrapolation is kept
 RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
 # Of s = t / duration, with three continuous derivatives, and with five, since anchors that turn need two more.
 RATE = np.polynomial.Polynomial([1, 0, 0, 0, -35, 84, -70, 20])
@@ -178,15 +179,16 @@ class _Stops:
         r, u = self.rate.reshape(-1, 1), slope.reshape(-1, 1)
         (pose, velocity, acceleration), self.planned = flat
         platform = pose, r * velocity, r**2 * acceleration + u * velocity
-        forces, tensions, before = _forces(robot, trajectory, r[:, 0], platform, flat[0], self.planned)
+        # Beyond its end a plan is extrapolated, body by body: soon its balance and its lengths count no more.
+        beyond = np.clip((self.tau.reshape(-1, 1) - (trajectory.duration or 0.0)) / FORGOTTEN, 0.0, 1.0)
+        kept = r * (1.0 - beyond**2 * (3.0 - 2.0 * beyond))
+        forces, tensions, before = _forces(robot, trajectory, kept[:, 0], platform, flat[0], self.planned)
         self.platform = [part.reshape(*shape, 6) for part in platform]
         self.tensions = tensions.reshape(*shape, -1)
         self._forces, self._before = (part.reshape(*shape, robot.m, 3) for part in (forces, before))
         held = points.attachments(robot, pose)
         lengths = np.linalg.norm(points.anchors(robot, self.planned[0]) - held, axis=-1)
-        lengths = r * lengths + (1.0 - r) * np.array(
-            robot.fixed_lengths
-        )  # those of a plan that has ended are not exact
+        lengths = kept * lengths + (1.0 - kept) * np.array(robot.fixed_lengths)
         ends = held + (lengths / tensions)[..., None] * forces
         self._ends = ends.reshape(self._forces.shape)  # of cables on carriers
         self.carriers = self._motions()
@@ -253,9 +255,12 @@ class _Stops:
 
 
 def _forces(
-    robot: Robot, trajectory: Trajectory, rate: np.ndarray, platform: Motion, planned: Motion, carriers: Motion
+    robot: Robot, trajectory: Trajectory, kept: np.ndarray, platform: Motion, planned: Motion, carriers: Motion
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the forces of the cables on the platform, (n, m, 3), the tensions, (n, m), and the plan's forces [N]."""
+    """Return the forces of the cables on the platform, (n, m, 3), the tensions, (n, m), and the plan's forces [N].
+
+    Of what is missing in the balance of the plan, the share `kept`, (n,), is missing in these forces too.
+    """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
     A = dynamics.wrench_matrix(planned[0], carriers[0])
@@ -263,7 +268,7 @@ def _forces(
     along = A[:, rows] * scale[:, None]
     tensions = _least(along.swapaxes(1, 2) @ along, along.swapaxes(1, 2) @ (scale * before[:, rows])[..., None])[..., 0]
     missing = before[:, rows] - (A[:, rows] @ tensions[..., None])[..., 0]
-    wanted = scale * ((now - before)[:, rows] + (1.0 - rate[:, None]) * missing)
+    wanted = scale * ((now - before)[:, rows] + (1.0 - kept[:, None]) * missing)
     may_turn = _have_one_each(robot)
     G = scale[:, None] * _wrenches_of_forces(robot, planned[0])[:, rows] if may_turn else along
     turned = G.swapaxes(1, 2)
