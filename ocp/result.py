@@ -202,7 +202,7 @@ class PlanData(Displayed):
         inside += between_points(seen, scenario.limits.all, limited)
         others = (*outside_frame(seen), *short_cables(seen), *into_each_other(seen))
         if scenario.task.base.kind == "free":
-            others = (*others, *weak_formation(seen))
+            others = (*others, *weak_formation(seen, scenario.task.objective.formation))
         units = slipped_units(scenario.robot, scenario.task)
         path = scenario.task.path
         return (*units, *long_turns(path), *leaves_its_points(path), *inside, *others)

@@ -222,6 +222,7 @@ def test_three_cables_nearly_in_one_plane_are_warned_of(out):
     share = np.sqrt(np.linalg.eigvalsh(pulls.T @ pulls)[0].clip(0)) / (np.sin(lean) * np.sqrt(1.5))
     assert (share > 0.05) == (found == []) == (out == 0.2)
     if found:
+        assert "such as 0.85 m, keeps" in found[0]  # 0.3 times the length of the cables, sqrt(8) m
         said = re.search(
             r"at t = 1\.250 s, the cables pull along force \((.+), (.+), (.+)\) with (less than )?([\d.]+) %", found[0]
         )

@@ -7,14 +7,16 @@ from ...solvers.certificate import direction_text
 from .instants import Instants
 
 WEAK = 0.05  # of the smallest singular value at home
-LEAST = 1e-4  # a smaller share is not told
+LEAST = 1e-4  # smaller shares are reported as less than this
+SMALLER = 0.3  # of the formation, as advice
 NONE = 1e-3  # of the largest one at home; a smaller one does not count
 
 
-def weak_formation(seen: Instants) -> list[str]:
+def weak_formation(seen: Instants, formation: float | None = None) -> list[str]:
     """Return a sentence if the wrench matrix comes close to losing rank, in comparison with home.
 
-    Moments are divided by the robot's length. Only those singular values count that the robot has at home.
+    Moments are divided by the robot's length, and singular values that are near zero at home do not count. `formation`
+    is that of the objective [m]; default: the mean length of the cables.
     """
     robot = seen.robot
     rows = np.flatnonzero(robot.dof_mask)
@@ -27,10 +29,11 @@ def weak_formation(seen: Instants) -> list[str]:
     if share > WEAK:
         return []
     of_home = quantity(100 * share, "%", 2) if share >= LEAST else f"less than {100 * LEAST:g} %"
+    smaller = quantity(SMALLER * (formation or float(seen.dynamics.cable_lengths(robot.home).mean())), "m", 2)
     direction = np.zeros(6)
     direction[rows] = U[k, :, rank - 1]
     return [
         f"from where the carriers are at t = {seen.times[k]:.3f} s, the cables pull along {direction_text(direction)} "
         f"with {of_home} of their effect at home; a smaller objective.formation, such as "
-        "0.3 m, keeps carriers closer to their formation at home"
+        f"{smaller}, keeps carriers closer to their formation at home"
     ]
