@@ -64,18 +64,16 @@ class Predictive(ComputedTorque):
     as with cables that begin below their CoM.
 
     Args:
-        robot: A `Robot`, the name of one in the library, or the path of a robot file. A carrier may have at most three
-            cables of fixed length.
+        robot: A `Robot`, the name of one in the library, or the path of a robot file.
         bandwidth: Closed-loop bandwidth [rad/s] away from limits, a number or one for each coordinate of the pose.
             Default: 40, but less if carriers correct errors, as they do with cables of fixed length or with fewer
             cables than degrees of freedom: 8 for teams with cables of fixed length, 6 for towing robots with winches.
             At most 1.2 / `stage` has an effect, 0.45 / `stage` if carriers correct errors.
         stages, stage: Number of stages, and duration of each [s]. Default: 20 of 0.015 s; of 0.03 s if carriers may
-            leave their reference, because they are slower; of 0.025 s if carriers correct errors. In slow
-            loops, stages become as long as the steps, at most 0.21 s. A loop is slow if the references of `follow` are
-            farther apart than twice the default (with carriers that fly: than the default), and so are the first two
-            steps or three in a row. A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth`
-            apart.
+            leave their reference, because they are slower; of 0.025 s if carriers correct errors. In slow loops, stages
+            become as long as the steps, at most 0.21 s. A loop is slow if the references of `follow` are farther apart
+            than twice the default (with carriers that fly: than the default), and so are the first two steps or three
+            in a row. A given duration is kept, with a warning if steps are more than 1.2 / `bandwidth` apart.
         reach: Intended maximum deviation of carriers from their reference: position [m] and attitude [rad]. A soft
             scale, not a limit: at this deviation a carrier costs as much as a tension error of 5 % of the robot's
             weight. With cables of fixed length it is at least 2 % of their length. Default: 0, but 6 % of the cables'
@@ -87,8 +85,7 @@ class Predictive(ComputedTorque):
         tube: Largest distance of the platform from its reference [m] (default: no limit).
         keep_out: Bodies in {G} that the platform's frame and attachments should avoid, as in a task's `keep_out`. Exact
             penalties enforce tube and bodies wherever the tensions allow. The reference may pass through a body.
-        observer: Bandwidth of the estimates of disturbances [rad/s], 0: none. Default: 60, but 20 if carriers correct
-            errors.
+        observer: Bandwidth of the disturbance estimates [rad/s], 0: none. Default: 60; 20 if carriers correct errors.
         rate, place, attitude, patience, tension_loop, tension_lag, rotor_lag, sensors: See `ComputedTorque`. The
             sensors never make a bandwidth larger than its default.
 

@@ -259,7 +259,7 @@ def _forces(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the forces of the cables on the platform, (n, m, 3), the tensions, (n, m), and the plan's forces [N].
 
-    Of what is missing in the balance of the plan, the share `kept`, (n,), is missing in these forces too.
+    The imbalance of the plan is kept by the share `kept`, (n,), from 0 to 1.
     """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]

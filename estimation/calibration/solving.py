@@ -161,7 +161,7 @@ def _without_slip(model: Model, result: Fit, index: int, length: float) -> tuple
 def _again(model: Model, result: Fit, length: float, outliers: bool) -> tuple[Fit, Model]:
     """Return the better of a fit and one from the beginning with the same slips and weights, and its model.
 
-    What was wrong with the readings may have left unknown poses in wrong local minima.
+    Wrong readings may have left unknown poses in wrong local minima.
     """
     begin, slips = model.begin(), slice(model.parameters.clock + OF_ROBOT, None)
     begin.x[slips] = result.state.x[slips]

@@ -45,7 +45,7 @@ SHRINK = 5e-3  # of the limits, for what happens between the nodes
 # Of all programs of relaxations, as iterations times free coordinates at their nodes: as much as the plan took, within
 # these bounds, of a few seconds.
 LEAST_EFFORT, MOST_EFFORT = 8e4, 1.2e5
-PART = 0.6  # of what is left of it, for one program
+PART = 0.6  # of the remaining effort, for one program
 LEAST_ITERATIONS = 15  # fewer find nothing
 LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 
