@@ -7,11 +7,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from towline import Task, plan, sweep
+from towline import Task, load, plan, sweep
 from towline.base.errors import InputError
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp.audits.violation import cost
 from towline.ocp.costs import Cost, RateCost
+from towline.ocp.tasks.scenario import cost_list
 
 PAGE = (Path(__file__).parent.parent / "docs" / "adding-a-cost.md").read_text()
 (CODE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
@@ -66,6 +67,18 @@ class Away(Cost):
         return ca.vertcat(*(carrier.pose for carrier in state.offsets[1:]))
 
 
+class Near(Cost):
+    """The places of `multi-quadrotor-3` at home, on a circle of 1 m radius, 1.5 m above the load, turned by its yaw."""
+
+    name, unit = "near", "m"
+
+    def values(self, state):
+        x, y, z, _, _, yaw = ca.vertsplit(state.platform.pose)
+        angles = [yaw + 2 * np.pi * k / 3 for k in range(3)]
+        places = [ca.vertcat(x + ca.cos(angle), y + ca.sin(angle), z + 1.5) for angle in angles]
+        return ca.vertcat(*(body.pose[:3] - place for body, place in zip(state.carriers, places, strict=True)))
+
+
 class Hurry(Cost):
     name, unit, squared = "hurry", "s", False
 
@@ -82,6 +95,7 @@ TEAM = {
     "base": {"kind": "free"},
     "tube": {"position": 0.1},
 }
+TURNING = TEAM | {"path": {"kind": "line", "start": [0, 0, 0, 0, 0, 0], "end": [1, 0, 0.5, 0, 0, 0.6]}}
 
 
 @pytest.mark.parametrize(
@@ -91,6 +105,7 @@ TEAM = {
         ("ipanema-1", GROUND, {"tension": 100.0}, Pull(100.0), {"tension": 100 / np.sqrt(2)}),
         ("ipanema-1", GROUND, {"tension_rate": 50.0}, PullRate(50.0), {"tension_rate": 50 / np.sqrt(2)}),
         ("multi-quadrotor-3", TEAM, {"carrier_offset": 0.2}, Away(0.2), {"carrier_offset": 0.2 / np.sqrt(2)}),
+        ("multi-quadrotor-3", TURNING, {"formation": 0.5}, Near(0.5), {"formation": 0.5 / np.sqrt(2)}),
         ("ipanema-1", GROUND | {"duration": {"min": 1, "max": 4}}, {"time": 0.5}, Hurry(0.5), {"time": 0.25}),
     ],
 )
@@ -101,6 +116,21 @@ def test_a_cost_of_ones_own_is_worth_what_the_same_term_of_the_objective_is(robo
     assert mine.objective == pytest.approx(other.objective, rel=1e-6)
     tensions = other.audit.tensions[: len(mine.audit.tensions)]
     np.testing.assert_allclose(mine.audit.tensions, tensions, rtol=1e-3, atol=1e-9)  # what is slack has rounding
+
+
+@pytest.mark.parametrize(
+    ("robot", "base", "amount"),
+    [
+        ("multi-quadrotor-3", {"kind": "free"}, np.hypot(0.7, 1.45)),  # the length of its cables [m]
+        ("multi-quadrotor-3", {"kind": "free", "around": {"quad1": {"kind": "rest", "pose": [1, 0, 1.5]}}}, None),
+        ("multi-quadrotor-3", {"kind": "hold"}, None),
+        ("wang-flying", {"kind": "free"}, None),  # one carrier
+    ],
+)
+def test_several_free_carriers_without_a_reference_have_a_formation(robot, base, amount):
+    task = Task.model_validate(REST | {"base": base})
+    amounts = [each.amount for each in cost_list(load(robot), task).all if each.name == "formation"]
+    assert amounts == ([] if amount is None else [pytest.approx(amount, rel=1e-9)])
 
 
 def test_a_time_law_is_chosen_by_costs_of_ones_own_too():
