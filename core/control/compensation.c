@@ -12,9 +12,8 @@
  *
  * With as many cables as degrees of freedom or more, dw = -d, the disturbance: the carriers take over what is steady,
  * and the tensions correct errors. With fewer the carriers have to correct them too: dw = w - A t_ref where they are now,
- * and dp adds to the offset that they have. Of that offset only the part of least norm
- * with the same change of the wrench is kept, because an offset along a single cable of constant length would leave the
- * platform too high.
+ * and dp adds to the offset that they have. Of that offset only the part of least norm with the same change of the wrench
+ * is kept, because an offset along a single cable of constant length would leave the platform too high.
  */
 #include "control/equations.h"
 #include "control/internal.h"
