@@ -7,8 +7,8 @@ the cables on it change with the wrench by the least amount,
 
 so each carrier is where its cable has the direction of its force. If carriers hold several cables, and the cables give
 every wrench, tensions change instead, by A^+ (w - w_plan), and the carriers stay on their paths. Their acceleration,
-tilt and efforts follow. They, and the tensions, bound how soon the platform can rest; the duration is found by
-bisection.
+tilt and efforts follow. They, and the tensions, bound how soon the platform can rest: of some durations, the shortest
+that keeps all limits is taken.
 """
 
 from collections.abc import Sequence
@@ -26,11 +26,13 @@ from ..models.part import inertia_matrix
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
 
-SHORTEST, LONGEST, ATTEMPTS = 0.1, 30.0, 10  # [s] of a stop, and how many durations are tried at once
-COARSE, APART = 24, 0.01  # instants of an attempt; [s] between those of the result
+SHORTEST, LONGEST = 0.1, 30.0  # [s], of a stop
+ATTEMPTS, FIRST, USUAL = 10, 5, 2.5  # durations, how many are tried first, and the least of these, of sqrt(length / g)
+LEAST = 1.7  # times that carriers need at their largest acceleration: the rate falls up to 2.2 times its mean
+COARSE, FINE, APART = 24, 150, 0.01  # instants of an attempt, and at most of the result; [s] between those, at least
 SMOOTHED = 0.03  # [s], over which tilt is smoothed: a plan's jerk jumps between its nodes
 ACCEPTED = 2e-3  # of a limit's range, up to which differences are inexact
-LONGER, AGAIN = 1.1, 4  # what broke a limit in between takes longer
+LONGER, AGAIN = 1.03, 3  # at least, and how often: what broke a limit in between takes longer
 TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
@@ -75,20 +77,41 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
     last = [motion[1] for motion in trajectory.at(np.array([end]))]
     rests = max(np.abs(velocity).max() for velocity in last) < RESTS
     left = end - begins if rests else np.inf
-    durations = np.geomspace(SHORTEST, max(min(2 * left, LONGEST), SHORTEST), ATTEMPTS)
-    durations = durations[durations < left]
-    best: TeamStop | None = None
+    soonest = max(SHORTEST, LEAST * _braking_time(robot, trajectory, begins))
+    durations = np.geomspace(soonest, max(min(2 * left, LONGEST), soonest), ATTEMPTS)
+    durations, best = durations[durations < left], None
+    excess = np.full(len(durations), np.inf)
+
+    def attempt(first: int, end: int) -> None:
+        if some := durations[first:end].tolist():
+            tried = _Stops(robot, trajectory, begins, np.array(some), COARSE)
+            excess[first:end] = [each for each, _ in tried.worst]
+
     if len(durations):
-        excess = [each for each, _ in _Stops(robot, trajectory, begins, durations, COARSE).worst]
+        usual = USUAL * np.sqrt(robot.fixed_lengths.max() / np.linalg.norm(robot.gravity))
+        middle = min(int(np.searchsorted(durations, usual)), max(len(durations) - FIRST, 0))
+        attempt(middle, middle + FIRST)
+        if excess[middle] == 0:
+            attempt(0, middle)
+        elif excess.min() > 0:
+            attempt(middle + FIRST, ATTEMPTS)
         duration = float(durations[np.argmin(excess)])  # the shortest of those that keep the limits
         # With more instants more is exceeded: where no attempt keeps the limits, the result does not either.
-        for _ in range(AGAIN if min(excess) == 0 else not rests):
-            found = _Stops(robot, trajectory, begins, np.array([duration]), max(int(duration / APART), 10)).only()
+        for _ in range(AGAIN if excess.min() == 0 else not rests):
+            count = int(np.clip(duration / APART, 10, FINE))
+            found = _Stops(robot, trajectory, begins, np.array([duration]), count).only()
             best = found if best is None or found.excess < best.excess else best
-            duration *= LONGER
+            duration *= max(np.sqrt(1.0 + found.excess), LONGER)  # accelerations are as its inverse square
             if best.excess == 0 or duration >= left:
                 break
     return _remainder(robot, trajectory, begins) if best is None or (rests and best.excess > 0) else best
+
+
+def _braking_time(robot: Robot, trajectory: Trajectory, begins: float) -> float:
+    """Return the time in which each carrier can rest at its largest acceleration, if that is limited [s]."""
+    speeds = np.linalg.norm(trajectory.at(np.array([begins]))[1][1][0, :, :3], axis=1)
+    limits = [carrier.motion_limits.acceleration or np.inf for carrier in robot.carriers]
+    return float((speeds / np.array(limits)).max())
 
 
 def _have_one_each(robot: Robot) -> bool:
