@@ -20,7 +20,7 @@ SECTIONS = {
     Verdict.REPRODUCED: [],
     Verdict.DIFFERS: ["Printed results that differ, and what is correct"],
     Verdict.IMPOSSIBLE: ["Impossible"],
-    Verdict.NOT_DETERMINED: ["Not printed in the paper"],
+    Verdict.NOT_DETERMINED: ["Not determined by what the paper prints"],
     Verdict.REPAIRED: ["What is possible instead"],
 }
 

@@ -25,7 +25,7 @@ def errata(account: Account) -> str:
     titles = {
         Verdict.DIFFERS: "Printed results that differ, and what is correct",
         Verdict.IMPOSSIBLE: "Impossible",
-        Verdict.NOT_DETERMINED: "Not printed in the paper",
+        Verdict.NOT_DETERMINED: "Not determined by what the paper prints",
         Verdict.REPAIRED: "What is possible instead",
     }
     for verdict, title in titles.items():
