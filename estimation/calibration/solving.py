@@ -265,7 +265,7 @@ def check_enough(robot: Robot, measurements: Measurements, groups: tuple[str, ..
     model = Model(parameters, measurements, prior, np.ones((robot.m, len(measurements)), dtype=bool))
     model = replace(model, interpolates="clock" in groups)
     if not set(IN_BALANCE).isdisjoint(groups) and (robot.weight == 0.0 or model.balanced is None):
-        needed = "gravity" if robot.weight == 0.0 else "fewer cables than coordinates, or tensions"
+        needed = "gravity" if robot.weight == 0.0 else "tensions, unless the robot has fewer cables than coordinates"
         raise InputError(f"free must not have {', '.join(of_forces)} without {needed}, got robot {robot.name}")
     unknown = np.isinf(model.pose_sigmas)
     spare = robot.m + (model.balanced.equations if model.balanced else 0) + sighted(measurements) - unknown.sum(axis=1)
