@@ -187,6 +187,78 @@ def test_a_slicers_file_is_planned_as_it_comes(tmp_path):
     assert np.linalg.norm(motion.velocity, axis=1).max() <= 0.03 * (1 + 1e-6)
 
 
+MILLED = """%
+O1001 (Klötze)
+N10 G90 G94 G17 G91.1
+N15 G21
+N20 G53 G0 Z0.
+N25 T1 M6
+N35 G54
+N45 G0 X0. Y0. S5000 M3
+N50 G43 Z600. H1
+G64 P0.01
+N55 G1 X100. F600. M8
+G4 P2
+N60 G18
+N65 G3 X110. Z590. K-10.
+N70 G19 G2 Y10. Z600. R10.
+N75 G53 G0 Z0.
+M30
+%
+"""
+PRINTED = """M104 S200
+G91
+G1 Z5 F600 ; before homing
+G90
+G28
+N1 G4 P500*71
+START_PRINT BED=60
+EXCLUDE_OBJECT NAME=a
+M0 Click to continue
+G1 X0 Y0 Z600 F1200
+G4 P500
+G0 X100
+M204 P800
+G1 X100 Y100 E5 F600
+G4
+G4 S1
+G1 X0
+"""
+
+
+def path_of_file(name, folder):
+    (folder / "task.yaml").write_text(f"path: {{kind: feed, points: {name}, acceleration: 1}}\n")
+    return read_task(folder / "task.yaml").path
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_a_mills_file_has_lines_with_moves_and_switches_and_arcs_in_all_planes(encoding, tmp_path):
+    (tmp_path / "part.ngc").write_text(MILLED, encoding=encoding)
+    path = path_of_file("part.ngc", tmp_path)
+    points = np.array(path.points)[:, :3] * 1000
+    np.testing.assert_allclose(points[:2], [[0, 0, 600], [100, 0, 600]], atol=1e-9)
+    np.testing.assert_allclose(points[-1], [110, 10, 600], atol=1e-9)
+    corner = int(np.argmin(np.linalg.norm(points - [110, 0, 590], axis=1)))
+    about_y, about_x = points[1 : corner + 1] - [100, 0, 590], points[corner:] - [110, 10, 590]
+    np.testing.assert_allclose(np.linalg.norm(about_y, axis=1), 10, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(about_x, axis=1), 10, atol=1e-9)
+    assert (np.cross(about_y[:-1], about_y[1:])[:, 1] > 0).all(), "G3 turns about +y"
+    assert (np.cross(about_x[:-1], about_x[1:])[:, 0] < 0).all(), "G2 turns about -x"
+    assert path.dwell[:3] == (0, 2, 0)
+    assert set(path.ignored) == {"G17", "G43", "G53", "G54", "G64", "G91.1", "G94", "H", "M3", "M6", "M8", "S", "T"}
+
+
+def test_a_printers_file_has_the_units_of_its_firmware(tmp_path):
+    (tmp_path / "part.gcode").write_text(PRINTED)
+    path = path_of_file("part.gcode", tmp_path)
+    np.testing.assert_allclose(
+        np.array(path.points)[:, :3] * 1000, [[0, 0, 600], [100, 0, 600], [100, 100, 600], [0, 100, 600]]
+    )
+    np.testing.assert_allclose(path.feeds, [0.02, 0.01, 0.01])
+    assert path.dwell == (0.5, 0, 1, 0)
+    assert set(path.ignored) == {"E", "EXCLUDE_OBJECT", "G28", "M0", "M104", "M204", "START_PRINT"}
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -194,7 +266,12 @@ def test_a_slicers_file_is_planned_as_it_comes(tmp_path):
         ("G21\nG1 X0 Y0 Z0 F60\nG2 X10 Y0 R1", "line 3: R must be a radius that reaches"),
         ("G21\nG1 X0 Y0 Z0 F60\nG1 X10 I3", "line 3: the words I, J and R must follow G2 or G3"),
         ("G21\nG1 X0 Y0 Z0 F60\nG28\nG1 X10", "line 4: no move must follow G28"),
-        ("G21\nG18\n", "line 2: must be G0 to G4"),
+        ("G21\nG81\n", "line 2: must be G0 to G4"),
+        ("G21 G18\nG1 X0 Y0 Z0 F60\nG2 X10 I5 J0", "line 3: an arc must have I and J, or R"),
+        ("G21\nG1 X0 Y0 Z0 F60\nG55\nG1 X10", "line 3: G55 must not change the coordinates within a path"),
+        ("G21\nG10 L2 P1 X5\nG1 X0 Y0 Z0 F60", "line 2: G10 must be without L"),
+        ("G21\nG1 X0 Y0 Z0 F60\nM98 P1000\nG1 X10", "line 3: M98 must be left out: programs that are called"),
+        ("G21\nG1 X0 Y0 Z0 F60\nG53 G0 Z0\nG1 X10", "line 4: no move must follow G53"),
         ("G21\nG1 X0 Y0 Z0 F60\nG1 X", "line 3: must be G0 to G4.*got 'X'"),
         ("G21\nG1 X0 Y0 Z0\nG1 X5", "line 3: G1 must have a feed F"),
         ("G21\nM104 S200\n", "two points or more, got 0"),

@@ -29,14 +29,13 @@ def read_points(name: str, folder: Path) -> dict[str, Any]:
     if ending != ".csv" and ending not in GCODE:
         endings = ", ".join((".csv", *GCODE))
         raise InputError(f"points must be a list, or a file whose name ends in one of {endings}, got {shown(name)}")
+    content = read_bytes(path, "a list of points")
+    if ending in GCODE:
+        return read_gcode(content.decode("utf-8-sig", "replace"), where)  # comments are in any encoding
     try:
-        text = read_bytes(path, "a list of points").decode("utf-8-sig")
+        return read_csv(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"{where} must be text in UTF-8, got another one (byte {error.start})") from None
-    if ending in GCODE:
-        return read_gcode(text, where)
-    try:
-        return read_csv(text)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
