@@ -11,7 +11,7 @@ UNITS = {20: 0.0254, 21: 0.001}  # [m]: inches, millimetres
 MOVES = {0, 1, 2, 3}
 ARCS = {2: -1.0, 3: 1.0}  # their sense of rotation about the normal of the plane
 PLANES = {17: "XYZ", 18: "ZXY", 19: "YZX"}  # the axes of the plane of arcs, and its normal
-CENTRE = dict(zip("XYZ", "IJK", strict=True))  # the words of an arc's centre
+CENTRE = {"X": "I", "Y": "J", "Z": "K"}  # the words of an arc's centre
 ELSEWHERE = {28, 29, 30, 32, 34, 53}  # homing, levelling, and machine coordinates: the position is unknown afterwards
 OFFSETS = {54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3}  # of the program's coordinates
 # Retraction, a tool's length, and the usual state of a machine: they change no path.
