@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...models.robot import Robot
+from ..logs.alignment import coarse_offset
 from ..logs.measurements import Measurements, measured_poses, tracked
 from ..logs.pose_track import PoseTrack
 from .fit import held
@@ -15,7 +16,6 @@ CLOCK_RANGE = 1.0  # [s] to each side
 SHARE = 0.25  # of the record, to which the range is limited
 MOST_SAMPLES = 400
 TRIED = 81
-MOST_CORRELATED = 20_000  # samples
 FEWEST = 0.4  # of the samples that must have a pose
 SMOOTH = 0.1  # error of a pose between others, as a share of how far poses are apart
 
@@ -70,29 +70,13 @@ def _by_cable_speeds(model: Model) -> float:
     given, track = model.measurements, model.track
     assert given.times is not None
     assert track is not None
-    grid = np.linspace(given.times[0], given.times[-1], min(len(given), MOST_CORRELATED))
-    begin = model.begin()
+    begin, known = model.begin(), track.inside(0.0)
+    if known.sum() < 4:
+        return 0.0
     # The residuals at the clock offset 0 are lengths less readings, up to their scales and offsets.
     readings = model.lengths(begin)
     lengths = readings + (model.residuals(begin).readings * given.sigma.lengths).T
-    known, times = track.inside(0.0), given.times
-    if known.sum() < 4:
-        return 0.0
-
-    def speeds(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        on_grid = [np.interp(grid, times[rows], column) for column in values[rows].T]
-        rates = np.diff(on_grid, axis=1)
-        rates -= rates.mean(axis=1, keepdims=True)
-        return rates / np.maximum(np.sqrt((rates**2).mean(axis=1, keepdims=True)), 1e-12)
-
-    of_poses, of_readings = speeds(lengths, known), speeds(readings, np.ones_like(known))
-    count = of_poses.shape[1]
-    spectra = np.fft.rfft(of_poses, 2 * count) * np.conj(np.fft.rfft(of_readings, 2 * count))
-    together = np.fft.irfft(spectra.sum(axis=0), 2 * count)
-    lags = np.arange(-(count // 2), count // 2 + 1)
-    # Fewer samples are together at a larger lag.
-    best = lags[int(np.argmax(together[lags] / (count - np.abs(lags)) * (1 - np.abs(lags) / (2 * count))))]
-    return float(best * (grid[1] - grid[0]))
+    return coarse_offset(given.times, readings, given.times[known], lengths[known])
 
 
 def _cost_at(model: Model, clock: float, length: float) -> float:

@@ -68,6 +68,11 @@ def align(
     return clock._replace(likeness=likeness)
 
 
+def coarse_offset(times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray) -> float:
+    """Return the offset of the clock of poses [s] with the best correlation of cable speeds; arguments as of `align`."""
+    return _coarse(times, readings, pose_times, lengths, _speeds)[0]
+
+
 def _coarse(
     times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray, signals: Signals
 ) -> tuple[float, np.ndarray, float]:
