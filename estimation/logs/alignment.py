@@ -69,7 +69,7 @@ def align(
 
 
 def coarse_offset(times: np.ndarray, readings: np.ndarray, pose_times: np.ndarray, lengths: np.ndarray) -> float:
-    """Return the offset of the clock of poses [s] with the best correlation of cable speeds; arguments as of `align`."""
+    """Return the offset of the clock of poses [s] with the best correlation of cable speeds, as `align` begins with."""
     return _coarse(times, readings, pose_times, lengths, _speeds)[0]
 
 
