@@ -132,7 +132,7 @@ class ComputedTorque(Controller):
         gains = loops.bandwidth, damping, integral, loops.observer
         of_carriers = carrier_bandwidth, carrier_acceleration, held
         self._settings = settings_of(self.robot, self._limits, *gains, *of_carriers, patience)
-        far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
+        self._reach = far = reach_of(self.robot, (0.5 if few else 0.0, 0.0) if reach is None else reach)
         set_reach(self._settings, far)
         self._settings["attitude"] = self._attitude = loops.attitude
         self._flies = bool(self._settings["by_wrench"].any())
@@ -172,7 +172,7 @@ class ComputedTorque(Controller):
     @property
     def uncontrolled(self) -> np.ndarray:
         """Return wrench directions that the controller cannot change at home, (k, 6), moments over the length [N]."""
-        return uncontrolled(self.robot, self._settings["reach"][: len(self.robot.carriers)])
+        return uncontrolled(self.robot, self._reach)
 
     @property
     def cut(self) -> np.ndarray:

@@ -52,7 +52,9 @@ def _simulated(controller: Controller, robot: Robot, tensions: np.ndarray, bandw
     still = np.zeros_like(robot.carrier_home)
     reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)
     scale = np.repeat([1.0, robot.length], 3) * robot.dof_mask
-    push = PUSH * robot.force_scale * scale * np.random.default_rng(0).normal(size=6)
+    push = np.random.default_rng(0).normal(size=6)
+    push -= push @ controller.uncontrolled.T @ controller.uncontrolled  # a load that spins below a cable is let alone
+    push *= PUSH * robot.force_scale * scale
     state = plant.start(tensions=tensions)
     steps = int(np.clip(SLOW / max(bandwidth, SLOWEST) / PERIOD, LEAST, MOST))
     sizes, pulls = np.zeros(steps), tensions
