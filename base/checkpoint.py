@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from .errors import InputError
-from .inputs import file_path, flag, shown
 from .writing import check_writable
 
 ACCEPTED = "a checkpoint of this run"
@@ -67,16 +66,6 @@ class Checkpoint:
         except sqlite3.Error as error:
             where = f"{self._path} cannot be written after {self._kind.unit} {self.stored}"
             raise InputError(f"checkpoint {where} ({error}); it can be resumed") from None
-
-
-def checkpoint_path(checkpoint: object, resume: object, progress: object) -> Path | None:
-    """Return the path of a checkpoint or None; raise InputError if one of these arguments of a long run is wrong."""
-    path = None if checkpoint is None else file_path("checkpoint", checkpoint, "a path or None")
-    if flag("resume", resume) and path is None:
-        raise InputError("checkpoint must be a path if resume is True, got None")
-    if progress is not None and not callable(progress):
-        raise InputError(f"progress must be a function or None, got {shown(progress)}")
-    return path
 
 
 @contextmanager

@@ -9,13 +9,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, TypedDict, TypeVar
 
-from .checkpoint import checkpoint_path
+from .checkpoint import Checkpoint, Kind, open_checkpoint
 from .errors import InputError, SolverError
-from .inputs import shown, whole_number
+from .inputs import file_path, flag, shown, whole_number
 from .processes import processes
 from .quiet import quiet
 
@@ -64,8 +65,16 @@ class Execution:
 
     def __post_init__(self) -> None:
         """Check all fields, and make a path of the checkpoint."""
-        check_workers(self.workers, self.scheduler)
-        object.__setattr__(self, "checkpoint", checkpoint_path(self.checkpoint, self.resume, self.progress))
+        whole_number("workers", self.workers, 1, MOST_WORKERS)
+        if self.scheduler is not None and not (isinstance(self.scheduler, str) and self.scheduler):
+            accepted = "the address of a Dask scheduler or None"
+            raise InputError(f"scheduler must be {accepted}, got {shown(self.scheduler)}")
+        path = None if self.checkpoint is None else file_path("checkpoint", self.checkpoint, "a path or None")
+        if flag("resume", self.resume) and path is None:
+            raise InputError("checkpoint must be a path if resume is True, got None")
+        if self.progress is not None and not callable(self.progress):
+            raise InputError(f"progress must be a function or None, got {shown(self.progress)}")
+        object.__setattr__(self, "checkpoint", path)
 
     def check_alone(self) -> None:
         """Check that no field is set that applies only to many runs.
@@ -124,25 +133,25 @@ class Workers:
             yield future.result()
 
 
-def check_workers(workers: object, scheduler: object) -> None:
-    """Check the arguments of `start_workers`, before anything is started.
+@contextmanager
+def started(
+    execution: Execution, kind: Kind, header: Callable[[], dict[str, Any]]
+) -> Iterator[tuple[Workers, Checkpoint | None]]:
+    """Start workers and open the checkpoint, if there is one, until the end of the block.
 
-    Raises `InputError` if `workers` is not a whole number from 1, or `scheduler` neither a text nor None.
+    - `header`: function that returns everything on which the results depend.
+
+    Raises `InputError` if there is no such scheduler, or the checkpoint cannot be used.
     """
-    whole_number("workers", workers, 1, MOST_WORKERS)
-    if scheduler is not None and not (isinstance(scheduler, str) and scheduler):
-        raise InputError(f"scheduler must be the address of a Dask scheduler or None, got {shown(scheduler)}")
+    opened = nullcontext()
+    if execution.checkpoint is not None:
+        opened = open_checkpoint(Path(execution.checkpoint), kind, header(), execution.resume)
+    with _workers(execution.workers, execution.scheduler) as workers, opened as stored:
+        yield workers, stored
 
 
 @contextmanager
-def start_workers(workers: int, scheduler: str | None) -> Iterator[Workers]:
-    """Start workers, which end with the block.
-
-    - `workers`: processes of this machine; 1: this process.
-    - `scheduler`: address of a Dask scheduler, which has workers of its own; default: this machine.
-
-    Raises `InputError` if there is no such scheduler.
-    """
+def _workers(workers: int, scheduler: str | None) -> Iterator[Workers]:
     if scheduler is not None:
         with _cluster(scheduler) as started:
             yield started

@@ -5,8 +5,7 @@ import inspect
 import io
 import pickle
 from collections.abc import Callable, Iterator
-from contextlib import nullcontext, suppress
-from pathlib import Path
+from contextlib import suppress
 from time import perf_counter
 from typing import Any
 
@@ -14,9 +13,9 @@ import numpy as np
 from pydantic import BaseModel
 from typing_extensions import override
 
-from ..base.checkpoint import Kind, open_checkpoint
+from ..base.checkpoint import Kind
 from ..base.errors import InputError
-from ..base.execution import Execution, start_workers
+from ..base.execution import Execution, started
 from ..base.version import __version__
 from ..control import Controller
 from ..plant import Plant
@@ -48,21 +47,18 @@ def fly_many(
     everything = plant, controller, conditions
     figures, done = np.zeros(len(seeds), dtype=FIGURES), np.zeros(len(seeds), dtype=bool)
     workers, scheduler, progress = execution.workers, execution.scheduler, execution.progress
-    opened = nullcontext()
-    if execution.checkpoint is not None:
-        opened = open_checkpoint(Path(execution.checkpoint), KIND, _header(*everything, seeds), execution.resume)
     packed = None if workers == 1 and scheduler is None else _packed(everything, scheduler)
-    with start_workers(workers, scheduler) as started, opened as stored:
+    with started(execution, KIND, lambda: _header(*everything, seeds)) as (working, stored):
         for first, content in () if stored is None else stored.items():
             block = np.frombuffer(content, dtype=FIGURES)
             figures[first : first + len(block)] = block
             done[first : first + len(block)] = True
-        shares = None if packed is None else started.limit if scheduler is not None else lambda: workers
+        shares = None if packed is None else working.limit if scheduler is not None else lambda: workers
         sizes = _Sizes(_estimated(everything, seeds), shares, stored is not None or progress is not None)
         fly = (lambda *job: fly_part(everything, *job)) if packed is None else fly_packed
         jobs = ((some.start, seeds[some.start : some.stop]) for some in _blocks(done, sizes))
         jobs = jobs if packed is None else ((packed, *job) for job in jobs)
-        for first, result, seconds in started.map(fly, jobs, in_order=False):
+        for first, result, seconds in working.map(fly, jobs, in_order=False):
             sizes.learn(len(result), seconds)
             if stored is not None:
                 stored.put(first, result.tobytes())

@@ -6,16 +6,15 @@ import hashlib
 import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
-from pathlib import Path
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from typing_extensions import Unpack
 
-from ..base.checkpoint import Checkpoint, Kind, open_checkpoint
+from ..base.checkpoint import Checkpoint, Kind
 from ..base.errors import InputError
-from ..base.execution import Execution, ExecutionOptions, Progress, Workers, start_workers
+from ..base.execution import Execution, ExecutionOptions, Progress, Workers, started
 from ..base.inputs import one_of, required, shown, whole_number, with_fields
 from ..base.version import __version__
 from ..models import Robot
@@ -134,12 +133,9 @@ def sample(
     total = int(samples) if sampler is None else sampler.samples
     counter = Counter(condition, domain, sampler, keep, total, metrics)
     counts = Counts(domain, points_max if keep != "none" else 0)
-    opened = nullcontext()
-    if where.checkpoint is not None:
-        header = _header(robot, {**requested, "samples": total, "size": size})
-        opened = open_checkpoint(Path(where.checkpoint), KIND, header, where.resume)
-    with start_workers(where.workers, where.scheduler) as started, opened as stored:
-        _Run(counter, counts, started, stored, where.progress).count(refinement)
+    depends_on = {**requested, "samples": total, "size": size}
+    with started(where, KIND, lambda: _header(robot, depends_on)) as (workers, stored):
+        _Run(counter, counts, workers, stored, where.progress).count(refinement)
     result = dataset(counts, domain, keep, method, refinement, metrics)
     seconds = time.perf_counter() - start
     result.attrs = {

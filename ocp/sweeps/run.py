@@ -4,14 +4,13 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from ...base.checkpoint import Kind, checkpoint_path, open_checkpoint
+from ...base.checkpoint import Kind
 from ...base.errors import InputError
 from ...base.inputs import file_path
 from ...base.version import __version__
@@ -76,10 +75,9 @@ def sweep(
             checkpoint or a plan of `keep` can no longer be written; the checkpoint can be resumed.
         SolverError: If workers end before their work is done, or the extra `cluster` is not installed.
     """
-    from ...base.execution import check_workers, start_workers  # imports as long as a short plan takes
+    from ...base.execution import Execution, started  # imports as long as a short plan takes
 
-    check_workers(workers, scheduler)
-    file = checkpoint_path(checkpoint, resume, progress)
+    where = Execution(workers, scheduler, checkpoint, resume, progress)
     folder = None if keep is None else file_path("keep", keep, "a path or None").resolve()
     cases = Cases(as_robot(robot), read_task(task), read_axes(vary))
     cases.check()
@@ -88,14 +86,13 @@ def sweep(
             check_writable(plan_file(folder, cases, 0))
         except InputError as error:
             raise InputError(f"keep: {error}") from None
-    opened = nullcontext() if file is None else open_checkpoint(file, KIND, _header(cases, folder), resume)
     rows: dict[int, Row] = {}
-    with start_workers(workers, scheduler) as started, opened as stored:
+    with started(where, KIND, lambda: _header(cases, folder)) as (working, stored):
         if stored is not None:
             rows.update((number, Row(*json.loads(content))) for number, content in stored.items())
         feasible = sum(row.status == MotionStatus.FEASIBLE for row in rows.values())
         _report(progress, rows, cases, feasible)
-        for number, row in started.map(plan_case, _jobs(cases, set(rows), folder), in_order=False):
+        for number, row in working.map(plan_case, _jobs(cases, set(rows), folder), in_order=False):
             if stored is not None:
                 stored.put(number, json.dumps(row).encode())
             rows[number] = row
