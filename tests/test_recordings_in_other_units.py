@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 from towline import Dynamics, load, read_measurements
 from towline.estimation.calibration import Measurements, calibrate
 from towline.estimation.calibration.correction import correction_of
+from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.logs import read_log
+from towline.estimation.logs.measurements import measured_poses
 from towline.estimation.logs.names import role, time_unit
 
 from . import user_recordings as user
@@ -216,12 +218,84 @@ def test_an_ahrs_in_north_east_down(tmp_path):
         assert abs(one["value"] - offset) < 4 * one["sigma"] + 5e-3
 
 
+def test_an_ahrs_in_north_east_down_with_another_heading(tmp_path):
+    """Quaternions w first as q0 to q3, load cells in grams, magnetic north 37 deg off, and an unknown CoM."""
+    robot, offsets = user.hanging_robot(tmp_path), np.array([0.03, -0.02, 0.01, -0.03])
+    user.statics(tmp_path, offsets)
+    _, *lines = (tmp_path / "statics.csv").read_text().splitlines()
+    rows = np.array([line.split(",") for line in lines], dtype=float)
+    turn = Rotation.from_euler("z", 37, degrees=True) * Rotation.from_euler("xyz", rows[:, 4:7], degrees=True)
+    q = Rotation.from_matrix(TO_NED @ turn.as_matrix() @ np.diag([1.0, -1, -1])).as_quat()[:, [3, 0, 1, 2]]
+    names = [*(f"L{i} [cm]" for i in (1, 2, 3, 4)), *(f"q{i}" for i in range(4)), *(f"F{i} [g]" for i in (1, 2, 3, 4))]
+    path = user.write(tmp_path / "ned.csv", names, np.hstack([100 * rows[:, :4], q, 1e3 * rows[:, 7:]]))
+    robot.write_text(robot.read_text().replace("com: [0.01,", "com: [-0.02,"))
+    built = load(robot)
+    read = read_measurements(path, robot=built)
+    np.testing.assert_allclose(read.tensions, user.KGF * rows[:, 7:], rtol=1e-8)
+    found = mistake(built, read.only(slice(0, None, 2)))
+    assert "north, east, down" in found.text
+    seen = Rotation.from_matrix(measured_poses(built, found.corrected)[1])
+    apart = seen.inv() * Rotation.from_euler("xyz", rows[::2, 4:7], degrees=True)
+    assert np.degrees(apart.mean().magnitude()) < 2
+
+
+def test_the_take_of_a_motion_capture_in_mm_with_y_up(tmp_path):
+    """Millimetres are stated above all names, and the label of the rows is part of the name of the times."""
+    draw, s = np.random.default_rng(3), np.arange(0, 6, 0.05)
+    places = np.array([0, 0, 1.2]) + np.array([0.8, 0.6, 0.3]) * np.sin(np.outer(s, [1.1, 0.8, 0.6]))
+    turns = Rotation.from_rotvec(0.3 * np.sin(np.outer(s, [0.7, 1.2, 0.9])))
+    y = user.lengths_at(user.FRAME, user.PLATFORM, places, turns.as_matrix()) + draw.normal(0, 5e-4, (len(s), 4))
+    user.write(tmp_path / "winches.csv", ["tick_ms", "l1", "l2", "l3", "l4"], np.column_stack([5e4 + 1e3 * s, y]))
+    up = Rotation.from_matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]])  # from z up to y up
+    q = (up * turns * up.inv()).as_quat()
+    rows = np.column_stack([np.arange(len(s)), s, q, 1e3 * up.apply(places)])
+    above = [
+        "Format Version,1.23,Rotation Type,Quaternion,Length Units,Millimeters,Coordinate Space,Global",
+        *(f",{name}" + f",{value}" * 7 for name, value in (("Type", "Rigid Body"), ("Name", "platform"), ("ID", "1"))),
+        ",,Rotation,Rotation,Rotation,Rotation,Position,Position,Position",
+    ]
+    user.write(tmp_path / "take.csv", ["Frame", "Time (Seconds)", *"XYZWXYZ"], rows)
+    (tmp_path / "take.csv").write_text("\n".join(above) + "\n" + (tmp_path / "take.csv").read_text())
+    robot = load(user.hanging_robot(tmp_path))
+    read = read_measurements(tmp_path / "winches.csv", poses=tmp_path / "take.csv", robot=robot)
+    found = mistake(robot, read)
+    assert "measured in axes of which y points up, with their x along x of {G}" in found.text
+    position, rotation, _ = measured_poses(robot, found.corrected)
+    assert len(position) > 100
+    np.testing.assert_allclose(position, places[: len(position)], atol=1e-9)
+    np.testing.assert_allclose(rotation, turns[: len(position)].as_matrix(), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["theta_deg", "heading [deg]"])
+def test_the_angle_of_a_planar_robot_with_z_down(name, tmp_path):
+    """It is the only one, whatever its name; a scale of 2 % hides neither the sign of z nor that of the angle."""
+    robot, _ = user.planar(tmp_path)
+    built, t = load(robot), np.arange(0, 12, 0.05)
+    attachments, turns = np.array(built.attachments) * 3, 0.15 * np.sin(0.9 * t)
+    ends = {f"cables[{i}].attachment.{axis}": attachments[i, k] for i in range(4) for k, axis in ((0, "x"), (2, "z"))}
+    built = built.with_parameters(ends)
+    places = np.column_stack([1.45 + 0.8 * np.sin(1.1 * t), 0 * t, 1.1 + 0.55 * np.sin(1.37 * t + 0.4)])
+    rotation = Rotation.from_rotvec(np.outer(turns, [0, 1, 0])).as_matrix()
+    y = user.lengths_at(built.anchors, attachments, places, rotation) / 1.02
+    rows = np.column_stack([t, y, places[:, 0], -places[:, 2], np.degrees(turns)])
+    path = user.write(tmp_path / "log.csv", ["t", "l1", "l2", "l3", "l4", "x", "z", name], rows)
+    found = mistake(built, read_measurements(path, robot=built))
+    assert found.text.startswith("z of the positions seems to have the wrong sign")
+    np.testing.assert_allclose(
+        found.corrected.poses[:, [0, 2, 4]], np.column_stack([places[:, [0, 2]], turns]), atol=1e-9
+    )
+
+
 def test_names_of_joints_and_of_px4():
     found = role("/joint_states/position[winch_2_joint]")
     assert (found.role, found.which) == ("lengths", "2")
     assert [role(f"vehicle_attitude/q[{i}]").which for i in range(4)] == ["w", "x", "y", "z"]
     assert (role("TimeUS").role, role("TimeUS").unit) == ("time", "us")
     assert role("dir_x").role == "directions"
+    assert [role(f"q{i}").which for i in range(4)] == ["w", "x", "y", "z"]
+    assert {role(name).role for name in ("tick_ms", "clock", "Type/Name/ID/Time (Seconds)")} == {"time"}
+    assert role("theta_deg") == ("angles", "pitch", "#", "deg")
+    assert [role(f"F1_{unit}").unit for unit in ("g", "gf", "kg", "lbf")] == ["g", "gf", "kg", "lbf"]
     assert [role(name).unit for name in ("millis", "micros", "sensor/nanoseconds", "t_ms")] == ["ms", "us", "ns", "ms"]
 
 

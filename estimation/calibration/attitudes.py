@@ -22,11 +22,13 @@ from .interpretations import interpretations
 from .solving import model_of
 from .starts import fit_from
 
-MOST_SAMPLES, MOST_FITTED, FEWEST = 40, 60, 6
+MOST_SAMPLES, MOST_FITTED, MOST_LIKELY, FEWEST = 40, 60, 3, 6
 CLEARLY = 3.0  # times smaller differences
+EXPLAINED = 0.75  # of the turns from a constant orientation, which differences in another convention must be below
 VISIBLE = np.radians(3.0)  # smaller ones are noise, or small offsets of the readings
 TILTED = np.radians(20.0)  # of a world whose vertical is another one
 LIKELIER = 0.95  # of the sum of squares that a fit with the orientations as they are leaves
+SIMPLER = 2.0  # times the least sum of squares, which a simpler error may leave
 ENOUGH = 1e-3  # of the sum of squares, of a step that these fits need not take
 MOST_TURNED, ACCURATE = np.radians(30.0), np.radians(0.1)
 
@@ -56,6 +58,7 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
     rows, expected = rows[good], Rotation.from_matrix(points.rotations(estimate.pose[good, 3:]))
     tried: list[tuple[float, float, str, Rotation, Rotation, int]] = []
     none, up = Rotation.identity(), -np.array(robot.gravity) / max(np.linalg.norm(robot.gravity), 1e-12)
+    spread = float(np.median((expected * expected.mean().inv()).magnitude()))
     ways = [way for way in interpretations(True) if way.turned is not None or not way.text]
     for k, way in enumerate(ways):
         R = rotation[rows] if way.turned is None else way.turned(rotation[rows], given.poses[rows, 3:])
@@ -67,33 +70,39 @@ def misread_attitudes(robot: Robot, given: Measurements) -> Misread | None:
         for left, right, frame in ((none, none, ""), (world, none, "world"), (none, inner, "sensor")):
             size = float(np.median((left * seen * right * expected.inv()).magnitude()))
             corrections = (k > 0) + bool(frame)
+            if (k > 0 or frame == "sensor") and size > EXPLAINED * spread:  # a constant orientation differs as little
+                continue
             tried.append((size * CLEARLY**corrections, size, frame, left, right, k))
-    best, (as_they_are, other_heading) = min(tried, key=lambda one: one[0]), tried[:2]
+    as_they_are, other_heading = tried[:2]
     if as_they_are[1] < VISIBLE:
         return None
-    likely = [best, other_heading] if best is not other_heading else [best]
+    ranked = sorted(tried, key=lambda one: one[0])
+    likely = [one for one in ranked if any(one is other for other in (*ranked[:MOST_LIKELY], other_heading))]
     try:
         as_given = _fitted(robot, given)[0]
     except InputError:  # too few samples for a fit
-        as_given, likely = np.inf, [best]
-    likeliest: Misread | None = None
-    least = LIKELIER * as_given  # offsets and the CoM may explain the differences as well
+        as_given, likely = np.inf, ranked[:1]
+    fitted: list[tuple[float, float, str, Rotation, Rotation, str]] = []
     for _, size, frame, left, right, k in (one for one in likely if one is not as_they_are):
         turn = ways[k].turned
         every = rotation if turn is None else turn(rotation, np.nan_to_num(given.poses[:, 3:]))
         whole = left * Rotation.from_matrix(every) * right
-        if as_given < np.inf:
-            more = _heading(robot, given, whole, up) if frame == "world" else none
-            left, whole = more * left, more * whole
-            cost = _fitted(robot, _turned(given, whole))[0]
-            if cost > least:
-                continue
-            least = cost
-        now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, as_they_are[1]))
-        looks = " and ".join(filter(None, (ways[k].text, _said(frame, left * right))))
-        text = f"{looks}: they then differ from those computed from the lengths by {now} instead of {before}"
-        likeliest = Misread(text, _turned(given, whole))
-    return likeliest
+        cost = _fitted(robot, _turned(given, whole))[0] if as_given < np.inf else size
+        fitted.append((cost, size, frame, left * right, whole, ways[k].text))
+    if not fitted:
+        return None
+    simple = SIMPLER * min(one[0] for one in fitted)
+    cost, size, frame, turned, whole, text = next(one for one in fitted if one[0] <= simple)
+    if as_given < np.inf and frame == "world":
+        more = _heading(robot, given, whole, up)
+        turned, whole = more * turned, more * whole
+        cost = _fitted(robot, _turned(given, whole))[0]
+    if cost > LIKELIER * as_given:  # offsets and the CoM may explain the differences as well
+        return None
+    now, before = (quantity(np.degrees(part), "deg", 2) for part in (size, as_they_are[1]))
+    looks = " and ".join(filter(None, (text, _said(frame, turned))))
+    text = f"{looks}: they then differ from those computed from the lengths by {now} instead of {before}"
+    return Misread(text, _turned(given, whole))
 
 
 def _said(frame: str, turn: Rotation) -> str:

@@ -1,6 +1,6 @@
 """`interpretations`: ways to read a log in which units, signs, axes or conventions of angles are mistaken."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import permutations
 from typing import NamedTuple
 
@@ -69,21 +69,32 @@ def interpretations(turns: bool) -> list[Interpretation]:
                 lambda R, angles, axes=axes, columns=columns: _euler(angles[:, columns], axes)
             )
     result += [Interpretation(text, turned=turned) for text, turned in conventions.items()]
-    for axis, turn in FROM_NED.items():
-        text = f"in axes north, east, down (of the body: forward, right, down), with x of {{G}} to the {axis}"
+    for text, turn, body in _framed():
         result += [
             Interpretation(
                 f"the poses seem to be measured {text}",
                 lambda x, turn=turn: x @ turn.T,
-                lambda R, _, turn=turn: turn @ R @ FROM_FRD,
+                lambda R, _, turn=turn, body=body: turn @ R @ body,
             ),
             Interpretation(
                 f"the angles look like degrees read as radians, {text}",
                 lambda x, turn=turn: x @ turn.T,
-                lambda _, angles, turn=turn: turn @ points.rotations(np.radians(angles)) @ FROM_FRD,
+                lambda _, angles, turn=turn, body=body: turn @ points.rotations(np.radians(angles)) @ body,
             ),
         ]
     return result
+
+
+def _framed() -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """Yield usual frames of world and body by their names, and the rotations from both to those with z up."""
+    for axis, turn in FROM_NED.items():
+        named = f"in axes north, east, down (of the body: forward, right, down), with x of {{G}} to the {axis}"
+        yield named, turn, FROM_FRD
+    up = np.array([[1, 0, 0], [0, 0, -1.0], [0, 1, 0]])  # of many motion capture systems
+    for quarters in range(4):
+        turn = np.rint(Rotation.from_euler("z", 90 * quarters, degrees=True).as_matrix()) @ up
+        along = ("x", "y", "-x", "-y")[quarters]
+        yield f"in axes of which y points up, with their x along {along} of {{G}}", turn, turn.T
 
 
 def _times(factor: float | np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

@@ -192,7 +192,7 @@ def _explanations(log: LogPart, e: np.ndarray, noise: float) -> tuple[list[_Way]
         same, one = np.ones(len(order)), _rms(plain)
         if not way.text:
             as_given = one
-        elif way.turned:
+        elif way.turned and way.placed is tried[0].placed:
             other = (lengths - way.factor * y[order, order])[:, : len(log.y)]
             turns.append((other, _Way(one, one, way.text, way, order, same)))
         else:

@@ -78,8 +78,8 @@ class CalibrationData(Displayed):
     def refused(self) -> str | None:
         """Return why `save` and `towline calibrate` do not write the robot, in one line; None if they do.
 
-        The log probably has an input error, the fit did not converge, an end of a cable would move by more than half
-        of the cables' length, or validation samples fit worse than with the file's robot.
+        The log probably has an input error, the fit did not converge, an end of a cable or the CoM would move by more
+        than half of the cables' length, or validation samples fit worse than with the file's robot.
         """
         if self.doubt is not None:
             return self.doubt
@@ -100,8 +100,8 @@ class CalibrationData(Displayed):
 
     @cached_property
     def undetermined(self) -> str | None:
-        """Return which end of a cable would move too far to be real, in one line, or None."""
-        ends = (one for one in self.parameters if ".a" in one.name)
+        """Return which end of a cable, or the CoM, would move too far to be real, in one line, or None."""
+        ends = (one for one in self.parameters if ".a" in one.name or one.name.startswith("com"))
         far, length = max(ends, key=lambda one: abs(one.correction), default=None), length_of(self.file)
         if far is None or abs(far.correction) <= FARTHEST * length:
             return None

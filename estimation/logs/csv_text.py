@@ -6,10 +6,11 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import accumulate
 
-from .names import UNITS
+from .names import UNITS, unit_of
 
 MOST_ABOVE, LONGEST_HEADER = 20, 100_000  # lines above the numbers, and their characters
 KNOWN_UNITS = {"", *(unit for units in UNITS.values() for unit in units)}
+LENGTH_UNITS = re.compile(r"(?i)length units?[,;:=\t ]+([a-z]+)")
 DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
 _CLOCK = r"\d\d?:\d\d:\d\d(?:\.\d+)?"
 DATE = re.compile(rf"(?<![\d-])\d{{4}}-\d\d-\d\d[T ]{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
@@ -92,6 +93,9 @@ def _one_header(text: str) -> str:
     # The name of a body may stand above the first of its columns only.
     above_names = [list(accumulate(row, lambda before, cell: cell or before)) for row in above_names]
     names = ["/".join(dict.fromkeys(filter(None, column))) for column in zip(*above_names, last, strict=True)]
+    if not stated and (unit := LENGTH_UNITS.search("\n".join(lines[:first]))):  # of a motion capture, above all names
+        units = [unit_of(unit[1]) if "position" in name.lower() else "" for name in names]
+        stated = True
     titles = [f"{name} [{unit}]" if stated and unit else name for name, unit in zip(names, units, strict=True)]
     below = text.split("\n", first)[-1] if "\n" in text else ""
     return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines

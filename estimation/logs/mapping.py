@@ -24,6 +24,7 @@ OF_DIRECTION = ("x", "y", "z", "swivel", "azimuth", "elevation")
 TITLE = re.compile(r"(.+?)(?:\s+\[([^\]]*)\])?")
 OF_STRUCTURES = ("x", "y", "z", "w", "roll", "pitch", "yaw")
 MOST_LISTED = 12
+GREEK = re.compile(r"(?i)phi|theta|psi|heading")
 BEHIND_NUMBER = re.compile(r"\d[_ ][^\]0-9]+\]$")  # words in the name of a joint
 
 
@@ -240,9 +241,12 @@ def _usual(
         by_name = {found.which: one for found, one in members}
         if kind in AXES:
             axes = tuple(axis for axis in AXES[kind] if axis in free.split())
+            if kind == "angles" and len(axes) == len(by_name) == 1:  # a planar robot has one angle, whatever its name
+                by_name = dict(zip(axes, by_name.values(), strict=True))
             axes = axes if set(axes) == set(by_name) else AXES[kind]
             missing = set(axes) - set(by_name)
-            if missing and kind != "thrust_vectors" and not members[0][1].topic.name:
+            greek = GREEK.search(members[0][1].name) is not None  # which have other meanings too
+            if missing and kind != "thrust_vectors" and not greek and not members[0][1].topic.name:
                 names = ", ".join(one.full for _, one in members)
                 wanted = ", ".join(_like(members[0], axis) for axis in axes)
                 raise InputError(f"must have all columns {wanted} or none of them, got {names}")

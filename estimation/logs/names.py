@@ -7,7 +7,9 @@ import numpy as np
 
 from ...base.csv_columns import ANGLES, LENGTHS, TIMES
 
-FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3, "kgf": 9.80665}
+# Load cells that were calibrated with weights report kilograms or grams.
+FORCES = {"N": 1.0, "kN": 1e3, "mN": 1e-3, "kgf": 9.80665, "kg": 9.80665, "gf": 9.80665e-3, "g": 9.80665e-3}
+FORCES["lbf"] = 4.4482216152605
 NUMBERS = {"1": 1.0, "-": 1.0}
 UNITS = {
     "lengths": LENGTHS,
@@ -63,9 +65,9 @@ PATTERNS = {
     "quaternion": (
         rf"{_BEFORE}(?:orientation|rotation|quaternion|quat|q)[./_ ]?([xyzw])",
         r"(?:.*/)?r([xyzw])",
-        rf"{_BEFORE}q\[([0-3])\]",  # w, x, y, z, in logs of PX4
+        rf"{_BEFORE}q\[?([0-3])\]?",  # w, x, y, z, as in logs of PX4
     ),
-    "angles": (rf"{_BEFORE}(roll|pitch|yaw)", r"(?:.*/)?r([xyz])"),  # rx with a unit
+    "angles": (rf"{_BEFORE}(roll|pitch|yaw|heading|phi|theta|psi)", r"(?:.*/)?r([xyz])"),  # rx with a unit
     "thrusts": (rf"{_BEFORE}thrusts?{_SENSED}[_ ]?\[?(\d*)\]?{_SENSED}",),
     "thrust_vectors": (rf"{_BEFORE}thrusts?{_SENSED}{_VECTOR}",),
     "efforts": (r"/?cables[./]joints\[[^\]]*?(\d+)\]\.effort",),  # tensions in what towline writes
@@ -80,8 +82,9 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
     "time": (
-        rf"[%_]*(t|(?:ros|sim|log|recv|rec|unix)?[_ ]?times?|time_?us|{_BEFORE}(?:time[_ ]?)?stamp|secs?|seconds)",
-        r"(epoch|elapsed(?:[_ ]time)?)",
+        r"(?:.*/)?[%_]*(t|(?:ros|sim|log|recv|rec|unix)?[_ ]?times?|time_?us|secs?|seconds)",
+        rf"[%_]*({_BEFORE}(?:time[_ ]?)?stamp)",
+        r"(epoch|elapsed(?:[_ ]time)?|(?:sys(?:tem)?[_ ]?)?(?:ticks?|clock|uptime))",
         rf"{_BEFORE}((?:milli|micro|nano)s(?:ec(?:ond)?s?)?)",  # since an Arduino was switched on
     ),
 }
@@ -95,10 +98,14 @@ _COMMAND = re.compile(
 _MEASURED = re.compile(
     r"[./_ ]?(?<![a-z])(?:meas(?:ured)?|act(?:ual)?|gt|ground[_ ]?truth|mocap|vicon|optitrack)(?![a-z])"
 )
-_WORDS = {unit: unit.lower() for unit in ("mm", "cm", "m", "rad", "deg", "ms", "us", "ns", "s", "N", "kN")}  # of units
+_WORDS = {unit: unit.lower() for unit in ("cm", "ms", "us", "ns", "s", *FORCES)}  # of units
 _WORDS |= {"s": "s|secs?|seconds?", "ms": "ms|milliseconds?", "us": "us|microseconds?", "ns": "ns|nanoseconds?"}
+_WORDS |= {"cm": "cm|centimet(?:er|re)s?", "in": "in|inch(?:es)?"}
 _WORDS |= {"deg": "deg|degrees?|°", "rad": "rad|radians?", "m": "m|met(?:er|re)s?", "mm": "mm|millimet(?:er|re)s?"}
 _SUFFIX = re.compile(rf"(.+?)\s*(?:[_ ]|\()({'|'.join(_WORDS.values())})\)?")
+
+
+_ANGLES = {"x": "roll", "y": "pitch", "z": "yaw", "phi": "roll", "theta": "pitch", "psi": "yaw"} | {"heading": "yaw"}
 
 
 class Role(NamedTuple):
@@ -152,8 +159,8 @@ def _role(which: str, match: re.Match[str], unit: str, name: str) -> Role:
     parts = sorted(match.groups(), key=lambda part: not (part.isdigit() or not part))
     if which == "quaternion" and parts[0].isdigit():
         parts = ["wxyz"[int(parts[0])]]
-    if which == "angles" and parts[0] in "xyz":
-        parts = [("roll", "pitch", "yaw")["xyz".index(parts[0])]]
+    if which == "angles":
+        parts = [_ANGLES.get(parts[0], parts[0])]
     if which == "time" and (short := re.search("us$|(milli|micro|nano)s", text)):
         unit = {"milli": "ms", "nano": "ns"}.get(short[1] or "", "us")
     return Role(which, " ".join(parts), group, unit)
