@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from towline.base.errors import InputError
-from towline.models import load
+from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp import plan, read_task
 from towline.ocp.limits.clearance import between_cables, cable_outside, point_outside
@@ -115,6 +115,24 @@ def test_winch_speeds_are_differences_of_lengths():
     soft = plan(robot, {"path": path, "duration": 1.0, "limits": {"cable_speed": 0.5, "soft": {"cable_speed": 0.1}}})
     assert soft.feasible
     assert soft.audit.soft_excess
+
+
+def test_winches_of_the_robot_file_limit_the_speeds_of_their_cables():
+    plain = load("planar-4")
+    line = {"path": {"kind": "line", "start": [-0.3, 0, 0.1], "end": [0.3, 0, -0.2]}, "duration": 1}
+    planned = plan(plain, line).trajectory
+    lengths = Dynamics(plain).cable_lengths(planned["pose"].values, planned["carrier_pose"].values)
+    fastest = np.abs(np.gradient(lengths, planned["time"].values, axis=0)).max(axis=0)  # (m,) [m/s]
+
+    def status(speeds):
+        winch = {"inertia": 1, "force_max": 1000}
+        data = plain.model_dump()
+        cables = [{**c, "winch": {**winch, "speed_max": v}} for c, v in zip(data["cables"], speeds, strict=True)]
+        found = plan(Robot.model_validate({**data, "cables": cables}), line)
+        return found.status, [(excess.limit, excess.about) for excess in found.audit.excess]
+
+    assert status(1.01 * fastest) == ("feasible", [])
+    assert status(fastest * [1.01, 1.01, 0.97, 1.01]) == ("infeasible", [("cable_speed", "cable 3")])
 
 
 def test_a_place_is_kept_out_of():

@@ -1,5 +1,6 @@
 """Limits of the cables: speeds, accelerations, jerks, powers, lengths, and distances between cables."""
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import casadi as ca
@@ -29,13 +30,18 @@ class EachCable(Limit):
 
 
 class CableSpeed(EachCable):
-    """Limit the rate of each cable's length, that is, the speed of its winch."""
+    """Limit the rate of the length of some cables, that is, the speed of their winches."""
 
     name, unit = "cable_speed", "m/s"
 
+    def __init__(self, robot: Robot, most: float, cables: Sequence[int]):
+        super().__init__(robot, most)
+        self.labels = tuple(self.labels[cable] for cable in cables)
+        self.cables = list(cables)  # indices
+
     @override
     def values(self, state: State) -> ca.SX:
-        return state.rate(state.run.lengths)
+        return state.rate(state.run.lengths)[self.cables]
 
 
 class CableAcceleration(EachCable):

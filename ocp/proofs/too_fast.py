@@ -56,7 +56,8 @@ def too_fast(
             if lengths is None:
                 poses = places[0], places[1:].swapaxes(0, 1)
                 lengths = scenario.dynamics.cable_lengths(*poses)[..., None]
-            yield from _mean_rate(limit, times, lengths, (spread[0] + spread[1:][scenario.robot.carrier_of_cable]).T)
+            ends = (spread[0] + spread[1:][scenario.robot.carrier_of_cable]).T
+            yield from _mean_rate(limit, times, lengths[:, limit.cables], ends[:, limit.cables])
         elif isinstance(limit, PlatformAcceleration | CarrierAcceleration):
             yield from _acceleration(limit, times, x[:, 0], off[:, 0], bool(resting[body]))
 

@@ -65,8 +65,14 @@ def limit_list(robot: Robot, task: Task) -> Limits:
 
 
 def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
+    """Return the limits of the task, and the speeds of the winches of the robot's file, whichever are tighter."""
     given = task.limits
-    for kind in (CableSpeed, CableAcceleration, CableJerk, WinchPower):
+    files = [cable.winch.speed_max if cable.winch and robot.fixed_lengths is None else None for cable in robot.cables]
+    speeds = [_tighter(given.cable_speed, speed) for speed in files]
+    for most in dict.fromkeys(speeds):
+        if most is not None:
+            yield CableSpeed(robot, most, [cable for cable, its in enumerate(speeds) if its == most])
+    for kind in (CableAcceleration, CableJerk, WinchPower):
         if (most := getattr(given, kind.name)) is not None:
             yield kind(robot, most)
     if given.cable_length is not None:

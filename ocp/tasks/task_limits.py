@@ -108,7 +108,9 @@ class TaskLimits(Part):
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
-    cable_speed: Positive | None = optional("rate of every cable's length, the speed of its winch [m/s]")
+    cable_speed: Positive | None = optional(
+        "rate of every cable's length, the speed of its winch, in addition to the robot file's limit [m/s]"
+    )
     cable_acceleration: Positive | None = optional(
         "second derivative of every cable's length, the acceleration of its winch [m/s^2]"
     )
