@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from towline.models import Dynamics, load
+from towline.models.part import Box
 from towline.solvers import solve
 from towline.statics.distribution import pose_problem
+from towline.workspace import StaticEquilibrium, sample
 from towline.workspace.resting_box import resting_box
 
 from .framed import framed
@@ -50,3 +52,21 @@ def test_moving_faster_needs_more(name):
     still = solve(pose_problem(dynamics, robot.home))
     up = solve(pose_problem(dynamics, robot.home, acceleration=[0, 0, 2, 0, 0, 0]))
     assert up.cost > still.cost
+
+
+def test_the_default_region_is_above_the_floor_and_in_the_room():
+    """Below the floor the cables could hold the platform too; no point of it may be there."""
+    free = load("ipanema-2")  # attachments and CoM at home's attitude: offsets from the platform's origin
+    lowest = np.vstack([free.attachments, free.platform.com]).min(axis=0)
+    highest = np.vstack([free.attachments, free.platform.com]).max(axis=0)
+    room = {"min": [-1, -9, -9], "max": [2, 9, 3.5]}
+    robot = free.model_copy(update={"floor": 1.5, "workspace_box": Box(**room)})
+    every = {name: sample(r, StaticEquilibrium(), samples=400) for name, r in {"free": free, "bounded": robot}.items()}
+    assert every["free"]["position"].values[:, 2].min() < 1.5 - lowest[2]
+    position = every["bounded"]["position"].values
+    assert len(position) > 100
+    assert (position + lowest >= [-1, -9, 1.5]).all()
+    assert (position + highest <= [2, 9, 3.5]).all()
+    low, high = position.min(axis=0), position.max(axis=0)
+    np.testing.assert_allclose(low[[0, 2]] + lowest[[0, 2]], [-1, 1.5], atol=0.1)  # nothing more is left out
+    np.testing.assert_allclose(high[[0, 2]] + highest[[0, 2]], [2, 3.5], atol=0.1)

@@ -14,7 +14,7 @@ from ..base.text import quantity_row
 from ..models import Robot
 from ..models.part import COORDINATES, Box
 from .places import Places
-from .region import AngleBox, Region, reach_boxes, surrounding_box
+from .region import AngleBox, Region, reach_boxes, room, surrounding_box
 from .three_cable_pose import three_cable_pose
 
 THINNEST = 1e-9  # [m or rad]; thinner than this is no extent
@@ -48,7 +48,7 @@ class Domain(Displayed):
             position = np.array(region.position.min), np.array(region.position.max)
             _check_locked(robot, "position", position, 0)
         elif region.lengths is None:
-            position = surrounding_box(robot, boxes)
+            position = _default_box(robot, boxes)
         else:
             position = _box_of_lengths(robot, region, carriers)
         if region.lengths is None and not (position[1] - position[0] > THINNEST).any():
@@ -160,6 +160,15 @@ def _carrier_boxes(robot: Robot, region: Region) -> dict[str, Box]:
         if name not in names:
             raise InputError(f"region.carriers must have the names {', '.join(names)}, got {shown(name)}")
     return dict(region.carriers)
+
+
+def _default_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray, np.ndarray]:
+    """Return a box about home and anchors, (3,) and (3,) [m], where the platform is above the floor and in the room."""
+    low, high = surrounding_box(robot, carriers)
+    lowest, highest = room(robot)
+    moving = robot.dof_mask[:3] > 0
+    low = np.where(moving, np.clip(low, lowest, robot.home[:3]), low)
+    return low, np.where(moving, np.clip(high, robot.home[:3], highest), high)
 
 
 def _attitude(robot: Robot, region: Region) -> tuple[np.ndarray, np.ndarray]:

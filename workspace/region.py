@@ -6,7 +6,9 @@ import numpy as np
 from pydantic import model_validator
 
 from ..models import Robot
+from ..models.body import skeleton
 from ..models.part import Box, Name, Part, PositiveRange, Vector3, optional
+from ..models.points import rotations
 
 
 class AngleBox(Box):
@@ -26,7 +28,8 @@ class Region(Part):
     """
 
     position: Box | None = optional(
-        "box of positions of the platform frame in {G} [m]; default: a box about home and anchors"
+        "box of positions of the platform frame in {G} [m]; default: a box about home and anchors, above the floor "
+        "and inside the workspace_box of the robot file"
     )
     attitude: Vector3 | AngleBox | None = optional(
         "(roll, pitch, yaw) or a box of them [rad]; default: the attitude at home"
@@ -65,6 +68,20 @@ def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray,
     low = np.minimum(low, (low + high - spread) / 2)
     moving = robot.dof_mask[:3] > 0
     return np.where(moving, low, robot.home[:3]), np.where(moving, low + spread, robot.home[:3])
+
+
+def room(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the platform may be in its home attitude above the floor and in the room, (3,) and (3,) [m]."""
+    body = robot.platform.body
+    points = np.vstack([robot.platform.com, robot.attachments]) if body is None else skeleton(body).corners
+    around = points @ rotations(robot.home[3:]).T
+    radius = 0.0 if body is None else body.rounding
+    low, high = np.full(3, -np.inf), np.full(3, np.inf)
+    if robot.floor is not None:
+        low[2] = robot.floor
+    if (room := robot.workspace_box) is not None:
+        low, high = np.maximum(low, room.min), np.minimum(high, room.max)
+    return low - around.min(axis=0) + radius, high - around.max(axis=0) - radius
 
 
 def reach_boxes(robot: Robot) -> dict[str, Box]:

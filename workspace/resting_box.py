@@ -5,12 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..models import Robot
-from ..models.body import skeleton
 from ..models.diagnosis import too_weak
-from ..models.points import rotations
 from .feasibility import feasible, rest_wrench
 from .places import Places
-from .region import surrounding_box
+from .region import room, surrounding_box
 
 ROUNDING = 1e-9  # [m]
 STEPS = 10  # from the middle of the grid to each of its sides
@@ -46,7 +44,7 @@ def resting_box(robot: Robot) -> RestingBox | None:
     centre = robot.home[:3]
     if robot.dof_mask[2]:  # a platform that hangs can be lower than home: down to the floor, which is probably at z = 0
         low[2] = min(low[2], 0.0 if centre[2] > 0 else centre[2] - (high[2] - low[2]) / 2)
-    lowest, highest = _room(robot)
+    lowest, highest = room(robot)
     low, high = np.maximum(np.minimum(low, centre), lowest), np.minimum(np.maximum(high, centre), highest)
     axes = _grid(robot, np.minimum(low, centre), centre, np.maximum(high, centre))
     able = _can_rest(robot, axes)
@@ -105,7 +103,7 @@ def _moved_along(robot: Robot) -> RestingBox | None:
             low = np.maximum(low, np.subtract(reach.min, carrier.home[:3]))
             high = np.minimum(high, np.subtract(reach.max, carrier.home[:3]))
     moving, home = robot.dof_mask[:3] > 0, robot.home[:3]
-    lowest, highest = _room(robot)
+    lowest, highest = room(robot)
     low, high = np.maximum(home + low, lowest), np.minimum(home + high, highest)
     low, high = np.where(moving, low, home), np.where(moving, high, home)
     return RestingBox(low, high, home, 0, np.zeros(3), np.zeros((0, 3)))
@@ -130,20 +128,6 @@ def _can_rest(robot: Robot, axes: list[np.ndarray]) -> np.ndarray:
     poses = np.tile(robot.home, (*nodes.shape[:3], 1))
     poses[..., :3] = nodes
     able = feasible(robot, Places.at_home(robot, poses.reshape(-1, 6)), rest_wrench(robot)[None])
-    lowest, highest = _room(robot)
+    lowest, highest = room(robot)
     inside = ((nodes >= lowest - ROUNDING) & (nodes <= highest + ROUNDING)).all(axis=-1)
     return able.reshape(nodes.shape[:3]) & inside
-
-
-def _room(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the platform may be in its home attitude above the floor and in the room, (3,) and (3,) [m]."""
-    body = robot.platform.body
-    points = np.vstack([robot.platform.com, robot.attachments]) if body is None else skeleton(body).corners
-    around = points @ rotations(robot.home[3:]).T
-    radius = 0.0 if body is None else body.rounding
-    low, high = np.full(3, -np.inf), np.full(3, np.inf)
-    if robot.floor is not None:
-        low[2] = robot.floor
-    if (room := robot.workspace_box) is not None:
-        low, high = np.maximum(low, room.min), np.minimum(high, room.max)
-    return low - around.min(axis=0) + radius, high - around.max(axis=0) - radius
