@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.text import numbered
 from . import style
 from .end_labels import name_at_the_end, together
 
@@ -72,8 +73,7 @@ def tensions(trajectory: xr.Dataset) -> style.Figure:
     if slack.any():
         for start, stop in _spans(time, np.asarray(slack.any(axis=1))):
             ax.axvspan(start, stop, color=GREY, linewidth=1.0, zorder=0)
-        names = ", ".join(str(cable) for cable in trajectory["cable"].values[slack.any(axis=0)])
-        ax.fill_between([], [], color=GREY, label=f"slack: cable {names}")
+        ax.fill_between([], [], color=GREY, label=f"slack: {numbered('cable', np.flatnonzero(slack.any(axis=0)))}")
     reach = max(high - low, 0.3 * max(abs(low), abs(high)))  # limits farther away than this would flatten the curves
     limits = [("t_min", float(limit)) for limit in np.unique(t_min)]
     limits += [("t_max", float(limit)) for limit in np.unique(t_max)]

@@ -42,6 +42,23 @@ class Limited(NamedTuple):
         known = ~np.isnan(share)
         return np.where(known.any(axis=1), np.max(share, axis=1, where=known, initial=0.0).clip(max=MOST), np.nan)
 
+    @property
+    def is_drawn(self) -> bool:
+        """Return whether it has a curve: a share that is large enough to be seen."""
+        used = self.used()
+        return used is not None and bool(np.nanmax(used, initial=0.0) >= SHOWN)
+
+    def most(self) -> str:
+        """Return the largest share or, where a share has no meaning, the value nearest to the only bound."""
+        used, unit = self.used(), self.unit.replace("-", "")
+        if used is not None:
+            return f": {100 * np.nanmax(used):.3g} %" if np.isfinite(used).any() else ""
+        bounds = np.isfinite([self.low, self.high])
+        if bounds.all() or not np.isfinite(self.values).any():
+            return ""
+        nearest = np.nanmin(self.values) if bounds[0] else np.nanmax(self.values)
+        return f": {quantity(float(nearest), unit, 3)}"
+
     def text(self) -> str:
         """Return the name with its limits."""
         unit = self.unit.replace("-", "")
@@ -60,21 +77,15 @@ def limits(times: np.ndarray, quantities: list[Limited]) -> style.Figure:
     """Draw what quantities over `times` (n,) [s] use of their limits; those that use little are named below."""
     canvas = style.figure(height=1.9 + 0.16 * len(quantities))
     ax = style.axes(canvas, "time [s]", "share of the limit [%]")
-    drawn: list[tuple[str, np.ndarray]] = []
-    small: list[str] = []
-    for limited in quantities:
-        used = limited.used()
-        if used is not None and np.isfinite(used).any() and np.nanmax(used) >= SHOWN:
-            drawn.append((f"{limited.text()}: {100 * np.nanmax(used):.3g} %", 100 * used))
-        else:
-            shown = "" if used is None or not np.isfinite(used).any() else f": {100 * np.nanmax(used):.2g} %"
-            small.append(limited.text() + shown)
-    for index, (label, used) in enumerate(drawn):
-        ax.plot(times, used, **style.look(index), label=label)
+    highest = 100.0
+    for index, limited in enumerate(each for each in quantities if each.is_drawn):
+        used = 100 * np.asarray(limited.used())
+        highest = max(highest, float(np.nanmax(used)))
+        ax.plot(times, used, **style.look(index), label=limited.text() + limited.most())
     ax.axhline(100.0, **style.LIMIT)
     ax.set_xlim(times[0], times[-1])
-    highest = max([100.0, *(float(np.nanmax(used[np.isfinite(used)], initial=0.0)) for _, used in drawn)])
     ax.set_ylim(0.0, 1.08 * min(highest, 200.0))
-    for label in small:
-        ax.plot([], [], " ", label=label)
+    for limited in quantities:
+        if not limited.is_drawn:
+            ax.plot([], [], " ", label=limited.text() + limited.most())
     return style.legend_below(canvas, ax)

@@ -25,8 +25,8 @@ SHARE = 2.0  # [%] of the values below the lowest level, and above the highest o
 def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray | None = None) -> style.Figure:
     """Draw contours of metrics, one row of panels each: the mean of the samples in each cell of the positions.
 
-    A region without extent along one axis has one panel, a volume three: the lower, middle and upper third of its
-    heights. Along a line, the samples themselves are drawn.
+    A region without extent along one axis has one panel, a volume three: the lower, middle and upper third of the
+    heights of its samples. Along a line, the samples themselves are drawn.
 
     - `result`: from `workspace.sample`, with the variables `metrics` and `position`.
     - `anchors`: anchors to mark, (m, 3) in {G} [m] (default: none).
@@ -35,10 +35,13 @@ def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray |
     position = result["position"].values
     layers, headings = [np.ones(len(position), dtype=bool)], [""]
     if len(thick) == 3:
-        ends = np.linspace(*outer_edges(result["z"].values), LAYERS + 1)
+        heights = position[:, 2] if len(position) else outer_edges(result["z"].values)
+        low, high = np.min(heights), np.max(heights)
+        ends = np.linspace(low, high, LAYERS + 1)
+        digits = 2 - int(np.floor(np.log10(max(high - low, 1e-9))))
         between = list(pairwise(ends))
         layers = [(position[:, 2] >= low) & (position[:, 2] <= high) for low, high in between]
-        headings = [f"z = {low:.3g} to\n{high:.3g} m" for low, high in between]
+        headings = ["z = {:g} to\n{:g} m".format(*np.round(pair, digits)) for pair in between]
     marks = np.empty((0, 3)) if anchors is None else anchors
     axes = thick[:2]
     box = np.array([outer_edges(result["xyz"[k]].values) for k in axes])

@@ -69,19 +69,20 @@ def tensions_side_by_side(trajectories: dict[str, xr.Dataset]) -> style.Figure:
 
 
 def base_offset(trajectory: xr.Dataset) -> style.Figure:
-    """Draw the horizontal distance of each carrier from the platform, and its height above it."""
-    canvas = style.figure(height=2.7)
-    ax = style.axes(canvas, "time [s]", "carrier position\nrelative to platform [m]")
+    """Draw the horizontal distance of each carrier from the platform, and below it its height above it."""
+    canvas = style.figure(height=3.6)
+    panels = style.panels_below(
+        canvas, "time [s]", ["horizontal distance\nfrom platform [m]", "height above\nplatform [m]"]
+    )
     time = trajectory["time"].values
     trajectory = trajectory.isel(carrier=trajectory["carrier_moves"].values)
     apart = trajectory["carrier_pose"].values[:, :, :3] - trajectory["pose"].values[:, None, :3]
-    sideways = np.linalg.norm(apart[:, :, :2], axis=2)
-    highest = float(max(sideways.max(), apart[:, :, 2].max()))
-    for index, name in enumerate(trajectory["carrier"].values):
-        ax.plot(time, sideways[:, index], **style.look(2 * index), label=f"{name}: horizontal")
-        ax.plot(time, apart[:, index, 2], **style.look(2 * index + 1), label=f"{name}: height")
-    ax.set_ylim(bottom=min(0.0, float(apart[:, :, 2].min())), top=1.08 * max(highest, 1e-3))
-    return style.legend_below(canvas, ax)
+    for ax, values in zip(panels, (np.linalg.norm(apart[:, :, :2], axis=2), apart[:, :, 2]), strict=True):
+        for index, name in enumerate(trajectory["carrier"].values):
+            ax.plot(time, values[:, index], **style.look(index), label=str(name))
+        low, high = float(min(values.min(), 0.0)), float(max(values.max(), 1e-3))
+        ax.set_ylim(1.08 * low, 1.08 * high)
+    return style.legend_below(canvas, *panels)
 
 
 def _same_scale(panels: list[style.Axes]) -> None:
@@ -139,14 +140,21 @@ def _draw_phases(ax: style.Axes, trajectory: xr.Dataset) -> None:
         ax.plot(trajectory["time"].values, pushing, color="#aaaaaa", linewidth=1.8, label="ground")
 
 
+def _free_end(values: np.ndarray, limit: float) -> float:
+    """Return at which end of the axes, 0 or 1, curves (n, m) stay farther from a limit: there its name fits."""
+    part = -(-2 * len(values) // 5)  # as long as the name
+    first, last = (np.abs(some - limit).min() for some in (values[:part], values[-part:]))
+    return 0.0 if first > last else 1.0
+
+
 def _draw_limits(ax: style.Axes, trajectory: xr.Dataset, shown: np.ndarray) -> None:
     """Draw the limits; upper ones too far away to draw without flattening the curves are in the legend."""
     for low in np.unique(trajectory["t_min"].values):
-        style.limit_line(ax, low, f"t_min = {low:g} N")
+        style.limit_line(ax, low, f"t_min = {low:g} N", _free_end(shown, low))
     far: list[str] = []
     for high in np.unique(trajectory["t_max"].values):
         if high < 2 * np.abs(shown).max():
-            style.limit_line(ax, high, f"t_max = {high:g} N", above=False)
+            style.limit_line(ax, high, f"t_max = {high:g} N", _free_end(shown, high), above=False)
         else:
             far.append(f"{high:g}")
     if far:

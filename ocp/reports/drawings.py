@@ -39,7 +39,8 @@ def drawings(plan: PlanData, trajectory: xr.Dataset) -> dict[str, Drawing]:
         drawn["path"] = Drawing("Path of the platform and positions of the carriers", plan_figures.path(trajectory))
         drawn["base"] = Drawing("Carriers relative to the platform", plan_figures.base_offset(trajectory))
     rows = output_rows(plan)
-    if quantities := limited(plan, rows):
+    quantities = limited(plan, rows)
+    if any(each.used() is not None for each in quantities):
         drawn["limits"] = Drawing("Other limits", limits(plan.audit.times[rows], quantities))
     if plan.iterates:
         drawn["convergence"] = Drawing("Convergence of the solver", convergence(plan.iterates))
