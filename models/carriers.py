@@ -253,7 +253,7 @@ class QuadrotorCarrier(Carrier):
     thrust_min: NonNegative = optional("smallest total thrust [N]", 0.0)
     thrust_max: Positive = Field(description="largest total thrust [N]")
     torque_max: tuple[Positive, Positive, Positive] = Field(description="largest torque about each axis [N m]")
-    tilt_max: Positive = optional("largest angle between its z axis and the vertical in plans [rad]", 0.6)
+    tilt_max: Positive = optional("largest angle between its z axis and the vertical in plans [rad]", 0.6, lt=1.5)
     speed_max: Positive = optional("largest speed in plans [m/s]", 10.0)
     acceleration_max: Positive = optional("largest acceleration in plans [m/s^2]", 10.0)
     radius: Positive | None = optional(

@@ -113,6 +113,8 @@ def spoiled(what):
         header[3] = "length [m]"
     elif what == "twice":
         header[3] = "l1 [m]"
+    elif what == "a name of another kind":
+        header[8] = "length8 [m]"
     elif what == "a gap":
         header[3] = "l9 [m]"
     elif what == "nan":
@@ -146,6 +148,7 @@ FAULTS = {
     "wrong unit": "the unit of l2 must be one of m, dm, cm, mm, um, km, in, got 'N'",
     "unknown column": "must have columns l0 to l6 without a gap, got no l2",
     "twice": "must have each column once, got l1 twice",
+    "a name of another kind": "must have lengths under names of one kind, got l0, l1, l2, l3, l4, l5, l6 and length8",
     "a gap": "must have columns l0 to l7 without a gap, got no l2",
     "nan": "l3 must be a finite number at sample 0, got nan",
     "times": "times must increase from sample to sample, got 9.5 s and then 9 s at sample 20",

@@ -64,6 +64,12 @@ def test_the_drive_follows_from_the_file(robot, drive):
     assert again.drive == drive
 
 
+def test_a_tilt_in_degrees_is_refused():
+    """40 rad are 132 degrees, if only the cosine is compared."""
+    with pytest.raises(InputError, match=r"carriers\[0\]\.tilt_max must be less than 1\.5, got 40"):
+        beam({**QUAD, "tilt_max": 40})
+
+
 def test_a_cable_without_a_length_keeps_that_at_home():
     lengths = beam(QUAD, cable={"length": 1.7}).fixed_lengths
     np.testing.assert_allclose(lengths, [1.7, np.hypot(1, 2)], rtol=1e-15)

@@ -263,6 +263,11 @@ def _usual(
             first, count = int(order[0] or 0), len(order)
             wanted = [str(i) for i in range(min(first, 1), min(first, 1) + count)]
             if order not in (wanted, [""]) and not members[0][1].topic.name:
+                mine = [one.full for _, one in members]
+                others = [one.full for its in groups.values() if its is not members for _, one in its]
+                if len(mine) < len(others):
+                    rest = ", ".join(others)
+                    raise InputError(f"must have {what} under names of one kind, got {rest} and {', '.join(mine)}")
                 names = [_like(members[0], i) for i in (wanted[0], wanted[-1])]
                 lost = _like(members[0], next(i for i in wanted if i not in order))
                 raise InputError(f"must have columns {names[0]} to {names[1]} without a gap, got no {lost}")
