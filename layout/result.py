@@ -185,7 +185,7 @@ class Design(Drawn, Reported, Displayed):
         text = certificate.text(self._up())
         facts = [
             ("pose", f"({quantity_row(proof.pose)}) [m, rad]"),
-            ("wrench", f"({quantity_row(proof.wrench)}) [N, N m]"),
+            ("required wrench", f"({quantity_row(proof.wrench)}) [N, N m]"),
             ("direction", text.along),
             ("needed", text.needed),
             ("available", f"{text.available}, in the best layout inside the boxes"),
@@ -236,7 +236,7 @@ class Design(Drawn, Reported, Displayed):
             for one in found.advice
         ]
         rows = [self._binding_row(one) for one in found.binding[:MOST_LISTED]]
-        columns = ("share", "pose [m, rad]", "wrench [N, N m]", "least reserve along", "limits")
+        columns = ("share", "pose [m, rad]", "required wrench [N, N m]", "least reserve along", "limits")
         more = len(found.binding) - len(rows)
         table = Table("What binds", columns, rows, (0,))
         changes = Table("What a change would gain", ("change", "gain"), gains)

@@ -12,9 +12,10 @@ the fraction P of the robots at all poses simultaneously:
 - any poses (`ellipsoid_factor`): the ellipsoid dp^T Sigma^-1 dp <= k^2 contains the fraction P of the robots if k^2 is
   the quantile P of the chi-square distribution with r degrees of freedom, r the rank of Sigma. Inside it
   |g . dp| <= k sqrt(g^T Sigma g) for every g (Scheffe);
-- a motion (`motion_factor`): along it the row of each cable, scaled to variance 1, is a curve of length L_i on the unit
-  sphere. Rice's formula bounds the probability that it exceeds k anywhere by 2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2).
-  The sum over the cables is 1 - P. This factor is usually half of the first one, and never larger than the first one.
+- a motion (`motion_factor`): the row of G S of each cable, with S S^T = Sigma, has a direction that moves along a curve
+  of length L_i on the unit sphere. Rice's formula bounds the probability that |dt_i| exceeds k sigma_i anywhere by
+  2 (1 - Phi(k)) + L_i / pi exp(-k^2 / 2). The sum of these bounds over the cables is 1 - P. This factor is usually half
+  of the first one, and never larger than it.
 
 Source: H. Scheffe, Biometrika 40, 1953; S. O. Rice, Bell System Technical Journal 24, 1945; D. Q. Naiman, Annals of
 Statistics 14, 1986.

@@ -267,7 +267,7 @@ def test_measured_poses_have_errors_of_their_own():
     assert error @ np.linalg.solve(result.covariance, error) / len(error) == pytest.approx(1, abs=0.5)
     unstated = calibrate("cogiro", Measurements(built.readings, noisy), outliers=False)
     assert unstated.noise > 4e-3  # and the sigmas grow accordingly
-    assert "not by the 1 mm stated" in unstated.report()
+    assert "not by the 1 mm assumed" in unstated.report()
 
 
 def test_some_poses_may_be_unknown():

@@ -1,5 +1,5 @@
 /*
- * The bounded least norm in lanes for any number of cables, and soft answers: Newton's method on the dual.
+ * The bounded least norm in lanes for any number of cables, also with a soft wrench: Newton's method on the dual.
  *
  * The dual has one unknown for each equation. With multipliers y the best s is s(y) = clip(B^T y), and y is right where
  *
@@ -11,8 +11,8 @@
  * the wrench is out of reach the dual has no maximum, and y, the step or r are soon directions that prove it. Whatever
  * is not decided in a few steps, or rests on a pivot that is nearly zero, is left to the solver of one problem.
  *
- * Soft answers to wrenches that are out of reach are most of what is left: y is as large as what is missing times rho,
- * and B^T y has no digits left for the cables between their limits.
+ * Most of these problems have a soft wrench (rho) and a wrench outside the available set: y is then about rho times the
+ * missing wrench, and rounding errors of B^T y are as large as the tensions of the cables between their limits.
  */
 #ifndef TOWLINE_BATCH_NEWTON_H
 #define TOWLINE_BATCH_NEWTON_H

@@ -1,4 +1,4 @@
-/* Directions in lanes that prove their wrenches out of reach, as `towline_proves_infeasible` has it but for rank. */
+/* Proofs in lanes that wrenches are not available: as `towline_proves_infeasible`, but without its test of the rank. */
 #ifndef TOWLINE_BATCH_PROOF_H
 #define TOWLINE_BATCH_PROOF_H
 

@@ -5,15 +5,17 @@
  *
  *     dw = A dt + G dp        G: moves or turns the cables of a carrier, with t_ref in them
  *
- * of which the solution of least norm is taken, each coordinate of a carrier measured by its reach and each tension by a
- * share of the weight. Carriers go there as a critically damped lag of second order does: their command is smooth, and
- * has its acceleration too. Without that they would be as late as their own loops are slow, which have no more bandwidth
- * than this lag; with fewer cables than degrees of freedom the loop over errors of the platform would be unstable.
+ * of which the solution of least norm is taken, each coordinate of a carrier relative to its reach and each tension
+ * relative to a share of the weight. A critically damped filter of second order smooths the carriers' command, which
+ * includes its acceleration. Without this feedforward the carriers would lag by the time of their own loops, whose
+ * bandwidth is no larger than that of the filter; with fewer cables than degrees of freedom, the loop over errors of
+ * the platform would then be unstable.
  *
- * With as many cables as degrees of freedom or more, dw = -d, the disturbance: the carriers take over what is steady,
- * and the tensions correct errors. With fewer the carriers have to correct them too: dw = w - A t_ref where they are now,
- * and dp adds to the offset that they have. Of that offset only the part of least norm with the same change of the wrench
- * is kept, because an offset along a single cable of constant length would leave the platform too high.
+ * With at least as many cables as degrees of freedom, dw = -d, where d is the disturbance: the carriers balance its
+ * steady part, and the tensions correct errors. With fewer cables the carriers have to correct errors too: then
+ * dw = w - A t_ref at their current positions, and dp is added to their current offset. Of this offset only the part of
+ * least norm with the same effect on the wrench is kept, because an offset along a single cable of constant length
+ * would leave the platform too high.
  */
 #include "control/equations.h"
 #include "control/internal.h"

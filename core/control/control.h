@@ -1,6 +1,6 @@
 /*
  * The step of a controller: the problem of tension distribution that it solves, the commands of flying carriers, and
- * the stages of predictive control. No allocation, no globals; any numbers, also none, are taken.
+ * the stages of predictive control. No allocation, no globals; every number is accepted, NaN too.
  */
 #ifndef TOWLINE_CONTROL_H
 #define TOWLINE_CONTROL_H

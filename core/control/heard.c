@@ -1,11 +1,12 @@
 /*
- * What is heard of cables: which are cut, which tensions observers know, and the bounds of the next tensions.
+ * What the tension sensors show: which cables are cut, the tensions for the observers, and the bounds of the next ones.
  *
- * A cable is taken for cut once it reports less than LITTLE of what it is commanded, which takes the patience if it
- * reports nothing. It is trusted again once it reports ENOUGH of the little that it is commanded then.
+ * A cable is treated as cut once its filtered reading is less than the share LITTLE of its filtered command. If the
+ * sensor reads zero, this takes the time `patience`. The cable is used again once its sensor reads the share ENOUGH of
+ * the small tension that is commanded to cut cables.
  *
- * Where no cable reports a tension, the sensors are taken for lost, not all cables, without which nothing could be
- * controlled: the commands take the place of the reports.
+ * If no sensor reads a tension, the sensors are treated as failed rather than all cables as cut, because without cables
+ * nothing could be controlled: the commands replace the readings.
  */
 #include "control/internal.h"
 #include "control/usable.h"

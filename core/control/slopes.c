@@ -1,4 +1,4 @@
-/* Exact derivatives, see slopes.h; in the axes of the body, what turns with it changes by its own turn alone. */
+/* Exact derivatives, see slopes.h. They are taken in the axes of the body, in which vectors fixed to it are constant. */
 #include "control/slopes.h"
 
 /* How the rate Omega and its derivative alpha change with an angle or its rate, and the axis of that angle (or zero). */

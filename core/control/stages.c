@@ -1,14 +1,15 @@
 /*
  * The robot's motion over the stages of a predictive controller, to first order about a guess.
  *
- * A state is (pose, its rate, and position and rate of each coordinate in which a carrier may leave its reference, or
- * that cables of fixed length leave it), a control (tensions, accelerations of those coordinates). With the tensions t,
- * the disturbance d and H ddx + h = w(x, dx, ddx),
+ * A state consists of the pose and its rate, and of value and rate of each free coordinate of a carrier: one in which
+ * it may leave its reference or, of a carrier on cables of fixed length, one in which they let it move. A control
+ * consists of the tensions and the accelerations of these coordinates. With the tensions t, the disturbance d and
+ * H ddx + h = w(x, dx, ddx),
  *
  *     ddx = H^-1 (A(x) t + d - h(x, dx))
  *
  * which is constant during a stage, so that x moves by dt dx + dt^2 ddx / 2. Its derivatives are H^-1 times those of
- * A(x) t - w(x, dx, ddx) with ddx as it is.
+ * A(x) t - w(x, dx, ddx) at constant ddx.
  */
 #include "control/internal.h"
 #include "control/mobility.h"

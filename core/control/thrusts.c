@@ -1,5 +1,5 @@
 /*
- * What the actuators of flying carriers do, so that these go where they are ordered with their cables' pull.
+ * Thrusts and torques with which flying carriers follow their commanded motion under the pull of their cables.
  *
  *     F   = m (a + 2 k (v - v_q) + k^2 (p - p_q) - g) + sum of t u - d
  *     tau = J (alpha + 2 h (Omega - Omega_q) + h^2 e) + Omega_q x J Omega_q - M
@@ -9,14 +9,15 @@
  * F is the wanted thrust in {G}, T the one given, d the estimate of all other forces (air, a mass that is not as in the
  * robot file), e the rotation from the thrust's axis to F, inside a cone, and to the ordered yaw, M the moment of the
  * cables about the CoM, k and h the bandwidths of position and attitude; q marks what is measured. Only the part of F
- * along the thrust's axis is there at once; the rest comes when the carrier has turned, so it is lacking where it cannot
- * turn as ordered: where F is outside the cone, or the actuators are at their limits most of the time. This is where an
- * attitude loop that is unstable ends, for any reason: oscillations grow until the limits stop them. Source: T. Lee,
- * M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first order in e.
+ * along the thrust's axis acts at once; the rest follows when the carrier has turned. It is missing if the carrier
+ * cannot turn as commanded: if F is outside the cone, or the actuators are at their limits most of the time. An
+ * unstable attitude loop is noticed in this way too, because its oscillations grow until they reach the limits. Source:
+ * T. Lee, M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first
+ * order in e.
  *
- * While a state is missing, e is predicted from the commands, so that the carrier turns as it was about to and stops; F
- * and M stay. The last command instead would keep its angular acceleration, which noise makes so large that a carrier
- * turns over in 0.3 s.
+ * While a state is missing, F and M stay, and e is predicted from the commands, so that the carrier completes its turn
+ * and stops. To hold the last command instead would hold its angular acceleration, which noise makes so large that a
+ * carrier turns over in 0.3 s.
  */
 #include <string.h>
 

@@ -1,16 +1,18 @@
 /*
- * How late flying carriers turn after the angular accelerations that they are ordered.
+ * How late flying carriers turn after their commanded angular accelerations.
  *
  * With rotors that follow their commands with a lag tau, a critically damped attitude loop of bandwidth h,
  *
  *     tau phi''' + phi'' + 2 h phi' + h^2 phi = 0,
  *
- * is stable for h tau < 2 (Routh). Rates r without what they were long ago, and the integrals x of ordered
- * accelerations without the same, obey tau dr/dt = x - r. A delay of D counts as D at most. So
+ * is stable for h tau < 2 (Routh). Let r be the angular rate and x the integral of the commanded acceleration, both
+ * without their slow parts (a high-pass filter with the time constant 2 / h). They obey tau dr/dt = x - r. A delay D
+ * looks like a lag of at most D. So
  *
  *     tau = <x - r, dr/dt> / <dr/dt, dr/dt>
  *
- * of all carriers and axes of a robot, where a lag of 1 / h before gives derivatives, and keeps vibrations away.
+ * over all carriers and axes of a robot. A low-pass filter with the time constant 1 / h, applied to x and r first,
+ * gives the derivative dr/dt, and removes vibrations.
  */
 #include <string.h>
 

@@ -1,9 +1,9 @@
 /*
- * Slacks, excesses and multipliers of a Newton step, without variables of their own.
+ * The elimination of slacks, excesses and multipliers from a Newton step, whose only unknowns are then dz.
  *
- * Of a bound with slack t and multiplier f, the linear equation f dt + t df = product makes df of dt, which is du or -du.
- * Of a soft row, with excess s and rest = penalty + square s - f of its slope, f dt + t df = product of the row and
- * rest ds + s drest = product of the excess make df = steep E dz + shift.
+ * A bound has the slack t and the multiplier f, and dt is du or -du: the linear equation f dt + t df = product gives
+ * df. A soft row has in addition the excess s, whose own multiplier is rest = penalty + square s - f. The equations
+ * f dt + t df = product of the row and rest ds + s drest = product of the excess give df = steep E dz + shift.
  */
 #include "horizon/internal.h"
 

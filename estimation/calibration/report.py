@@ -103,7 +103,7 @@ def _of_noise(result: CalibrationData) -> list[str]:
     lines = []
     if np.isfinite(result.noise) and result.noise > 1.05 * stated:
         lines.append(
-            f"lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} stated: the standard deviations "
+            f"lengths scatter by {_mm(result.noise)}, not by the {_mm(stated)} assumed: the standard deviations "
             f"below are multiplied by {quantity(result.noise / stated, digits=3)}"
         )
     if result.noise > LACKS * stated and "scales" not in result.free:

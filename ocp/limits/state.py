@@ -24,7 +24,7 @@ class Body(NamedTuple):
 
     @classmethod
     def symbols(cls) -> Self:
-        """Return a motion of three symbols, by which expressions can be differentiated, unlike by parts of one."""
+        """Return a motion of three symbols; expressions cannot be differentiated with respect to parts of a symbol."""
         return cls(ca.SX.sym("x", 6), ca.SX.sym("v", 6), ca.SX.sym("a", 6))
 
     @property
