@@ -180,7 +180,7 @@ def test_more_balances_miss_less_between_them():
     missing = {}
     for name in ("linear", "hermite"):
         for steps in (20, 40):
-            task = towing_plans.task(robot, "effort").model_copy(update={"scheme": name})
+            task = towing_plans.task(robot).model_copy(update={"scheme": name})
             scenario = lay_out(robot, task)
             outcome = Solver(build(scenario, Mesh(steps))).solve(None)
             assert outcome.success

@@ -34,7 +34,6 @@ PATIENCE = 60.0  # [s] for a browser to draw a picture
 FINE = 2.0  # times the size in the browser: of a saved picture
 RATE = 12.5  # [1/s]
 LONGEST = 12.0  # [s] of the film: longer motions are shown faster
-Switch = Callable[[str], None]  # to the robot of a name
 
 
 class Panel:

@@ -1,7 +1,5 @@
 """Read a robot, a plan, a simulation or a workspace to show."""
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ The core needs a compiler. If the machine has none, the package ziglang provides
 is requested only then.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import compiler  # pyrefly: ignore[missing-import]

@@ -26,7 +26,8 @@ def begin_with_clock(model: Model, length: float) -> State:
     Offsets within a second are tried, and around the one with the best correlation of cable speeds if it is larger.
     `length` is the length of the cables [m].
     """
-    few = _thinned(model)
+    count = len(model.measurements)
+    few = model.only(np.unique(np.linspace(0, count - 1, min(count, MOST_SAMPLES)).astype(int)))
     fixed = tuple(group for group in few.parameters.groups if group != "clock")
     without = replace(few, parameters=replace(few.parameters, groups=fixed))
     times = model.measurements.times
@@ -92,10 +93,3 @@ def _cost_at(model: Model, clock: float, length: float) -> float:
     if equations.b.size:
         gained = float(equations.b @ np.linalg.solve(held(equations.S, length), equations.b))
     return (equations.cost - of_poses - gained) / max(inside, 1)
-
-
-def _thinned(model: Model) -> Model:
-    """Return the model with fewer samples, but with poses of the whole track."""
-    count = len(model.measurements)
-    rows = np.unique(np.linspace(0, count - 1, MOST_SAMPLES).astype(int)) if count > MOST_SAMPLES else np.arange(count)
-    return model.only(rows)

@@ -1,7 +1,5 @@
 """`poses_from_log`: the poses of a platform over a log of readings of its winches."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

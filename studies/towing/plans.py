@@ -17,13 +17,10 @@ from ...statics.equilibria import equilibria
 
 Drive = Literal["fixed-length", "variable-length", "both"]
 DRIVES: tuple[Drive, ...] = ("fixed-length", "variable-length", "both")
-Aim = Literal["effort", "time"]
 FIXED, LONG, SHORT = 1.2, 1.25, 1.1  # lengths [m]
 SHIFT = np.array([0.08, 0.1, 0.1])  # of all robot-ends [m], inside their boxes
 TAUT = 0.1  # [N]: paper C requires tensions above zero
-SECONDS = 2.0  # of a motion with least effort
-SPAN = {"min": 0.1, "max": 4.0}  # [s], of a motion in least time
-OBJECTIVES = {"effort": {}, "time": {"time": 0.01, "jerk": 30.0, "carrier_acceleration": 2.0, "carrier_offset": 0.5}}
+SECONDS = 2.0  # of a motion
 
 
 @cache
@@ -34,8 +31,8 @@ def robot(name: str, drive: Drive) -> Robot:
     return Robot.model_validate({**data, "drive": drive, "cables": cables})
 
 
-def task(mover: Robot, aim: Aim, steps: int = 50) -> Task:
-    """Return the task to carry the load of `mover` between two rest poses."""
+def task(mover: Robot, steps: int = 50) -> Task:
+    """Return the task to carry the load of `mover` between two rest poses with least effort."""
     home = mover.carrier_home
     stays = mover.drive == "variable-length"
     there = home if stays else home + np.concatenate([SHIFT, np.zeros(3)])
@@ -48,14 +45,13 @@ def task(mover: Robot, aim: Aim, steps: int = 50) -> Task:
     around = {name: _line(*ends) for name, *ends in zip(names, home, there, strict=True)}
     return Task.model_validate(
         {
-            "name": f"{mover.drive}-{aim}",
+            "name": f"{mover.drive}-effort",
             "path": _line(start, end),
             "tube": {"position": "free", "attitude": "free", "ends": "exact"},
             "base": {"kind": "hold"} if stays else {"kind": "free", "ends": "exact", "around": around},
-            "duration": SECONDS if aim == "effort" else SPAN,
+            "duration": SECONDS,
             "margin": TAUT,
             "steps": steps,
-            "objective": OBJECTIVES[aim],
         }
     )
 
@@ -64,7 +60,7 @@ def task(mover: Robot, aim: Aim, steps: int = 50) -> Task:
 def planned(name: str, drive: Drive) -> Plan:
     """Return the plan with least effort of a robot of the library with a drive, computed once in a process."""
     mover = robot(name, drive)
-    return plan(mover, task(mover, "effort"))
+    return plan(mover, task(mover))
 
 
 def _line(start: np.ndarray, end: np.ndarray) -> dict[str, Any]:
