@@ -22,7 +22,7 @@ GHOST = style.colour(2)  # the reference of a flight
 OTHER = "#444444"  # of the plan or flight that is compared
 PART, BLACK = "#969696", "#000000"  # of posts; of pulleys and rotors
 STOPS = 9  # of the legend's gradient
-COLUMNS = (("cable", "left", 0), ("tension", "right", 10), ("", "left", 0), ("limits [N]", "left", 10))
+COLUMNS = (("cable", "left", 0), ("tension", "right", 6), ("", "left", 0), ("limits [N]", "left", 6))
 # On screens below 36 em, viser's panel is a sheet of 20 em that covers 60 % of the height.
 SHEET = ".mantine-Paper-root:has(.towline-readout)"
 NARROW = (
@@ -89,7 +89,7 @@ def table(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str
         there = bool(np.isfinite(tension))
         hue = f"rgb({', '.join(str(part) for part in shade)})"
         bar = (
-            f'<div style="width:64px;height:8px;background:#e8e8e8">'
+            f'<div style="width:40px;height:8px;background:#e8e8e8">'
             f'<div class="towline-bar" style="width:{100 * at if there else 0:.0f}%;height:8px;background:{hue}">'
             "</div></div>"
         )
@@ -103,12 +103,12 @@ def table(instant: Snapshot, robot: Robot, other: Snapshot | None = None) -> str
         # The colour of the cable's curve, where there are curves.
         edge = "" if instant.time is None else f"border-left:4px solid {style.colour(index)};padding-left:6px"
         rows.append(
-            f'<tr><td style="{edge}">{index + 1}</td><td style="text-align:right;padding:0 10px" '
-            f'class="towline-tension">{shown}</td><td>{bar}</td>'
-            f'<td style="color:{MUTED};padding-left:10px">{limits}</td></tr>'
+            f'<tr style="white-space:nowrap"><td style="{edge}">{index + 1}</td>'
+            f'<td style="text-align:right;padding:0 6px" class="towline-tension">{shown}</td><td>{bar}</td>'
+            f'<td style="color:{MUTED};padding-left:6px">{limits}</td></tr>'
         )
     heads = "".join(
-        f'<th style="font-weight:600;text-align:{side};padding:0 {pad}px">{name}</th>'
+        f'<th style="font-weight:600;text-align:{side};padding:0 {pad}px;white-space:nowrap">{name}</th>'
         for name, side, pad in (COLUMNS if other is None else (*COLUMNS[:2], ("other", "left", 0), COLUMNS[3]))
     )
     return f'<table style="border-collapse:collapse;margin-top:6px"><tr>{heads}</tr>{"".join(rows)}</table>'
