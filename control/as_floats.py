@@ -71,12 +71,6 @@ def as_floats(given: Given, robot: Robot, rows: int | None) -> Given:
     return given._replace(**arrays) if arrays else given
 
 
-def for_all(value: Any, rows: int) -> np.ndarray:
-    """Return the motion of carriers for each row, (rows, c, 6), from one for each or one for all, (c, 6)."""
-    value = np.asarray(value, dtype=float)
-    return value if value.ndim == 3 else value[None].repeat(rows, axis=0)
-
-
 def _array(name: str, value: Any, core: tuple[int, ...]) -> np.ndarray:
     """Return an array of float64 whose last dimensions are `core`, or raise InputError."""
     if type(value) is np.ndarray and value.dtype is FLOAT and value.shape[-len(core) :] == core:

@@ -24,9 +24,8 @@ class Moved(ABC):
     """Coordinates of carriers in a predictive solution, with their accelerations as controls."""
 
     freed: np.ndarray  # carrier and coordinate of each one that may leave the reference, (f, 2) or (0, 2)
-    tethers: np.ndarray  # carriers held by cables of fixed length, (k,) of `TETHER`
+    tethers: np.ndarray  # carriers held by cables of fixed length, (k,) of `TETHER`; another array: other coordinates
     count: int  # number of coordinates, f
-    recentred = False  # whether the coordinates are others than when this was last set to False
 
     @abstractmethod
     def reset(self) -> None:
@@ -37,7 +36,7 @@ class Moved(ABC):
         """Return the coordinates and two derivatives, (K, 3, f), for motions (K, 3, 6) and (K, c, 3, 6)."""
 
     def recentre(self, platform: np.ndarray, carriers: np.ndarray) -> None:
-        """Change the coordinates, and set `recentred`, if motions as in `along` come near their bounds."""
+        """Change the coordinates, those of `tethers`, if motions as in `along` come near their bounds."""
         return None
 
     @abstractmethod
@@ -198,7 +197,7 @@ class Tethered(Late):
     @override
     def reset(self) -> None:
         self._now, self._measured = np.zeros((1, 3, self.count)), np.zeros((0, 12))
-        self.tethers, self.recentred = self._at_home, True
+        self.tethers = self._at_home
         self._pending.reset(self.count)
 
     @override
@@ -215,7 +214,8 @@ class Tethered(Late):
         )
         far = np.array([place.sum(axis=1).max() for place in places[:-1]])
         if (far > (LEAVES * self.tethers["farthest"]) ** 2).any():
-            self.tethers, self.recentred = _tethers(self._model, platform[:, 0], carriers[:, :, 0]), True
+            self.tethers = _tethers(self._model, platform[:, 0], carriers[:, :, 0])
+            self._pending.reset(self.count)  # these coordinates have other axes
 
     @override
     def now(self, dt: float, measured: np.ndarray, reference: np.ndarray) -> np.ndarray:

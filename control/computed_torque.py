@@ -13,7 +13,7 @@ from ..core import control_step, control_thrusts
 from ..models.files import AnyRobot, as_robot
 from ..models.record import record_of
 from ..solvers.in_place import InPlace
-from .as_floats import ROUNDING, as_floats, for_all, is_time, measured_at, rows_of
+from .as_floats import ROUNDING, as_floats, is_time, measured_at, rows_of
 from .bandwidths import HELD, SWINGING, bandwidths_for, place_for
 from .boxes import boxes, stay_inside
 from .carried_load import CarriedLoad
@@ -47,8 +47,8 @@ class ComputedTorque(Controller):
     with errors of the attitude as rotation vectors in the platform's axes, so that no attitude is special, and
     d the disturbance that an observer estimates from the momentum: dp/dt = A t + m g + d. Every state gets a
     command: these tensions if they exist (status "as planned"), otherwise those with the closest wrench ("soft
-    wrench"). While states contain nan, the last command moves to the planned tensions as fast as the rate permits, and
-    quadrotors finish their turn ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted;
+    wrench"). While state or reference contain nan, the last command moves to the planned tensions as fast as the rate
+    permits, and quadrotors finish their turn ("hold"). A wrench error up to 0.1 % of the robot's weight is accepted;
     with fewer cables than degrees of freedom, 0.1 % along each cable and 10 % in all. Carriers follow the reference, or
     deviate from it within their `reach` to help the tensions. This damps the swing of loads of towing robots and of
     teams of quadrotors, with fewer cables than degrees of freedom. Quadrotors have separate loops for position and
@@ -145,9 +145,8 @@ class ComputedTorque(Controller):
         self._little = np.maximum(self._limits.low, SOMETHING * self._limits.high)
         self._boxes = boxes(self.robot) if far.any() else None
         self._robot, self._carried = record_of(self.robot), CarriedLoad(self.robot)
-        self._moves_carriers = self._flies or bool(far.any())
         self._lead = rotor_lead(self.robot, rotors) if rotors else None
-        self._is_plain = not self._moves_carriers and self._loop is None and self._ahead is None
+        self._is_plain = not self._flies and not far.any() and self._loop is None and self._ahead is None
         self._negligible, self._deviation = NEGLIGIBLE * self.robot.force_scale, Deviation(self.robot)
         self._begin(1)
 
@@ -196,7 +195,7 @@ class ComputedTorque(Controller):
         self._accelerations = bytes(8 * rows * count * 6)  # of carriers, as ordered last
         self._last = bytes(8 * rows * m)  # tensions that were commanded last
         self._measured, self._wanted = np.zeros((rows, 1 + count, 12)), np.zeros((rows, 18))
-        self._carriers = np.zeros((rows, count, 3, 6))  # how they should move, where they have a command of their own
+        self._carriers = np.zeros((rows, count, 3, 6))  # how they should move
         self._cables, self._platform = np.zeros((rows, m), CABLE), np.zeros(rows, PLATFORM)
         self._platform["integrates"] = 1
         ComputedTorque._speed_up(self)
@@ -204,9 +203,8 @@ class ComputedTorque(Controller):
         self._actuation = np.zeros((rows, count, max(len(carrier.actuators) for carrier in self.robot.carriers)))
         self._turning = np.zeros(rows, TURNING) if self._flies else None
         self._problems = problems = InPlace(rows, 6, m, self.robot.length)
-        orders = self._carriers if self._moves_carriers else None
         memory = self._cables, self._platform, self._of_carriers
-        self._arrays = self._measured, self._wanted, orders, *memory, problems.memory
+        self._arrays = self._measured, self._wanted, self._carriers, *memory, problems.memory
         for part in (self._loop, self._ahead, self._lead):
             if part is not None:
                 part.reset()
@@ -241,7 +239,7 @@ class ComputedTorque(Controller):
             tensions, proof = problems.tensions.copy(), (problems.direction.copy(), problems.shortfall.copy())
             self._platform["integrates"] = answered == PLANNED
         self._paused = answered is not self._as_planned
-        return self._command(reference, tensions, answered, proof, self._is_one)
+        return self._command(tensions, answered, proof, self._is_one)
 
     def _measure(
         self, time: float, state: State, reference: Reference, solves: int = 0
@@ -327,28 +325,21 @@ class ComputedTorque(Controller):
         self._robot = self._carried.change(load, time)
 
     def _command(
-        self,
-        reference: Reference,
-        tensions: np.ndarray,
-        answered: np.ndarray,
-        proof: tuple[np.ndarray, np.ndarray],
-        alone: bool,
+        self, tensions: np.ndarray, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray], alone: bool
     ) -> Command:
-        """Return the command from tensions (N, m) and the reference of carriers that do not compensate or fly."""
-        carriers = reference.carrier_pose, reference.carrier_velocity, reference.carrier_acceleration
+        """Return the command from tensions (N, m) and the motion of the carriers."""
         if self._is_missing:
             tensions = np.where(self.cut, self._little, tensions)  # so that one that is not cut reports it
             unheard = (self._platform["silent"] > 1) & ((answered == PLANNED) | (answered == SHIFTED))
             answered = np.where(unheard, SOFT, answered).astype(np.int8)
-        rows, self._cables["last"], self._last = len(tensions), tensions, tensions.tobytes()
-        if self._moves_carriers:
-            own = self._carriers.copy()
-            if self._boxes is not None:
-                stay_inside(own, *self._boxes)
-            own = own[0] if alone else own
-            carriers = own[..., 0, :], own[..., 1, :], own[..., 2, :]
-        ordered = carriers[2]
-        self._accelerations = (ordered if self._moves_carriers else for_all(ordered, rows)).tobytes()
+        self._cables["last"], self._last = tensions, tensions.tobytes()
+        carriers = self._carriers.copy()
+        if answered is not self._as_planned:
+            self._go_on(carriers)
+        if self._boxes is not None:
+            stay_inside(carriers, *self._boxes)
+        pose, velocity, acceleration = carriers.transpose(2, 0, 1, 3)  # (N, c, 6) each
+        self._accelerations = acceleration.tobytes()
         actuation = None
         if self._flies:
             memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation
@@ -364,9 +355,15 @@ class ComputedTorque(Controller):
             answered = self._deviation.status(answered, self._measured[:, 0, :6], self._wanted[:, :6])
         if alone:
             own = None if actuation is None else actuation[0]
-            return Command(tensions[0], *carriers, answered[0], proof[0][0], proof[1][0], own)
-        pose, velocity, acceleration = (for_all(part, rows) for part in carriers)
+            moving = pose[0], velocity[0], acceleration[0]
+            return Command(tensions[0], *moving, answered[0], proof[0][0], proof[1][0], own)
         return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
+
+    def _go_on(self, carriers: np.ndarray) -> None:
+        """Let carriers, (N, c, 3, 6), with nan in their reference go on as measured."""
+        unknown = ~np.isfinite(carriers).all(axis=(2, 3))
+        measured = self._measured[:, 1:].reshape(*unknown.shape, 2, 6)
+        carriers[unknown, :2], carriers[unknown, 2] = measured[unknown], 0.0
 
     def _with_thrust_lacking(
         self, answered: np.ndarray, proof: tuple[np.ndarray, np.ndarray]

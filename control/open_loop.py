@@ -47,6 +47,7 @@ def planned_command(robot: Robot, reference: Reference, rows: int | None) -> Com
     lead, planned = () if rows is None else (rows,), reference.tensions
     known = planned is not None and bool(np.isfinite(planned).all())
     tensions = np.clip(robot.t_min if planned is None or not known else planned, robot.t_min, robot.t_max)
-    answered = np.full(lead, PLANNED if known else HOLD, dtype=np.int8)
+    follows = known and all(np.isfinite(part).all() for part in reference[3:6])
+    answered = np.full(lead, PLANNED if follows else HOLD, dtype=np.int8)
     pose, velocity, acceleration = (np.broadcast_to(part, (*lead, *np.shape(part)[-2:])) for part in reference[3:6])
     return Command(np.broadcast_to(tensions, (*lead, robot.m)), pose, velocity, acceleration, answered)

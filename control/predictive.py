@@ -183,7 +183,7 @@ class Predictive(ComputedTorque):
             self._horizon = self._program(reaches)
         count, n, u = self._sizes
         self._guess, self._solved = (np.zeros((count + 1, n)), np.zeros((count, u))), np.nan  # and when it was [s]
-        self._is_near = False  # whether the next solution may start from the last
+        self._is_near, self._tethers = False, self._moved.tethers  # whether the next may start from it; its coordinates
         self._moved.reset()
 
     @override
@@ -274,7 +274,7 @@ class Predictive(ComputedTorque):
             answered, proof = instead
         else:
             answered = self._as_planned if self._solved == time else np.full(1, SHIFTED, dtype=np.int8)
-        command = self._command(reference, tensions, answered, proof, alone=True)
+        command = self._command(tensions, answered, proof, alone=True)
         agree(self._beside, self)
         if self._turning is not None and (lag := self._turning["lag"][0]):
             self.handed_over = HandOver(time, f"{LATE}, here {1e3 * lag:.0f} ms of {2e3 / self._turned:.0f}")
@@ -318,8 +318,8 @@ class Predictive(ComputedTorque):
     def _predict(self, time: float, dt: float, reference: Reference) -> np.ndarray | None:
         """Return the tensions of the next stage, (1, m), by a new solution or the last one; None without any."""
         bounds, now = self._problems.bounds[:, 0], self._preview.rows([reference])
-        if self._preview.recentred:  # the last solution has other coordinates
-            self._solved, self._preview.recentred = np.nan, False
+        if self._tethers is not self._moved.tethers:  # the last solution has other coordinates
+            self._solved, self._tethers = np.nan, self._moved.tethers
         placed = self._moved.now(dt, self._measured[0], self._preview.moved_of(now))
         if not all(np.isfinite(part).all() for part in (self._problems.w, *now[:2])):
             self._solved = np.nan

@@ -41,7 +41,6 @@ class Preview:
             must = f"the pitch at home must be from -{STEEPEST} to {STEEPEST} rad for predictive control"
             raise InputError(f"{must}, got {pitch:g} rad; other axes of the platform's frame avoid it")
         self._robot, self._unknown = robot, tensions
-        self.recentred = False  # whether the moved coordinates are others than when this was last set to False
         self.reset()
 
     def lay_out(self, steps: np.ndarray, moved: Moved) -> None:
@@ -85,10 +84,9 @@ class Preview:
             of_carriers[:, 0, :, 3:] = np.unwrap(of_carriers[:, 0, :, 3:], axis=0)
             motions[:, 0, 6 : 6 + carriers] = of_carriers[:, 0].reshape(count, -1)
         self._moved.recentre(platform, of_carriers.swapaxes(1, 2))
-        if self._moved.recentred:
-            self.recentred, self._moved.recentred = True, False
-            if self._announced is not None:
-                self._set_moved(self._announced[2].motions)
+        if self._announced is not None and self._tethers is not self._moved.tethers:
+            self._set_moved(self._announced[2].motions)
+        self._tethers = self._moved.tethers  # of the coordinates in announced references
         self._set_moved(motions)
         tensions = [self._unknown if each.tensions is None else each.tensions for each in references]
         return Rows(motions, np.array(tensions, dtype=float), [each.load for each in references])

@@ -9,7 +9,7 @@ from ..models.robot import Robot
 from ..plant import Plant
 from ..solvers import TensionSolution
 from .command import OTHERWISE
-from .controller import Controller
+from .computed_torque import ComputedTorque
 from .reference import Reference
 from .state import State
 
@@ -21,7 +21,7 @@ MORE = 1.2  # of the velocities in the second third of the steps are in the last
 PUSH, PUSHED = 0.01, 0.05  # of the robot's weight, and for how long [s]: so little that the loop is that of first order
 
 
-def grows(controller: Controller, robot: Robot, rest: TensionSolution, bandwidth: float) -> bool:
+def grows(controller: ComputedTorque, robot: Robot, rest: TensionSolution, bandwidth: float) -> bool:
     """Return whether a small error at rest at home grows in the closed loop, with the rotation of flying carriers.
 
     The loop is closed around `Plant` after a small push in all coordinates, in which unstable modes soon dominate.
@@ -42,12 +42,12 @@ def grows(controller: Controller, robot: Robot, rest: TensionSolution, bandwidth
 
 
 @lru_cache(maxsize=8)
-def _kept(kind: type[Controller], state: bytes) -> bool:
+def _kept(kind: type[ComputedTorque], state: bytes) -> bool:
     """Return what the simulation shows; a class that is defined anew is another `kind`, though its name is the same."""
     return _simulated(*pickle.loads(state))
 
 
-def _simulated(controller: Controller, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
+def _simulated(controller: ComputedTorque, robot: Robot, tensions: np.ndarray, bandwidth: float) -> bool:
     plant = Plant(robot, drive="tensions" if robot.fixed_lengths is None else "lengths")
     still = np.zeros_like(robot.carrier_home)
     reference = Reference(robot.home, np.zeros(6), np.zeros(6), robot.carrier_home, still, still, tensions)

@@ -487,6 +487,26 @@ def test_a_team_hovers_with_the_thrust_that_statics_requires():
         assert command.actuation[index, 0] == pytest.approx(force @ axis, rel=1e-9)
 
 
+@pytest.mark.parametrize("name", ["wang-flying", "wang-ctmrts", "cogiro"])
+@pytest.mark.parametrize("part", ["carrier_pose", "carrier_velocity", "carrier_acceleration"])
+def test_carriers_without_a_reference_go_on_as_measured_and_the_step_says_hold(name, part):
+    """`nan` was commanded to the carrier, and the step was "as planned"."""
+    robot = load(name)
+    state, reference = at_home(robot)
+    state.carrier_velocity[0, 0] = 0.3
+    lost = getattr(reference, part).copy()
+    lost[0, 1] = np.nan
+    for controller in (ComputedTorque(robot), Predictive(robot, stages=3)):
+        controller.step(0.0, state, reference)
+        command = controller.step(1e-3, state, reference._replace(**{part: lost}))
+        assert ANSWERS[command.answered] == "hold"
+        assert all(np.isfinite(given).all() for given in command[:4])
+        if robot.m >= len(robot.platform.dof):  # other carriers help the tensions
+            np.testing.assert_array_equal(command.carrier_pose, state.carrier_pose)
+            np.testing.assert_array_equal(command.carrier_velocity, state.carrier_velocity)
+    assert ANSWERS[OpenLoop(robot).step(0.0, state, reference._replace(**{part: lost})).answered] == "hold"
+
+
 def test_a_row_that_lacks_thrust_says_so_beside_one_without_a_state():
     """A quadrotor that falls at 8 m/s beyond its load needs 2 x 5 x 8 m/s^2 more; its cable is at no limit."""
     robot = load("multi-quadrotor-3")
