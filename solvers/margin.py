@@ -7,8 +7,6 @@ length one gives a smaller h(d) - d . w than the distance, so too many candidate
 neither.
 """
 
-from itertools import combinations
-from math import comb
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +17,7 @@ from ..base.tolerances import NEGLIGIBLE, OPTIMALITY, RANK
 from .box_least_squares import Projection, project
 from .certificate import certificate_along
 from .exact_arithmetic import exact_optimum
+from .margins import subsets_inside
 from .problem import Array, TensionProblem
 
 
@@ -101,8 +100,8 @@ def _margin(problem: TensionProblem, value: float, direction: Array) -> Margin:
 def _normals(columns: Array) -> Array:
     """Return unit vectors orthogonal to each rank - 1 of the columns, both signs, shape (candidates, rank)."""
     rank, k = columns.shape
-    subsets = np.array(list(combinations(range(k), rank - 1)), dtype=np.intp).reshape(comb(k, rank - 1), rank - 1)
-    chosen = np.zeros((subsets.shape[0], rank, rank))
+    subsets = subsets_inside(rank, k)
+    chosen = np.zeros((len(subsets), rank, rank))
     # Columns of length one, so that a short one affects where its facet is.
     lengths = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(lengths > 0.0, lengths, 1.0)

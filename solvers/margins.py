@@ -65,7 +65,7 @@ def reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray,
     - `normal`: number of the normal in `all_reserves`, (N,).
     """
     _, n, m = A.shape
-    inside = _subsets(n, m)[normal]
+    inside = subsets_inside(n, m)[normal]
     Q, R = np.linalg.qr(np.take_along_axis(A, inside[:, None, :], axis=2), mode="complete")  # columns of the facets
     direction = Q[:, :, -1]
     pull = np.einsum("ki,kim->km", direction, A)
@@ -87,7 +87,7 @@ def reserves(A: np.ndarray, w: np.ndarray, t_min: np.ndarray, t_max: np.ndarray,
 
 
 @lru_cache(maxsize=16)
-def _subsets(n: int, m: int) -> np.ndarray:
+def subsets_inside(n: int, m: int) -> np.ndarray:
     """Return the columns inside each facet, (K, n - 1)."""
     return np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(comb(m, n - 1), n - 1)
 

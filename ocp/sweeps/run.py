@@ -86,29 +86,24 @@ def sweep(
             check_writable(plan_file(folder, cases, 0))
         except InputError as error:
             raise InputError(f"keep: {error}") from None
-    rows: dict[int, Row] = {}
+    rows, tell = dict[int, Row](), progress or (lambda *_: None)
     with started(where, KIND, lambda: _header(cases, folder)) as (working, stored):
         if stored is not None:
             rows.update((number, Row(*json.loads(content))) for number, content in stored.items())
         feasible = sum(row.status == MotionStatus.FEASIBLE for row in rows.values())
-        _report(progress, rows, cases, feasible)
+        tell(len(rows), len(cases), feasible)
         for number, row in working.map(plan_case, _jobs(cases, set(rows), folder), in_order=False):
             if stored is not None:
                 stored.put(number, json.dumps(row).encode())
             rows[number] = row
             feasible += row.status == MotionStatus.FEASIBLE
-            _report(progress, rows, cases, feasible)
+            tell(len(rows), len(cases), feasible)
     return Sweep(cases, tuple(rows[number] for number in range(len(cases))))
 
 
 def plan_file(folder: Path, cases: Cases, number: int) -> Path:
     """Return the file in which a plan is saved."""
     return folder / f"plan-{number:0{len(str(len(cases) - 1))}}.nc"
-
-
-def _report(progress: Progress | None, rows: dict[int, Row], cases: Cases, feasible: int) -> None:
-    if progress is not None:
-        progress(len(rows), len(cases), feasible)
 
 
 def _jobs(cases: Cases, known: set[int], folder: Path | None) -> Iterator[tuple[Any, ...]]:
