@@ -205,7 +205,7 @@ def test_a_picture_is_saved(shown, tmp_path):
             assert download.value.suggested_filename == "caroca-pulleys.png"
             download.value.save_as(tmp_path / "saved.png")
             before, pixels = pixels, np.asarray(Image.open(tmp_path / "saved.png").convert("RGB"))
-            if np.array_equal(before, pixels) and (pixels.max(axis=2) < 100).sum() > 100:
+            if len(pixels) == 2 * 480 and np.array_equal(before, pixels) and (pixels.max(axis=2) < 100).sum() > 100:
                 break
             page.wait_for_timeout(250)
     assert pixels.shape[0] == 2 * 480
