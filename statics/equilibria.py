@@ -133,10 +133,11 @@ def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.n
     return replace(reached, neutral=bool(np.abs(frequencies).min(initial=np.inf) < UNSTABLE))
 
 
-def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> np.ndarray | None:
+def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivative of CoM and rotation vector in {G} by the lengths at an equilibrium, (6, m) [-, rad/m].
 
-    Carriers, (c, 6), are fixed, and slack cables have no effect. None if a motion is neutral, that is, undetermined.
+    Carriers, (c, 6), are fixed, and slack cables have no effect. Also return neutral, that is, undetermined motions of
+    CoM and rotation vector, (6, k).
     """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
     taut = np.setdiff1d(np.arange(robot.m), rest.slack)
@@ -146,12 +147,13 @@ def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> np.ndar
     system[:n, :n] /= max(robot.weight, 1e-300) / robot.length  # stiffness beside cosines
     U, values, V = np.linalg.svd(system)
     regular = values > 1e-9 * values[0]
-    if rest.neutral or np.abs(V[~regular, :n]).max(initial=0.0) > 1e-6:
-        return None
-    moves = np.zeros((6, robot.m))
+    moves, neutral = np.zeros((6, robot.m)), np.zeros((6, int((~regular).sum())))
+    neutral[rows] = V[~regular, :n].T * robot.wrench_scale[rows, None]
+    if rest.neutral and np.abs(neutral).max(initial=0.0) <= 1e-6:
+        neutral = np.diag(robot.dof_mask)
     inverse = V[regular].T @ (U[:, regular] / values[regular]).T
     moves[np.ix_(rows, taut)] = inverse[:n, n:] * robot.wrench_scale[rows, None]
-    return moves
+    return moves, neutral
 
 
 def _newton_system(

@@ -352,6 +352,8 @@ def test_what_the_lengths_leave_open_is_undetermined():
     assert estimate.converged
     assert not estimate.determined
     assert not estimate.conditioned
+    np.testing.assert_array_equal(np.isinf(estimate.sigmas), [False] * 5 + [True])
+    np.testing.assert_allclose(estimate.sigmas[:3], [0, 0, 1e-3], atol=1e-9)
     with pytest.raises(InputError, match="gravity must not be zero if the lengths do not determine the pose"):
         pose_from_lengths(robot.model_copy(update={"gravity": (0.0, 0.0, 0.0)}), [1.0])
 
@@ -365,6 +367,10 @@ def test_parallel_cables_leave_it_to_gravity():
     assert estimate.determined
     np.testing.assert_allclose(estimate.pose[:2], robot.home_anchors[:, :2].mean(axis=0), atol=1e-6)
     assert not pose_from_lengths(robot, np.full(6, 0.1)).consistent
+    alone = pose_from_lengths(robot.model_copy(update={"gravity": (0.0, 0.0, 0.0)}), lengths, estimate.pose)
+    np.testing.assert_array_equal(np.isinf(alone.sigmas), [True, True, False, True, True, True])  # x with ry, y with rx
+    rise = robot.home_anchors[:, 2] - alone.pose[2] - robot.attachments[:, 2]  # of level cables: all have the same
+    np.testing.assert_allclose(alone.sigmas[2], 1e-3 / (rise.mean() / 1.2 * np.sqrt(6)), rtol=1e-6)
 
 
 def test_a_nearly_singular_geometry_is_reported():

@@ -244,6 +244,8 @@ def test_simulations_are_recordings_of_any_kind(tmp_path):
     for result in (direct, replay(robot, saved.save(tmp_path / "run.nc"))):
         assert result.passed
         assert result.error < 2e-4  # of a recording without noise, but with means of tensions over periods
+    listed = run("log", tmp_path / "run.nc").stdout
+    assert "tensions for replays" in listed
     with pytest.raises(InputError, match="reference must be a plan if simulate has other arguments"):
         simulate(robot, recording, duration=1)
 

@@ -365,6 +365,13 @@ def test_angles_and_orientations_alone(tmp_path):
     np.testing.assert_allclose(points.rotations(measured.poses[:, 3:]), points.rotations(poses[:, 3:]), atol=1e-9)
 
 
+@pytest.mark.parametrize("ending", [".db3", ".bag", ".mcap", ".nc"])
+def test_a_damaged_beginning_is_not_taken_for_a_table(ending, tmp_path):
+    (tmp_path / f"log{ending}").write_bytes(b"SQXite format 3\0" + bytes(100))
+    with pytest.raises(InputError, match=f"must begin as {ending} files do, got other bytes"):
+        read_measurements(tmp_path / f"log{ending}")
+
+
 def test_plans_and_simulations_are_written_as_mcap(tmp_path):
     """What is written is read back: poses and lengths of the robot; cables end where the robot's do."""
     from mcap.reader import make_reader

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.display import Displayed
+from ..pose.estimate import unbounded
 from .curvature import curvature
 from .geometry import length_of
 from .model import STILL, Derivatives, Model, Residuals, State
@@ -284,9 +285,7 @@ def pose_covariances(model: Model, state: State) -> np.ndarray:
     They are infinite where nothing determines a coordinate, and zero where it cannot move.
     """
     roots = [_poses(part, *part.linearised(own), None)[0] for _, part, own in model.parts(state)]
-    inverse_root = np.concatenate(roots)
-    varies = model.poses_vary[:, :, None] & model.poses_vary[:, None, :]
-    covariance = np.where(varies, np.swapaxes(inverse_root, 1, 2) @ inverse_root, 0.0)[:, :6, :6]
-    unknown = np.trace(covariance, axis1=1, axis2=2) > LARGEST_VARIANCE
-    covariance[unknown] = np.inf
-    return covariance
+    _, values, V = np.linalg.svd((np.concatenate(roots) * model.poses_vary[:, None])[..., :6])
+    open_ = values[..., None] ** 2 > LARGEST_VARIANCE
+    root = np.where(open_, 0.0, values[..., None] * V)
+    return unbounded(np.swapaxes(root, 1, 2) @ root, np.swapaxes(np.where(open_, V, 0.0), 1, 2))

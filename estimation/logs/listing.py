@@ -24,7 +24,7 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
     carriers, too.
     """
     moving = [] if robot is None else [carrier.name for carrier in robot.carriers if carrier.moves]
-    carriers: dict[str, list[str]] = {}
+    others: dict[str, list[str]] = {}
     try:
         found, problem = (
             fields_of(recordings, given, None if robot is None else robot.m, moving, free_axes(robot)),
@@ -32,9 +32,11 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
         )
         for name in moving:
             of = carrier_fields(recordings, given, name)
-            carriers[name] = [one.label for one in (*of.position, *of.orientation, *of.thrusts, *of.directions)]
+            others[name] = [one.label for one in (*of.position, *of.orientation, *of.thrusts, *of.directions)]
         if given and given.thrusts and robot is not None:
-            carriers["thrusts"] = [one.label for one in command_fields(recordings, given, robot.m).thrusts]
+            others["thrusts"] = [one.label for one in command_fields(recordings, given, robot.m).thrusts]
+        if found.efforts and not found.tensions:
+            others["tensions for replays"] = [one.label for one in found.efforts]
     except InputError as error:
         found, problem = Fields(), f"{error}{', or give the robot (--robot)' if robot is None else ''}"
     return {
@@ -47,7 +49,7 @@ def listing(recordings: Sequence[Recording], given: LogMap | None = None, robot:
             }
             for one in recordings
         ],
-        "fields": {name: [one.label for one in getattr(found, name)] for name in ROLES} | carriers,
+        "fields": {name: [one.label for one in getattr(found, name)] for name in ROLES} | others,
         "uses": _uses(found, robot is not None and robot.fixed_lengths is not None),
         "problem": problem,
     }

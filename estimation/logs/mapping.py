@@ -125,6 +125,7 @@ def fields_of(
         if not found.get(name) and not (given and given.pose and name in ("position", "orientation")):
             fields = of_platform if name in ("position", "orientation", "directions") else everything
             found[name] = _usual(fields, name, m, found.get("position", ()), free=free)
+    found["efforts"] = _usual(everything, "efforts", m, ())
     return Fields(**found, time=_times(recordings, given))
 
 

@@ -77,6 +77,8 @@ def _recording(file: Path) -> Recording:
             return from_bag(file, where, kind)
         if kind == "NetCDF":
             return from_netcdf(read_bytes(file, WHAT, LARGEST_LOG), where)
+        if file.suffix.lower() in (*PARTS, ".bag", ".nc"):
+            raise InputError(f"must begin as {file.suffix} files do, got other bytes; it may be damaged")
         return from_csv(read_bytes(file, WHAT, LARGEST_CSV), where)  # which drops the bytes before it reads the text
     except InputError as error:
         text = str(error)

@@ -17,6 +17,7 @@ from ...models.robot import Robot
 
 FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
 EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
+SINGULAR, CHANGED = 1e-9, 1e-6  # share of the largest singular value, and of a motion of unit length
 MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the geometry is nearly linear
 MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standard deviations away
 
@@ -74,6 +75,8 @@ class PoseEstimate(Displayed):
                 shaped = value[0] if value.ndim > 1 else bool(value[0])
             setattr(self, name, shaped)
         self.carrier_pose = carrier_pose
+        for name in ("covariance", "conditioned"):  # of the former dimensions
+            self.__dict__.pop(name, None)
 
     @property
     def residual(self) -> Any:
@@ -95,13 +98,21 @@ class PoseEstimate(Displayed):
     def covariance(self) -> np.ndarray:
         """Return the covariance of x, y, z and a small rotation in {G}, (..., 6, 6) [m^2, m rad, rad^2].
 
-        It is zero for coordinates that cannot move, and infinite if some motion is undetermined.
+        It is zero for coordinates that cannot move, and infinite for those that an undetermined motion changes.
         """
         if self.known_covariance is not None:
             return self.known_covariance
         covariances = np.empty((*self.pose.shape[:-1], 6, 6))
         poses = np.ascontiguousarray(self.pose)
         pose_covariance(record_of(self.robot), self._carriers(), 1.0 / self.sigma, poses, covariances)
+        partly = np.isinf(covariances).any(axis=(-2, -1))
+        if partly.any():
+            units = np.repeat([1.0, self.robot.length], 3)
+            J = self._weighted_gradient()[partly] / units
+            inverse = np.linalg.pinv(J, rcond=SINGULAR)  # (..., 6, m)
+            open_ = np.diag(self.robot.dof_mask) - inverse @ J
+            known = inverse @ np.swapaxes(inverse, -1, -2) / np.outer(units, units)
+            covariances[partly] = unbounded(known, open_)
         return covariances
 
     @property
@@ -177,6 +188,12 @@ class PoseEstimate(Displayed):
         if carriers is not None and carriers.ndim > 2:
             carriers = carriers.reshape(*carriers.shape[:-2], *[1] * (pose.ndim - self.pose.ndim), *carriers.shape[-2:])
         return dynamics_of(self.robot).cable_lengths(pose, carriers)
+
+
+def unbounded(covariance: np.ndarray, motions: np.ndarray) -> np.ndarray:
+    """Return covariances (..., 6, 6) that are infinite for coordinates that undetermined motions (..., 6, k) change."""
+    changed = (np.abs(motions) > CHANGED).any(axis=-1)
+    return np.where(changed[..., :, None] | changed[..., None, :], np.inf, covariance)
 
 
 def largest_cost(redundancy: int, false_alarm: float = FALSE_ALARM) -> float:

@@ -9,7 +9,7 @@ from ...base.text import counted
 from ...models import points
 from ...models.robot import Robot
 from ...statics.equilibria import Equilibrium, equilibria, per_length, rest_near
-from .estimate import PoseEstimate
+from .estimate import PoseEstimate, unbounded
 from .problem import Problem
 
 
@@ -47,10 +47,9 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
 
 
 def _covariance(robot: Robot, rest: Equilibrium, carriers: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Return the covariance of the platform frame and a small rotation, (6, 6), infinite if a motion is neutral."""
-    moves = per_length(robot, rest, carriers)
-    if moves is None:
-        return np.full((6, 6), np.inf)
+    """Return the covariance of the platform frame and a small rotation, (6, 6), infinite where motions are neutral."""
+    motions = np.hstack(per_length(robot, rest, carriers))
     arm = points.rotations(rest.pose[3:]) @ np.array(robot.platform.com)
-    moves[:3] += np.cross(arm, moves[3:], axis=0)  # of the CoM before
-    return (moves * sigma**2) @ moves.T
+    motions[:3] += np.cross(arm, motions[3:], axis=0)  # of the CoM before
+    moves, neutral = np.split(motions, [robot.m], axis=1)
+    return unbounded((moves * sigma**2) @ moves.T, neutral)
