@@ -17,7 +17,7 @@ from ..tasks.scenario import MOST_SAMPLES
 from .checks import LENGTH_TOLERANCE
 from .curvature import between, is_jump, leaves
 from .instants import Instants, instants, joined
-from .tensions import tolerance_of
+from .tensions import scaled, tolerance_of
 
 BESIDE = 2e-9  # of the duration: how far before a jump
 APART = 1e-4  # of the time between two instants: a corner that is nearer to one is as good as at it
@@ -152,7 +152,8 @@ def _missing_and_reached(
     Both are in [N]. The second derivatives are those at `rows`. The second value is known between the
     instants that are `doubtful`, where the first is more than is tolerated.
     """
-    times, A, w, robot = seen.times, seen.A, seen.w, seen.scenario.robot
+    times, robot = seen.times, seen.scenario.robot
+    A, w = scaled(seen.scenario, seen.A), scaled(seen.scenario, seen.w)
     h, dA, dw, product = np.diff(times), np.diff(A, axis=0), np.diff(w, axis=0), "nij,nj->ni"
     after = np.einsum(product, dA[rows], t[rows]) - dw[rows]
     before = np.einsum(product, dA[rows - 1], t[rows]) - dw[rows - 1]
@@ -173,7 +174,10 @@ def _missing_and_reached(
     square = weighted @ weighted.swapaxes(1, 2)
     size = np.einsum("nii->n", square)
     square += (SINGULAR * size + (size == 0))[:, None, None] * np.eye(len(moving))
-    parts = np.linalg.norm(weighted.swapaxes(1, 2) @ np.linalg.inv(square), axis=2).max(axis=1)  # of a cable's room
-    weighted_reach = np.divide(1.0, parts, out=np.zeros_like(parts), where=parts > 0)
+    inverse = np.linalg.inv(square)
+    parts = np.linalg.norm(weighted.swapaxes(1, 2) @ inverse, axis=2).max(axis=1)  # of a cable's room
+    # Where these miss a share of a wrench they can make up for it in turn, as for a geometric series, if it is below 1.
+    missed = SINGULAR * size * np.linalg.norm(inverse, axis=(1, 2))
+    weighted_reach = np.divide((1.0 - missed).clip(0.0), parts, out=np.zeros_like(parts), where=parts > 0)
     reached[spans] = np.maximum(reached[spans], weighted_reach)
     return missing, reached

@@ -17,6 +17,7 @@ import numpy as np
 from ...base.text import quantity
 from ...solvers import solve_batch
 from ..audits.tensions import INDEPENDENT
+from ..tasks.paths import Motion
 from ..tasks.scenario import Scenario
 
 PLACES = 41
@@ -55,29 +56,34 @@ def durations(scenario: Scenario) -> Durations | None:
     """Return the durations that are possible at `PLACES` points of the path; None if this method does not apply.
 
     It does not if anything but the duration is free, a path has times of its own, the drag depends on the speed
-    in another way, or the cables have fewer independent columns than the platform has degrees of freedom.
+    in another way, the ground bears something, or the cables have fewer independent columns than the platform has
+    degrees of freedom.
     """
-    paths = [scenario.path, *scenario.carrier_paths.values()]
-    if scenario.count or scenario.task.wind is not None or not all(path.stretches for path in paths):
+    if scenario.count or scenario.task.wind is not None or scenario.phases.rest or not scenario.stretches:
         return None
     robot, dynamics = scenario.robot, scenario.dynamics
-    shares = np.linspace(0.0, 1.0, PLACES)
-    platform, carriers = scenario.motion(shares * scenario.duration, None)
     rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
+    loads = [None, *range(scenario.phases.extremes)]
+    shares = np.linspace(0.0, 1.0, PLACES)
+    platform, carriers = scenario.motion(shares * scenario.duration, None)
     A = dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     values = np.linalg.svd(A, compute_uv=False)
     if robot.m < len(rows) or (values[:, -1] < INDEPENDENT * values[:, 0]).any():
         return None
-    still = np.zeros_like(platform.pose)
-    at_rest = dynamics.required_wrench(platform.pose, still, still)
-    c = at_rest[:, rows] * scale / robot.force_scale
+
+    def wrenches(platform: Motion, carriers: Motion) -> np.ndarray:
+        """Return the wrenches that platform and each load need, place after place, (k, r) [force scale]."""
+        each = [scenario.required_wrench(shares, platform, carriers, None, load) for load in loads]
+        return np.stack(each, axis=1).reshape(-1, 6)[:, rows] * scale / robot.force_scale
+
+    A, places = (np.repeat(values, len(loads), axis=0) for values in (A, shares))
+    c = wrenches(*(Motion(body.pose, 0 * body.pose, 0 * body.pose) for body in (platform, carriers)))
     # T_0 is the duration with wrenches of the size of the robot's forces: others lose the digits of X or of d.
     d, whole = np.zeros_like(c), scenario.duration
     for _ in range(2):
         whole *= np.sqrt(float(np.abs(d).max()) or 1.0)
-        moving = scenario.lasting(whole).motion(shares * whole, None)
-        d = dynamics.required_wrench(*moving[0], *moving[1])[:, rows] * scale / robot.force_scale - c
+        d = wrenches(*scenario.lasting(whole).motion(shares * whole, None)) - c
     bounds = [bound / robot.force_scale for bound in scenario.bounds()]
     least, most, decisive, k = 0.0, FASTEST, 0, 0
     while True:
@@ -90,13 +96,13 @@ def durations(scenario: Scenario) -> Durations | None:
         k += int(first)
         interval = _interval(A[k], c[k], d[k], bounds, (least, most), (here[0][first], here[1][first]))
         if interval is None:
-            return Durations(np.inf, 0.0, float(shares[k]))
+            return Durations(np.inf, 0.0, float(places[k]))
         decisive = k if interval[1] < most else decisive
         least, most = interval
         k += 1
-    shortest = whole / np.sqrt(most)
+    shortest = 0.0 if most == FASTEST else whole / np.sqrt(most)
     longest = np.inf if least <= SLACK else whole / np.sqrt(least)
-    return Durations(float(shortest), float(longest), float(shares[decisive]))
+    return Durations(float(shortest), float(longest), float(places[decisive]))
 
 
 def _interval(

@@ -13,6 +13,7 @@ from ...base.text import quantity
 from ...models.part import PositiveRange
 from ..audits.audit import audit
 from ..plan import Plan
+from ..proofs.durations import Durations, durations
 from ..result import PlannerStep
 from ..tasks.lay_out import lay_out
 from ..tasks.lay_out_phases import LEAST_INSTANTS
@@ -73,10 +74,10 @@ def _with_dwell(scenario: Scenario, span: PositiveRange) -> tuple[Scenario, Chos
 def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
     """Return the scenario with a number for each duration of a phase, and the stage that chose them.
 
-    A phase is audited alone, at durations that double, and then halve the range in which the shortest lies. What its
-    neighbours require of it, such as loads that the ground takes up, is only known to the audit of the whole. A phase
-    that is not even feasible at its longest duration keeps this, and so do those left when the task's time limit has
-    passed. A scenario without a range of a phase is returned as it is.
+    A phase is audited alone, from the shortest duration on that its tensions allow (`durations`), at ever larger steps,
+    which are then halved. What its neighbours require of it, such as loads that the ground takes up, is only known to
+    the audit of the whole. A phase that is not even feasible at its longest duration keeps this, and so do those left
+    when the task's time limit has passed. A scenario without a range of a phase is returned as it is.
 
     Raises `InputError` if a phase has a range although tube or base leave the motion free.
     """
@@ -95,33 +96,45 @@ def _shortest_phases(scenario: Scenario) -> tuple[Scenario, Chosen | None]:
     message = ""
     for index, span in ranged:
 
-        def lasts(seconds: float, index: int = index) -> bool:
-            return audit(lay_out(scenario.robot, _alone(task, index, seconds)), None).passed
+        def lasting(seconds: float, index: int = index) -> Scenario:
+            return lay_out(scenario.robot, _alone(task, index, seconds))
 
         if time.perf_counter() - start > task.time_limit:
             message, seconds = "time limit", span.max
         else:
-            seconds = _shortest(span, lasts)
+            left = _left(lasting(span.max))
+            seconds = _shortest(span, lambda seconds: audit(lasting(seconds), None).passed, left)
         phases[index] = phases[index].model_copy(update={"duration": seconds})
     chosen = lay_out(scenario.robot, task.model_copy(update={"phases": tuple(phases)}))
     message = ", ".join(filter(None, [message, f"motion of {quantity(chosen.duration, 's')}"]))
     return chosen, Chosen(PlannerStep("durations of phases", message, time.perf_counter() - start))
 
 
-def _shortest(of: PositiveRange, feasible: Callable[[float], bool]) -> float:
-    """Return the shortest feasible duration of a range [s], or its longest if that is not feasible either."""
-    low = min(max(of.min, LEAST), of.max)
-    high = min(2 * low, of.max)
+def _shortest(of: PositiveRange, feasible: Callable[[float], bool], left: Durations | None = None) -> float:
+    """Return the shortest feasible duration of a range [s], or its longest if that is not feasible either.
+
+    No duration but those that are `left` is feasible, if that is known.
+    """
+    if left is not None and not left.leave(of.min, of.max):
+        return of.max
+    low = min(max(of.min, LEAST, 0.0 if left is None else left.shortest), of.max)
     if feasible(low):
         return low
-    while not feasible(high):  # short motions are audited sooner
+    step = CLOSE  # first: where the tensions decide, the shortest is near
+    while not feasible(high := min((1 + step) * low, of.max)):
         if high == of.max:
             return high
-        low, high = high, min(2 * high, of.max)
+        low, step = high, 4 * step
     while high > (1 + CLOSE) * low:
         middle = (low * high) ** 0.5
         low, high = (low, middle) if feasible(middle) else (middle, high)
     return high
+
+
+def _left(alone: Scenario) -> Durations | None:
+    """Return the durations that the tensions of a phase allow, which is laid out alone; None if they are not known."""
+    assert isinstance(alone.path, SequencePath)
+    return durations(alone.along(alone.path.parts[0].path, alone.duration))
 
 
 def _alone(task: Task, index: int, seconds: float) -> Task:

@@ -33,7 +33,7 @@ from .parametrised_path import ParametrisedPath, PathLimits
 from .phase_plane import PhasePlane, phase_plane, proofs
 from .timed_task import ACCELERATIONS, KNOWN_LIMITS, SPEEDS, check_task
 
-ATTEMPTS = 8
+ATTEMPTS = 12
 MOST_INTERVALS = 6400
 FINER_TRIES = 2  # after a grid on which the search ended without a law
 RESERVE = 1e-7  # of the weight, kept from the tension limits against rounding
