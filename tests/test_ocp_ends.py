@@ -15,6 +15,7 @@ from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, Planner, plan
 from towline.ocp.audits.audit import audit
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
+from towline.ocp.proofs.no_cycle import _Cycle
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.task_limits import TaskLimits
@@ -364,3 +365,65 @@ def test_ends_that_carriers_cannot_hold_from_within_their_reach_are_proven(name)
         (offer,) = plan(robot, proofs[0]).relaxations
         assert offer.plan.feasible
         assert 0 < offer.possible < offer.requested
+
+
+def hung(reach):
+    """Return a point mass of 5 kg under four anchors, and a cycle about a place as far from their middle [m]."""
+    cables = [
+        {"carrier": "frame", "anchor": [x, y, 2.5], "attachment": [0, 0, 0], "t_min": 1, "t_max": 150}
+        for x, y in ((2, 1), (2, -1), (-2, 1), (-2, -1))
+    ]
+    platform = {"mass": 5, "dof": ["x", "y", "z"], "home": [0, 0, 1, 0, 0, 0]}
+    keys = {"name": "hung", "source": "here", "platform": platform, "cables": cables}
+    robot = Robot.model_validate(keys | {"carriers": [{"name": "frame", "kind": "ground"}]})
+    points = [[reach, 0.1, 1], [reach, -0.1, 1], [reach + 0.1, 0, 1.1]]
+    path = {"kind": "waypoints", "points": [*points, points[0]]}
+    return robot, {"path": path, "duration": 2, "tube": {"position": 0.1, "ends": "periodic"}, "steps": 30}
+
+
+def mean_exists(planned):
+    """Whether some tensions at poses all over the tube have the weight for their mean, by HiGHS (3 rows of forces)."""
+    rng, robot, tube = np.random.default_rng(0), planned.scenario.robot, planned.scenario.task.tube
+    poses = np.repeat(planned.scenario.motion(np.linspace(0, planned.duration, 25), None)[0].pose, 8, axis=0)
+    way = rng.normal(size=(len(poses), 3))
+    poses[:, :3] += tube.position * way / np.linalg.norm(way, axis=1, keepdims=True)
+    lines = robot.anchors - poses[:, None, :3]
+    u = lines / np.linalg.norm(lines, axis=2, keepdims=True)
+    k, m = u.shape[:2]
+    share, each = np.kron(np.eye(k), np.ones((m, 1))), np.eye(k * m)  # of the time, at each pose
+    bounded = [np.hstack([sign * each, -sign * bound * share]) for sign, bound in ((1, 150), (-1, 1))]
+    mean = np.hstack([u.reshape(-1, 3).T, np.zeros((3, k))])
+    equal = np.vstack([mean, np.append(np.zeros(k * m), np.ones(k))])
+    w = [0, 0, 5 * 9.81, 1]
+    found = linprog(np.zeros(k * m + k), np.vstack(bounded), np.zeros(2 * k * m), equal, w, method="highs")
+    return found.status == 0
+
+
+def test_a_cycle_whose_mean_no_tensions_give_is_proven_infeasible():
+    outside, inside = (plan(*hung(reach)) for reach in (2.4, 1.5))
+    assert outside.status is MotionStatus.INFEASIBLE
+    assert "in the mean over every cycle" in str(outside.audit.excess[0])
+    assert 0 < outside.audit.excess[0].value < 5 * 9.81
+    assert not mean_exists(outside)
+    assert inside.feasible
+    assert mean_exists(inside)
+
+
+def test_no_direction_proves_a_cycle_infeasible_that_exists():
+    """The wrench of the cables about a fixed point has the weight for its mean, whatever the cycle does."""
+    points = [[0, 0, 1], [0.3, 0.1, 1.1], [0.1, 0.3, 1.2], [0, 0, 1]]
+    tube = {"position": 0.05, "attitude": 0.1, "ends": "periodic"}
+    task = {"path": {"kind": "waypoints", "points": points}, "duration": 1.5, "tube": tube, "steps": 40}
+    found = plan(ROBOT, task)
+    assert found.feasible
+    motion, cycle = found.audit.motion, _Cycle(found.scenario)
+    dynamics, force = Dynamics(ROBOT), ROBOT.platform.mass * np.array(ROBOT.gravity)
+    A = dynamics.wrench_matrix(motion.pose)
+    com = motion.pose[:, :3] + Rotation.from_euler("xyz", motion.pose[:, 3:]).apply(ROBOT.platform.com) - cycle.about
+    pull = np.einsum("nij,nj->ni", A, found.audit.tensions)
+    about = pull[:, 3:] + np.cross(com, pull[:, :3] + force)
+    mean = np.trapezoid(np.hstack([pull[:, :3] + force, about]), found.audit.times, axis=0) / found.duration
+    assert np.abs(mean).max() < 1e-3 * np.linalg.norm(force)
+    rng = np.random.default_rng(3)
+    for direction in rng.normal(size=(50, 6)):
+        assert cycle.shortfall(direction / np.linalg.norm(direction))[0] <= 0

@@ -24,6 +24,7 @@ from ..tasks.ends import AT_REST, fixed_values
 from ..tasks.paths import Motion
 from ..tasks.scenario import ATTITUDE, Scenario
 from .no_attitude import CERTAIN, no_attitude
+from .no_cycle import no_cycle
 from .out_of_reach import out_of_reach
 from .too_fast import too_fast
 from .too_heavy import OF_WEIGHT, too_heavy
@@ -78,7 +79,7 @@ def infeasible_ends(scenario: Scenario) -> InfeasibleEnds | None:
     if certificate is None:
         certificate = _beyond_reach(scenario, times, freedom, platform, carriers)
     if not proven and certificate is None:
-        proven += _at_no_attitude(scenario, times, freedom, platform, carriers)
+        proven += _at_no_attitude(scenario, times, freedom, platform, carriers) or no_cycle(scenario)
     return InfeasibleEnds(proven, certificate) if proven or certificate is not None else None
 
 
