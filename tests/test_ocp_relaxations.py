@@ -287,3 +287,20 @@ def test_an_enclosed_end_has_a_way_without_the_wall_that_closes_it(monkeypatch):
     assert not none.relaxations
     assert none.cut_short
     assert "the search for changes was cut short" in none.report()
+
+
+def test_robots_that_cannot_be_so_far_apart_have_a_distance_at_which_they_hold_the_platform():
+    """The farthest corners of their reach are less than 8 m apart."""
+    task = {"path": {"kind": "rest", "pose": [1.26, 0.96, 0.4]}, "duration": 1, "base": {"kind": "free"}, "steps": 4}
+    task |= {"tube": {"position": 0.02, "attitude": 0.1}}
+    robot = load("wang-ctmrts")
+    laid_out = lay_out(robot, read_task(task | {"limits": {"carrier_separation": 8.4}}))
+    search = Search(laid_out, {}, None)
+    (offer,) = relaxations.near_motion(search, laid_out, None, search.audit_motion(laid_out, None), (1.0, 1.0))
+    assert offer.name == "limits.carrier_separation"
+    corners = np.array([[carrier.reach.min, carrier.reach.max] for carrier in robot.carriers])
+    assert np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)) < 8
+    anchors = robot.home_anchors
+    nearest = min(np.linalg.norm(anchors[i] - anchors[j]) for i in range(3) for j in range(i))
+    assert 0.7 * nearest < offer.possible < 8.4
+    assert plan(robot, task | {"limits": {"carrier_separation": offer.possible}}).feasible

@@ -6,6 +6,7 @@ import pytest
 from towline import Robot, Task, load, plan, tensions
 from towline.ocp.planner import Planner
 from towline.ocp.reports.report import sections
+from towline.ocp.search.largest_share import largest_share
 from towline.ocp.search.other_paths import other_yaws
 from towline.ocp.search.search import Search
 from towline.ocp.tasks.paths.shifted import shifted
@@ -240,6 +241,26 @@ def test_a_shifted_path_is_the_path_elsewhere(fields):
     np.testing.assert_allclose(after.acceleration, before.acceleration, atol=1e-9)
 
 
+def test_two_causes_have_two_changes_and_neither_alone_is_enough():
+    held = {"carrier": "f", "attachment": [0, 0, 0], "t_min": 1, "t_max": 900}
+    aero = {"air_density": 1.2, "drag": 1.0, "lift": 0.0, "area": 1.0}
+    robot = {"name": "r", "source": "made up", "carriers": [{"name": "f", "kind": "ground"}]}
+    robot |= {"platform": FLOOR | {"aero": aero}, "cables": [held | {"anchor": anchor} for anchor in ANCHORS]}
+    line = {"kind": "line", "start": [0, 0, 1], "end": [0.1, 0.1, 1.1]}
+    task = {"path": line, "duration": 1, "wind": [60, 0, 0], "margin": 300}
+    found = plan(Robot.model_validate(robot), task)
+    wind, margin = sorted(found.relaxations, key=lambda offer: offer.unit, reverse=True)
+    assert (wind.name, margin.name) == ("wind", "margin")
+    changes = {"wind": [wind.possible, 0, 0]}, {"margin": margin.possible}
+    assert plan(Robot.model_validate(robot), task | changes[0] | changes[1]).feasible
+    for change in ({"wind": [0, 0, 0]}, {"margin": 0}):
+        assert not plan(Robot.model_validate(robot), task | change).feasible
+    larger = {"wind": [1.1 * wind.possible, 0, 0]}, {"margin": 1.1 * margin.possible}
+    for k in (0, 1):
+        assert not plan(Robot.model_validate(robot), task | larger[k] | changes[1 - k]).feasible
+    assert "together with margin" in advice(found, "feasible wind")
+
+
 def advice(found, name):
     """The text of a row of what can be tried."""
     return dict(next(section for section in sections(found) if section.title == "What you can try").facts)[name]
@@ -301,7 +322,9 @@ def test_a_region_on_the_way_has_a_way_round():
     assert not any("leaves the frame" in warning for warning in followed.warnings)
 
 
-@pytest.mark.parametrize(("which", "tube"), [("start", {}), ("end", {}), ("start", {"position": "free"})])
+@pytest.mark.parametrize(
+    ("which", "tube"), [("start", {}), ("end", {}), ("start", {"position": 0.1}), ("start", {"position": "free"})]
+)
 def test_an_end_inside_a_region_has_a_clear_one_near_by(which, tube):
     crate = {"kind": "box", "name": "crate", "min": [-1, -1, 1], "max": [1, 1.4, 3], "cables": None}
     inside, outside = [0, 0, 2], [3, 2, 2]
@@ -314,6 +337,19 @@ def test_an_end_inside_a_region_has_a_clear_one_near_by(which, tube):
     place = [float(each) for each in text[1 : text.index(")")].split(", ")]
     assert float(text.split(" m, ")[1].split()[0]) == pytest.approx(np.linalg.norm(np.subtract(place, inside)))
     assert plan("cogiro", task | {"path": {"kind": "line", **ends, which: place}}).feasible
+
+
+def test_in_a_tube_too_the_line_from_another_start_is_clear():
+    """The nearest start that is clear lies behind the ball, from where the line leads through it."""
+    ball = {"kind": "sphere", "name": "ball", "centre": [-0.25, 0, 0.72], "radius": 0.15, "cables": None}
+    behind, end = [-0.41, 0, 0.7], [0.3, 0, 0.7]
+    task = {"path": {"kind": "line", "start": [-0.3, 0, 0.7], "end": end}, "duration": 3, "tube": {"position": 0.02}}
+    text = advice(plan("planar-4", task | {"limits": {"keep_out": [ball]}}), "another start")
+    place = [float(each) for each in text[1 : text.index(")")].split(", ")]
+    line = place + np.linspace(0, 1, 1001)[:, None] * np.subtract(end, place)
+    assert np.linalg.norm(line - ball["centre"], axis=1).min() > ball["radius"]
+    assert np.linalg.norm(np.subtract(behind, ball["centre"])) > ball["radius"]
+    assert tensions("planar-4", [*behind, 0, 0, 0]).feasible
 
 
 def test_no_end_below_the_floor_is_suggested():
@@ -461,4 +497,4 @@ def test_a_variation_that_the_task_refuses_is_not_offered():
     task = {"path": {"kind": "waypoints", "points": points}, "duration": 8}
     for tube, names in (({}, ["yaw at path.points[1]"]), ({"position": 0.3, "waypoints": "exact"}, [])):
         scenario = Planner("cogiro", task | {"tube": tube}).scenario
-        assert [each.name for each in other_yaws(Search(scenario, {}, None), scenario)] == names
+        assert [each.name for each in largest_share(Search(scenario, {}, None), other_yaws(scenario))] == names

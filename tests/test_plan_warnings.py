@@ -147,6 +147,14 @@ SLIPPED = {
     "grams": [
         {"path": None, "duration": None, "phases": [{"name": "a", "path": LINE, "duration": 6, "load": {"mass": 5e4}}]}
     ],
+    "tonnes": [
+        {"path": None, "duration": None, "phases": [{"name": "a", "path": LINE, "duration": 6, "load": {"mass": 0.1}}]}
+    ],
+    "kilonewtons": [{"margin": 0.15}],
+    "kilonewtons per second": [{"limits": {"tension_rate": 0.5}}],
+    "kilowatts": [{"limits": {"winch_power": 0.8}}],
+    "minutes": [{"duration": 0.08}],
+    "milliseconds": [{"duration": 30000.0}],
 }
 
 
@@ -157,6 +165,48 @@ def test_units_that_slipped_are_named(unit, changes):
     said = slipped_units(COGIRO, task)
     assert len(said) == 1
     assert f"are these {unit}?" in said[0]
+
+
+def scaled(part, **factors):
+    """The fields of a part of a robot file with numbers that many times as large."""
+    return part | {name: (factor * np.array(part[name])).tolist() for name, factor in factors.items()}
+
+
+@pytest.mark.parametrize(
+    ("unit", "cables", "platform"),
+    [
+        ("grams", {}, {"mass": 1e3}),
+        ("tonnes", {}, {"mass": 1e-3}),
+        ("kilonewtons", {"t_min": 1e-3, "t_max": 1e-3}, {}),
+        ("millimetres", {"anchor": 1e3}, {}),
+        ("millimetres", {"attachment": 1e3}, {}),
+        ("millimetres", {"anchor": 1e3, "attachment": 1e3}, {"home": 1e3}),
+        ("millimetres", {}, {"home": 1e3}),
+        ("kilogram square millimetres", {}, {"inertia": 1e6}),
+    ],
+)
+def test_units_that_slipped_in_a_robot_file_are_named(unit, cables, platform):
+    data = COGIRO.model_dump()
+    data["cables"] = [scaled(cable, **cables) for cable in data["cables"]]
+    data["platform"] = scaled(data["platform"], **platform)
+    said = slipped_units(Robot.model_validate(data), Task.model_validate({"path": LINE, "duration": 6}))
+    assert any(f"are these {unit}?" in sentence for sentence in said)
+
+
+def test_the_same_robot_in_other_sizes_is_not_doubted():
+    """Lengths, and times with them, 1/20 to 20 times as large: all accelerations and tensions stay."""
+    for size in (0.05, 1.0, 20.0):
+        data = COGIRO.model_dump()
+        data["cables"] = [scaled(cable, anchor=size, attachment=size) for cable in data["cables"]]
+        data["platform"] = scaled(data["platform"], home=size, inertia=size**2)
+        line = {name: (size * np.array(LINE[name])).tolist() for name in ("start", "end")}
+        task = {
+            "path": {"kind": "line", **line},
+            "duration": 6 * size**0.5,
+            "margin": 10,
+            "tube": {"position": 0.2 * size},
+        }
+        assert not slipped_units(Robot.model_validate(data), Task.model_validate(task))
 
 
 WEEK = sorted((Path(__file__).parents[1] / "examples/week").glob("*.yaml"))

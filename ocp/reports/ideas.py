@@ -20,7 +20,7 @@ from ..tasks.task_limits import OF_BODY
 from ..tasks.wind_set import WindBox, WindDisc
 from ..warnings.long_turns import OTHER_WAY
 from ..warnings.outside_frame import LEAVES
-from ..warnings.slipped_units import TOO_LARGE
+from ..warnings.slipped_units import READS
 
 IN_THE_WAY = {"keep_out", "cable_clearance", *OF_BODY}
 TO_MOVE = 1.5  # times what carries the weight: tilted thrust and acceleration need more
@@ -51,7 +51,7 @@ def units(plan: PlanData) -> list[Fact]:
     """Return the numbers of an infeasible task that seem to be in another unit; these come before all else."""
     if plan.feasible:
         return []
-    return [("other units", sentence) for sentence in plan.warnings if TOO_LARGE in sentence]
+    return [("other units", sentence) for sentence in plan.warnings if READS in sentence]
 
 
 def _directions(plan: PlanData) -> list[Fact]:
@@ -95,19 +95,20 @@ def _clear_ends(scenario: Scenario) -> tuple[list[Fact], bool]:
     kept = AtRest(scenario, space.size, spare=0.0)
     limits_alone = AtRest(scenario, space.size, balance=False)(platform, carriers)
     facts, blocked, inside = [], [], False
-    held = kept(platform, carriers).slack >= 0
+    held, others = kept(platform, carriers).slack >= 0, platform[:, :3].copy()
     for end, (slack, worst) in enumerate(zip(limits_alone.slack, limits_alone.worst, strict=True)):
         limit = scenario.limits.all[worst]
         in_the_way = slack < 0 and limit.name in IN_THE_WAY
         if not in_the_way and (slack < 0 or held[end]):
             continue
         inside |= in_the_way
-        place, straight = _nearest(scenario, kept, space, end)
+        place, straight = _nearest(scenario, kept, space, end, others[1 - end])
         # A place beside an obstacle that only cables cross helps if the line from there is clear of it.
         if place is not None and (straight or not in_the_way or not limit.labels[0].startswith("cable ")):
             away = quantity(float(np.linalg.norm(place - platform[end, :3])), "m")
             where = f"({quantity_row(place + 0.0)}) m, {away} away, is clear of everything (checked at rest)"
             facts.append((f"another {ENDS[end]}", where))
+            others[end] = place
         elif in_the_way and limit.name == "keep_out":
             blocked.append(ENDS[end])
     if blocked:
@@ -117,11 +118,13 @@ def _clear_ends(scenario: Scenario) -> tuple[list[Fact], bool]:
     return facts, inside
 
 
-def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> tuple[np.ndarray | None, bool]:
+def _nearest(
+    scenario: Scenario, kept: AtRest, space: Space, end: int, other: np.ndarray
+) -> tuple[np.ndarray | None, bool]:
     """Return the position nearest to an end, along an axis of {G}, at which the robot can rest; None if none is found.
 
-    For a line that the platform follows, the nearest from which that line is clear is preferred. Also return whether
-    it is, or whether the planner can leave the line.
+    For a line that the platform follows, the nearest from which that line to the `other` end is clear is preferred.
+    Also return whether it is, or whether the planner can leave the line.
     """
     (from_, loose), axes = space.references, [axis for axis in POSITION if scenario.robot.dof_mask[axis]]
     points = np.vstack([scenario.robot.home_anchors, from_[:, :3]])
@@ -135,9 +138,8 @@ def _nearest(scenario: Scenario, kept: AtRest, space: Space, end: int) -> tuple[
         if clear.any():
             nearest.append((away[1 + clear.argmax()], way))
     places = [from_[end, :3] + far * way for far, way in sorted(nearest, key=lambda pair: pair[0])]
-    if isinstance(scenario.task.path, LinePath) and not scenario.platform_free:
+    if isinstance(scenario.task.path, LinePath) and scenario.task.tube.position != "free":
         share = np.linspace(0.0, 1.0, ALONG)[:, None]
-        other = from_[1 - end, :3]
         lines = ((place, place + share * (other - place) - from_[end, :3]) for place in places)
         straight = [place for place, line in lines if (_slack(kept, space, from_[end], loose[end], line) >= 0).all()]
         return next(iter(straight or places), None), bool(straight)

@@ -176,6 +176,9 @@ def _more(count: int) -> str:
 
 def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
     fact = f"{quantity(relaxed.possible, relaxed.unit)}{relaxed.detail and f' {relaxed.detail}'} (audited)"
+    others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]
+    if others:
+        return f"feasible {relaxed.name}", f"{fact}, together with {', '.join(others)}"
     if relaxed.name == "duration":
         longer = relaxed.possible > relaxed.requested
         side = "shortest" if longer else "longest"
@@ -183,8 +186,7 @@ def _relaxation(plan: PlanData, relaxed: Relaxed) -> Fact:
         other = "; `towline time` computes the fastest time law" if timed else ""
         close = "" if relaxed.detail else f", close to the {side} feasible one for this time law"
         return "feasible duration", f"{fact}{close}{other}"
-    others = [each.name for each in plan.relaxations if each.plan is relaxed.plan and each is not relaxed]
-    return f"feasible {relaxed.name}", fact + (f", together with {', '.join(others)}" if others else "")
+    return f"feasible {relaxed.name}", fact
 
 
 def _tensions(plan: PlanData) -> list[Fact]:

@@ -1,13 +1,14 @@
-"""Find the largest variation of a task that is feasible: `largest_share`."""
+"""Find the largest variation of a task that is feasible: `largest_share` of one change, `together` of several."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import product
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from ...base.errors import InputError
 from ...solvers import solve_batch
+from ..plan import Plan
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.scenario import ATTITUDE, Scenario
@@ -20,43 +21,117 @@ HALVINGS = 10
 RESERVES = 1.0, 0.98, 0.9  # of the largest share with tensions at these instants, tried in order until an audit passes
 OF_PROGRAMS = 0.25, 0.5, 0.75, 0.9  # of it, if programs decide: in order until one has no solution
 LEAST = 0.1  # of it, if the first one has none
+EASIEST = 1e-3  # the share at which changes together are as easy as can be
 
 Variation: TypeAlias = tuple[Scenario, float, str]
 """The scenario of a varied task, the value in which it differs, and a text that follows the value in reports."""
 
 
-def largest_share(
-    search: Search,
-    make: Callable[[float], Variation],
-    name: str,
-    unit: str,
-    up: bool = False,
-    most: float = 1.0,
-    rates: bool = False,
-) -> list[Relaxed]:
+class Change(NamedTuple):
+    """A change of a task or a robot: `at(share)` is the variation with this share of what is given.
+
+    At 1 it is what is given, or nearly; towards 0 it becomes easier. `up` states whether its value is rounded up.
+    """
+
+    name: str
+    unit: str
+    at: Callable[[float], Variation]
+    up: bool = False
+    requested: float | None = None  # what is given, if it is not the value at 1
+    least: float = EASIEST  # the share below which little is left of the task
+
+    def offer(self, share: float, plan: Plan) -> Relaxed:
+        """Return the relaxation of a feasible plan with this share."""
+        _, value, detail = self.at(share)
+        requested = self.at(1.0)[1] if self.requested is None else self.requested
+        return Relaxed(self.name, self.unit, requested, rounded(value, self.up), plan, detail)
+
+
+Maker: TypeAlias = Callable[[Scenario], Change | None]
+"""A function that returns a change of a scenario, or None if it has nothing to change."""
+
+
+def largest_share(search: Search, change: Change | None, most: float = 1.0, rates: bool = False) -> list[Relaxed]:
     """Return the variation with the largest share, from 0 to `most`, that passes its audit; [] if none is found.
 
     With `rates` the share decides about speeds and accelerations too, as that of a duration does.
     """
+    if change is None:
+        return []
+    largest = _largest(lambda share: change.at(share)[0], 0.0, most, rates)
+    name = f"audit, other {change.name}"
+    found = _planned(search, lambda part: change.at(part * largest)[0], name) if largest else None
+    return [] if found is None else [change.offer(found[0] * largest, found[1])]
 
-    def tried(reserve: float, near: list[Relaxed] | None = None) -> list[Relaxed]:
-        varied = _legal(make, reserve * low)
-        guess = near[0].plan.deviation if near else None
-        plan = varied and planned(search, varied[0], f"audit, other {name}", guess)
-        return [Relaxed(name, unit, make(1.0)[1], rounded(varied[1], up), plan, varied[2])] if varied and plan else []
 
-    low, high = 0.0, most
+def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> list[Relaxed]:
+    """Return changes that make a fixed motion feasible only together; [] if all of them do not.
+
+    Each change is as easy as can be at first. One after another, in the order of `makers`, is left out if the others
+    suffice without it. Those that remain have the largest share that all can have, and then each as much as it can.
+    """
+
+    def easy(makers: Sequence[Maker]) -> bool:
+        easiest = _legal(lambda share: _changed(scenario, makers, np.full(len(makers), share))[1], EASIEST)
+        return easiest is not None and _may_be_feasible(easiest, rates=True)
+
+    def at(shares: np.ndarray) -> Scenario:
+        return _changed(scenario, kept, shares)[1]
+
+    kept = [make for make in makers if make(scenario) is not None]
+    if not easy(kept):
+        return []
+    for make in tuple(kept):
+        others = [each for each in kept if each is not make]
+        kept = others if easy(others) else kept
+    every = np.ones(len(kept))
+    shares = every * _largest(lambda share: at(share * every), EASIEST)  # the same for all
+    for row in np.eye(len(kept), dtype=bool):
+        shares = np.where(
+            row, _largest(lambda share, row=row, others=shares: at(np.where(row, share, others)), shares.min()), shares
+        )
+    found = _planned(search, lambda part: at(part * shares), "audit, changes together")
+    if found is None:
+        return []
+    part, plan = found
+    changes, _ = _changed(scenario, kept, part * shares)
+    offered = zip(changes, part * shares, strict=True)
+    return [change.offer(max(float(share), change.least), plan) for change, share in offered]
+
+
+def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) -> tuple[list[Change], Scenario]:
+    """Return changes, each of what the ones before it left, and the scenario with a share of each, or its least."""
+    changes = []
+    for make, share in zip(makers, shares, strict=True):
+        if (change := make(scenario)) is not None:
+            changes.append(change)
+            scenario = change.at(max(float(share), change.least))[0]
+    return changes, scenario
+
+
+def _largest(at: Callable[[float], Scenario], low: float = 0.0, high: float = 1.0, rates: bool = True) -> float:
+    """Return the largest share between two whose scenario may be feasible; the lowest if none is known to be."""
     for _ in range(HALVINGS):
         middle = (low + high) / 2
-        varied = _legal(make, middle)
-        low, high = (middle, high) if varied and _may_be_feasible(varied[0], rates) else (low, middle)
-    if low == 0.0:
-        return []
-    if not by_programs(make(low)[0]):
-        return next(filter(None, map(tried, RESERVES)), [])
-    best: list[Relaxed] = []
-    for reserve in OF_PROGRAMS:
-        if not (larger := tried(reserve, best)):
+        varied = _legal(at, middle)
+        low, high = (middle, high) if varied and _may_be_feasible(varied, rates) else (low, middle)
+    return low
+
+
+def _planned(search: Search, at: Callable[[float], Scenario], name: str) -> tuple[float, Plan] | None:
+    """Return the largest part of a share at which a plan is feasible, and this plan; None if none is found."""
+
+    def tried(part: float, near: Plan | None = None) -> tuple[float, Plan] | None:
+        varied = _legal(at, part)
+        guess = None if near is None else near.deviation
+        plan = None if varied is None else planned(search, varied, name, guess)
+        return None if plan is None else (part, plan)
+
+    if not by_programs(at(1.0)):
+        return next(filter(None, map(tried, RESERVES)), None)
+    best: tuple[float, Plan] | None = None
+    for part in OF_PROGRAMS:
+        if not (larger := tried(part, best and best[1])):
             break
         best = larger
     return best or tried(LEAST)
@@ -72,10 +147,10 @@ def _tilts(scenario: Scenario) -> bool:
     return scenario.robot.m < scenario.robot.dof_mask.sum() and bool(scenario.task.tube.turn)
 
 
-def _legal(make: Callable[[float], Variation], share: float) -> Variation | None:
+def _legal(at: Callable[[float], Scenario], share: float) -> Scenario | None:
     """Return a variation, or None if its task is refused: exact waypoints may be outside the tube of other legs."""
     try:
-        return make(share)
+        return at(share)
     except InputError:
         return None
 

@@ -8,7 +8,7 @@ from ..result import Relaxed
 from ..tasks.lay_out import lay_out
 from ..tasks.paths import RestPath, SequencePath
 from ..tasks.scenario import Scenario
-from .largest_share import Variation, largest_share
+from .largest_share import Change, Variation, largest_share
 from .relaxations import LONGEST, rounded
 from .search import Search
 
@@ -43,4 +43,4 @@ def longer_phases(search: Search, scenario: Scenario, audit: Audit) -> list[Rela
         others = [f"phases[{k}].duration {quantity(seconds, 's')}" for k, seconds in zip(longer, values, strict=True)]
         return varied, values[0], ", ".join([f"instead of {quantity(given[0], 's')}", *others[1:]])
 
-    return largest_share(search, lasting, f"phases[{longer[0]}].duration", "s", up=True, rates=True)
+    return largest_share(search, Change(f"phases[{longer[0]}].duration", "s", lasting, up=True), rates=True)

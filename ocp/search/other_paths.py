@@ -1,7 +1,5 @@
 """What path near a task's own is feasible: a nearer end, a smaller, slower or shifted path, other yaws."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ...base.text import quantity, quantity_row
@@ -15,21 +13,22 @@ from ..tasks.lay_out import lay_out
 from ..tasks.paths import AnyPath, CirclePath, FeedPath, LinePath, WaypointPath
 from ..tasks.paths.shifted import shifted, shrunk
 from ..tasks.scenario import POSITION, Scenario
-from .largest_share import HALVINGS, RESERVES, Variation, largest_share
+from .largest_share import HALVINGS, RESERVES, Change, Variation, largest_share
 from .relaxations import planned, rounded, slower
 from .search import Search
 
+LEAST = 0.05  # of a path: with less, other changes are better advice
 PLACES = 31  # of a path, at which a shifted one is compared
 SHIFT_STEP = 1.3  # of a shift to the next one that is tried
 SHIFTS = SHIFT_STEP ** np.arange(-36, 0)  # that are tried, in parts of the distance between the farthest anchors
 YAWS = np.deg2rad(np.arange(-180, 180, 5))  # that are tried
 
 
-def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the farthest end up to which a straight line from the same start is feasible."""
+def nearer_end(scenario: Scenario) -> Change | None:
+    """Return the change of the end of a straight line to one nearer to its start."""
     path = scenario.task.path
     if not isinstance(path, LinePath):
-        return []
+        return None
     start, way = np.array(path.start), np.array(path.end) - np.array(path.start)
     whole, turns = float(np.linalg.norm(way[:3])), not way[:3].any()
 
@@ -45,24 +44,21 @@ def nearer_end(search: Search, scenario: Scenario) -> list[Relaxed]:
         place = f"of {quantity(whole, 'm')}, to ({quantity_row(end[:3] + 0.0)}) m"
         return varied, float(np.linalg.norm(end[:3] - start[:3])), ", ".join(filter(None, [place, attitude]))
 
-    return (
-        largest_share(search, to, "part of the rotation", "%")
-        if turns
-        else largest_share(search, to, "length of the line", "m")
-    )
+    name, unit = ("part of the rotation", "%") if turns else ("length of the line", "m")
+    return Change(name, unit, to, least=LEAST)
 
 
-def smaller_circle(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest radius with which a circle is feasible at its angular velocity."""
+def smaller_circle(scenario: Scenario) -> Change | None:
+    """Return the change of a circle to a smaller one at the same angular velocity."""
     path = scenario.task.path
     if not isinstance(path, CirclePath) or any(carrier.moves for carrier in scenario.robot.carriers):
-        return []  # carriers that move with the platform may make all of it feasible
+        return None  # carriers that move with the platform may make all of it feasible
 
     def with_radius(share: float) -> Variation:
         smaller = path.model_copy(update={"radius": share * path.radius})
         return _along(scenario, smaller), share * path.radius, f"instead of {quantity(path.radius, 'm')}"
 
-    return largest_share(search, with_radius, "path.radius", "m")
+    return Change("path.radius", "m", with_radius)
 
 
 def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -70,9 +66,16 @@ def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
 
     `audit` is that of the motion exactly on the path.
     """
-    path, factors = scenario.task.path, [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
-    if not isinstance(path, FeedPath | CirclePath) or min(factors, default=2.0) <= 1.0:
-        return []
+    factors = [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
+    change = slower_rate(scenario) if min(factors, default=2.0) > 1.0 else None
+    return largest_share(search, change, most=1.0 / max(factors, default=1.0))
+
+
+def slower_rate(scenario: Scenario) -> Change | None:
+    """Return the change of the feed or angular velocity of a path that has its own to a smaller one."""
+    path = scenario.task.path
+    if not isinstance(path, FeedPath | CirclePath):
+        return None
     fed = isinstance(path, FeedPath)
     fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
     others = ", the others by the same factor" if fed and path.feed is None else ""
@@ -89,23 +92,23 @@ def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxe
         return _along(scenario, type(path).model_validate(data)), share * fastest, push.removeprefix(", ")
 
     name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
-    return largest_share(search, at, name, unit, up=fastest < 0, most=1.0 / max(factors, default=1.0))
+    return Change(name, unit, at, up=fastest < 0)
 
 
-def near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest feasible path of the same form, shrunk towards the platform's home.
+def near_home(scenario: Scenario) -> Change | None:
+    """Return the change of a path to one of the same form, shrunk towards the platform's home.
 
     Its attitudes come nearer to that of home in proportion. It helps where neither end can be reached.
     """
     path, home = scenario.task.path, scenario.robot.home
-    if not isinstance(path, LinePath | WaypointPath | CirclePath) or scenario.relative:
-        return []
+    if not isinstance(path, LinePath | WaypointPath | CirclePath | FeedPath) or scenario.relative:
+        return None
 
     def about_home(share: float) -> Variation:
         place = quantity_row(home[:3] + 0.0)
         return _along(scenario, shrunk(path, home, share)), 100 * share, f"of it, shrunk towards home, ({place}) m"
 
-    return largest_share(search, about_home, "size of the path", "%", rates=True)
+    return Change("size of the path", "%", about_home, least=LEAST)
 
 
 def shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -152,22 +155,22 @@ def shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relax
     return []
 
 
-def other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return feasible yaws for the points of the path at which no tensions hold the platform at rest.
+def other_yaws(scenario: Scenario) -> Change | None:
+    """Return the change of the yaws at the points of the path at which no tensions hold the platform at rest.
 
     Each lies between the given yaw and the one with the largest capacity margin there, as near to the given one as
     tensions at rest permit, or by one factor less.
     """
     path, robot = scenario.task.path, scenario.robot
     if not isinstance(path, LinePath | WaypointPath) or scenario.relative or not robot.dof_mask[5]:
-        return []
+        return None
     line = isinstance(path, LinePath)
     points = np.array([path.start, path.end] if line else path.points)
     names = ["path.start", "path.end"] if line else [f"path.points[{i}]" for i in range(len(points))]
     wrong = np.flatnonzero(_margins_at_yaws(scenario, points, points[:, 5:])[:, 0] < 0)
     given, held = points[wrong, 5], _margins_at_yaws(scenario, points[wrong], np.tile(YAWS, (len(wrong), 1)))
     if not len(wrong) or held.max(axis=1).min() < 0:
-        return []
+        return None
     back = np.angle(np.exp(1j * (YAWS[held.argmax(axis=1)] - given)))
     shares = np.linspace(0.0, 1.0, len(YAWS))
     between = given[:, None] + back[:, None] * (1 - shares)
@@ -182,8 +185,7 @@ def other_yaws(search: Search, scenario: Scenario) -> list[Relaxed]:
         detail = ", ".join([f"instead of {quantity(given[0], 'rad')}", *others])
         return _along(scenario, path_with_yaws), float(yaws[0]), detail
 
-    found = largest_share(search, with_yaws, f"yaw at {names[wrong[0]]}", "rad", up=bool(back[0] > 0))
-    return [replace(each, requested=float(given[0])) for each in found]
+    return Change(f"yaw at {names[wrong[0]]}", "rad", with_yaws, up=bool(back[0] > 0), requested=float(given[0]))
 
 
 def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -> np.ndarray:

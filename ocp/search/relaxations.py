@@ -1,6 +1,6 @@
 """Search for feasible tasks near an infeasible one, by another duration or looser limits, and audit each."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -24,6 +24,7 @@ from ..tasks.lay_out import lay_out
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Task
+from ..tasks.task_limits import TaskLimits
 from .refinement import refine
 from .search import Search
 
@@ -61,7 +62,7 @@ class Change(NamedTuple):
 
 def near_fixed_motion(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return what would make a fixed motion feasible; `left` are the durations that the tensions allow."""
-    chosen = _soft_limits(search, None) if other_tensions_may_pass(scenario, audit) else []
+    chosen = _soft_limits(search) if other_tensions_may_pass(scenario, audit) else []
     return other_duration(search, scenario, left, audit) + (chosen or _other_limits(search, scenario, None, audit))
 
 
@@ -75,7 +76,7 @@ def near_motion(
     open_ended = span[0] < span[1]
     fast = at_ease(scenario) > span[0] or any(slower(excess) > 1 for excess in audit.excess)
     longer = _longer_duration(search, audit, *span) if open_ended and fast else []
-    limits = _soft_limits(search, deviation) or _other_limits(search, scenario, deviation, audit)
+    limits = _soft_limits(search) or _other_limits(search, scenario, deviation, audit)
     if open_ended and not (fast or limits):  # it hardly helps where nothing is fast
         longer = _longer_duration(search, audit, *span)
     return longer + limits
@@ -164,10 +165,10 @@ def _other_limits(
     return [Relaxed(*change, plan) for change in changes.values()]
 
 
-def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
+def _soft_limits(search: Search) -> list[Relaxed]:
     """Return looser bounds from the motion that exceeds the limits which a task can loosen by least.
 
-    The list is empty if the program has no solution with these limits soft.
+    Else it is the motion without these limits; the list is empty if there is none.
     """
     scenario = search.scenario
     limits = scenario.task.limits
@@ -184,12 +185,24 @@ def _soft_limits(search: Search, start: Deviation | None) -> list[Relaxed]:
     softened = replace(lay_out(scenario.robot, softer), path=scenario.path)
     if infeasible_ends(softened) is not None:  # by what is not soft
         return []
-    outcome = solved(search, softened, start)
-    if outcome is None:
+    without = _without(search, soft)
+    if without is None:
         return []
-    lasting = scenario.lasting(outcome.duration)
-    audit = search.audit_motion(lasting, outcome.deviation)
-    return _other_limits(search, lasting, outcome.deviation, audit, BEYOND)
+    for outcome, beyond in ((solved(search, softened, without.deviation), BEYOND), (without, 0.0)):
+        if outcome is not None:
+            lasting = scenario.lasting(outcome.duration)
+            audit = search.audit_motion(lasting, outcome.deviation)
+            if found := _other_limits(search, lasting, outcome.deviation, audit, beyond):
+                return found
+    return []
+
+
+def _without(search: Search, names: Iterable[str]) -> Outcome | None:
+    """Return the solution of the program without limits of the task, such as one far from what carriers can reach."""
+    scenario, limits = search.scenario, search.scenario.task.limits
+    none = {name: TaskLimits.model_fields[name].default for name in names if name in TaskLimits.model_fields}
+    without = {"limits": limits.model_copy(update=none), "margin": 0.0}
+    return solved(search, lay_out(scenario.robot, scenario.task.model_copy(update=without)), None)
 
 
 def _longer_duration(search: Search, audit: Audit, shortest: float, longest: float) -> list[Relaxed]:

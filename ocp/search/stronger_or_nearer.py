@@ -24,15 +24,24 @@ from ..tasks.status import MotionStatus
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
 from .given_states import near_given_states
-from .largest_share import Variation, by_programs, exceeds, largest_share
+from .largest_share import Change, Variation, by_programs, exceeds, largest_share, together
 from .longer_phases import longer_phases
-from .other_paths import near_home, nearer_end, other_yaws, shifted_path, slower_path, smaller_circle
-from .relaxations import LONGER, longer_durations, near_motion, other_duration, planned, rounded, slower
+from .other_paths import near_home, nearer_end, other_yaws, shifted_path, slower_path, slower_rate, smaller_circle
+from .relaxations import (
+    LONGER,
+    LONGEST,
+    at_ease,
+    longer_durations,
+    near_motion,
+    other_duration,
+    planned,
+    rounded,
+    slower,
+)
 from .search import Search
 from .tilting import tilting_platform
 
-AT_EASE = 10.0  # times the time in which a force like the platform's weight moves it across the robot
-LIGHTEST = 0.01  # of the platform's mass, of one that is tried near home
+AT_EASE = 10.0  # times the duration with small accelerations: speeds are small too
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 
 
@@ -65,10 +74,9 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of what a task does not name: where its path is, the platform's mass, t_max, t_min.
 
-    `audit` is that of the motion exactly on the path. Each variation is one change; if speeds or accelerations are
-    exceeded too, it may also need a longer duration, which is not tried in phases. If there is none, it is a path of
-    the same form near the platform's home, if necessary at ease, unless a region is in the way. The list is empty for
-    uncertain robots.
+    `audit` is that of the motion exactly on the path. Each variation is one change. If there is none, it is a path of
+    the same form near the platform's home, or else several changes together, unless a region is in the way. The list is
+    empty for uncertain robots.
     """
     task = scenario.task
     if task.robust is not None:
@@ -78,7 +86,7 @@ def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list
     found = _changes(search, scenario, audit)
     if found or _blocked(audit):
         return found
-    return near_home(search, scenario) or _at_ease_near_home(search, scenario)
+    return largest_share(search, near_home(scenario), rates=True) or together(search, scenario, TOGETHER)
 
 
 def _fewer_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
@@ -106,74 +114,71 @@ def _blocked(audit: Audit) -> bool:
     return any(excess.limit == "keep_out" for excess in audit.excess)
 
 
-def _at_ease_near_home(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest feasible path near the platform's home without margin and wind, and with a longer duration.
-
-    If there is none, it is one of a lighter platform.
-    """
-    eased: dict[str, object] = {"margin": 0.0, "wind": None}
-    conditions = ["a margin of 0 N"] * bool(scenario.hard_margin) + ["no wind"] * (scenario.task.wind is not None)
-    robot, size = scenario.robot, float(np.linalg.norm(np.ptp(scenario.robot.home_anchors, axis=0)))
-    seconds = rounded(AT_EASE * np.sqrt(size * robot.platform.mass / robot.force_scale), up=True)
-    if scenario.stretches and scenario.duration < seconds <= scenario.longest:
-        eased["duration"] = seconds
-        conditions.append(f"a duration of {quantity(seconds, 's')}")
-    calm = lay_out(robot, scenario.task.model_copy(update=eased))
-    found = near_home(search, calm) if conditions else []
-    mass = robot.platform.mass
-    while not found and mass > LIGHTEST * robot.platform.mass:  # it is too heavy even there
-        mass = rounded(mass / 2, up=False)
-        found = near_home(search, _weighing(calm, mass))
-    conditions += [f"a platform of {quantity(mass, 'kg')}"] * (mass < robot.platform.mass)
-    return [replace(each, detail=f"{each.detail}, with {', '.join(conditions)}") for each in found]
-
-
 def _by_a_program(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the first change with which a program finds a motion; only one, since each solves programs."""
-    changes = (_less_wind, _lighter_load, _lighter_platform, nearer_end, near_home)
-    return next((found for make in changes if (found := make(search, scenario))), [])
+    makers = (_less_wind, _lighter_load, _lighter_platform, nearer_end)
+    every = partial(largest_share, search)
+    return next(filter(None, (every(make(scenario)) for make in makers)), []) or every(near_home(scenario), rates=True)
 
 
 def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
-    """Return the changes of the path, of the task and of the robot with which a fixed motion is feasible."""
-    task, others = scenario.task, [excess for excess in audit.excess if excess.limit != TENSIONS]
-    if others and task.phases is not None:
-        return []
-    factors = [slower(excess) for excess in others]
+    """Return the changes of the path, of the task and of the robot with which a fixed motion is feasible.
+
+    If speeds or accelerations are exceeded too, each may also need a longer duration, which is not tried in phases.
+    """
     found = slower_path(search, scenario, audit)
-    if min(factors, default=2.0) <= 1.0 or (others and not scenario.stretches):
+    factors = [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
+    if min(factors, default=2.0) <= 1.0 or (factors and not scenario.stretches):
         if _blocked(audit):  # ideas name other places and ways round
             inside = exceeds(scenario, np.array([scenario.duration]), rates=False)
-            return found + (nearer_end(search, scenario) if inside else [])
-        return found + (shifted_path(search, scenario, audit) or nearer_end(search, scenario))
+            return found + (largest_share(search, nearer_end(scenario)) if inside else [])
+        return found + (shifted_path(search, scenario, audit) or largest_share(search, nearer_end(scenario)))
+    found += tilting_platform(search, scenario)
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
-    for make in (
-        tilting_platform,
-        nearer_end,
-        smaller_circle,
-        other_yaws,
-        _less_wind,
-        _lighter_load,
-        _surer_load,
-        _lighter_platform,
-        partial(_other_limits_of_cables, limit="t_max"),
-        partial(_other_limits_of_cables, limit="t_min"),
-    ):
-        its = make(search, scenario)
-        if not its and others and seconds <= scenario.longest:
-            longer = lay_out(scenario.robot, task.model_copy(update={"duration": seconds}))
+    for make in SINGLE:
+        its = largest_share(search, make(scenario))
+        if not its and factors and scenario.task.phases is None and seconds <= scenario.longest:
+            longer = lay_out(scenario.robot, scenario.task.model_copy(update={"duration": seconds}))
             with_it = f", with a duration of {quantity(seconds, 's')}"
-            its = [replace(each, detail=each.detail + with_it) for each in make(search, longer)]
+            its = [replace(each, detail=each.detail + with_it) for each in largest_share(search, make(longer))]
         found += its
     return found + shifted_path(search, scenario, audit)
 
 
-def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the strongest wind, or set of winds, from the same directions that is feasible."""
+def _longer(scenario: Scenario) -> Change | None:
+    """Return the change of the duration to a longer one."""
+    if not scenario.stretches or scenario.task.phases is not None:
+        return None
+    most = min(max(AT_EASE * at_ease(scenario), LONGEST * scenario.duration), scenario.longest) / scenario.duration
+    if most <= 1.0:
+        return None
+
+    def lasting(share: float) -> Variation:
+        seconds = rounded(scenario.duration * most ** (1 - share), up=True)
+        varied = lay_out(scenario.robot, scenario.task.model_copy(update={"duration": seconds}))
+        return varied, seconds, f"instead of {quantity(scenario.duration, 's')}"
+
+    return Change("duration", "s", lasting, up=True)
+
+
+def _less_margin(scenario: Scenario) -> Change | None:
+    """Return the change of the margin of tensions to a smaller one."""
+    margin = scenario.hard_margin
+
+    def with_margin(share: float) -> Variation:
+        less = {"margin": rounded(share * margin, up=False)}
+        varied = lay_out(scenario.robot, scenario.task.model_copy(update=less))
+        return varied, share * margin, f"instead of {quantity(margin, 'N')}"
+
+    return Change("margin", "N", with_margin) if margin else None
+
+
+def _less_wind(scenario: Scenario) -> Change | None:
+    """Return the change of the wind, or set of winds, to a weaker one from the same directions."""
     wind = scenario.task.wind
     fastest = max(_speeds(wind), default=0.0)
     if wind is None or not fastest:
-        return []
+        return None
 
     def with_wind(share: float) -> Variation:
         if isinstance(wind, tuple):
@@ -184,7 +189,7 @@ def _less_wind(search: Search, scenario: Scenario) -> list[Relaxed]:
         task = scenario.task.model_copy(update={"wind": weaker})
         return lay_out(scenario.robot, task), share * fastest, f"instead of {quantity(fastest, 'm/s')}"
 
-    return largest_share(search, with_wind, "wind", "m/s")
+    return Change("wind", "m/s", with_wind)
 
 
 def _speeds(wind: Vector3 | WindBox | WindDisc | None) -> list[float]:
@@ -195,13 +200,13 @@ def _speeds(wind: Vector3 | WindBox | WindDisc | None) -> list[float]:
     return [float(np.linalg.norm(corner)) for corner in corners]
 
 
-def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the heaviest loads of phases that are feasible, by one factor, with moments of inertia in proportion."""
+def _lighter_load(scenario: Scenario) -> Change | None:
+    """Return the change of the loads of phases to lighter ones by one factor, with moments of inertia in proportion."""
     phases = scenario.task.phases or ()
     masses = [0.0 if phase.load is None else phase.load.mass for phase in phases]
     mass = max(masses, default=0.0)
     if mass == 0.0:
-        return []
+        return None
     others = "in each phase" if len({*masses, 0.0}) == 2 else "the others by the same factor"
     every = f", {others}" if sum(each > 0 for each in masses) > 1 else ""
 
@@ -212,13 +217,13 @@ def _lighter_load(search: Search, scenario: Scenario) -> list[Relaxed]:
 
         return _carrying(scenario, lighter), share * mass, f"instead of {quantity(mass, 'kg')}{every}"
 
-    return largest_share(search, with_loads, f"phases[{masses.index(mass)}].load.mass", "kg")
+    return Change(f"phases[{masses.index(mass)}].load.mass", "kg", with_loads)
 
 
-def _surer_load(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the largest tolerances of the loads with which it is feasible, all in proportion to the task's."""
+def _surer_load(scenario: Scenario) -> Change | None:
+    """Return the change of the tolerances of the loads to smaller ones, all in proportion to the task's."""
     if not scenario.phases.extremes:
-        return []
+        return None
 
     def with_loads(share: float) -> Variation:
         def surer(load: Load) -> Load:
@@ -227,7 +232,7 @@ def _surer_load(search: Search, scenario: Scenario) -> list[Relaxed]:
 
         return _carrying(scenario, surer), 100 * share, "of the task's"
 
-    return largest_share(search, with_loads, "mass_tolerance and com_tolerance of the loads", "%")
+    return Change("mass_tolerance and com_tolerance of the loads", "%", with_loads)
 
 
 def _carrying(scenario: Scenario, change: Callable[[Load], Load]) -> Scenario:
@@ -239,33 +244,27 @@ def _carrying(scenario: Scenario, change: Callable[[Load], Load]) -> Scenario:
     return lay_out(scenario.robot, scenario.task.model_copy(update={"phases": carried}))
 
 
-def _lighter_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the heaviest platform that is feasible, with the moments of inertia that go with its mass."""
-    mass = scenario.robot.platform.mass
+def _lighter_platform(scenario: Scenario) -> Change:
+    """Return the change of the platform to a lighter one, with moments of inertia in proportion."""
+    data, mass = scenario.robot.model_dump(), scenario.robot.platform.mass
 
     def with_mass(share: float) -> Variation:
-        return _weighing(scenario, share * mass), share * mass, f"instead of {quantity(mass, 'kg')}"
+        platform = data["platform"] | {"mass": share * mass}
+        if platform["inertia"] is not None:
+            platform["inertia"] = [share * value for value in platform["inertia"]]
+        varied = lay_out(Robot.model_validate(data | {"platform": platform}), scenario.task)
+        return varied, share * mass, f"instead of {quantity(mass, 'kg')}"
 
-    return largest_share(search, with_mass, "platform.mass", "kg")
-
-
-def _weighing(scenario: Scenario, mass: float) -> Scenario:
-    """Return the scenario with a platform of another mass [kg], with moments of inertia in proportion."""
-    data = scenario.robot.model_dump()
-    platform = data["platform"] | {"mass": mass}
-    if platform["inertia"] is not None:
-        share = mass / scenario.robot.platform.mass
-        platform["inertia"] = [share * value for value in platform["inertia"]]
-    return lay_out(Robot.model_validate(data | {"platform": platform}), scenario.task)
+    return Change("platform.mass", "kg", with_mass)
 
 
-def _other_limits_of_cables(search: Search, scenario: Scenario, limit: str) -> list[Relaxed]:
-    """Return the largest t_max, or t_min, after all are multiplied by the feasible factor that changes them least."""
+def _other_limits_of_cables(scenario: Scenario, limit: str) -> Change | None:
+    """Return the change of all t_max to larger ones, or of all t_min to smaller ones, by one factor."""
     data, values = scenario.robot.model_dump(), getattr(scenario.robot, limit)
     largest, others = float(values.max()), "" if np.ptp(values) == 0 else ", the others by the same factor"
     stronger = limit == "t_max"
     if largest == 0.0:
-        return []
+        return None
 
     def with_limits(share: float) -> Variation:
         factor = 1 + (STRONGEST - 1) * (1 - share) ** 4 if stronger else share  # fine steps near one
@@ -273,4 +272,17 @@ def _other_limits_of_cables(search: Search, scenario: Scenario, limit: str) -> l
         varied = lay_out(Robot.model_validate(data | {"cables": cables}), scenario.task)
         return varied, factor * largest, f"instead of {quantity(largest, 'N')}{others}"
 
-    return largest_share(search, with_limits, f"cables.{limit}", "N", up=stronger)
+    return Change(f"cables.{limit}", "N", with_limits, up=stronger)
+
+
+_larger_t_max = partial(_other_limits_of_cables, limit="t_max")
+_smaller_t_min = partial(_other_limits_of_cables, limit="t_min")
+SINGLE = (
+    *(nearer_end, smaller_circle, other_yaws, _less_wind, _lighter_load, _surer_load, _lighter_platform),
+    *(_larger_t_max, _smaller_t_min),
+)
+# The first are left out first. Stronger cables permit what a lighter platform does, at any t_min.
+TOGETHER = (
+    *(_smaller_t_min, _larger_t_max, near_home, _lighter_load, _less_wind, nearer_end, _less_margin),
+    *(slower_rate, _longer),
+)

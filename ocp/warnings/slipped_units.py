@@ -1,7 +1,7 @@
-"""`slipped_units`: numbers of a task that fit the robot only in another unit, such as millimetres instead of metres."""
+"""`slipped_units`: numbers that fit the robot only in another unit, such as millimetres instead of metres."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,71 +11,70 @@ from ...base.text import quantity
 from ...models import Robot
 from ..tasks.task import Task
 
-FAR = 5.0  # times the robot's size: no task of it is farther away
+READS = "towline reads"  # is in each sentence
+OTHERS = {  # by the unit that is read: its name, and the names and sizes of units that are written instead
+    "m": ("metres", {"millimetres": 1e-3, "centimetres": 1e-2}),
+    "rad": ("radians", {"degrees": np.pi / 180}),
+    "rad/s": ("radians per second", {"degrees per second": np.pi / 180, "revolutions per minute": np.pi / 30}),
+    "kg": ("kilograms", {"grams": 1e-3, "tonnes": 1e3}),
+    "kg m^2": ("kilogram square metres", {"kilogram square millimetres": 1e-6}),
+    "m/s": ("metres per second", {"millimetres per second": 1e-3}),
+    "wind": ("metres per second", {"kilometres per hour": 1 / 3.6}),
+    "m/s^2": ("metres per second squared", {"millimetres per second squared": 1e-3}),
+    "N": ("newtons", {"kilonewtons": 1e3}),
+    "N/s": ("newtons per second", {"kilonewtons per second": 1e3}),
+    "W": ("watts", {"kilowatts": 1e3}),
+    "s": ("seconds", {"milliseconds": 1e-3, "minutes": 60.0}),
+}
+FAR, WIDE = 5.0, 2.0  # times the robot's size: no position of a task is farther away, and no other length is larger
 FAR_ANYWHERE = 100.0  # the same of robots whose carriers can go anywhere
-SMALLER = {"centimetres": 100.0, "millimetres": 1000.0}  # in a metre
-TURN, QUARTER = 2 * np.pi + 0.1, np.pi / 2 + 0.1  # [rad]: larger angles occur in no pose, and in no limit
-FAST = {"m/s": 60.0, "m/s^2": 500.0, "rad/s": 20.0}  # no cable robot is faster or accelerates more
-LEAST = 0.02  # of the robot's size: what would be smaller in millimetres is taken for centimetres
-GRAMS = 1000.0  # in a kilogram
-TOO_LARGE = "is too large for this robot"
+LARGEST = 1e3  # [m]: no robot is larger
+LEAST = {True: 0.02, False: 0.002}  # of the robot's size: no position, and no other length, is written that is smaller
+LEAST_SPREAD = 4e-4  # of the anchors' spread: attachments that are nearer together are in a larger unit than anchors
+SLOWEST = 5e-5  # of the speed after a fall from the height of the robot: no motion has a smaller mean speed
+PLACES = 101  # along a path, for its length
 _UNIT = re.compile(r"\[([^\]]+)\]")  # in the description of a field
 
 
 class _Number(NamedTuple):
-    """A number of a task or an array of them, with its dotted key and the unit of each column, or of all."""
+    """A number of a task or robot or an array of them, with its dotted key and its unit."""
 
     key: str
-    units: tuple[str, ...]
+    unit: str
     values: np.ndarray
-
-    def of(self, unit: str) -> np.ndarray:
-        """Return the values in a unit; of a pose lengths are the first three columns, angles the others."""
-        if len(self.units) == 2 and self.values.ndim and self.values.shape[-1] > 3:
-            return (
-                self.values[..., :3] if unit == self.units[0] else self.values[..., 3:] if unit in self.units else _NO
-            )
-        return self.values if unit == self.units[0] else _NO
 
 
 class _Suspect(NamedTuple):
-    """Keys of numbers that are too large, the largest, and the unit that they seem to have."""
+    """A number that is too large or too small, and the units that it may have; its unit is a key of `OTHERS`."""
 
-    keys: list[str]
-    largest: float
-    named: str
-
-
-_NO = np.zeros(0)
+    key: str
+    size: float
+    side: str
+    unit: str
+    named: tuple[str, ...]
 
 
 def slipped_units(robot: Robot, task: Task) -> list[str]:
-    """Return a sentence for each unit in which numbers of a task seem to be, instead of the unit that towline reads.
+    """Return a sentence for each unit in which numbers of a task or robot seem to be, instead of what towline reads.
 
-    A number is suspect if it is too large for the robot, but usual in the other unit.
+    A number is suspect if it is unusual for the robot, but usual in the other unit.
     """
-    numbers = list(_numbers(task, ""))
-    suspects = [
-        ("m", "metres", _lengths(robot, numbers)),
-        ("rad", "radians", _above(numbers, "rad", "degrees", lambda key: TURN if key.startswith("path") else QUARTER)),
-        ("rad/s", "radians per second", _above(numbers, "rad/s", "degrees per second", lambda key: FAST["rad/s"])),
-        ("kg", "kilograms", _masses(robot, task)),
-    ]
-    for unit, read in (("m/s", "metres per second"), ("m/s^2", "metres per second squared")):
-        of_task = _above(numbers, unit, f"milli{read}", lambda key, unit=unit: np.inf if key == "wind" else FAST[unit])
-        suspects.append((unit, read, of_task))
-    of_wind = _above(numbers, "m/s", "kilometres per hour", lambda key: FAST["m/s"] if key == "wind" else np.inf)
-    suspects.append(("m/s", "metres per second", of_wind))
-    return [
-        f"{', '.join(suspect.keys)}: {quantity(suspect.largest, unit, 4)} {TOO_LARGE}; "
-        f"are these {suspect.named}? towline reads {read}"
-        for unit, read, suspect in suspects
-        if suspect is not None
-    ]
+    numbers = [*_numbers(robot, ""), *_numbers(task, "")]
+    suspects = [*_lengths(robot, numbers)] or [*_durations(robot, task)]
+    suspects += _unusual(robot, numbers)
+    sentences = []
+    for side, unit, named in dict.fromkeys(suspect[2:] for suspect in suspects):
+        of_kind = [suspect for suspect in suspects if suspect[2:] == (side, unit, named)]
+        keys = dict.fromkeys(re.sub(r"^(cables|carriers)\[\d+\]", r"\1", suspect.key) for suspect in of_kind)
+        size = (max if side == "large" else min)(suspect.size for suspect in of_kind)
+        written, others = quantity(size, unit.replace("wind", "m/s"), 4), " Or ".join(f"{name}?" for name in named)
+        about = f"{', '.join(keys)}: {written} is too {side} for this robot"
+        sentences.append(f"{about}; are these {others} {READS} {OTHERS[unit][0]}")
+    return sentences
 
 
 def _numbers(part: Any, key: str) -> Iterator[_Number]:
-    """Yield the numbers with units that a part of a task was given."""
+    """Yield the numbers with units that a part of a task or robot was given."""
     for name, field in type(part).model_fields.items():
         if name not in part.model_fields_set:
             continue
@@ -85,6 +84,7 @@ def _numbers(part: Any, key: str) -> Iterator[_Number]:
 
 
 def _of(value: Any, key: str, units: tuple[str, ...]) -> Iterator[_Number]:
+    """Yield the numbers of a value; of a pose lengths are the first three columns, angles the others."""
     if isinstance(value, BaseModel):
         yield from _numbers(value, key)
     elif isinstance(value, Mapping):
@@ -98,45 +98,88 @@ def _of(value: Any, key: str, units: tuple[str, ...]) -> Iterator[_Number]:
             array = np.array(value, dtype=float)
         except (TypeError, ValueError):
             return
+        if len(units) == 2 and array.ndim and array.shape[-1] > 3:
+            yield _Number(key, units[1], array[..., 3:])
+            array = array[..., :3]
         if array.size:
-            yield _Number(key, units, array)
+            yield _Number(key, units[0], array)
 
 
-def _lengths(robot: Robot, numbers: list[_Number]) -> _Suspect | None:
-    """Return the lengths that are far from the robot, and the unit in which they are near."""
-    points = np.vstack([robot.home_anchors, robot.home[:3] + robot.attachments])
-    centre, size = (points.min(axis=0) + points.max(axis=0)) / 2, float(np.linalg.norm(np.ptp(points, axis=0)))
+def _unusual(robot: Robot, numbers: list[_Number]) -> Iterator[_Suspect]:
+    """Yield the numbers that are usual only in another unit."""
+    t_max, size, mass = np.minimum(robot.t_max, 1e12), _frame(robot)[1], robot.platform.mass
+    strongest, liftable = float(t_max.max()), float(t_max.sum()) / max(float(np.linalg.norm(robot.gravity)), 1e-9)
+    weight = robot.weight / robot.m  # that a cable carries
+    usual = [  # unit, pattern of keys, least and most; the first that matches decides
+        ("rad", "path|pose|home|attitude|around", 0.0, 2 * np.pi + 0.1),
+        ("rad", "", 0.0, np.pi / 2 + 0.1),  # of a limit
+        ("rad/s", "", 0.0, 20.0),
+        ("wind", "^wind", 0.0, 33.0),  # of a hurricane
+        ("m/s", "", 0.0, 25.0),  # no cable robot is faster or accelerates more
+        ("m/s^2", "", 0.0, 500.0),
+        ("kg", r"load\.mass$", 2e-4 * liftable, liftable),
+        ("kg", r"^platform\.mass$", liftable / 5000, 20 * liftable),
+        ("kg m^2", r"^platform\.inertia$", 0.0, mass * size**2),
+        ("N", r"^(margin|objective\.(tension|margin))$", 2e-3 * weight, strongest),
+        ("N", r"t_max$", weight / 20, np.inf),
+        ("N", r"stiffness$", strongest, np.inf),
+        ("N/s", "", 1e-3 * strongest, np.inf),
+        ("W", "", 2e-3 * weight * np.sqrt(10 * size), np.inf),
+    ]
+    for key, unit, values in numbers:
+        largest = float(np.abs(values).max(initial=0.0))
+        for of, keys, least, most in usual:
+            if unit == of.replace("wind", "m/s") and re.search(keys, key):
+                named = tuple(name for name, factor in OTHERS[of][1].items() if least <= factor * largest <= most)
+                if named and 0.0 < largest < np.inf and not least <= largest <= most:
+                    yield _Suspect(key, largest, "large" if largest > most else "small", of, named)
+                break
+
+
+def _frame(robot: Robot) -> tuple[np.ndarray, float]:
+    """Return centre (3,) and size [m] of the box about anchors in a frame, or else about anchors and platform."""
+    points = robot.home_anchors
+    if not (np.ptp(points, axis=0).any() and all(robot.carriers[index].confined for index in robot.carrier_of_cable)):
+        points = np.vstack([points, robot.home[:3] + robot.attachments])
+    return (points.min(axis=0) + points.max(axis=0)) / 2, float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def _lengths(robot: Robot, numbers: list[_Number]) -> Iterator[_Suspect]:
+    """Yield the lengths that are far from the robot, and the units in which they are near, or too large a robot."""
+    centre, size = _frame(robot)
+    if size > LARGEST or 0.0 < np.linalg.norm(np.ptp(robot.attachments, axis=0)) < LEAST_SPREAD * size:
+        yield _Suspect("cables.anchor", float(np.abs(robot.home_anchors).max()), "large", "m", ("millimetres",))
+        return
     confined = all(robot.carriers[index].confined for index in robot.carrier_of_cable)
-    lower = {each.key.removesuffix(".min"): each.of("m") for each in numbers if each.key.endswith(".min")}
-    keys, largest, written = [], 0.0, 0.0
-    for each in numbers:
-        values = each.of("m")
-        if not values.size or each.key.endswith(".min"):
+    lengths = {each.key: each.values for each in numbers if each.unit == "m"}
+    keys, largest, least = dict[str, float](), 0.0, 0.0
+    for key, values in lengths.items():
+        position, low = bool(values.ndim) and values.shape[-1] == 3, lengths.get(key.replace(".max", ".min"))
+        if key.endswith(".min"):
             continue
-        away = np.abs(values - centre if values.ndim and values.shape[-1] == 3 else values)
-        if (
-            each.key.endswith(".max")
-            and (low := lower.get(each.key.removesuffix(".max"))) is not None
-            and low.size == 3
-        ):
+        away = np.abs(values - centre if position else values)
+        if key.endswith(".max") and low is not None and low.size == 3:
             away = np.maximum(np.maximum(low - centre, centre - values), 0.0)  # of the box
-        if np.isfinite(far := float(away.max())) and far > (FAR if confined else FAR_ANYWHERE) * size:
-            keys.append(each.key.removesuffix(".max"))
-            largest, written = max(largest, far), max(written, float(np.abs(values).max()))
-    named = "millimetres" if largest >= 1e3 * LEAST * size else "centimetres"
-    return _Suspect(keys, written, named) if keys and largest <= SMALLER[named] * size else None
+        most = FAR_ANYWHERE if not confined else FAR if position else WIDE
+        if np.isfinite(far := float(away.max())) and far > most * size:
+            keys[key.removesuffix(".max")] = float(np.abs(values).max())
+            largest, least = max(largest, far), max(least, LEAST[position] * size)
+    named = tuple(name for name, metres in OTHERS["m"][1].items() if least <= metres * largest <= size)
+    yield from (_Suspect(key, written, "large", "m", named) for key, written in keys.items() if named)
 
 
-def _above(numbers: list[_Number], unit: str, named: str, most: Callable[[str], float]) -> _Suspect | None:
-    """Return the numbers in a unit that are above what `most` returns of their key."""
-    sizes = {each.key: float(np.abs(each.of(unit)).max(initial=0.0)) for each in numbers}
-    keys = [key for key, size in sizes.items() if most(key) < size < np.inf]
-    return _Suspect(keys, max(sizes[key] for key in keys), named) if keys else None
-
-
-def _masses(robot: Robot, task: Task) -> _Suspect | None:
-    """Return the loads that all cables together cannot lift, but could if their numbers were grams."""
-    most = float(np.minimum(robot.t_max, 1e12).sum()) / max(float(np.linalg.norm(robot.gravity)), 1e-9)
-    loads = {f"phases[{i}].load.mass": phase.load.mass for i, phase in enumerate(task.phases or ()) if phase.load}
-    keys = [key for key, mass in loads.items() if most < mass <= GRAMS * most]
-    return _Suspect(keys, max(loads[key] for key in keys), "grams") if keys else None
+def _durations(robot: Robot, task: Task) -> Iterator[_Suspect]:
+    """Yield the durations in which the platform can hardly move so far, or creeps, and the units in which it moves."""
+    pull = float(np.minimum(robot.t_max, 1e12).sum()) / robot.platform.mass + float(np.linalg.norm(robot.gravity))
+    for key, part in [(f"phases[{i}].duration", phase) for i, phase in enumerate(task.phases or ())] or [
+        ("duration", task)
+    ]:
+        if not isinstance(part.duration, float) or part.path is None:
+            continue
+        places = part.path.at(np.linspace(0.0, part.duration, PLACES), part.duration).pose[:, :3]
+        way = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
+        least, most = 2 * np.sqrt(way / pull), way / (SLOWEST * np.sqrt(10 * _frame(robot)[1]))
+        units = OTHERS["s"][1].items()
+        named = tuple(name for name, seconds in units if 2 * least <= seconds * part.duration <= most / 100)
+        if named and not least <= part.duration <= most:
+            yield _Suspect(key, part.duration, "large" if part.duration > most else "small", "s", named)
