@@ -338,8 +338,9 @@ class ComputedTorque(Controller):
             self._go_on(carriers)
         if self._boxes is not None:
             stay_inside(carriers, *self._boxes)
-        pose, velocity, acceleration = carriers.transpose(2, 0, 1, 3)  # (N, c, 6) each
-        self._accelerations = acceleration.tobytes()
+        carriers = carriers[0] if alone else carriers
+        moving = carriers[..., 0, :], carriers[..., 1, :], carriers[..., 2, :]
+        self._accelerations = moving[2].tobytes()
         actuation = None
         if self._flies:
             memory = self._cables, self._platform, self._of_carriers, self._turning, self._actuation
@@ -355,9 +356,8 @@ class ComputedTorque(Controller):
             answered = self._deviation.status(answered, self._measured[:, 0, :6], self._wanted[:, :6])
         if alone:
             own = None if actuation is None else actuation[0]
-            moving = pose[0], velocity[0], acceleration[0]
             return Command(tensions[0], *moving, answered[0], proof[0][0], proof[1][0], own)
-        return Command(tensions, pose, velocity, acceleration, answered, *proof, actuation)
+        return Command(tensions, *moving, answered, *proof, actuation)
 
     def _go_on(self, carriers: np.ndarray) -> None:
         """Let carriers, (N, c, 3, 6), with nan in their reference go on as measured."""

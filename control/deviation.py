@@ -8,7 +8,8 @@ from .command import OFF, PLANNED, SHIFTED
 
 FAR, MOST = 0.1, 0.5  # position: of the mean length of the cables at home, and at most [m]
 TURNED = 0.5  # [rad], of the rotation between the two
-OFF_TARGET, LEFT = 0.2, 0.5  # of these: errors that have to decrease, and how much of them a prediction may leave
+OFF_TARGET = 0.2  # of these: an error with which predictions may end
+LEFT = 0.5  # of larger ones, how much they may leave
 
 
 class Deviation:
@@ -35,12 +36,13 @@ class Deviation:
             return np.asarray((away > self.most[0] ** 2) | ((trace - 1.0) / 2 < np.cos(TURNED)))
 
     def stays(self, errors: np.ndarray) -> bool:
-        """Return whether predicted errors, (K, 6) [m, rad], begin as more than negligible and do not decrease.
+        """Return whether predicted errors, (K, 6) [m, rad], do not decrease, or will be more than negligible.
 
-        Errors that are reported in any case do not.
+        Errors that are reported in any case do not count.
         """
         first, last = np.linalg.norm(errors[[0, -1]] / np.repeat(self.most, 3), axis=1)
-        return bool(first > OFF_TARGET and last > LEFT * first and not self.are_far(errors[0], np.zeros(6)))
+        most = LEFT * first if first > OFF_TARGET else OFF_TARGET
+        return bool(last > most and not self.are_far(errors[0], np.zeros(6)))
 
     def status(self, answered: np.ndarray, poses: np.ndarray, wanted: np.ndarray) -> np.ndarray:
         """Return the status of each platform, (N,), from that of its tensions; poses and references are (N, 6)."""

@@ -93,6 +93,18 @@ def test_predictive_control_does_not_call_an_overload_as_planned():
     assert run.answered["soft wrench"] > 50
 
 
+def test_a_platform_that_no_tensions_hold_is_overloaded_before_it_is_a_centimetre_away():
+    """The lowest tensions of FAST's cables lift its cabin: the stages of a step end 0.1 m and more above its home."""
+    fast = load("fast")
+    dynamics, weight = Dynamics(fast), fast.weight
+    w = np.asarray(dynamics.required_wrench(fast.home, np.zeros(6), np.zeros(6))) / weight
+    bounds = np.stack([fast.t_min, fast.t_max], axis=1) / weight
+    assert linprog(np.zeros(6), A_eq=dynamics.wrench_matrix(fast.home), b_eq=w, bounds=bounds).status == 2
+    run = simulate(fast, fast.home, Predictive(fast), duration=0.3, period=5e-3)
+    assert run.error.max() > 0.09
+    assert (run.record.answered[run.error[: len(run.record.answered)] > 0.01] == ANSWERS.index("soft wrench")).all()
+
+
 def test_rows_of_a_batch_have_their_own_status():
     controller, still = ComputedTorque(COGIRO), np.zeros((2, 1, 6))
     poses = np.stack([COGIRO.home, COGIRO.home + 1.5 * np.eye(6)[0]])
