@@ -13,6 +13,7 @@ from towline.estimation.calibration.plausibility import mistake
 from towline.estimation.logs import read_log
 from towline.estimation.logs.measurements import measured_poses
 from towline.estimation.logs.names import role, time_unit
+from towline.estimation.logs.tables import from_csv
 
 from . import user_recordings as user
 from .warm import towline
@@ -302,6 +303,13 @@ def test_names_of_joints_and_of_px4():
 @pytest.mark.parametrize(("step", "unit"), [(10_000, "us"), (1e7, "ns"), (200, "ms"), (0.01, "s"), (3, "s")])
 def test_units_of_times_since_the_start(step, unit):
     assert time_unit(12_345_000 + step * np.arange(50)) == unit
+
+
+def test_the_title_of_a_sheet_is_no_part_of_the_names(tmp_path):
+    (tmp_path / "log.csv").write_text("Run 12;;\ntime_usec;l1 [cm];X [m]\n0;101,5;1,5\n100000;102;1,6\n")
+    topic = from_csv((tmp_path / "log.csv").read_bytes(), "log.csv").topics[""]
+    assert list(topic.fields) == ["time_usec", "l1", "X"]
+    assert (role("time_usec").unit, role("time_boot_ms").unit, role("X").role) == ("us", "ms", "position")
 
 
 def test_lines_without_a_value_are_listed(tmp_path):

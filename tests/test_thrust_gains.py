@@ -45,6 +45,25 @@ def test_gains_drift_and_tilt_of_thrusts(gains, end, tilt, said, recorded, tmp_p
     assert found.robot.platform.mass == pytest.approx(0.4, rel=0.01)
 
 
+def test_noise_of_thrusts_makes_no_load_lighter(recorded, tmp_path):
+    """Of 2 %: 0.2 N of 2 N in the cables. Weights that follow it are larger where the tensions are too small."""
+    t, x, drones = recorded
+    robot, off = load(user.team_robot(tmp_path)), []
+    for seed in range(3):
+        draw = np.random.default_rng(seed)
+        columns = {"t": t[:, None], "load": x + draw.normal(0, 1e-3, x.shape)}
+        for i, (p, R, thrust, _) in enumerate(drones):
+            columns[f"cf{i + 1}"] = p + draw.normal(0, 1e-3, p.shape)
+            columns[f"cf{i + 1}_q"] = Rotation.from_matrix(R).as_quat()
+            columns[f"cf{i + 1}_thrust"] = (1.03 * thrust * (1 + draw.normal(0, 0.02, len(t))))[:, None]
+        axes = {"load": "_x _y _z", "cf1": "_x _y _z", "cf2": "_x _y _z", "cf1_q": "x y z w", "cf2_q": "x y z w"}
+        names = [name + axis for name in columns for axis in axes.get(name, "").split() or [""]]
+        path = user.write(tmp_path / f"flight{seed}.csv", names, np.hstack(list(columns.values())))
+        mass = calibrate(robot, read_log(path, robot=robot).measurements, free=("offsets", "mass")).parameters[-1]
+        off.append((mass.value - 0.4) / mass.sigma)
+    assert abs(np.mean(off)) < 1.7  # three standard deviations of the mean
+
+
 @pytest.mark.parametrize("tilt", [0.0, 3.0])
 def test_directions_that_contradict_thrusts_are_named(tilt, recorded, tmp_path):
     """Without the load nothing shows which of them is wrong, and 3 degrees make cables seem 6 cm longer."""

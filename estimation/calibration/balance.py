@@ -28,6 +28,7 @@ from .motion import Motion, cross, motion_of
 from .parameters import Parameters
 
 OWN = 2e-3  # of the weight: standard deviation of forces that the model lacks
+NOISY = 2.0  # times the stated standard deviations, of the noise that tensions of a motion show
 LEAST_TENSION = 0.1  # of a cable's mean: relative errors of smaller tensions are not smaller
 UNMEASURED = 3.0  # times the weight or the largest mean tension: standard deviation of one that was not measured
 MOST_CAPSTAN = 30.0  # of which exp is no overflow
@@ -110,6 +111,14 @@ class _Log:
             return np.full((len(self._measurements), self._robot.m), (UNMEASURED * weight) ** 2)
         usual = np.abs(given).mean(axis=0)
         size = self._measurements.sigma.tensions * np.maximum(np.abs(self.terms[1][2]), LEAST_TENSION * usual)
+        smooth = self.motion.smooth
+        if smooth is not None:
+            # Noise far above the stated share, as of tensions by thrusts, does not grow with the tension: weights that
+            # follow it would prefer samples whose tensions are too small.
+            off = 1.4826 * np.median(np.abs(self.terms[0][2] - self.terms[1][2]), axis=0)  # (m,)
+            off = off / np.sqrt(1 - min(float(np.median(smooth.share)), 0.5))
+            stated = np.median(size, axis=0)
+            size = np.where(off > NOISY * stated, stated, size)
         size = np.where(self.lost, UNMEASURED * max(weight, usual.max()), size)
         return size**2 + (1e-9 * max(weight, 1.0)) ** 2
 

@@ -80,7 +80,8 @@ def _one_header(text: str) -> str:
     table = [[cell.strip().strip('"') for cell in line.split(mark)] for line in lines]
     first = next((k for k, row in enumerate(table) if _is_data(row, table[k + 1] if k + 1 < len(table) else row)), 0)
     above = [(row, line) for row, line in zip(table[:first], lines, strict=False) if len(row) == len(table[first])]
-    rows = [row for row, line in above if line[:1] != "#"]
+    # The title of a sheet is alone in the first of its columns.
+    rows = [row for row, line in above if line[:1] != "#" and (len(row) < 2 or any(row[1:]))]
     commented = not rows and bool(above)
     if commented:
         rows = [[cell.lstrip("# ") for cell in above[-1][0]]]

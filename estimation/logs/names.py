@@ -82,7 +82,7 @@ PATTERNS = {
         rf"{_BEFORE}{_OF}(?:dir(?:ection)?[_ ])?(azimuth|elevation|swivel)[_ ]?\[?(\d*)\]?",
     ),
     "time": (
-        r"(?:.*/)?[%_]*(t|(?:ros|sim|log|recv|rec|unix)?[_ ]?times?|time_?us|secs?|seconds)",
+        r"(?:.*/)?[%_]*(t|(?:ros|sim|log|recv|rec|unix)?[_ ]?times?|time_?us(?:ec)?|time_?boot|secs?|seconds)",
         rf"[%_]*({_BEFORE}(?:time[_ ]?)?stamp)",
         r"(epoch|elapsed(?:[_ ]time)?|(?:sys(?:tem)?[_ ]?)?(?:ticks?|clock|uptime))",
         rf"{_BEFORE}((?:milli|micro|nano)s(?:ec(?:ond)?s?)?)",  # since an Arduino was switched on
@@ -161,7 +161,7 @@ def _role(which: str, match: re.Match[str], unit: str, name: str) -> Role:
         parts = ["wxyz"[int(parts[0])]]
     if which == "angles":
         parts = [_ANGLES.get(parts[0], parts[0])]
-    if which == "time" and (short := re.search("us$|(milli|micro|nano)s", text)):
+    if which == "time" and (short := re.search("us(?:ec)?$|(milli|micro|nano)s", text)):
         unit = {"milli": "ms", "nano": "ns"}.get(short[1] or "", "us")
     return Role(which, " ".join(parts), group, unit)
 

@@ -65,7 +65,9 @@ def thrust_gains(robot: Robot, measured: Measurements, poses: np.ndarray, thrust
         end = poses[:, index, :3] + turn @ np.array(robot.cables[cable].anchor)
         line = position + rotation @ np.array(robot.cables[cable].attachment) - end
         needed = carrier.mass * (parabolas.fitted(poses[:, index, :3]).bends - np.array(robot.gravity))
+        # Noise would make gains too small, so lifts are as smooth as the accelerations.
         lift = thrusts[:, index, None, None] * turn
+        lift = parabolas.values(lift.reshape(1, -1, 9)).reshape(lift.shape)
         lift = np.concatenate([lift, lift[:, :, 2:] * _along(times)[:, None, None]], axis=2)
         factors = _factors(*(part[used] for part in (line, needed, lift)))
         found += [] if factors is None else [ThrustGain(int(index), factors)]

@@ -192,7 +192,7 @@ class PoseEstimate(Displayed):
 
 def unbounded(covariance: np.ndarray, motions: np.ndarray) -> np.ndarray:
     """Return covariances (..., 6, 6) that are infinite for coordinates that undetermined motions (..., 6, k) change."""
-    changed = (np.abs(motions) > CHANGED).any(axis=-1)
+    changed = np.asarray((np.abs(motions) > CHANGED).any(axis=-1))
     return np.where(changed[..., :, None] | changed[..., None, :], np.inf, covariance)
 
 
