@@ -521,7 +521,11 @@ WRONG = {
     ),
     "for ever": (
         {"path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 1e5},
-        "duration must be at most 1000 s, .*got 100000 s",
+        "duration must be at most 10000 s, .*got 100000 s",
+    ),
+    "phases for an hour": (
+        {"phases": [{"name": "long", "path": {"kind": "rest", "pose": [0, 0, -1]}, "duration": 3600}]},
+        "duration must be at most 1000 s with phases, .*got 3600 s",
     ),
     "at an anchor": (
         {"path": {"kind": "rest", "pose": [0.395, -0.216506350946, -0.1]}, "duration": 1},

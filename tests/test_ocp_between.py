@@ -6,6 +6,7 @@ import pytest
 from towline.models import Robot, load
 from towline.ocp.audits.audit import audit
 from towline.ocp.tasks.lay_out import lay_out
+from towline.ocp.tasks.scenario import MOST_SAMPLES
 from towline.ocp.tasks.task import read_task
 
 from .soak.recheck import cable_distance, least_along, point_distance
@@ -112,9 +113,13 @@ def shaken(robot, times):
     return np.abs(np.einsum("nki,ni->nk", u, velocity)), np.linalg.solve(u.swapaxes(1, 2), force[..., None])[..., 0]
 
 
-@pytest.mark.parametrize("seconds", [0.2003, 0.3337])
-def test_a_peak_between_instants_is_found(seconds):
-    """A bound that all instants of the audit keep, but not the peak between them: of a rate and of a tension."""
+@pytest.mark.parametrize(("seconds", "most"), [(0.2003, MOST_SAMPLES), (0.3337, MOST_SAMPLES), (0.3337, 33)])
+def test_a_peak_between_instants_is_found(seconds, most, monkeypatch):
+    """A bound that all instants of the audit keep, but not the peak between them: of a rate and of a tension.
+
+    The last are as far apart as those of a motion of hours.
+    """
+    monkeypatch.setattr("towline.ocp.audits.audit.MOST_SAMPLES", most)
     robot, task = load("point-mass-3"), {"path": SHAKEN, "duration": seconds}
     instants = audit(lay_out(robot, read_task(task)), None).times
     peaks = [values.max() for values in shaken(robot, np.linspace(0, seconds, 200_001))]

@@ -13,7 +13,7 @@ from ...base.display import Displayed
 from ...solvers import Certificate
 from ..tasks.deviation import Deviation
 from ..tasks.paths import Motion
-from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, Scenario
+from ..tasks.scenario import AUDIT_RATE, LEAST_INTERVALS, MOST_SAMPLES, Scenario
 from .checks import START_TENSIONS, excesses
 from .clearances import came_too_near
 from .drift import Drift, drift
@@ -82,8 +82,8 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
     """
     intervals = scenario.output_samples
     if not to_show:  # a multiple: saved instants are audited ones
-        least = max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS)
-        intervals *= max(int(np.ceil(least / intervals - 1e-9)), 1)
+        wanted = min(max(AUDIT_RATE * scenario.duration, LEAST_INTERVALS), MOST_SAMPLES)
+        intervals *= max(int(np.ceil(wanted / intervals - 1e-9)), 1)
     times = np.linspace(0.0, scenario.duration, intervals + 1)
     regular = instants(scenario, deviation, times)
     seen = regular if to_show else with_peaks(regular)

@@ -25,6 +25,7 @@ MOST_HALVES = 20  # of the time between two instants
 WIDE = 3  # instants to each side of a span, which its curvature needs
 SINGULAR = 1e-12  # of the squares of all that the cables can change: what is so little counts as nothing
 MOST_ROOM = 1e3  # of the weight: limits may be infinite
+BLOCK = 8192  # instants whose matrices are in memory at once, besides those of all
 UNDECIDED = 0.05  # of a tolerance: less than that beyond it is not looked for
 
 
@@ -152,32 +153,42 @@ def _missing_and_reached(
     Both are in [N]. The second derivatives are those at `rows`. The second value is known between the
     instants that are `doubtful`, where the first is more than is tolerated.
     """
-    times, robot = seen.times, seen.scenario.robot
-    A, w = scaled(seen.scenario, seen.A), scaled(seen.scenario, seen.w)
-    h, dA, dw, product = np.diff(times), np.diff(A, axis=0), np.diff(w, axis=0), "nij,nj->ni"
-    after = np.einsum(product, dA[rows], t[rows]) - dw[rows]
-    before = np.einsum(product, dA[rows - 1], t[rows]) - dw[rows - 1]
+    scenario, times, A = seen.scenario, seen.times, seen.A
+    h, dw = np.diff(times), np.diff(seen.w, axis=0)
+    after = scaled(scenario, _by_change(A, rows, t[rows]) - dw[rows])
+    before = scaled(scenario, _by_change(A, rows - 1, t[rows]) - dw[rows - 1])
     bent = np.zeros(len(times))
     slopes = after / h[rows, None] - before / h[rows - 1, None]
     bent[rows] = 2 * np.linalg.norm(slopes, axis=1) / (h[rows] + h[rows - 1])
     bent[1:-1][jumps[1:] | jumps[:-1]] = 0.0
     missing = between(times, bent)
-    missing += np.linalg.norm(np.einsum(product, dA, np.diff(t, axis=0)), axis=1) / 4
-    room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * robot.force_scale)
+    missing += np.linalg.norm(scaled(scenario, _by_change(A, np.arange(len(h)), np.diff(t, axis=0))), axis=1) / 4
+    room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * scenario.robot.force_scale)
     room, gains = np.minimum(room[:-1], room[1:]), np.maximum(seen.gains[:-1], seen.gains[1:])
     reached = np.divide(room, gains, out=np.full_like(room, np.inf), where=gains > 0).min(axis=1)
     # Where a cable has no room the others have to make up for it, by changes in proportion to the room of each.
     spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & doubtful)
-    room = room[spans]
-    moving = np.flatnonzero(robot.dof_mask)
-    weighted = (A[spans] + A[spans + 1])[:, moving] / 2 * room[:, None, :]
-    square = weighted @ weighted.swapaxes(1, 2)
-    size = np.einsum("nii->n", square)
-    square += (SINGULAR * size + (size == 0))[:, None, None] * np.eye(len(moving))
-    inverse = np.linalg.inv(square)
-    parts = np.linalg.norm(weighted.swapaxes(1, 2) @ inverse, axis=2).max(axis=1)  # of a cable's room
-    # Where these miss a share of a wrench they can make up for it in turn, as for a geometric series, if it is below 1.
-    missed = SINGULAR * size * np.linalg.norm(inverse, axis=(1, 2))
-    weighted_reach = np.divide((1.0 - missed).clip(0.0), parts, out=np.zeros_like(parts), where=parts > 0)
-    reached[spans] = np.maximum(reached[spans], weighted_reach)
+    moving = np.flatnonzero(scenario.robot.dof_mask)
+    for some in np.split(spans, range(BLOCK, len(spans), BLOCK)):
+        weighted = scaled(scenario, A[some] + A[some + 1])[:, moving] / 2 * room[some, None, :]
+        square = weighted @ weighted.swapaxes(1, 2)
+        size = np.einsum("nii->n", square)
+        square += (SINGULAR * size + (size == 0))[:, None, None] * np.eye(len(moving))
+        inverse = np.linalg.inv(square)
+        parts = np.linalg.norm(weighted.swapaxes(1, 2) @ inverse, axis=2).max(axis=1)  # of a cable's room
+        # Where these miss a share of a wrench they can make up for it in turn, as for a geometric series, if it is
+        # below 1.
+        missed = SINGULAR * size * np.linalg.norm(inverse, axis=(1, 2))
+        weighted_reach = np.divide((1.0 - missed).clip(0.0), parts, out=np.zeros_like(parts), where=parts > 0)
+        reached[some] = np.maximum(reached[some], weighted_reach)
     return missing, reached
+
+
+def _by_change(A: np.ndarray, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return (A[row + 1] - A[row]) t for each of the rows (k,) and t (k, m), (k, 6); in blocks, which memory holds."""
+    out = np.empty((len(rows), A.shape[1]))
+    for start in range(0, len(rows), BLOCK):
+        block = slice(start, start + BLOCK)
+        change = A[rows[block] + 1] - A[rows[block]]
+        out[block] = (change @ t[block][..., None])[..., 0]
+    return out

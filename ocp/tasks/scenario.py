@@ -39,10 +39,19 @@ from .wind_set import WindBox, WindDisc, WindSet, as_wind, possible_winds_at
 
 POSITION, ATTITUDE = range(3), range(3, 6)
 AUDIT_RATE = 1000.0  # [1/s]: the audit looks at every millisecond
+LEAST_AUDIT_RATE = 100.0  # [1/s], of motions that last longer than a thousand seconds
 LEAST_INTERVALS = 200  # of the audit: short motions are audited between their ends too
 START_BAND = 1e-4  # of the force scale: how far planned tensions may start from the measured ones
-MOST_SAMPLES = 1_000_000  # of the audit: a thousand seconds
+MOST_SAMPLES = 1_000_000  # of the audit
 FEW = 20  # intervals of the saved trajectory of a motion that is shorter than two of its samples
+
+
+def least_audit_rate(task: Task) -> float:
+    """Return how many instants per second an audit looks at, at least [1/s]: phases may be short.
+
+    Where instants are far apart, more are looked at in between (`audits.peaks`).
+    """
+    return AUDIT_RATE if task.phases else LEAST_AUDIT_RATE
 
 
 @dataclass(frozen=True)
@@ -149,7 +158,7 @@ class Scenario(Displayed):
     @property
     def longest(self) -> float:
         """Return the longest duration of which all samples can be audited [s]."""
-        return MOST_SAMPLES / max(AUDIT_RATE, self.task.output_rate)
+        return MOST_SAMPLES / max(least_audit_rate(self.task), self.task.output_rate)
 
     @property
     def output_samples(self) -> int:

@@ -15,7 +15,7 @@ from .ends import carrier_ends, platform_ends
 from .initial import Final, Initial, check_ends
 from .limit_list import bodies
 from .paths import FeedPath, SequencePath, WaypointPath
-from .scenario import ATTITUDE, AUDIT_RATE, MOST_SAMPLES, Scenario
+from .scenario import ATTITUDE, MOST_SAMPLES, Scenario, least_audit_rate
 from .task import FreeBase, Task
 from .task_limits import OF_CARRIERS
 from .wind_set import WindBox, WindDisc
@@ -138,10 +138,12 @@ def _check_feed(robot: Robot, task: Task, where: str) -> None:
 def _check_times(task: Task, where: str) -> None:
     """Refuse a task longer or shorter than its waypoints: beyond their times a spline is arbitrary."""
     longest = task.duration.max if isinstance(task.duration, PositiveRange) else task.seconds
-    if longest * AUDIT_RATE > MOST_SAMPLES:
+    rate = least_audit_rate(task)
+    if longest * rate > MOST_SAMPLES:
+        with_phases = " with phases" if task.phases else ""
         raise InputError(
-            f"{where}: duration must be at most {MOST_SAMPLES / AUDIT_RATE:g} s, since the audit evaluates "
-            f"{AUDIT_RATE:g} instants per second, got {longest:g} s"
+            f"{where}: duration must be at most {MOST_SAMPLES / rate:g} s{with_phases}, since the audit evaluates "
+            f"{rate:g} instants per second, got {longest:g} s"
         )
     if longest * task.output_rate > MOST_SAMPLES:
         raise InputError(
