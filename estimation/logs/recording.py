@@ -77,5 +77,5 @@ def check_rising(times: np.ndarray) -> None:
         row = int(falling[0])
         raise InputError(
             f"times must increase from sample to sample, got {times[row]:.15g} s and then {times[row + 1]:.15g} s at "
-            f"sample {row + 1}"
+            f"sample {row + 1}{'; cut the log where its clock was set back' if times[row + 1] < times[row] else ''}"
         )
