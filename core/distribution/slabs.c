@@ -1,9 +1,9 @@
 /*
  * The point of least norm in slabs of a line or a plane: m - rank of at most two.
  *
- * With s = s_0 + N z, cable i is the slab low_i <= s_0i + n_i . z <= high_i. The optimum z of some slabs begins as the
- * origin, of none. If it violates a further slab, the most violated one is taken, and the new optimum lies on the edge
- * that was violated (Seidel 1991):
+ * With s = s_0 + N z, cable i is the slab low_i <= s_0i + n_i . z <= high_i. Slabs are taken one by one. Without slabs,
+ * the optimum z is the origin. If it violates slabs, the most violated one is taken, and the new optimum lies on the
+ * edge that was violated (Seidel 1991):
  *
  *     z = base + x along,   base = edge n_i / |n_i|^2,   along . n_i = 0,   |along| = 1
  *

@@ -2,9 +2,9 @@
  * Numbers for some problems at once: `num` is a vector of GCC and Clang with one lane for each of them, `mask` one
  * whose lanes have all bits set (yes) or none (no). Comparisons of two `num` give a mask.
  *
- * A file that uses lanes is compiled once for each kind of processor, by files such as rows_avx2.c: vectors are made
- * instructions where a function is compiled, before it is inlined elsewhere. Neither compiler chooses between two
- * vectors by `?:` in C, nor has a root of one.
+ * A file that uses lanes is compiled once for each kind of processor, by files such as rows_avx2.c: a compiler turns
+ * vectors into instructions in the function that it compiles, before that function is inlined into another. Neither
+ * compiler has a square root of a vector, or chooses between two vectors by `?:` in C.
  */
 #ifndef TOWLINE_LANES_H
 #define TOWLINE_LANES_H
