@@ -157,8 +157,9 @@ class Scenario(Displayed):
 
     @property
     def longest(self) -> float:
-        """Return the longest duration of which all samples can be audited [s]."""
-        return MOST_SAMPLES / max(least_audit_rate(self.task), self.task.output_rate)
+        """Return the longest duration that is tried where a longer one may help [s]; audits of longer ones take long."""
+        given = self.duration if self.duration_range is None else self.duration_range.max
+        return max(MOST_SAMPLES / max(AUDIT_RATE, self.task.output_rate), given)
 
     @property
     def output_samples(self) -> int:
