@@ -157,7 +157,7 @@ class Scenario(Displayed):
 
     @property
     def longest(self) -> float:
-        """Return the longest duration that is tried where a longer one may help [s]; audits of longer ones take long."""
+        """Return the longest duration that is tried where a longer one may help [s]; longer audits take minutes."""
         given = self.duration if self.duration_range is None else self.duration_range.max
         return max(MOST_SAMPLES / max(AUDIT_RATE, self.task.output_rate), given)
 
