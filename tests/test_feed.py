@@ -248,6 +248,22 @@ def test_a_mills_file_has_lines_with_moves_and_switches_and_arcs_in_all_planes(e
     assert set(path.ignored) == {"G17", "G43", "G53", "G54", "G64", "G91.1", "G94", "H", "M3", "M6", "M8", "S", "T"}
 
 
+@pytest.mark.parametrize("kind", ["feed, acceleration: 1", "waypoints"])
+def test_the_zero_of_a_file_is_where_the_task_says(kind, tmp_path):
+    (tmp_path / "part.ngc").write_text("G21\nG0 X1 Y2 Z3\nG1 X11 F60")
+    task = f"path: {{kind: {kind}, points: part.ngc, origin: ORIGIN}}\n"
+    (tmp_path / "task.yaml").write_text(task.replace("ORIGIN", "[0.5, -1, 2]"))
+    path = read_task(tmp_path / "task.yaml").path
+    np.testing.assert_allclose(np.array(path.points)[:, :3], [[0.501, -0.998, 2.003], [0.511, -0.998, 2.003]])
+    assert read_task({"path": path.model_dump()}).path == path, "a saved task is not moved again"
+    for wrong in ("[1, 2]", ".inf", "[a, 0, 0]"):
+        (tmp_path / "task.yaml").write_text(task.replace("ORIGIN", wrong))
+        with pytest.raises(InputError, match="origin must be three numbers"):
+            read_task(tmp_path / "task.yaml")
+    with pytest.raises(InputError, match="origin must be left out unless points is the name of a file"):
+        read_task({"path": path.model_dump() | {"origin": [0, 0, 1]}})
+
+
 def test_a_printers_file_has_the_units_of_its_firmware(tmp_path):
     (tmp_path / "part.gcode").write_text(PRINTED)
     path = path_of_file("part.gcode", tmp_path)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
+from ....base.inputs import shown
 from ....models.part import Part, Pose, Vector3, optional
 from .motion import Motion
 from .stations import Stations
@@ -32,8 +33,13 @@ def or_number(schema: dict[str, Any]) -> None:
 
 
 def with_points_of_file(data: dict[str, Any], info: ValidationInfo, wanted: Collection[str]) -> dict[str, Any]:
-    """Return a path's fields with those `wanted` of the file that `points` names, and one dwell for each point."""
-    dwell, points = data.get("dwell"), data.get("points")
+    """Return a path's fields with those `wanted` of the file that `points` names, and one dwell for each point.
+
+    The points of a file are moved by `origin`, and the fields no longer have it.
+    """
+    dwell, points, origin = data.get("dwell"), data.get("points"), data.get("origin")
+    if origin is not None and not isinstance(points, str):
+        raise ValueError("origin must be left out unless points is the name of a file")
     if isinstance(points, list | tuple) and isinstance(dwell, int | float) and not isinstance(dwell, bool):
         return data | {"dwell": [dwell] * len(points)}
     if not isinstance(points, str):
@@ -45,9 +51,15 @@ def with_points_of_file(data: dict[str, Any], info: ValidationInfo, wanted: Coll
     for name in read:
         if name != "points" and data.get(name) is not None:
             raise ValueError(f"{name} must be left out, since {data['points']!r} has them")
-    return data | read
+    if origin is not None:
+        by = np.array(origin, dtype=object)
+        if by.shape != (3,) or not all(isinstance(x, int | float) and np.isfinite(x) for x in by):
+            raise ValueError(f"origin must be three numbers (x y z), got {shown(origin)}")
+        read["points"] = [(*(point[:3] + by).tolist(), *point[3:]) for point in read["points"]]
+    return data | read | {"origin": None}
 
 
+FILE_ORIGIN = "where the zero of the file of points is, in the path's frame [m]; default: at the frame's origin"
 PoseOrPosition = Annotated[Pose, BeforeValidator(_with_level_attitude, json_schema_input_type=Pose | Vector3)]
 
 

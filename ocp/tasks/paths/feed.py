@@ -10,8 +10,8 @@ from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
 from ....base.text import counted, quantity
-from ....models.part import NonNegative, Positive, optional
-from .base import PathBase, PoseOrPosition, or_file, or_number, with_points_of_file
+from ....models.part import NonNegative, Positive, Vector3, optional
+from .base import FILE_ORIGIN, PathBase, PoseOrPosition, or_file, or_number, with_points_of_file
 from .motion import Motion
 from .rounded_corners import CELLS, RoundedCorners
 from .time_law import TimeLaw
@@ -36,6 +36,7 @@ class FeedPath(PathBase):
         description="at least two positions [m], or poses with the same attitude [m, rad]; a task may give the name of "
         "a file of points instead, .csv with units in its header or .gcode, relative to the task file",
     )
+    origin: Vector3 | None = optional(FILE_ORIGIN)
     feed: Positive | None = optional("speed [m/s]; default: that of each line of a .gcode file")
     acceleration: Positive = Field(description="largest acceleration, along the path and across it in corners [m/s^2]")
     tolerance: NonNegative = optional(

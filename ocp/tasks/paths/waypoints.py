@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 from typing_extensions import override
 
-from ....models.part import Finite, NonNegative, optional
-from .base import PathBase, PoseOrPosition, check_times, or_file, or_number, with_points_of_file
+from ....models.part import Finite, NonNegative, Vector3, optional
+from .base import FILE_ORIGIN, PathBase, PoseOrPosition, check_times, or_file, or_number, with_points_of_file
 from .legs import Legs
 from .motion import Motion
 from .stations import Stations
@@ -46,6 +46,7 @@ class WaypointPath(PathBase):
         description="at least two poses or positions [m, rad]; a task may give the name of a file of points instead, "
         ".csv with units in its header or .gcode, relative to the task file",
     )
+    origin: Vector3 | None = optional(FILE_ORIGIN)
     shape: Literal["legs", "spline"] = optional(
         "legs: straight, rounded at the points; spline: a smooth curve of degree 5", "legs"
     )
