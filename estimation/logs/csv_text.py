@@ -4,16 +4,23 @@ import re
 from collections.abc import Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
+from ...base.errors import InputError
 from .names import UNITS, unit_of
 
-MOST_ABOVE, LONGEST_HEADER = 20, 100_000  # lines above the numbers, and their characters
+MOST_ABOVE, LONGEST_HEADER = 40, 100_000  # lines above the numbers, and their characters
 KNOWN_UNITS = {"", *(unit for units in UNITS.values() for unit in units)}
 LENGTH_UNITS = re.compile(r"(?i)length units?[,;:=\t ]+([a-z]+)")
 DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+(?:[eE][-+]?\d+)?\s*")
 _CLOCK = r"\d\d?:\d\d:\d\d(?:\.\d+)?"
 DATE = re.compile(rf"(?<![\d-])\d{{4}}-\d\d-\d\d[T ]{_CLOCK}(?:Z|[+-]\d\d:?\d\d)?")
+HEADER = "t [s], l0 [m], l1 [m], x [m], y [m], z [m]"
+LABVIEW = "***End_of_Header***"
+# Rates [Hz] of motion capture systems: FREQUENCY of Qualisys, the second line of Vicon.
+_ABOVE = r"(?:sampl[a-z]+ |frame )?(?:rate|frequency)[^\d\n]*|[a-z ]+[,;]*\r?\n"
+RATE = re.compile(rf"(?i)(?:^|\n)(?:{_ABOVE})(\d+(?:\.\d+)?)[.,;\s]*\n")
+PERIOD = re.compile(r"\nDelta_X\t+(\d+\.\d+)")  # [s] of LabVIEW
 TIME_OF_DAY = re.compile(rf"(?<![\d:]){_CLOCK}(?![\d:])")
 
 
@@ -79,27 +86,79 @@ def _one_header(text: str) -> str:
     mark = max(",;\t", key="".join(lines).count)
     table = [[cell.strip().strip('"') for cell in line.split(mark)] for line in lines]
     first = next((k for k, row in enumerate(table) if _is_data(row, table[k + 1] if k + 1 < len(table) else row)), 0)
-    above = [(row, line) for row, line in zip(table[:first], lines, strict=False) if len(row) == len(table[first])]
-    # The title of a sheet is alone in the first of its columns.
-    rows = [row for row, line in above if line[:1] != "#" and (len(row) < 2 or any(row[1:]))]
+    width, ends = len(table[first]), [k + 1 for k in range(first) if lines[k].startswith(LABVIEW)]
+    begin = max(ends, default=0)
+    if len(table[first - 1]) == width - 1 and not table[first][-1]:
+        table[first - 1].append("")
+    above = [(_cut(row, width), line) for row, line in zip(table[begin:first], lines[begin:], strict=False)]
+    above = [(row, line) for row, line in above if len(row) == width]
+    # The title of a sheet is alone in the first of its columns; bodies of OptiTrack have numbers beside their names.
+    rows = [row for row, line in above if line[:1] != "#" and (len(row) < 2 or any(row[1:])) and row[1:2] != ["ID"]]
     commented = not rows and bool(above)
     if commented:
         rows = [[cell.lstrip("# ") for cell in above[-1][0]]]
+    if not above and _is_data(table[first], table[first]) and all(line[:1] in ("", "#") for line in lines[:first]):
+        raise InputError(f"must have a header that names its columns, as in {HEADER}, got numbers in its first line")
     plain = all(not line.strip() or line[:1] == "#" for line in lines[: first - 1])
-    if not rows or (len(rows) == 1 and plain and not commented):
+    if not rows or (len(rows) == 1 and plain and not commented and len(table[first - 1]) == width):
         return text
+    head = "\n".join(lines[:first])
+    names, units = _of_scope(rows) if any(row[0] == "Name" for row in rows) else _of_rows(rows, head)
+    # Where each channel has times of its own, their columns have one name.
+    names = [f"{names[0]} of {names[k + 1]}" if k and name == names[0] else name for k, name in enumerate(names)]
+    titles = [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
+    below = text.split("\n", first)[-1] if "\n" in text else ""
+    return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines
+
+
+def _cut(row: list[str], width: int) -> list[str]:
+    """Return a row of names without a last cell, empty or for comments (LabVIEW), that rows of numbers leave out."""
+    return row[:width] if row[width:] in ([""], ["Comment"]) else row
+
+
+def _of_rows(rows: Sequence[list[str]], head: str) -> tuple[list[str], list[str]]:
+    """Return names and units of columns: of rows of names, and of one of units below them."""
     units = [cell.strip("[]()") for cell in rows[-1]]
     stated = len(rows) > 1 and all(unit in KNOWN_UNITS for unit in units)
     *above_names, last = rows[: len(rows) - stated]
-    # The name of a body may stand above the first of its columns only.
+    # The name of a body may stand above the first of its columns only, or before the name of this column (Qualisys).
     above_names = [list(accumulate(row, lambda before, cell: cell or before)) for row in above_names]
+    bodies = [cell[:-2] if cell.endswith(" X") and after == "Y" else "" for cell, after in pairwise([*last, ""])]
+    of = list(accumulate(bodies, lambda before, body: body or before))
+    last = [
+        cell if not body or cell.startswith(body) else f"{body} {cell}" for cell, body in zip(last, of, strict=True)
+    ]
     names = ["/".join(dict.fromkeys(filter(None, column))) for column in zip(*above_names, last, strict=True)]
-    if not stated and (unit := LENGTH_UNITS.search("\n".join(lines[:first]))):  # of a motion capture, above all names
-        units = [unit_of(unit[1]) if "position" in name.lower() else "" for name in names]
-        stated = True
-    titles = [f"{name} [{unit}]" if stated and unit else name for name, unit in zip(names, units, strict=True)]
-    below = text.split("\n", first)[-1] if "\n" in text else ""
-    return "\n" * (first - 1) + mark.join(titles) + "\n" + below  # empty lines keep the numbers of lines
+    if stated:
+        return names, units
+    if last[0] == "X_Value":  # of LabVIEW
+        return [name.replace("X_Value", "time") for name in names], ["s" if one == "X_Value" else "" for one in last]
+    if "NO_OF_FRAMES" in head:  # of Qualisys
+        units_of = dict.fromkeys("XYZ", "mm") | dict.fromkeys(("Roll", "Pitch", "Yaw"), "deg")
+        return names, [units_of.get(name.rpartition(" ")[2], "") for name in names]
+    if unit := LENGTH_UNITS.search(head):  # of a motion capture, above all names
+        return names, [unit_of(unit[1]) if "position" in name.lower() else "" for name in names]
+    return names, [""] * len(names)
+
+
+def _of_scope(rows: Sequence[list[str]]) -> tuple[list[str], list[str]]:
+    """Return names and units of columns of TwinCAT Scope: rows such as Name and Unit, beside the times of channels."""
+    known = {row[0]: row for row in rows}
+    titles, words = known["Name"], known.get("Unit", [""] * len(rows[0]))
+    named = [
+        ("time", "ms") if name == "Name" else (name, word.partition(" ")[0])
+        for name, word in zip(titles, words, strict=True)
+    ]
+    return [name for name, _ in named], [unit if unit in KNOWN_UNITS else "" for _, unit in named]
+
+
+def sample_period(text: str) -> float | None:
+    """Return the time between samples [s] that the lines above the names of `plain_csv` state, or None."""
+    head = "\n".join(_head(text)).replace(",", ".")
+    for pattern, power in ((PERIOD, 1), (RATE, -1)):
+        if (found := pattern.search(head)) and float(found[1]) > 0:
+            return float(float(found[1]) ** power)
+    return None
 
 
 def _is_data(row: Sequence[str], below: Sequence[str]) -> bool:

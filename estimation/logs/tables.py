@@ -12,7 +12,8 @@ from ...base.declared import check_hdf5, check_heaps
 from ...base.errors import InputError
 from ...base.inputs import printable
 from ...base.netcdf import check_units
-from .csv_text import plain_csv
+from ...base.text import quantity
+from .csv_text import plain_csv, sample_period
 from .measurements import Sigma
 from .names import FORCES, role
 from .recording import Recording, Samples, Topic
@@ -48,7 +49,10 @@ def from_csv(content: bytes, where: str) -> Recording:
     if not lines.size:
         raise InputError("must have a line for each sample below its header, got none")
     _with_whole_stamps(columns)
-    return Recording(where, "CSV", {"": _table(columns, {name: units.get(name, "") for name in columns})})
+    columns = _at_one_time(columns)
+    notes = _with_frames(columns, sample_period(text))
+    table = _table(columns, {name: units.get(name, "") for name in columns})
+    return Recording(where, "CSV", {"": table}, notes=notes)
 
 
 def _with_whole_stamps(columns: dict[str, np.ndarray]) -> None:
@@ -61,6 +65,33 @@ def _with_whole_stamps(columns: dict[str, np.ndarray]) -> None:
         if whole is not None:
             stamps = columns.pop(whole) + 1e-9 * columns.pop(name)
             columns[stem.rstrip("./_ ") or "stamp"] = stamps
+
+
+def _at_one_time(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return columns at the times of the first one, of a table in which each channel has times of its own."""
+    first, times = next(iter(columns.items()))
+    apart = {name: name.removeprefix(f"{first} of ") for name in columns if name.startswith(f"{first} of ")}
+    if not apart:
+        return columns
+    there = np.isfinite(times)
+    moved = {name: column[there] for name, column in columns.items() if name not in apart}
+    for name, channel in apart.items():
+        known = np.isfinite(columns[name])
+        own, values = columns[name][known], columns[channel][known]
+        moved[channel] = np.interp(times[there], own, values, np.nan, np.nan) if known.any() else moved[channel]
+    return moved
+
+
+def _with_frames(columns: dict[str, np.ndarray], period: float | None) -> list[str]:
+    """Add times of frames, `period` [s] apart, to a table of several columns without times, in place; return a note."""
+    timed = any(
+        (found := role(name)) and found.role == "time" and np.isfinite(column).any() for name, column in columns.items()
+    )
+    if timed or period is None or len(columns) < 2:
+        return []
+    count = np.arange(len(next(iter(columns.values()))), dtype=float)
+    columns["time"] = period * next((column for name, column in columns.items() if name.lower() == "frame"), count)
+    return [f"times are those of frames {quantity(1e3 * period, 'ms', 4)} apart, as the file states above its columns"]
 
 
 def from_netcdf(content: bytes, where: str) -> Recording:
