@@ -112,8 +112,8 @@ def _clear_ends(scenario: Scenario) -> tuple[list[Fact], bool]:
         elif in_the_way and limit.name == "keep_out":
             blocked.append(ENDS[end])
     if blocked:
-        where = f"at the {' and at the '.join(blocked)} the robot is inside a region"
-        why = "no position along x, y or z was found at which it is not"
+        where = f"at the {' and at the '.join(blocked)} the platform or a cable is inside a region"
+        why = "no shift along x, y or z was found that clears it and the line to the other end"
         facts.append(("other regions", f"or other anchors: {where}, and {why}"))
     return facts, inside
 
@@ -124,7 +124,7 @@ def _nearest(
     """Return the position nearest to an end, along an axis of {G}, at which the robot can rest; None if none is found.
 
     For a line that the platform follows, the nearest from which that line to the `other` end is clear is preferred.
-    Also return whether it is, or whether the planner can leave the line.
+    Also return whether it is, or whether the tube is wide enough for the planner to leave the line by that distance.
     """
     (from_, loose), axes = space.references, [axis for axis in POSITION if scenario.robot.dof_mask[axis]]
     points = np.vstack([scenario.robot.home_anchors, from_[:, :3]])
@@ -138,7 +138,9 @@ def _nearest(
         if clear.any():
             nearest.append((away[1 + clear.argmax()], way))
     places = [from_[end, :3] + far * way for far, way in sorted(nearest, key=lambda pair: pair[0])]
-    if isinstance(scenario.task.path, LinePath) and scenario.task.tube.position != "free":
+    width = scenario.task.tube.position or 0.0
+    leaves = width == "free" or (bool(places) and float(np.linalg.norm(places[0] - from_[end, :3])) <= width)
+    if isinstance(scenario.task.path, LinePath) and not leaves:
         share = np.linspace(0.0, 1.0, ALONG)[:, None]
         lines = ((place, place + share * (other - place) - from_[end, :3]) for place in places)
         straight = [place for place, line in lines if (_slack(kept, space, from_[end], loose[end], line) >= 0).all()]
