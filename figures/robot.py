@@ -89,6 +89,7 @@ def draw(scene: Scene, resting: np.ndarray | None = None) -> style.Figure:
         place_of_bar = {"location": "bottom", "aspect": 40, "pad": 0.02}
         bar = style.colour_bar(canvas, scale(), ax, "tension [N] from t_min to t_max", **place_of_bar)
         mark(bar, scene.t_min, scene.t_max, LETTERS)
+    canvas.draw_without_rendering()  # the first pass of the layout cuts off the title of a robot that fills the width
     return canvas
 
 

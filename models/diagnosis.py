@@ -147,6 +147,13 @@ def _implausible(robot: Robot) -> list[str]:
             "platform.com: it lies outside the attachments in the view from above, so suspended cables cannot hold "
             "it level"
         )
+    borne = np.array(robot.gravity) * (robot.dof_mask[:3] == 0)  # along coordinates that cannot move
+    if np.abs(borne @ Dynamics(robot).wrench_matrix(robot.home)[:3]).max(initial=0.0) > 1e-3 * np.linalg.norm(borne):
+        fixed = ", ".join(np.array(["x", "y", "z"])[borne != 0])
+        warnings.append(
+            f"platform.dof: {fixed} cannot move, so something else is assumed to carry the weight, although the cables "
+            f"are inclined; if the platform hangs from them, add {fixed}"
+        )
     warnings.extend(
         f"cables[{index}]: t_min equals t_max, {quantity(cable.t_max, 'N')}"
         for index, cable in enumerate(robot.cables)

@@ -233,8 +233,8 @@ def path_of_file(name, folder):
 
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
 def test_a_mills_file_has_lines_with_moves_and_switches_and_arcs_in_all_planes(encoding, tmp_path):
-    (tmp_path / "part.ngc").write_text(MILLED, encoding=encoding)
-    path = path_of_file("part.ngc", tmp_path)
+    (tmp_path / "part.nc").write_text(MILLED, encoding=encoding)
+    path = path_of_file("part.nc", tmp_path)
     points = np.array(path.points)[:, :3] * 1000
     np.testing.assert_allclose(points[:2], [[0, 0, 600], [100, 0, 600]], atol=1e-9)
     np.testing.assert_allclose(points[-1], [110, 10, 600], atol=1e-9)

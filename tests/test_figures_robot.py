@@ -5,8 +5,9 @@ from collections import Counter
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.text import Text
 
-from towline import available, load
+from towline import Robot, available, load
 from towline.figures import projection, style
 from towline.figures import robot as figure
 from towline.figures.hull import faces, outline
@@ -83,3 +84,22 @@ def test_views_have_what_they_show_in_their_middle():
             assert sum(limits) == pytest.approx(low + high)
     shown = [(ax.xaxis.get_tick_params()["labelbottom"], ax.yaxis.get_tick_params()["labelleft"]) for ax in panels]
     assert shown == [(False, True), (True, True), (True, False)], "numbers are where panels have none beside or below"
+
+
+def test_the_title_of_a_robot_that_fills_the_width_is_inside_the_picture():
+    corners = [[x, y, 25.0] for x in (-45, 45) for y in (-30, 30)]
+    ends = {"carrier": "masts", "attachment": [0, 0, 0], "t_min": 5, "t_max": 2000}
+    camera = Robot.model_validate(
+        {
+            "name": "camera",
+            "source": "a test",
+            "platform": {"mass": 25, "dof": ["x", "y", "z"], "home": [0, 0, 10, 0, 0, 0]},
+            "carriers": [{"name": "masts", "kind": "ground"}],
+            "cables": [ends | {"anchor": corner} for corner in corners],
+        }
+    )
+    resting = np.array([[x, y, 5.0] for x in (-40, 40) for y in (-27, 27)])
+    canvas = figure.draw(scene_at(camera, camera.home, np.full(4, 229.0), "camera"), resting)
+    canvas.draw_without_rendering()
+    (title,) = canvas.findobj(lambda it: isinstance(it, Text) and it.get_text().startswith("camera"))
+    assert title.get_window_extent().y1 <= canvas.bbox.height

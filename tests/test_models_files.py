@@ -273,3 +273,14 @@ def test_a_changed_copy_keeps_nothing_computed_from_the_old_numbers():
     anew = Robot.model_validate(copy.model_dump())
     assert (copy, copy.length, hash(copy)) == (anew, anew.length, hash(anew))
     assert (robot.length, hash(robot)) == known != (copy.length, hash(copy))
+
+
+@pytest.mark.parametrize(("height", "warned"), [(25.0, True), (10.0, False)])
+def test_a_weight_that_inclined_cables_could_carry_but_do_not_is_a_warning(height, warned):
+    """In the plane of its four anchors the cables pull across gravity only, so a table carries the weight."""
+    data = load("planar-4").model_dump(mode="json")
+    data["platform"] |= {"dof": ["x", "y", "yaw"], "home": [0, 0, 10, 0, 0, 0]}
+    for cable, (x, y) in zip(data["cables"], [(45, 30), (-45, 30), (-45, -30), (45, -30)], strict=True):
+        cable |= {"anchor": [x, y, height], "attachment": [x / 150, y / 150, 0]}
+    warnings = diagnose(Robot.model_validate(data)).warnings
+    assert any("z cannot move" in warning for warning in warnings) == warned

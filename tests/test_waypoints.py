@@ -344,6 +344,7 @@ WRONG = {
     "late start": ("a.csv", CSV.replace(";0;0\n", ";0;1\n"), "line 3, column t must start at 0 s, got 1 s"),
     "one line": ("a.csv", "x [m],y [m],z [m]\n0,0,0\n", "a header and two points or more, got 1"),
     "ending": ("a.txt", CSV, "points must be a list, or a file whose name ends in one of .csv, .*got 'a.txt'"),
+    "NetCDF": ("a.nc", "CDF\x01", "a.nc must be G-code or CSV, got NetCDF"),
     "no unit": ("a.ngc", "G0 X0 Y0 Z0", "a.ngc, line 1: the unit must be given before, by G20 .inches. or G21"),
     "arc": ("a.ngc", GCODE.replace("G91 Z", "G2 Z"), "line 6: an arc must have I and J, or R"),
     "rotary": ("a.ngc", GCODE.replace("X500", "A90"), "line 4: must be G0 to .*got A90"),

@@ -16,7 +16,7 @@ UNITS = {
     **dict.fromkeys(("roll", "pitch", "yaw"), ANGLES),
     **dict.fromkeys(("t", "dwell"), TIMES),
 }
-GCODE = (".gcode", ".ngc", ".tap")
+GCODE = (".gcode", ".nc", ".ngc", ".tap")
 
 
 def read_points(name: str, folder: Path) -> dict[str, Any]:
@@ -30,6 +30,8 @@ def read_points(name: str, folder: Path) -> dict[str, Any]:
         endings = ", ".join((".csv", *GCODE))
         raise InputError(f"points must be a list, or a file whose name ends in one of {endings}, got {shown(name)}")
     content = read_bytes(path, "a list of points")
+    if content.startswith((b"\x89HDF", b"CDF")):
+        raise InputError(f"{where} must be G-code or CSV, got NetCDF")
     if ending in GCODE:
         return read_gcode(content.decode("utf-8-sig", "replace"), where)  # comments are in any encoding
     try:
