@@ -102,14 +102,19 @@ def test_cables_that_come_a_little_too_near_to_each_other_are_found():
 SHAKEN = {"kind": "circle", "centre": [0, 0, 1], "radius": 0.004, "rate": 31.0, "phase": 0.123}
 
 
-def shaken(robot, times):
-    """The rates of the cables and the tensions of a point mass on a circle, by its formula."""
+def shaken(robot, times, load=0.0, drag=0.0, wind=0.0):
+    """The rates of the cables and the tensions of a point mass on a circle, by its formula.
+
+    With a load [kg], and in wind along x [m/s] which pushes with `drag` times its square [N s^2/m^2].
+    """
     angle = SHAKEN["phase"] + SHAKEN["rate"] * times
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) * SHAKEN["radius"]
     velocity = SHAKEN["rate"] * np.stack([-ring[:, 1], ring[:, 0], ring[:, 2]], axis=1)
     along = robot.home_anchors - (ring + SHAKEN["centre"])[:, None]
     u = along / np.linalg.norm(along, axis=-1, keepdims=True)
-    force = robot.platform.mass * (-(SHAKEN["rate"] ** 2) * ring - np.array(robot.gravity))
+    force = (robot.platform.mass + load) * (-(SHAKEN["rate"] ** 2) * ring - np.array(robot.gravity))
+    air = np.array([wind, 0.0, 0.0]) - velocity
+    force[:, :2] -= drag * (air * np.abs(air))[:, :2]
     return np.abs(np.einsum("nki,ni->nk", u, velocity)), np.linalg.solve(u.swapaxes(1, 2), force[..., None])[..., 0]
 
 
@@ -134,6 +139,32 @@ def test_a_peak_between_instants_is_found(seconds, most, monkeypatch):
         judged = audit(lay_out(weaker, read_task(task)), None)
         assert judged.passed != found
         assert (judged.certificate is not None) == found
+
+
+@pytest.mark.parametrize("about", ["load", "wind"])
+def test_a_peak_between_instants_with_another_load_or_wind_is_found(about):
+    """As above for the heaviest load within its tolerance and the strongest wind, which the plan's tensions are not."""
+    bare, seconds = load("point-mass-3"), 0.2003
+    mass, aero = bare.platform.mass, {"air_density": 1.2, "drag": 1.0, "lift": 0.0, "area": 0.5}
+    if about == "load":
+        carried = {"mass": mass, "mass_tolerance": 0.1}
+        task = {"phases": [{"name": "carry", "path": SHAKEN, "duration": seconds, "load": carried}]}
+        worst = {"load": 1.1 * mass}
+    else:
+        task = {"path": SHAKEN, "duration": seconds, "wind": {"min": [-1.0, 0, 0], "max": [2.0, 0, 0]}}
+        worst = {"drag": 0.3, "wind": 2.0}
+
+    def weaker(tightest):
+        cables = [{**cable.model_dump(), "t_max": tightest} for cable in bare.cables]
+        platform = {**bare.platform.model_dump(), "aero": aero}
+        robot = Robot.model_validate({**bare.model_dump(), "platform": platform, "cables": cables})
+        return audit(lay_out(robot, read_task(task)), None)
+
+    peak = shaken(bare, np.linspace(0, seconds, 200_001), **worst)[1].max()
+    seen = shaken(bare, weaker(1e3).times, **worst)[1].max()
+    assert peak - seen > 1e-5
+    assert not weaker(peak - 0.8 * (peak - seen)).passed
+    assert weaker(peak + 0.01 * (peak - seen)).passed
 
 
 def test_a_distance_by_golden_section_is_that_of_samples():

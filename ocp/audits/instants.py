@@ -17,7 +17,10 @@ from ..tasks.scenario import Scenario
 from .by_phase import distribution, taken_up
 from .tensions import in_all_winds, scaled, with_all_loads
 
-OF_INSTANTS = ("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "gains", "violation", "supports")
+OF_INSTANTS = (
+    *("times", "tensions", "off_path", "A", "w", "tensions_unlimited", "gains", "violation", "supports"),
+    *("other_w", "other_tensions"),
+)
 MOTIONS = ("motion", "carriers")
 
 
@@ -38,11 +41,20 @@ class Instants(Displayed):
     w: np.ndarray  # required wrenches, with the same moments, (n, 6) [N]
     tensions_unlimited: np.ndarray  # of least norm without limits, (n, m) [N]
     gains: np.ndarray  # by how much tensions of least norm change at most for a wrench of 1 N, (n, m)
+    other_w: np.ndarray  # as `w`, with the winds and loads that decide, (n, k, 6) [N]
+    other_tensions: np.ndarray  # their tensions, (n, k, m) [N]
     violation: np.ndarray  # distance of the required wrench from the available ones, (n,) [N]
     supports: np.ndarray  # forces of the ground, (n, s) [N]; s = 0 for a task without ground
     values: list[np.ndarray]  # what each limit bounds, (n, k) each
     certificate: Certificate | None  # that with the largest shortfall, with its time
     beyond: tuple[float, float]  # beyond the limits within the range of few cables [N], and when [s]
+
+    @property
+    def cases(self) -> list[Instants]:
+        """Return them with the given wind and load, then with each other that decides in place of these."""
+        alone = replace(self, other_w=self.other_w[:, :0], other_tensions=self.other_tensions[:, :0])
+        others = zip(self.other_w.swapaxes(0, 1), self.other_tensions.swapaxes(0, 1), strict=True)
+        return [alone, *(replace(alone, w=w, tensions=tensions) for w, tensions in others)]
 
     def of(self, rows: np.ndarray) -> Instants:
         """Return some of them."""
@@ -70,6 +82,8 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
     if certificate is not None and result.row is not None:
         certificate = replace(certificate, time=float(times[result.row]))
     off_path = scenario.off_path(times, motion, carriers)
+    cases = [(scaled(scenario, its), tensions) for its, tensions in ((w, result.tensions), *result.others)]
+    other_w, other_tensions = (np.stack(each, axis=1)[:, 1:] for each in zip(*cases, strict=True))
     limited = zip(scenario.limits, scenario.limits.along(motion, carriers, result.tensions, off_path), strict=True)
     return Instants(
         scenario=scenario,
@@ -82,9 +96,11 @@ def instants(scenario: Scenario, deviation: Deviation | None, times: np.ndarray)
         few=distribute.few,
         tolerance=distribute.tolerance,
         A=scaled(scenario, A),
-        w=scaled(scenario, w),
+        w=cases[0][0],
         tensions_unlimited=distribute.unlimited(w),
         gains=distribute.gains,
+        other_w=other_w,
+        other_tensions=other_tensions,
         violation=result.violation,
         supports=result.supports,
         values=[

@@ -6,6 +6,7 @@ looked at too, until it is decided. Where the motion's derivatives have corners 
 and where phases meet, instants are on both sides.
 """
 
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
@@ -17,11 +18,12 @@ from ..tasks.scenario import MOST_SAMPLES
 from .checks import LENGTH_TOLERANCE
 from .curvature import between, is_jump, leaves
 from .instants import Instants, instants, joined
-from .tensions import scaled, tolerance_of
+from .tensions import tolerance_of
 
 BESIDE = 2e-9  # of the duration: how far before a jump
 APART = 1e-4  # of the time between two instants: a corner that is nearer to one is as good as at it
-MOST_HALVES = 20  # of the time between two instants
+PARTS = 4  # of the time between two instants, at a time: most of it that has to be halved has to be halved again
+MOST_ROUNDS = 10  # of such parts
 WIDE = 3  # instants to each side of a span, which its curvature needs
 SINGULAR = 1e-12  # of the squares of all that the cables can change: what is so little counts as nothing
 MOST_ROOM = 1e3  # of the weight: limits may be infinite
@@ -53,16 +55,15 @@ def with_peaks(seen: Instants) -> Instants:
     jumps = is_jump(seen.times)
     spans = np.flatnonzero(_open(seen, jumps))
     near, further = seen, list[Instants]()
-    for _ in range(MOST_HALVES):
+    for _ in range(MOST_ROUNDS):
         if not spans.size or sum(len(each.times) for each in further) > MOST_SAMPLES:
             break
-        near, jumps, halved = _about(near, jumps, spans)
-        middles = (near.times[halved] + near.times[halved + 1]) / 2
-        further.append(instants(scenario, seen.deviation, middles))
+        near, jumps, parted = _about(near, jumps, spans)
+        inner = np.linspace(near.times[parted], near.times[parted + 1], PARTS, endpoint=False, axis=1)[:, 1:]
+        further.append(instants(scenario, seen.deviation, inner.ravel()))
         near = joined(near, further[-1])
-        jumps = np.insert(jumps, halved, False)
-        spans = halved + np.arange(len(halved))  # the first half of each, its second half is the next span
-        spans = np.sort(np.concatenate([spans, spans + 1]))
+        jumps = np.insert(jumps, np.repeat(parted, PARTS - 1), False)
+        spans = ((parted + (PARTS - 1) * np.arange(len(parted)))[:, None] + np.arange(PARTS)).ravel()
         undecided = _open(near, jumps)
         spans = spans[undecided[spans]]
     return joined(seen, reduce(joined, further)) if further else seen
@@ -90,11 +91,13 @@ def _open(seen: Instants, jumps: np.ndarray) -> np.ndarray:
         spans |= _may_exceed(times, lengths, jumps, 0.0, 0.0, LENGTH_TOLERANCE)
     if seen.few:
         low, high = scenario.bounds_at(times)
-        for beyond in (low - seen.tensions, seen.tensions - high):
-            spans |= _may_exceed(times, beyond, jumps, -np.inf, 0.0, tolerance_of(scenario.robot))
+        for case in seen.cases:
+            for beyond in (low - case.tensions, case.tensions - high):
+                spans |= _may_exceed(times, beyond, jumps, -np.inf, 0.0, tolerance_of(scenario.robot))
         spans |= _may_exceed(times, seen.violation[:, None], jumps, -np.inf, 0.0, seen.tolerance)
     elif (seen.violation <= seen.tolerance).all():
-        spans |= _may_be_short(seen, jumps)
+        for case in seen.cases:
+            spans |= _may_be_short(case, jumps)
     return spans & ~jumps
 
 
@@ -118,59 +121,45 @@ def _may_be_short(seen: Instants, jumps: np.ndarray) -> np.ndarray:
     bounded by its curvature, and is nothing if it is small, or if all cables together can make up for it from what they
     have left to their limits. Where they have not, other tensions of the same instants, far from their limits, may.
     """
-    scenario, times, open_spans = seen.scenario, seen.times, np.zeros(len(seen.times) - 1, bool)
-    low, high = scenario.bounds_at(times)
-    resting = scenario.phases.resting(times)
-    rows = np.arange(1, len(times) - 1)
-    hanging = ~(resting[1:] & resting[:-1]) & ~jumps
-    missing, reached = _missing_and_reached(seen, jumps, low, high, seen.tensions, rows, hanging)
-    spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & hanging)
+    resting = seen.scenario.phases.resting(seen.times)
+    doubtful = ~(resting[1:] & resting[:-1]) & ~jumps
+    doubtful &= _misses(seen, jumps, doubtful)
+    spans = np.flatnonzero(doubtful)
     if spans.size:
-        rows = np.unique(np.concatenate([spans, spans + 1]))
-        middle = low[rows] + np.minimum((high - low)[rows] / 2, scenario.robot.force_scale)
-        solved = solve_batch(seen.A[rows], seen.w[rows], low[rows], high[rows], middle)
-        tensions = seen.tensions.copy()
-        tensions[rows[solved.feasible]] = solved.tensions[solved.feasible]
-        rows = rows[(rows > 0) & (rows < len(times) - 1)]
-        doubtful = np.zeros(len(times) - 1, bool)
-        doubtful[spans] = True
-        missing, reached = _missing_and_reached(seen, jumps, low, high, tensions, rows, doubtful)
-        open_spans[spans] = (missing > np.maximum(seen.tolerance, reached))[spans]
-    return open_spans
+        near, apart, at = _about(seen, jumps, spans)
+        low, high = near.scenario.bounds_at(near.times)
+        middle = low + np.minimum((high - low) / 2, near.scenario.robot.force_scale)
+        solved = solve_batch(near.A, near.w, low, high, middle)
+        near = replace(near, tensions=np.where(solved.feasible[:, None], solved.tensions, near.tensions))
+        among = np.zeros(len(apart), bool)
+        among[at] = True
+        doubtful[spans] = _misses(near, apart, among)[at]
+    return doubtful
 
 
-def _missing_and_reached(
-    seen: Instants,
-    jumps: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    t: np.ndarray,
-    rows: np.ndarray,
-    doubtful: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the most that tensions between t (n, m) of two instants miss, and what cables can make up for, (n - 1,).
+def _misses(seen: Instants, jumps: np.ndarray, among: np.ndarray) -> np.ndarray:
+    """Return `among` which spans (n - 1,) the tensions between those of two instants miss more than cables make up for.
 
-    Both are in [N]. The second derivatives are those at `rows`. The second value is known between the
-    instants that are `doubtful`, where the first is more than is tolerated.
+    With the tensions t of an instant, A t - w is known there and at the instants before and after, which shows how it
+    is bent. The tensions change in between too, and A with them.
     """
-    scenario, times, A = seen.scenario, seen.times, seen.A
-    h, dw = np.diff(times), np.diff(seen.w, axis=0)
-    after = scaled(scenario, _by_change(A, rows, t[rows]) - dw[rows])
-    before = scaled(scenario, _by_change(A, rows - 1, t[rows]) - dw[rows - 1])
+    scenario, times, A, t, w = seen.scenario, seen.times, seen.A, seen.tensions, seen.w
+    h, at = np.diff(times), _product(A, t) - w
+    after, before = _product(A[1:], t[:-1]) - w[1:], _product(A[:-1], t[1:]) - w[:-1]
+    slopes = (after[1:] - at[1:-1]) / h[1:, None] - (at[1:-1] - before[:-1]) / h[:-1, None]
     bent = np.zeros(len(times))
-    slopes = after / h[rows, None] - before / h[rows - 1, None]
-    bent[rows] = 2 * np.linalg.norm(slopes, axis=1) / (h[rows] + h[rows - 1])
+    bent[1:-1] = 2 * np.linalg.norm(slopes, axis=1) / (h[1:] + h[:-1])
     bent[1:-1][jumps[1:] | jumps[:-1]] = 0.0
-    missing = between(times, bent)
-    missing += np.linalg.norm(scaled(scenario, _by_change(A, np.arange(len(h)), np.diff(t, axis=0))), axis=1) / 4
+    missing = between(times, bent) + np.linalg.norm(at[1:] - after - before + at[:-1], axis=1) / 4
+    low, high = scenario.bounds_at(times)
     room = np.minimum(t - low, high - t).clip(0.0, MOST_ROOM * scenario.robot.force_scale)
     room, gains = np.minimum(room[:-1], room[1:]), np.maximum(seen.gains[:-1], seen.gains[1:])
     reached = np.divide(room, gains, out=np.full_like(room, np.inf), where=gains > 0).min(axis=1)
     # Where a cable has no room the others have to make up for it, by changes in proportion to the room of each.
-    spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & doubtful)
+    spans = np.flatnonzero((missing > np.maximum(seen.tolerance, reached)) & among)
     moving = np.flatnonzero(scenario.robot.dof_mask)
     for some in np.split(spans, range(BLOCK, len(spans), BLOCK)):
-        weighted = scaled(scenario, A[some] + A[some + 1])[:, moving] / 2 * room[some, None, :]
+        weighted = (A[some] + A[some + 1])[:, moving] / 2 * room[some, None, :]
         square = weighted @ weighted.swapaxes(1, 2)
         size = np.einsum("nii->n", square)
         square += (SINGULAR * size + (size == 0))[:, None, None] * np.eye(len(moving))
@@ -181,14 +170,9 @@ def _missing_and_reached(
         missed = SINGULAR * size * np.linalg.norm(inverse, axis=(1, 2))
         weighted_reach = np.divide((1.0 - missed).clip(0.0), parts, out=np.zeros_like(parts), where=parts > 0)
         reached[some] = np.maximum(reached[some], weighted_reach)
-    return missing, reached
+    return (missing > np.maximum(seen.tolerance, reached)) & among
 
 
-def _by_change(A: np.ndarray, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Return (A[row + 1] - A[row]) t for each of the rows (k,) and t (k, m), (k, 6); in blocks, which memory holds."""
-    out = np.empty((len(rows), A.shape[1]))
-    for start in range(0, len(rows), BLOCK):
-        block = slice(start, start + BLOCK)
-        change = A[rows[block] + 1] - A[rows[block]]
-        out[block] = (change @ t[block][..., None])[..., 0]
-    return out
+def _product(A: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return the wrenches of tensions t (n, m) with matrices A (n, 6, m), (n, 6)."""
+    return (A @ t[..., None])[..., 0]

@@ -37,6 +37,7 @@ class AuditedTensions(NamedTuple):
     row: int | None  # of the certificate
     beyond: float  # [N] beyond the limits within the range of few cables, whose other errors are tolerated
     supports: np.ndarray  # (n, s) [N], forces of the ground
+    others: tuple[tuple[np.ndarray, np.ndarray], ...] = ()  # wrenches and tensions of other winds and loads that decide
 
 
 def tolerance_of(robot: Robot) -> float:
@@ -175,16 +176,17 @@ def in_all_winds(
     planned, n = np.nan_to_num(middle.tensions), len(motion.pose)
     worst = middle._replace(certificate=middle.certificate and replace(middle.certificate, wind=every.middle))
 
-    def include(winds: np.ndarray, proves: bool = True) -> None:
+    def include(winds: np.ndarray, proves: bool = True, decides: bool = False) -> None:
         nonlocal worst
         push = scenario.dynamics.aerodynamic_wrench(motion.pose, motion.velocity, winds)
         result = distribute(without_air - push, planned)
-        result = result if proves else result._replace(certificate=None)
+        others = ((without_air - push, result.tensions),) if decides else ()
+        result = result._replace(certificate=result.certificate if proves else None, others=others)
         worst = _worse(worst, result, lambda row: {"wind": as_wind(winds[row])})
 
     exact = isinstance(every, WindBox)
     for winds in decisive_winds_at(every, scenario.robot, motion.pose, motion.velocity):
-        include(winds, proves=exact)
+        include(winds, proves=exact, decides=True)
     if worst.violation.max() <= distribute.tolerance:
         for winds in every.inner(INNER_WINDS * n).reshape(n, INNER_WINDS, 3).swapaxes(0, 1):
             include(winds)
@@ -206,6 +208,7 @@ def with_all_loads(
     for extreme in range(scenario.phases.extremes):
         w = scenario.required_wrench(times, motion, carriers, scenario.wind, extreme)
         result = distribute(w, np.nan_to_num(given.tensions))
+        result = result._replace(others=((w, result.tensions),))
         worst = _worse(worst, result, lambda row, k=extreme: {"load": scenario.load_of(float(times[row]), k)})
     return worst
 
@@ -217,7 +220,7 @@ def _worse(some: AuditedTensions, other: AuditedTensions, about: Callable[[int],
     if proof is not None and other.row is not None and proof.shortfall > least:
         worst = some._replace(certificate=replace(proof, **about(other.row)), row=other.row)
     violation, beyond = np.maximum(some.violation, other.violation), max(some.beyond, other.beyond)
-    return worst._replace(violation=violation, beyond=beyond)
+    return worst._replace(violation=violation, beyond=beyond, others=some.others + other.others)
 
 
 def nearest(A: np.ndarray, w: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
