@@ -55,7 +55,7 @@ def calibrate(
     than with the robot's file. --fix corrects input errors of the log.
     """
     from ..estimation.calibration import calibrate as find
-    from ..estimation.calibration.correction import correction_of
+    from ..estimation.calibration.correction import correction_of, realigned
     from ..estimation.calibration.solving import usual
     from ..estimation.logs import read_log
     from ..models import load
@@ -70,11 +70,14 @@ def calibrate(
     check_outputs(files, {**{f"the log {log}": log for log in logs}, "--poses": poses})
     check_ending("--out", target, ".yaml", ".yml")
     read = read_log(logs, stated, poses, loaded, fields)
-    measurements, notes = read.measurements, read.notes
+    measurements, notes, clock = read.measurements, read.notes, read.clock
     del read  # with the files
     if fix:
         loaded, measurements, texts, counted = correction_of(loaded, measurements)
         notes.extend(f"corrected: {text}" for text in texts)
+        if clock is not None and texts:
+            measurements, clock = realigned(loaded, measurements)
+            notes.extend(f"aligned again after this: {clock}" for _ in range(clock is not None))
         if counted and names is None:
             names = [*usual(loaded, measurements), "scales"]
     if not as_json:

@@ -58,7 +58,7 @@ def clock_of_poses(
         raise InputError("lengths must change to align the clocks, got those of locked winches")
     if robot is None:
         raise InputError("robot must be given to align the clocks of lengths and poses, got None")
-    return _aligned(lengths, position, quaternions, robot, given, [one for one in from_ if one is source.recording])
+    return aligned(lengths, position, quaternions, robot, given, [one for one in from_ if one is source.recording])
 
 
 def _far_apart(
@@ -71,7 +71,7 @@ def _far_apart(
 ) -> Clock | None:
     """Return the clock of poses that another computer stamped, None unless it is clearly far from the lengths'."""
     try:
-        clock = _aligned(lengths, position, quaternions, robot, given, from_)
+        clock = aligned(lengths, position, quaternions, robot, given, from_)
     except InputError:
         return None
     assert lengths.times is not None
@@ -80,7 +80,7 @@ def _far_apart(
     return clock if abs(ahead) > max(FAR_APART, SURELY * clock.sigma) and clock.likeness > LIKE else None
 
 
-def _aligned(
+def aligned(
     lengths: Samples,
     position: Samples,
     quaternions: np.ndarray | None,
