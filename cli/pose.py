@@ -126,8 +126,6 @@ def _of_log(robot: Robot, logs: list[Path], fields: Path | None, sigma: str, out
             size = quantity(middle, "mm" if i < 3 else "mrad", 3) if np.isfinite(middle) else "undetermined"
             size = size if robot.dof_mask[i] else "fixed"
             typer.echo(f"  median sigma of {name}: {size}")
-        if any(cable.encoder for cable in robot.cables) or robot.uncertainty:
-            typer.echo("  these values do not include errors of calibrated parameters, which shift all poses equally")
         for line in (*read.notes, *found.lines()):
             typer.echo(f"  {line}")
         print_written(files)

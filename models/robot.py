@@ -22,7 +22,7 @@ from ..base.errors import InputError
 from ..base.inputs import number, printable, required, shown, whole_number
 from ..base.text import counted, quantity, quantity_range, quantity_row
 from . import parameters, points
-from .cable import Cable
+from .cable import Cable, Encoder
 from .carriers import AnyCarrier, Carrier, Drive
 from .part import COORDINATES, LARGEST, Box, Finite, Name, Part, Vector3, inertia_matrix, optional
 from .platform import Platform
@@ -58,7 +58,7 @@ class Robot(Part):
     carriers: tuple[AnyCarrier, ...] = Field(min_length=1, description="bodies from which the cables hang")
     cables: tuple[Cable, ...] = Field(min_length=1, description="cables; results number them in this order")
     uncertainty: Uncertainty | None = optional(
-        "uncertainty of anchors, attachments and pulley radii; default: no uncertainty"
+        "uncertainty of anchors, attachments, pulley radii and encoders; default: no uncertainty"
     )
 
     floor: Finite | None = optional(
@@ -104,7 +104,7 @@ class Robot(Part):
         return self
 
     def parameter_values(self, names: Iterable[str]) -> np.ndarray:
-        """Return cable parameters by name, such as `cables[2].anchor.x` or `cables[2].pulley.radius`, (p,) [m].
+        """Return cable parameters by name, such as `cables[2].anchor.x` or `cables[2].encoder.scale`, (p,) [m, -, 1/m].
 
         Raises:
             InputError: If `names` is not a list of names, or the robot has no such parameter.
@@ -116,11 +116,12 @@ class Robot(Part):
         if listed is None:
             raise InputError(f"names must be a list of names of a robot's parameters, got {shown(names)}")
         numbers = {"anchor": self.anchors, "attachment": self.attachments, "radius": self.pulley_radii[:, None]}
+        numbers["encoder"] = self.encoders
         found = (parameters.located("names", name, self.cables) for name in listed)
         return np.array([numbers[one.part][one.cable, one.axis] for one in found])  # (p,)
 
     def with_parameters(self, values: Mapping[str, float]) -> Robot:
-        """Return the robot with other cable parameters [m], by the names of `parameter_values`.
+        """Return the robot with other cable parameters, by the names of `parameter_values`.
 
         Raises `InputError` if `values` is not a mapping, the robot has no such parameter, or a value is impossible.
         """
@@ -131,6 +132,8 @@ class Robot(Part):
             new = number(name, value, -LARGEST, LARGEST)
             if part == "radius":
                 cables[cable]["pulley"] = {**cables[cable]["pulley"], "radius": new}
+            elif part == "encoder":
+                cables[cable]["encoder"] = {**cables[cable]["encoder"], parameters.ENCODER[axis]: new}
             else:
                 point = list(cables[cable][part])
                 point[axis] = new
@@ -228,6 +231,12 @@ class Robot(Part):
     def pulley_radii(self) -> np.ndarray:
         """Return the radius of each cable's pulley, (m,) [m], 0 for a point anchor."""
         return np.array([cable.pulley.radius if cable.pulley else 0.0 for cable in self.cables])  # (m,)
+
+    @property
+    def encoders(self) -> np.ndarray:
+        """Return offset [m], scale and build-up [1/m] of each cable's encoder, (m, 3); readings without are lengths."""
+        of = [cable.encoder or Encoder() for cable in self.cables]
+        return np.array([(one.offset, one.scale, one.build_up) for one in of])  # (m, 3)
 
     @property
     def pulley_axes(self) -> np.ndarray:

@@ -19,11 +19,12 @@ class Uncertainty(Part):
 
     parameters: tuple[ParameterName, ...] = Field(
         min_length=1,
-        description="names such as cables[2].anchor.x, cables[2].attachment.z, cables[2].pulley.radius; "
+        description="names such as cables[2].anchor.x, cables[2].pulley.radius, cables[2].encoder.scale; "
         "cables are numbered from 0",
     )
     covariance: tuple[tuple[Finite, ...], ...] = Field(
-        description="covariance of these parameters [m^2]; symmetric, no negative eigenvalues"
+        description="covariance of these parameters, in products of their units, such as m^2; "
+        "symmetric, no negative eigenvalues"
     )
 
     @field_validator("parameters")
@@ -59,21 +60,32 @@ class Uncertainty(Part):
         return hash((self.parameters, tuple(row[i] for i, row in enumerate(self.covariance))))
 
     @property
+    def geometry(self) -> Self | None:
+        """Return the part of anchors, attachments and pulleys; None if only encoders are uncertain."""
+        kept = [i for i, name in enumerate(self.parameters) if locate(name).part != "encoder"]
+        if len(kept) == len(self.parameters):
+            return self
+        covariance = self.matrix[np.ix_(kept, kept)].tolist()
+        names = tuple(self.parameters[i] for i in kept)
+        return type(self)(parameters=names, covariance=covariance) if kept else None
+
+    @property
     def matrix(self) -> np.ndarray:
-        """Return the covariance, (p, p) [m^2]."""
+        """Return the covariance, (p, p) [m^2 of two lengths]."""
         return np.array(self.covariance)  # (p, p)
 
     @property
     def sigmas(self) -> np.ndarray:
-        """Return the standard deviations of the parameters, (p,) [m]."""
+        """Return the standard deviations of the parameters, (p,) [m of a length]."""
         return np.sqrt(np.maximum(np.diag(self.matrix), 0.0))  # (p,)
 
     @property
     def factor(self) -> np.ndarray:
-        """Return S with S S^T equal to the covariance, (p, r) [m], r its rank: independent directions."""
-        eigenvalues, directions = np.linalg.eigh(self.matrix)
+        """Return S with S S^T equal to the covariance, (p, r) [m of a length], r its rank: independent directions."""
+        units = np.where(self.sigmas > 0.0, self.sigmas, 1.0)  # some parameters have other units than others
+        eigenvalues, directions = np.linalg.eigh(self.matrix / np.outer(units, units))
         kept = eigenvalues > ROUNDING * max(eigenvalues[-1], 0.0)
-        return directions[:, kept] * np.sqrt(eigenvalues[kept])  # (p, r)
+        return units[:, None] * directions[:, kept] * np.sqrt(eigenvalues[kept])  # (p, r)
 
     def errors(self, count: int, seed: int) -> np.ndarray:
         """Draw errors of the parameters, (count, p) [m], the same ones for the same seed."""

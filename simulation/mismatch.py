@@ -56,7 +56,7 @@ class Mismatch(Part):
         Raises:
             InputError: If it lacks one.
         """
-        if self.geometry and robot.uncertainty is None:
+        if self.geometry and (robot.uncertainty is None or robot.uncertainty.geometry is None):
             raise InputError("mismatch.geometry must be false for a robot file without an uncertainty, got true")
         moved = any(carrier.moves and not carrier.actuators for carrier in robot.carriers)
         reasons = {

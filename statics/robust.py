@@ -59,8 +59,9 @@ def _share(name: str, value: object) -> float:
 
 
 def uncertainty_of(robot: Robot) -> Uncertainty:
-    """Return the uncertainty of a robot, or raise InputError if it has none."""
-    uncertainty = required("robot", robot, Robot).uncertainty
+    """Return the uncertainty of a robot's geometry, or raise InputError if it has none."""
+    known = required("robot", robot, Robot).uncertainty
+    uncertainty = known and known.geometry
     if uncertainty is None:
         raise InputError(f"robust must be left out if the robot's file has no uncertainty, got robot {robot.name!r}")
     return uncertainty

@@ -500,7 +500,7 @@ def test_a_calibrated_robot_is_a_robot_file(tmp_path):
     assert robot == result.robot
     np.testing.assert_allclose(robot.anchors, built.robot.anchors, atol=0.03)
     assert [cable.encoder.offset for cable in robot.cables] == pytest.approx(built.offsets, abs=0.03)
-    known = {one.name: one.sigma for one in result.parameters if "anchor" in one.name}
+    known = {one.name.replace("offset", "encoder.offset"): one.sigma for one in result.parameters}
     assert robot.uncertainty.parameters == tuple(known)
     np.testing.assert_allclose(robot.uncertainty.sigmas, list(known.values()), rtol=1e-6)
     # Its own encoders explain the readings: nothing is left to correct.

@@ -20,6 +20,7 @@ from ...base.display import Displayed
 from ...base.errors import InputError
 from ...base.inputs import number, shown
 from ...models import points
+from ...models.parameters import ENCODER
 from ...models.robot import Robot
 
 OF_CABLE = 15  # parameters of a cable
@@ -41,6 +42,8 @@ WORDS = (
     *(f"{end}.{axis}" for end in ("anchor", "attachment") for axis in "xyz"),
     *("offset", "scale", "pulley.radius", "build-up", "compliance", "capstan", "friction", "gain", "zero"),
 )
+ENCODED = dict(zip((6, 7, 9), ENCODER, strict=True))  # columns of encoders, by their keys in robot files
+IN_FILE = {i: WORDS[i] for i in (*range(6), 8)} | {i: f"encoder.{name}" for i, name in ENCODED.items()}
 UNITS = (*("m",) * 7, "1", "m", "1/m", "1/N", "1", "N", "1", "N")
 STIFFEST = 1e-12  # [1/N]; less compliance is none
 IN_PLANE = 1e-9  # [m] out of it
@@ -92,12 +95,9 @@ class Parameters(Displayed):
     def first(self) -> np.ndarray:
         """Return the values of the robot's file, (count,) [m, 1, s]."""
         robot = self.robot
-        encoders = [cable.encoder for cable in robot.cables]
         table = np.zeros((robot.m, OF_CABLE))
         table[:, :3], table[:, 3:6], table[:, 8] = robot.anchors, robot.attachments, robot.pulley_radii
-        table[:, 6] = [encoder.offset if encoder else 0.0 for encoder in encoders]
-        table[:, 7] = [encoder.scale if encoder else 1.0 for encoder in encoders]
-        table[:, 9] = [encoder.build_up if encoder else 0.0 for encoder in encoders]
+        table[:, list(ENCODED)] = robot.encoders
         table[:, 10] = [1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables]
         table[:, 13] = 1.0
         of_robot = (0.0, robot.platform.mass, *robot.platform.com)
@@ -126,30 +126,35 @@ class Parameters(Displayed):
             cable["anchor"], cable["attachment"] = row[:3], row[3:6]
             if cable["pulley"] is not None:
                 cable["pulley"]["radius"] = row[8]
-            reading = [row[k] for k in (6, 7, 9)]
+            reading = [row[k] for k in ENCODED]
             if self.robot.fixed_lengths is not None:
                 cable["length"] = row[6] + (row[7] + row[9] * cable["length"]) * cable["length"]
-            elif cable["encoder"] is not None or reading != before[i, [6, 7, 9]].tolist():
-                cable["encoder"] = dict(zip(("offset", "scale", "build_up"), reading, strict=True))
+            elif cable["encoder"] is not None or reading != before[i, list(ENCODED)].tolist():
+                cable["encoder"] = dict(zip(ENCODER, reading, strict=True))
             if row[10] != before[i, 10]:
                 cable["stiffness"] = 1 / row[10] if row[10] > STIFFEST else None
             if "friction" in self.groups and cable["winch"] is not None:
                 cable["winch"]["friction"] = max(row[12], 0.0)
         _, mass, *com = x[self.clock : self.clock + OF_ROBOT].tolist()
         data["platform"] |= {"mass": mass, "com": com}
-        data["uncertainty"] = None if covariance is None else self._uncertainty(covariance)
+        encoded = [cable["encoder"] is not None and self.robot.fixed_lengths is None for cable in data["cables"]]
+        data["uncertainty"] = None if covariance is None else self._uncertainty(covariance, encoded)
         return Robot.model_validate(data)
 
-    def _uncertainty(self, covariance: np.ndarray) -> dict[str, Any] | None:
-        """Return the part of a covariance (p, p) that belongs to anchors, attachments and pulleys, for a robot file."""
-        where = np.flatnonzero(self.varies)
-        kept = [row for row, i in enumerate(where) if i < self.clock and i % OF_CABLE in (*range(6), 8)]
+    def _uncertainty(self, covariance: np.ndarray, encoded: list[bool]) -> dict[str, Any] | None:
+        """Return the part of a covariance (p, p) that a robot file holds: geometry, and encoders where `encoded`."""
+        cables = [
+            (row, *divmod(int(i), OF_CABLE)) for row, i in enumerate(np.flatnonzero(self.varies)) if i < self.clock
+        ]
+        named = {
+            row: f"cables[{i}].{IN_FILE[k]}"
+            for row, i, k in cables
+            if k in IN_FILE and (k not in ENCODED or encoded[i])
+        }
+        kept = list(named)
         if not kept:
             return None
-        return {
-            "parameters": [self.names[where[row]] for row in kept],
-            "covariance": covariance[np.ix_(kept, kept)].tolist(),
-        }
+        return {"parameters": list(named.values()), "covariance": covariance[np.ix_(kept, kept)].tolist()}
 
 
 def check_free(robot: Robot, free: object) -> tuple[str, ...]:

@@ -9,13 +9,17 @@ LOCKED = 1e-4  # of a length, by which noise may change the reading of a locked 
 
 def lengths_of(robot: Robot, readings: np.ndarray, tensions: np.ndarray | None = None) -> np.ndarray:
     """Return cable lengths (..., m) [m] of readings, by the encoders of the file, under tensions [N] where measured."""
-    encoders = [cable.encoder for cable in robot.cables]
-    offset = np.array([one.offset if one else 0.0 for one in encoders])
-    scale = np.array([one.scale if one else 1.0 for one in encoders])
+    offset, scale, build_up = robot.encoders.T
     by = np.array([1 / cable.stiffness if cable.stiffness else 0.0 for cable in robot.cables])
     stretch = 1.0 if tensions is None else 1 + np.maximum(tensions, 0.0) * by
-    build_up = np.array([one.build_up if one else 0.0 for one in encoders])
     return (offset + (scale + build_up * readings) * readings) * stretch
+
+
+def readings_of(robot: Robot, lengths: np.ndarray) -> np.ndarray:
+    """Return readings of the winches (..., m) at unstrained cable lengths (..., m) [m]: the reverse of `lengths_of`."""
+    offset, scale, build_up = robot.encoders.T
+    root = np.sqrt(np.maximum(scale**2 + 4 * build_up * (lengths - offset), 0.0))
+    return 2 * (lengths - offset) / (scale + np.copysign(root, scale))
 
 
 def locked(lengths: np.ndarray) -> bool:

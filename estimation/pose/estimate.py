@@ -14,7 +14,9 @@ from ...models import points
 from ...models.dynamics import dynamics_of
 from ...models.record import record_of
 from ...models.robot import Robot
+from .parameter_errors import covariance_of_lengths
 
+BLOCK = 5000  # poses, so that few derivatives are in memory at once
 FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
 EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
 SINGULAR, CHANGED = 1e-9, 1e-6  # share of the largest singular value, and of a motion of unit length
@@ -75,7 +77,7 @@ class PoseEstimate(Displayed):
                 shaped = value[0] if value.ndim > 1 else bool(value[0])
             setattr(self, name, shaped)
         self.carrier_pose = carrier_pose
-        for name in ("covariance", "conditioned"):  # of the former dimensions
+        for name in ("covariance", "covariance_of_noise", "conditioned"):  # of the former dimensions
             self.__dict__.pop(name, None)
 
     @property
@@ -98,8 +100,28 @@ class PoseEstimate(Displayed):
     def covariance(self) -> np.ndarray:
         """Return the covariance of x, y, z and a small rotation in {G}, (..., 6, 6) [m^2, m rad, rad^2].
 
-        It is zero for coordinates that cannot move, and infinite for those that an undetermined motion changes.
+        It is zero for coordinates that cannot move, and infinite for those that an undetermined motion changes. It
+        includes the `uncertainty` of the robot file, except for a pose `by_gravity`.
         """
+        own = self.covariance_of_noise
+        lengths_alone = ~np.asarray(self.by_gravity, dtype=bool) & np.isfinite(own).all(axis=(-2, -1))
+        if self.robot.uncertainty is None or not lengths_alone.any():
+            return own
+        pose, measured = self.pose.reshape(-1, 6), self._lengths_at(self.pose) - self.residuals
+        measured = measured.reshape(-1, self.robot.m)
+        noise = np.where(lengths_alone[..., None, None], own, 0.0).reshape(-1, 6, 6)
+        carriers, added = self._carriers(), np.empty_like(noise)
+        for first in range(0, len(pose), BLOCK):
+            rows = slice(first, first + BLOCK)
+            at = carriers if carriers.ndim == 2 else carriers[rows]
+            of_lengths, J = covariance_of_lengths(self.robot, pose[rows], measured[rows], at)
+            K = noise[rows] @ np.swapaxes(J / self.sigma[:, None] ** 2, 1, 2)  # (n, 6, m), least squares
+            added[rows] = K @ of_lengths @ np.swapaxes(K, 1, 2)
+        return own + added.reshape(own.shape)
+
+    @cached_property
+    def covariance_of_noise(self) -> np.ndarray:
+        """Return the part of the covariance that is due to the noise of the lengths, (..., 6, 6)."""
         if self.known_covariance is not None:
             return self.known_covariance
         covariances = np.empty((*self.pose.shape[:-1], 6, 6))
@@ -129,10 +151,10 @@ class PoseEstimate(Displayed):
     def conditioned(self) -> Any:
         """Return whether the covariance can be trusted, (...): the lengths are nearly linear about the pose.
 
-        It is False if the standard deviation of an angle exceeds 5 degrees, or if, two standard deviations away along
-        any principal axis of the covariance, half of the change of the lengths is nonlinear.
+        It is False if the standard deviation of an angle due to noise exceeds 5 degrees, or if, two standard deviations
+        away along any principal axis of the covariance, half of the change of the lengths is nonlinear.
         """
-        covariance = self.covariance
+        covariance = self.covariance_of_noise
         finite = np.asarray(np.isfinite(covariance).all(axis=(-2, -1)))
         believed = np.where(finite[..., None, None], covariance, 0.0)
         values, axes = np.linalg.eigh(believed)

@@ -211,7 +211,8 @@ class PoseFilter(Displayed):
             estimate = pose_from_lengths(self.robot, lengths, None, carriers, sigma["lengths"])  # type: ignore[arg-type]
             P, found = np.diag(P), estimate.pose
             far = np.diag(np.repeat([size, 1.0], 3) ** 2)  # of what lengths do not determine
-            P[:6, :6] = estimate.covariance if np.isfinite(estimate.covariance).all() else far
+            noise = estimate.covariance_of_noise
+            P[:6, :6] = noise if np.isfinite(noise).all() else far
         self._x[:18] = 0.0
         self._x[SHIFT], self._R = found[:3], points.rotations(found[3:])
         covariance = self._P.copy()

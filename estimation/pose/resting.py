@@ -31,7 +31,7 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
     hang = np.flatnonzero(~(own.consistent & own.conditioned))
     if robot.weight == 0.0 or not hang.size:
         return own
-    covariance, by_gravity = own.covariance.copy(), np.full(len(lengths), few)
+    covariance, by_gravity = own.covariance_of_noise.copy(), np.full(len(lengths), few)
     near = own.pose if starts is None else starts
     carriers = np.broadcast_to(problem.carriers, (len(lengths), *robot.carrier_home.shape))
     for row in hang:

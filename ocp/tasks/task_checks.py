@@ -99,7 +99,7 @@ def _check_robust(robot: Robot, task: Task, where: str) -> None:
     """Refuse what the differences between robots are not known for."""
     if task.robust is None:
         return
-    if robot.uncertainty is None:
+    if robot.uncertainty is None or robot.uncertainty.geometry is None:
         missing = f"because the file of robot {robot.name!r} has no uncertainty"
         raise InputError(f"{where}: robust must be left out, {missing}, got {task.robust:g}")
     if robot.m < len(robot.platform.dof):
