@@ -40,7 +40,7 @@ def no_cycle(scenario: Scenario) -> list[Excess]:
             break
         short, worst = cycle.shortfall(direction)
         if short > 0.0:
-            why = "in the mean over every cycle, at whose end the momentum is that of its start"
+            why = "in the mean over every cycle, because a cycle ends with the momentum with which it starts"
             return [Excess(TENSIONS, "platform", None, short, 0.0, "N", "at most", why)]
         poses = np.concatenate([poses, worst])
     return []
@@ -105,7 +105,7 @@ class _Cycle:
         return direction
 
     def shortfall(self, direction: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return by how much cables are short along a direction in all of the tube [N], at least, and where least.
+        """Return a lower bound of the shortfall along a direction in the whole tube [N], and where it is smallest.
 
         The latter are poses (k, 6) of corners.
         """

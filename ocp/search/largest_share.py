@@ -100,7 +100,10 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
 
 
 def _changed(scenario: Scenario, makers: Sequence[Maker], shares: np.ndarray) -> tuple[list[Change], Scenario]:
-    """Return changes, each of what the ones before it left, and the scenario with a share of each, or its least."""
+    """Return changes, each of the scenario that the previous ones have changed, and the scenario with all of them.
+
+    Each is made with its share, or with the least one that it allows.
+    """
     changes = []
     for make, share in zip(makers, shares, strict=True):
         if (change := make(scenario)) is not None:
