@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from towline.control import Predictive
+from towline.control import ComputedTorque, Predictive, Reference
 from towline.models import load
 from towline.simulation import simulate
 
-from .slung_load import slung
+from .slung_load import MASS, slung
+from .soak.mujoco_plant import Hardware, World
 
 
 @pytest.mark.parametrize("name", ["multi-quadrotor-3", "multi-quadrotor-4", "slung"])
@@ -27,3 +28,21 @@ def test_a_load_that_may_spin_below_its_cable_is_flown_by_predictions():
     assert controller.handed_over is None
     np.testing.assert_allclose(controller.uncontrolled[:, :3], 0.0, atol=1e-9)  # the quadrotor can push it anywhere
     assert np.linalg.matrix_rank(controller.uncontrolled[:, 3:]) == 3
+
+
+def test_a_quadrotor_that_was_turned_far_stops_turning_in_time_with_late_rotors():
+    """At rates that its torque does not brake it turned too far for good, and kept the load 0.3 m to 0.7 m off."""
+    pytest.importorskip("mujoco", reason="the extra 'mujoco' is not installed")
+    robot, period = slung(dof=["x", "y", "z"], inertia=[1e-3, 1e-3, 1e-3, 0, 0, 0]), 1e-3
+    controller, still, tension = ComputedTorque(robot), np.zeros((1, 6)), np.array([9.81 * MASS])
+    reference = Reference(robot.home, *np.zeros((2, 6)), robot.carrier_home, still, still, tension)
+    motion = np.zeros((2, 12))
+    motion[:, :6] = robot.home, robot.carrier_home[0]
+    motion[1, 3:5] = 0.7, -0.5
+    world = World(robot, Hardware(damping=50.0, rotor_lag=0.03), motion, tension, period)
+    off = []
+    for step in range(700):
+        world.run(controller.step(step * period, world.state(), reference), np.zeros(6))
+        off.append(np.linalg.norm(world.motions()[0, :3] - robot.home[:3]))
+    assert 0.01 < max(off) < 0.06  # 0.15 m and growing with a rate of h e / 2 for each e
+    assert off[-1] < 0.9 * max(off)

@@ -2,7 +2,7 @@
  * Thrusts and torques with which flying carriers follow their commanded motion under the pull of their cables.
  *
  *     F   = m (a + 2 k (v - v_q) + k^2 (p - p_q) - g) + sum of t u - d
- *     tau = J (alpha + 2 h (Omega - Omega_q) + h^2 e) + Omega_q x J Omega_q - M
+ *     tau = J (alpha + 2 h (Omega - Omega_q + r)) + Omega_q x J Omega_q - M
  *
  *     d   = K (m v_q - m v_0 - integral of (T + m g - sum of t u + d))
  *
@@ -14,6 +14,14 @@
  * unstable attitude loop is noticed in this way too, because its oscillations grow until they reach the limits. Source:
  * T. Lee, M. Leok and N. H. McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, to first
  * order in e.
+ *
+ * r is the rate with which the carrier turns back by e: h e / 2 while e is small, the usual law. A carrier that turns
+ * back by a large e so fast cannot stop in time, and oscillates for good if its rotors lag. So r, about each axis, is at
+ * most the rate from which half the largest torque stops it within what is left of e, 2 a / h^2 less:
+ *
+ *     |r| = sqrt(a (2 |e| - 4 a / h^2)),  |e| > 4 a / h^2,  a = half the largest angular acceleration
+ *
+ * Value and slope of both are equal where they meet. The other half is for lags, and for M.
  *
  * While a state is missing, F and M stay, and e is predicted from the commands, so that the carrier completes its turn
  * and stops. To hold the last command instead would hold its angular acceleration, which noise makes so large that a
@@ -29,6 +37,7 @@ static const double NO_FORCE = 1e-9; /* [N], and of a rotation [rad] */
 static const double WINDOW = 0.1;    /* [s]: well-damped turns towards a new force stay at limits for less */
 static const double MOSTLY = 0.5;    /* of the window */
 static const double SLOWER = 4;      /* bandwidths of the attitude loop: what is quicker is noise */
+static const double BRAKES = 0.5;    /* of the largest torque: with all of it, lags of 30 ms still leave oscillations */
 static const double UPRIGHT = 0.2;   /* of the weight: the least upward force for which a carrier turns */
 
 /* One carrier of a flight. */
@@ -162,6 +171,25 @@ static void turn_on(const towline_body *body, double dt, const double *given, to
     }
 }
 
+/* Return the largest angular acceleration about an axis that the actuators give [rad/s^2]. */
+static double largest_acceleration(const flier *it, int axis) {
+    double least = INFINITY;
+    for (int a = 0; a < it->body->actuators; a++) {
+        const double *by = it->controller->by_wrench[it->index][a] + 3;
+        double per = 0;
+        for (int k = 0; k < 3; k++) { per += by[k] * it->body->inertia[3 * k + axis]; }
+        if (per != 0) { least = fmin(least, (it->body->actuator[a].high - it->body->actuator[a].low) / 2 / fabs(per)); }
+    }
+    return least;
+}
+
+/* Return r about an axis, at which a carrier has to turn by `away`. */
+static double turning_back(const flier *it, int axis, double away) {
+    const double usual = it->attitude / 2, most = BRAKES * largest_acceleration(it, axis);
+    const double linear = most / (usual * usual), size = fabs(away);
+    return size > linear ? copysign(sqrt(most * (2 * size - linear)), away) : usual * away;
+}
+
 /* Write force and moment, in its own axes, that a carrier needs of its actuators; return F across the thrust [N]. */
 static double wrench_of_carrier(const flier *it, double dt, const double *tensions, const double *given,
                                 double *wrench) {
@@ -177,7 +205,7 @@ static double wrench_of_carrier(const flier *it, double dt, const double *tensio
         it->memory->lacking = 0;
     }
     for (int k = 0; k < 3; k++) {
-        faster[k] = h * (h * turn->away[k] + 2 * turn->rate[k]);
+        faster[k] = 2 * h * (turning_back(it, k, turn->away[k]) + turn->rate[k]);
         it->memory->ordered[k] = measured ? it->memory->ordered[k] + faster[k] : NAN;
     }
     constant_times(it->body->inertia, faster, moment);
