@@ -26,6 +26,7 @@ from ..base.writing import whole_file
 ENDINGS = (".yaml", ".yml")
 MOST_BRACKETS = 50  # inside each other; no file of towline needs more than three
 MOST_ITEMS = 30_000  # values and keys, some 50 us each; a file with the covariance of 24 cables has 29 200
+LARGE = 200_000  # characters of JSON, which takes ruamel seconds to write as other YAML
 NAMES = 'must have only letters, digits, ".", "_" and "-", and begin with a letter or digit'  # `part.Name`
 TITLES = NAMES.replace('"_" and "-"', '"_", "-" and spaces inside')  # `part.Title`
 Model = TypeVar("Model", bound=BaseModel)
@@ -38,8 +39,12 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def to_yaml(model: BaseModel) -> str:
-    """Return the YAML text of a model, which `parse_yaml` reads back to an equal one."""
-    return _yaml_of(json.dumps(model.model_dump(mode="json", exclude_none=True)))
+    """Return the YAML text of a model, which `parse_yaml` reads back to an equal one.
+
+    That of a large one, such as a task with the points of a slicer's file, is JSON, which is YAML too.
+    """
+    content = json.dumps(model.model_dump(mode="json", exclude_none=True))
+    return _yaml_of(content) if len(content) < LARGE else content
 
 
 @lru_cache(maxsize=16)  # writing takes milliseconds, and the same robot is in each of its plans and simulations
@@ -82,19 +87,23 @@ def parse_yaml(text: str, model: type[Model], where: str, folder: Path | None = 
 
     Files that it names are relative to `folder`; default: the working directory.
     """
-    reader = YAML(typ="safe", pure=True)
-    reader.Composer = _PlainComposer
-    reader.Scanner = _ShallowScanner
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # ruamel warns of what YAML 1.1 would have made of a number
-            data = reader.load(text)
+        data = json.loads(text) if len(text) >= LARGE and text.startswith("{") else _loaded(text)
     except (YAMLError, ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
         raise InputError(f"{where}: text is not YAML ({_problem(error)}); it must be a plain YAML mapping") from None
     if not isinstance(data, dict):
         got = "nothing" if data is None else shown(data)
         raise InputError(f"{where}: must hold a mapping with {_keys(json_schema(model))}, got {got}")
     return validate(data, model, where, folder)
+
+
+def _loaded(text: str) -> Any:
+    reader = YAML(typ="safe", pure=True)
+    reader.Composer = _PlainComposer
+    reader.Scanner = _ShallowScanner
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # ruamel warns of what YAML 1.1 would have made of a number
+        return reader.load(text)
 
 
 def validate(data: dict[str, Any], model: type[Model], where: str, folder: Path | None = None) -> Model:

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from towline import Dynamics, InputError, load, plan, read_task, time_along
+from towline.models.parsing import parse_yaml, to_yaml
 from towline.ocp.tasks.paths import FeedPath
+from towline.ocp.tasks.task import Task
 
 
 def facade(width, height, pitch):
@@ -262,6 +264,14 @@ def test_the_zero_of_a_file_is_where_the_task_says(kind, tmp_path):
             read_task(tmp_path / "task.yaml")
     with pytest.raises(InputError, match="origin must be left out unless points is the name of a file"):
         read_task({"path": path.model_dump() | {"origin": [0, 0, 1]}})
+
+
+def test_a_task_of_thousands_of_points_is_read_back_from_its_plan():
+    """Its text has more values than a file that a user writes may have."""
+    turns = np.linspace(0, 60, 8000)
+    points = np.stack([np.cos(turns), np.sin(turns), 1 + turns / 100], axis=1).tolist()
+    task = read_task({"path": {"kind": "feed", "points": points, "feed": 0.1, "acceleration": 1}})
+    assert parse_yaml(to_yaml(task), Task, "task") == task
 
 
 def test_a_printers_file_has_the_units_of_its_firmware(tmp_path):

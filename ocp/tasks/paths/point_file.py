@@ -17,6 +17,7 @@ UNITS = {
     **dict.fromkeys(("t", "dwell"), TIMES),
 }
 GCODE = (".gcode", ".nc", ".ngc", ".tap")
+LARGEST_FILE = 20_000_000  # [bytes]: half a million lines
 
 
 def read_points(name: str, folder: Path) -> dict[str, Any]:
@@ -29,7 +30,7 @@ def read_points(name: str, folder: Path) -> dict[str, Any]:
     if ending != ".csv" and ending not in GCODE:
         endings = ", ".join((".csv", *GCODE))
         raise InputError(f"points must be a list, or a file whose name ends in one of {endings}, got {shown(name)}")
-    content = read_bytes(path, "a list of points")
+    content = read_bytes(path, "a list of points", LARGEST_FILE)
     if content.startswith((b"\x89HDF", b"CDF")):
         raise InputError(f"{where} must be G-code or CSV, got NetCDF")
     if ending in GCODE:
