@@ -96,7 +96,10 @@ def in_blocks(block: ca.Function, arguments: list[np.ndarray], size: int = BLOCK
     column. Raises `RuntimeError` if the evaluation fails.
     """
     n = len(arguments[0])
-    whole = [np.concatenate([each, np.repeat(each[-1:], -n % size, axis=0)]) for each in arguments]
+    # Of a broadcast argument and one row more NumPy makes columns, which no buffer takes.
+    whole = [
+        np.ascontiguousarray(np.concatenate([each, np.repeat(each[-1:], -n % size, axis=0)])) for each in arguments
+    ]
     values = [np.empty((n + -n % size, block.nnz_out(i) // size)) for i in range(block.n_out())]
     buffer, evaluate = block.buffer()  # in place: as DM the arguments would take longer than all that is computed
     for start in range(0, n, size):

@@ -260,6 +260,15 @@ def test_wind_without_aero_is_an_error():
         Dynamics(robot).required_wrench(robot.home, np.zeros(6), np.zeros(6), wind=[1, 0, 0])
 
 
+@pytest.mark.parametrize("count", [63, 64, 65, 127, 128, 191])
+def test_one_wind_for_any_number_of_poses(count):
+    """Rows are evaluated in blocks: each number of them in the last one, also with one argument for all."""
+    dynamics, wind = Dynamics(load("wang-flying")), np.array([1.0, 2.0, 0.0])
+    motion = np.random.default_rng(0).uniform(-0.5, 0.5, (2, count, 6))
+    singly = [dynamics.aerodynamic_wrench(pose, velocity, wind) for pose, velocity in zip(*motion, strict=True)]
+    np.testing.assert_array_equal(dynamics.aerodynamic_wrench(*motion, wind), singly)
+
+
 def test_batches_broadcast_and_equal_single_calls():
     robot = load("wang-ctmrts")
     dynamics = Dynamics(robot)
