@@ -7,6 +7,7 @@ import os
 import re
 import warnings
 from functools import cache, lru_cache
+from math import radians
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -164,6 +165,9 @@ def _sentence(detail: Any, model: type[BaseModel]) -> str:
             message = TITLES if " " in context["pattern"] else NAMES
         if kind != "value_error" or not isinstance(value, dict):
             message += f", got {shown(value)}"
+        described = holder.get("properties", {}).get(key, {}).get("description", "")
+        if kind in ("less_than", "less_than_equal") and "[rad]" in described and value <= 360:
+            message += f" (in radians; {value:g} degrees are {radians(value):.4g})"
     if not field:
         return message
     if message.partition(" ")[0] in _known(node):  # a part's own check names one of its fields

@@ -28,12 +28,12 @@ from .proofs.infeasible_ends import infeasible_ends
 from .proofs.too_little_power import too_little_power
 from .result import Offers, Relaxed
 from .search.homotopy import from_easier
-from .search.longer_phases import longer_phases
-from .search.other_paths import slower_path
+from .search.largest_share import largest_share
 from .search.reference import about_better_reference
 from .search.refinement import refine
 from .search.relaxations import near_fixed_motion
 from .search.search import Search
+from .search.slower import longer_phases, slower_rate
 from .search.stronger_or_nearer import near_chosen_motion, stronger_or_nearer
 from .search.time_law import BOUND, fastest
 from .tasks.deviation import Deviation
@@ -109,8 +109,9 @@ def _offered(find: Callable[..., list[Relaxed]], search: Search, *about: Any) ->
 def _near_fixed(search: Search, scenario: Scenario, left: Durations | None, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of a task that fixes the motion, or else of where it ends and of the robot."""
     near = near_fixed_motion(search, scenario, left, audit)
-    others = slower_path(search, scenario, audit) + near if near else stronger_or_nearer(search, scenario, audit)
-    return longer_phases(search, scenario, audit) + others
+    phases, rate = longer_phases(search, scenario, audit), slower_rate(scenario)
+    others = largest_share(search, rate, rates=True) + near if near else stronger_or_nearer(search, scenario, audit)
+    return phases + others
 
 
 def _durations(search: Search, scenario: Scenario) -> Durations | None:
@@ -167,7 +168,7 @@ def _time_law(search: Search) -> tuple[Plan | None, bool]:
     audit = search.audit_motion(slowest, None, f"audit, duration {quantity(span.max, 's')}")
     if audit.passed:
         return None, True
-    offers = partial(_offered, near_fixed_motion, search, slowest, left, audit)
+    offers = partial(_offered, _near_fixed, search, slowest, left, audit)
     return Plan(slowest, MotionStatus.INFEASIBLE, None, audit, 0.0, 0.0, offers=offers), own
 
 

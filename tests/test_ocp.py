@@ -533,7 +533,7 @@ WRONG = {
     ),
     "tilt in degrees": (
         {"path": CIRCLE, "base": {"kind": "free", "tilt_max": 10}},
-        "base.tilt_max must be less than 1.5",
+        r"base.tilt_max must be less than 1.5, got 10 \(in radians; 10 degrees are 0.1745\)",
     ),
     "path without kind": (
         {"path": CIRCLE, "base": {"kind": "free", "around": {"quad": {"pose": [0, 0, 0]}}}},

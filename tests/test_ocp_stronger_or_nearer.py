@@ -261,6 +261,44 @@ def test_two_causes_have_two_changes_and_neither_alone_is_enough():
     assert "together with margin" in advice(found, "feasible wind")
 
 
+def without_attitude(**fields):
+    """A frame above the room, whose cables hold a point."""
+    held = {"carrier": "f", "attachment": [0, 0, 0], "t_min": 1, "t_max": 900} | fields
+    robot = {"name": "r", "source": "made up", "carriers": [{"name": "f", "kind": "ground"}], "platform": FLOOR}
+    return Robot.model_validate(robot | {"cables": [held | {"anchor": anchor} for anchor in ANCHORS]})
+
+
+def test_a_region_in_the_way_does_not_hide_that_t_min_is_too_large():
+    """Above the room four cables at t_min already pull up with more than the weight, wherever a path goes."""
+    drum = {"kind": "sphere", "name": "drum", "centre": [0, 0.1, 1.1], "radius": 0.2, "cables": None}
+    line = {"kind": "line", "start": [-0.5, 0, 1], "end": [0.5, 0.2, 1.2]}
+    task = {"path": line, "duration": 5, "limits": {"keep_out": [drum]}}
+    found = plan(without_attitude(t_min=600), task)
+    strength, nearer = found.relaxations
+    assert (strength.name, nearer.name) == ("cables.t_min", "length of the line")
+    path = line | {"end": [float(x) for x in nearer.detail.partition("(")[2].partition(")")[0].split(", ")]}
+    robot = without_attitude(t_min=float(f"{strength.possible:.4g}"))
+    assert plan(robot, task | {"path": path}).feasible
+    assert not plan(robot, task).feasible
+    assert not plan(without_attitude(t_min=600), task | {"path": path}).feasible
+
+
+def test_ranges_of_phases_that_are_too_short_have_durations_beside_another_cause():
+    there = {"kind": "line", "start": [-0.5, 0, 1], "end": [0.5, 0.2, 1.2]}
+    back = there | {"start": there["end"], "end": there["start"]}
+    span = {"min": 0.01, "max": 0.05}
+    phases = [{"name": "there", "path": there, "duration": span}, {"name": "wait", "duration": 0.5}]
+    task = {"phases": [*phases, {"name": "back", "path": back, "duration": span}], "margin": 440}
+    found = plan(without_attitude(), task)
+    margin, longer = found.relaxations
+    assert (margin.name, longer.name) == ("margin", "phases[0].duration")
+    assert "phases[2].duration" in longer.detail
+    shorter = [phase | {"duration": longer.possible} if "path" in phase else phase for phase in task["phases"]]
+    assert plan(without_attitude(), {"phases": shorter, "margin": margin.possible}).feasible
+    assert not plan(without_attitude(), task | {"margin": 0}).feasible
+    assert not plan(without_attitude(), task | {"phases": shorter}).feasible
+
+
 def advice(found, name):
     """The text of a row of what can be tried."""
     return dict(next(section for section in sections(found) if section.title == "What you can try").facts)[name]

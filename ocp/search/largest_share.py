@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from itertools import product
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from ...solvers import solve_batch
 from ..plan import Plan
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
+from ..tasks.ends import fixed_values
+from ..tasks.lay_out import with_task
+from ..tasks.paths import AnyPath
 from ..tasks.scenario import ATTITUDE, Scenario
 from ..tasks.wind_set import possible_winds_at
 from .relaxations import ORDERS, planned, rounded
@@ -65,10 +68,11 @@ def largest_share(search: Search, change: Change | None, most: float = 1.0, rate
 
 
 def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> list[Relaxed]:
-    """Return changes that make a fixed motion feasible only together; [] if all of them do not.
+    """Return changes that make a motion feasible only together; [] if all of them do not.
 
     Each change is as easy as can be at first. One after another, in the order of `makers`, is left out if the others
-    suffice without it. Those that remain have the largest share that all can have, and then each as much as it can.
+    suffice without it, unless only programs show that. Those that remain have the largest share that all can have, and
+    then each as much as it can.
     """
 
     def easy(makers: Sequence[Maker]) -> bool:
@@ -81,7 +85,7 @@ def together(search: Search, scenario: Scenario, makers: Sequence[Maker]) -> lis
     kept = [make for make in makers if make(scenario) is not None]
     if not easy(kept):
         return []
-    for make in tuple(kept):
+    for make in () if by_programs(scenario) else tuple(kept):
         others = [each for each in kept if each is not make]
         kept = others if easy(others) else kept
     every = np.ones(len(kept))
@@ -141,8 +145,16 @@ def _planned(search: Search, at: Callable[[float], Scenario], name: str) -> tupl
 
 
 def by_programs(scenario: Scenario) -> bool:
-    """Return whether only a program shows if a motion is feasible: carriers are free, or few cables let it tilt."""
-    return bool(scenario.carrier_free) or _tilts(scenario)
+    """Return whether only a program shows if a motion is feasible.
+
+    Carriers are free, given states are off the path, or few cables let the platform tilt.
+    """
+    return _off_path(scenario) or _tilts(scenario)
+
+
+def _off_path(scenario: Scenario) -> bool:
+    """Return whether no motion is exactly that of the references."""
+    return bool(scenario.carrier_free) or any(fixed.value for fixed in fixed_values(scenario))
 
 
 def _tilts(scenario: Scenario) -> bool:
@@ -161,10 +173,10 @@ def _legal(at: Callable[[float], Scenario], share: float) -> Scenario | None:
 def _may_be_feasible(scenario: Scenario, rates: bool) -> bool:
     """Return whether limits and tensions permit some instants of a fixed motion, tensions only off the ground.
 
-    If carriers are free, return whether nothing proves that they cannot hold the platform. If it tilts, tensions need
-    only exert the force.
+    Of a motion that leaves the path, return whether nothing proves that there is none. If the platform tilts, tensions
+    need only exert the force.
     """
-    if scenario.carrier_free:
+    if _off_path(scenario):
         return infeasible_ends(scenario) is None
     times = np.linspace(0.0, scenario.duration, INSTANTS)
     if exceeds(scenario, times, rates):
@@ -200,3 +212,19 @@ def exceeds(scenario: Scenario, times: np.ndarray, rates: bool) -> bool:
             if (over > limit.high + limit.tolerance).any() or (over < limit.low - limit.tolerance).any():
                 return True
     return False
+
+
+def along(scenario: Scenario, path: AnyPath) -> Scenario:
+    """Return the scenario along another path. Where a given state is that of an end of the path, it moves with it."""
+    times, changes = np.array([0.0, scenario.duration]), dict[str, Any](path=path)
+    motion = scenario.along(path, scenario.duration).motion(times, None)[0]
+    for row, key in enumerate(("initial", "final")):
+        state, moved = getattr(scenario.task, key), dict[str, tuple[float, ...]]()
+        for name, values in zip(("pose", "velocity", "acceleration"), motion, strict=True):
+            given = None if state is None else getattr(state, name)
+            if given is not None:
+                fixed = ~np.isin(np.arange(6), scenario.platform_free)
+                moved[name] = tuple(np.where(fixed, values[row], given).tolist())
+        if state is not None:
+            changes[key] = state.model_copy(update=moved)
+    return with_task(scenario, **changes)

@@ -1,20 +1,17 @@
-"""What path near a task's own is feasible: a nearer end, a smaller, slower or shifted path, other yaws."""
+"""What path near a task's own is feasible: a nearer end, a smaller or shifted path, other yaws."""
 
 import numpy as np
 
 from ...base.text import quantity, quantity_row
 from ...solvers.margins import margins
-from ..audits.audit import Audit
-from ..audits.excess import TENSIONS
 from ..audits.tensions import scaled
 from ..global_path.at_rest import AtRest
 from ..result import Relaxed
-from ..tasks.lay_out import lay_out
-from ..tasks.paths import AnyPath, CirclePath, FeedPath, LinePath, WaypointPath
+from ..tasks.paths import CirclePath, FeedPath, LinePath, WaypointPath
 from ..tasks.paths.shifted import shifted, shrunk
 from ..tasks.scenario import POSITION, Scenario
-from .largest_share import HALVINGS, RESERVES, Change, Variation, largest_share
-from .relaxations import planned, rounded, slower
+from .largest_share import HALVINGS, RESERVES, Change, Variation, along
+from .relaxations import planned, rounded
 from .search import Search
 
 LEAST = 0.05  # of a path: with less, other changes are better advice
@@ -37,7 +34,7 @@ def nearer_end(scenario: Scenario) -> Change | None:
         printed = np.array([rounded(to, up=back) for to, back in zip(end[:3], way[:3] < 0, strict=True)])
         # No coordinate goes beyond the start, so that those that are equal at both ends stay.
         end[:3] = np.where(way[:3] < 0, np.minimum(printed, start[:3]), np.maximum(printed, start[:3]))
-        varied = _along(scenario, path.model_copy(update={"end": tuple(end.tolist())}))
+        varied = along(scenario, path.model_copy(update={"end": tuple(end.tolist())}))
         attitude = f"to roll, pitch, yaw ({quantity_row(np.rad2deg(end[3:]) + 0.0)}) degrees" * bool(way[3:].any())
         if turns:
             return varied, 100 * share, f"of it, {attitude}"
@@ -56,43 +53,9 @@ def smaller_circle(scenario: Scenario) -> Change | None:
 
     def with_radius(share: float) -> Variation:
         smaller = path.model_copy(update={"radius": share * path.radius})
-        return _along(scenario, smaller), share * path.radius, f"instead of {quantity(path.radius, 'm')}"
+        return along(scenario, smaller), share * path.radius, f"instead of {quantity(path.radius, 'm')}"
 
     return Change("path.radius", "m", with_radius)
-
-
-def slower_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
-    """Return the largest feed or angular velocity of a path that has its own, at which it is feasible.
-
-    `audit` is that of the motion exactly on the path.
-    """
-    factors = [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
-    change = slower_rate(scenario) if min(factors, default=2.0) > 1.0 else None
-    return largest_share(search, change, most=1.0 / max(factors, default=1.0))
-
-
-def slower_rate(scenario: Scenario) -> Change | None:
-    """Return the change of the feed or angular velocity of a path that has its own to a smaller one."""
-    path = scenario.task.path
-    if not isinstance(path, FeedPath | CirclePath):
-        return None
-    fed = isinstance(path, FeedPath)
-    fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
-    others = ", the others by the same factor" if fed and path.feed is None else ""
-
-    least = scenario.duration / scenario.longest  # else it would last too long to be audited
-
-    def at(share: float) -> Variation:
-        share = max(share, least)
-        data = path.model_dump()  # a copy of the path would keep its law
-        for name, power in (("rate", 1), ("drift", 1), ("feed", 1), ("feeds", 1), ("acceleration", 2)):
-            if data.get(name) is not None:
-                data[name] = (share**power * np.array(data[name])).tolist()
-        push = f"{others}, with an acceleration of {quantity(data['acceleration'], 'm/s^2')}" if fed else ""
-        return _along(scenario, type(path).model_validate(data)), share * fastest, push.removeprefix(", ")
-
-    name, unit = ("path.feed", "m/s") if fed else ("path.rate", "rad/s")
-    return Change(name, unit, at, up=fastest < 0)
 
 
 def near_home(scenario: Scenario) -> Change | None:
@@ -106,12 +69,12 @@ def near_home(scenario: Scenario) -> Change | None:
 
     def about_home(share: float) -> Variation:
         place = quantity_row(home[:3] + 0.0)
-        return _along(scenario, shrunk(path, home, share)), 100 * share, f"of it, shrunk towards home, ({place}) m"
+        return along(scenario, shrunk(path, home, share)), 100 * share, f"of it, shrunk towards home, ({place}) m"
 
     return Change("size of the path", "%", about_home, least=LEAST)
 
 
-def shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+def shifted_path(search: Search, scenario: Scenario) -> list[Relaxed]:
     """Return the smallest shift of the whole path along an axis of {G} with which it is feasible.
 
     Shifts are compared at rest, at some positions of the path; the audit decides. The list is empty where other
@@ -149,7 +112,7 @@ def shifted_path(search: Search, scenario: Scenario, audit: Audit) -> list[Relax
     axis = int(np.abs(shortest).argmax())
     for reserve in RESERVES:
         by = rounded(float(np.abs(shortest[axis])) / reserve, up=True) * np.sign(shortest)
-        moved = _along(scenario, shifted(path, by))
+        moved = along(scenario, shifted(path, by))
         if (plan := planned(search, moved, "audit, shifted path")) is not None:
             return [Relaxed("shift of the path", "m", 0.0, float(by[axis]), plan, f"along {'xyz'[axis]}")]
     return []
@@ -183,7 +146,7 @@ def other_yaws(scenario: Scenario) -> Change | None:
         path_with_yaws = path.model_copy(update={"start": rows[0], "end": rows[-1]} if line else {"points": rows})
         others = [f"{quantity(yaw, 'rad')} at {names[i]}" for i, yaw in zip(wrong[1:], yaws[1:], strict=True)]
         detail = ", ".join([f"instead of {quantity(given[0], 'rad')}", *others])
-        return _along(scenario, path_with_yaws), float(yaws[0]), detail
+        return along(scenario, path_with_yaws), float(yaws[0]), detail
 
     return Change(f"yaw at {names[wrong[0]]}", "rad", with_yaws, up=bool(back[0] > 0), requested=float(given[0]))
 
@@ -197,19 +160,3 @@ def _margins_at_yaws(scenario: Scenario, points: np.ndarray, yaws: np.ndarray) -
     A = scaled(scenario, scenario.dynamics.wrench_matrix(poses, carriers))[:, axes]
     w = scaled(scenario, scenario.dynamics.required_wrench(poses, still, still, wind=scenario.wind))[:, axes]
     return margins(A, w, *scenario.bounds()).reshape(yaws.shape)
-
-
-def _along(scenario: Scenario, path: AnyPath) -> Scenario:
-    """Return the scenario along another path. Where a given state is that of an end of the path, it moves with it."""
-    times, changes = np.array([0.0, scenario.duration]), dict[str, object](path=path)
-    motion = scenario.along(path, scenario.duration).motion(times, None)[0]
-    for row, key in enumerate(("initial", "final")):
-        state, moved = getattr(scenario.task, key), dict[str, tuple[float, ...]]()
-        for name, values in zip(("pose", "velocity", "acceleration"), motion, strict=True):
-            given = None if state is None else getattr(state, name)
-            if given is not None:
-                fixed = ~np.isin(np.arange(6), scenario.platform_free)
-                moved[name] = tuple(np.where(fixed, values[row], given).tolist())
-        if state is not None:
-            changes[key] = state.model_copy(update=moved)
-    return lay_out(scenario.robot, scenario.task.model_copy(update=changes))

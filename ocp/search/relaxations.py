@@ -20,7 +20,7 @@ from ..proofs.durations import Durations
 from ..proofs.infeasible_ends import infeasible_ends
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
-from ..tasks.lay_out import lay_out
+from ..tasks.lay_out import lay_out, with_task
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Task
@@ -51,8 +51,8 @@ LEAST_ITERATIONS = 15  # fewer find nothing
 LARGE, FEWEST = 600, 20  # free coordinates at all nodes of a mesh, and its steps
 
 
-class Change(NamedTuple):
-    """A field of a task, and another value for it."""
+class Bound(NamedTuple):
+    """A field of a task that bounds something, its value, and the looser one that a motion keeps."""
 
     name: str
     unit: str
@@ -135,7 +135,7 @@ def _other_limits(
     The list is empty if the motion exceeds what a task cannot loosen: tension limits, limits of the robot's file, the
     ends of the motion, the inside of an obstacle.
     """
-    given, changes = scenario.task.model_dump(), dict[str, Change]()
+    given, changes = scenario.task.model_dump(), dict[str, Bound]()
     least = scenario.hard_margin
     for _ in range(TRIES):
         for excess in audit.excess:
@@ -159,7 +159,7 @@ def _other_limits(
             middle = (low + high) / 2
             _, tried = _audited(search, scenario, given | {"margin": middle}, deviation)
             low, high = (middle, high) if tried.passed else (low, middle)
-        changes["margin"] = Change("margin", "N", least, rounded(low, up=False))
+        changes["margin"] = Bound("margin", "N", least, rounded(low, up=False))
         looser, audit = _audited(search, scenario, given | {"margin": changes["margin"].possible}, deviation)
     plan = Plan(looser, MotionStatus.FEASIBLE, deviation, audit, 0.0, 0.0)
     return [Relaxed(*change, plan) for change in changes.values()]
@@ -181,8 +181,8 @@ def _soft_limits(search: Search) -> list[Relaxed]:
         soft["margin"] = PREFERRED * scenario.robot.force_scale
     if not soft:
         return []
-    softer = scenario.task.model_copy(update={"limits": limits.model_copy(update={"soft": limits.soft | soft})})
-    softened = replace(lay_out(scenario.robot, softer), path=scenario.path)
+    softer = limits.model_copy(update={"soft": limits.soft | soft})
+    softened = replace(with_task(scenario, limits=softer), path=scenario.path)
     if infeasible_ends(softened) is not None:  # by what is not soft
         return []
     without = _without(search, soft)
@@ -201,8 +201,7 @@ def _without(search: Search, names: Iterable[str]) -> Outcome | None:
     """Return the solution of the program without limits of the task, such as one far from what carriers can reach."""
     scenario, limits = search.scenario, search.scenario.task.limits
     none = {name: TaskLimits.model_fields[name].default for name in names if name in TaskLimits.model_fields}
-    without = {"limits": limits.model_copy(update=none), "margin": 0.0}
-    return solved(search, lay_out(scenario.robot, scenario.task.model_copy(update=without)), None)
+    return solved(search, with_task(scenario, limits=limits.model_copy(update=none), margin=0.0), None)
 
 
 def _longer_duration(search: Search, audit: Audit, shortest: float, longest: float) -> list[Relaxed]:
@@ -220,8 +219,8 @@ def _longer_duration(search: Search, audit: Audit, shortest: float, longest: flo
     if plan is None:
         return []
     objective = task.objective.model_copy(update={"time": TIME_COUNTS * plan.duration})
-    open_task = {"duration": PositiveRange(min=shortest, max=plan.duration), "objective": objective}
-    outcome = solved(search, lay_out(scenario.robot, task.model_copy(update=open_task)), plan.deviation)
+    open_ended = with_task(scenario, duration=PositiveRange(min=shortest, max=plan.duration), objective=objective)
+    outcome = solved(search, open_ended, plan.deviation)
     near = None if outcome is None else _lasting(search, LONGER_CHOSEN * max(outcome.duration, requested), outcome)
     found = near or plan
     return [Relaxed("duration", "s", requested, found.duration, found, "" if near else SHORTER)]
@@ -238,7 +237,7 @@ def at_ease(scenario: Scenario) -> float:
 def _lasting(search: Search, seconds: float, near: Outcome | None) -> Plan | None:
     """Return the plan of the search's task with another duration, from a motion that is `near`."""
     scenario, seconds = search.scenario, rounded(seconds, up=True)
-    longer = lay_out(scenario.robot, scenario.task.model_copy(update={"duration": seconds}))
+    longer = with_task(scenario, duration=seconds)
     guess = None if near is None else near.deviation.stretched(seconds / near.deviation.nodes[-1])
     return planned(search, longer, "audit, longer duration", guess)
 
@@ -246,11 +245,14 @@ def _lasting(search: Search, seconds: float, near: Outcome | None) -> Plan | Non
 def planned(search: Search, scenario: Scenario, name: str, guess: Deviation | None = None) -> Plan | None:
     """Return a feasible plan of another scenario, whose audit is a stage with a `name`; None if none is found.
 
-    Without free coordinates it is the motion itself, else the solution of the program, refined as that of any task.
+    Without free coordinates it is the motion itself, else the solution of the program, refined as that of any task,
+    unless the scenario is proven infeasible.
     """
     if not scenario.count:
         audit = search.audit_motion(scenario, None, name)
         return Plan(scenario, MotionStatus.FEASIBLE, None, audit, 0.0, 0.0) if audit.passed else None
+    if infeasible_ends(scenario) is not None:
+        return None
     with _beside(search, scenario) as beside:
         if beside is None:
             return None
@@ -339,8 +341,8 @@ def _audited(
     return looser, search.audit_motion(looser, deviation, "audit, looser limits")
 
 
-def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond: float) -> Change | None:
-    """Return the change of a task's field that accepts an excess, made in `given`; None if there is no such field."""
+def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond: float) -> Bound | None:
+    """Return the looser bound of a task's field that accepts an excess, made in `given`; None if there is none."""
     limits, above = given["limits"], excess.value > excess.bound
     value = rounded(excess.value + beyond * (excess.value - excess.bound), above)
     name, bound = f"limits.{excess.limit}", limits.get(excess.limit)
@@ -367,4 +369,4 @@ def _loosened(given: dict[str, Any], excess: Excess, scenario: Scenario, beyond:
         limits[excess.limit] = value = abs(value)
     else:
         return None
-    return Change(name, excess.unit, abs(excess.bound) if isinstance(bound, float) else excess.bound, value)
+    return Bound(name, excess.unit, abs(excess.bound) if isinstance(bound, float) else excess.bound, value)

@@ -16,32 +16,19 @@ from ..plan import Plan
 from ..proofs.durations import durations
 from ..result import Relaxed
 from ..tasks.deviation import Deviation
-from ..tasks.ends import fixed_values
-from ..tasks.lay_out import lay_out
+from ..tasks.lay_out import lay_out, with_task
 from ..tasks.phase import Load
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
 from ..tasks.task import Tube
 from ..tasks.wind_set import WindBox, WindDisc
-from .given_states import near_given_states
 from .largest_share import Change, Variation, by_programs, exceeds, largest_share, together
-from .longer_phases import longer_phases
-from .other_paths import near_home, nearer_end, other_yaws, shifted_path, slower_path, slower_rate, smaller_circle
-from .relaxations import (
-    LONGER,
-    LONGEST,
-    at_ease,
-    longer_durations,
-    near_motion,
-    other_duration,
-    planned,
-    rounded,
-    slower,
-)
+from .other_paths import near_home, nearer_end, other_yaws, shifted_path, smaller_circle
+from .relaxations import LONGER, longer_durations, near_motion, other_duration, planned, rounded, slower
 from .search import Search
-from .tilting import tilting_platform
+from .slower import longer, longer_phases, slower_rate, slower_states
+from .wider_tube import as_wide_as_states, tilting_platform
 
-AT_EASE = 10.0  # times the duration with small accelerations: speeds are small too
 STRONGEST = 100.0  # times t_max: a motion that needs more is not one that stronger cables make feasible
 
 
@@ -53,61 +40,69 @@ def near_chosen_motion(search: Search, scenario: Scenario, deviation: Deviation 
     """
     span = longer_durations(scenario)
     slower_helps = span[0] < span[1] or not scenario.stretches
-    longer = longer_phases(search, scenario, audit) if slower_helps else []
+    phases = longer_phases(search, scenario, audit) if slower_helps else []
     found = (
-        _fewer_regions(search, scenario, deviation, audit)
+        _without_regions(search, scenario, deviation, audit)
         or near_motion(search, scenario, deviation, audit, span)
-        or near_given_states(search, scenario, audit)
+        or as_wide_as_states(search, scenario, audit)
+        or slower_states(search, scenario)
     )
     if found:
-        return longer + found
+        return phases + found
     if by_programs(scenario):
-        return longer + _by_a_program(search, scenario)
-    if np.abs([fixed.value for fixed in fixed_values(scenario)]).max(initial=0.0) > 0:
-        return []  # no motion is exactly on the path
+        return phases + _by_a_program(search, scenario)
     along = search.audit_motion(scenario, None, "audit of the path")
-    exact = lay_out(scenario.robot, scenario.task.model_copy(update={"tube": Tube()}))
-    found = other_duration(search, scenario, durations(exact), along) if slower_helps else []
-    return longer + (found or stronger_or_nearer(search, scenario, along))
+    exact = durations(with_task(scenario, tube=Tube()))
+    found = other_duration(search, scenario, exact, along) if slower_helps else []
+    return phases + (found or stronger_or_nearer(search, scenario, along))
 
 
 def stronger_or_nearer(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
     """Return feasible variations of what a task does not name: where its path is, the platform's mass, t_max, t_min.
 
     `audit` is that of the motion exactly on the path. Each variation is one change. If there is none, it is a path of
-    the same form near the platform's home, or else several changes together, unless a region is in the way. The list is
-    empty for uncertain robots.
+    the same form near the platform's home, or else several changes together. Where only a region is in the way, none is
+    returned: ideas name other places and ways round. The list is empty for uncertain robots.
     """
     task = scenario.task
     if task.robust is not None:
         return []
     if by_programs(scenario):
         return _by_a_program(search, scenario)
-    found = _changes(search, scenario, audit)
-    if found or _blocked(audit):
-        return found
-    return largest_share(search, near_home(scenario), rates=True) or together(search, scenario, TOGETHER)
+    found, blocked = _changes(search, scenario, audit), _blocked(audit)
+    if found or not blocked:
+        return found or largest_share(search, near_home(scenario), rates=True) or together(search, scenario, TOGETHER)
+    several = together(search, scenario, (partial(_fewer_regions, audit=audit), *TOGETHER))
+    return several if len(several) > 1 else []
 
 
-def _fewer_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
+def _without_regions(search: Search, scenario: Scenario, deviation: Deviation | None, audit: Audit) -> list[Relaxed]:
     """Return, for a free position, how many regions can stay without those that the closest motion passes through."""
-    limits = scenario.task.limits
-    through = {
-        excess.about.partition(" outside ")[2]
-        for excess in audit.excess
-        if excess.limit == "keep_out" and excess.value < 0
-    }
-    kept = tuple(region for region in limits.keep_out if region.name not in through)
-    if len(kept) == len(limits.keep_out) or scenario.task.tube.position != "free":
+    change = _fewer_regions(scenario, audit) if scenario.task.tube.position == "free" else None
+    if change is None:
         return []
-    task = scenario.task.model_copy(update={"limits": limits.model_copy(update={"keep_out": kept})})
-    without, name = lay_out(scenario.robot, task), "number of keep-out regions"
-    without = without.lasting(scenario.duration)
-    closest = search.audit_motion(without, deviation, f"audit, other {name}")
+    without, name = change.at(0.0)[0].lasting(scenario.duration), f"audit, other {change.name}"
+    closest = search.audit_motion(without, deviation, name)
     plan = Plan(without, MotionStatus.FEASIBLE, deviation, closest, 0.0, 0.0) if closest.passed else None
-    plan = plan or planned(search, without, f"audit, other {name}", deviation)
-    detail = f"of {len(limits.keep_out)}, without {', '.join(map(repr, sorted(through)))}"
-    return [] if plan is None else [Relaxed(name, "", len(limits.keep_out), len(kept), plan, detail)]
+    plan = plan or planned(search, without, name, deviation)
+    return [] if plan is None else [change.offer(0.0, plan)]
+
+
+def _fewer_regions(scenario: Scenario, audit: Audit) -> Change | None:
+    """Return the change of the regions to those that the audited motion does not pass through."""
+    limits, given = scenario.task.limits, scenario.task.limits.keep_out
+    inside = [excess.about for excess in audit.excess if excess.limit == "keep_out" and excess.value < 0]
+    through = {about.partition(" outside ")[2] for about in inside}
+    kept = tuple(region for region in given if region.name not in through)
+    if len(kept) == len(given):
+        return None
+
+    def without(share: float) -> Variation:
+        left = given if share == 1.0 else kept
+        varied = with_task(scenario, limits=limits.model_copy(update={"keep_out": left}))
+        return varied, len(left), f"of {len(given)}, without {', '.join(map(repr, sorted(through)))}"
+
+    return Change("number of keep-out regions", "", without)
 
 
 def _blocked(audit: Audit) -> bool:
@@ -115,10 +110,11 @@ def _blocked(audit: Audit) -> bool:
 
 
 def _by_a_program(search: Search, scenario: Scenario) -> list[Relaxed]:
-    """Return the first change with which a program finds a motion; only one, since each solves programs."""
-    makers = (_less_wind, _lighter_load, _lighter_platform, nearer_end)
+    """Return the first change with which a program finds a motion, or else all together, since each solves programs."""
     every = partial(largest_share, search)
-    return next(filter(None, (every(make(scenario)) for make in makers)), []) or every(near_home(scenario), rates=True)
+    found = next(filter(None, (every(make(scenario)) for make in BY_PROGRAMS)), [])
+    found = found or every(near_home(scenario), rates=True)
+    return found or together(search, scenario, (*BY_PROGRAMS, longer))
 
 
 def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
@@ -126,39 +122,22 @@ def _changes(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
 
     If speeds or accelerations are exceeded too, each may also need a longer duration, which is not tried in phases.
     """
-    found = slower_path(search, scenario, audit)
+    found = largest_share(search, slower_rate(scenario), rates=True)
     factors = [slower(excess) for excess in audit.excess if excess.limit != TENSIONS]
     if min(factors, default=2.0) <= 1.0 or (factors and not scenario.stretches):
         if _blocked(audit):  # ideas name other places and ways round
             inside = exceeds(scenario, np.array([scenario.duration]), rates=False)
             return found + (largest_share(search, nearer_end(scenario)) if inside else [])
-        return found + (shifted_path(search, scenario, audit) or largest_share(search, nearer_end(scenario)))
+        return found + (shifted_path(search, scenario) or largest_share(search, nearer_end(scenario)))
     found += tilting_platform(search, scenario)
     seconds = rounded(LONGER * max(factors, default=1.0) * scenario.duration, up=True)
     for make in SINGLE:
         its = largest_share(search, make(scenario))
         if not its and factors and scenario.task.phases is None and seconds <= scenario.longest:
-            longer = lay_out(scenario.robot, scenario.task.model_copy(update={"duration": seconds}))
-            with_it = f", with a duration of {quantity(seconds, 's')}"
-            its = [replace(each, detail=each.detail + with_it) for each in largest_share(search, make(longer))]
+            lasting, with_it = with_task(scenario, duration=seconds), f", with a duration of {quantity(seconds, 's')}"
+            its = [replace(each, detail=each.detail + with_it) for each in largest_share(search, make(lasting))]
         found += its
-    return found + shifted_path(search, scenario, audit)
-
-
-def _longer(scenario: Scenario) -> Change | None:
-    """Return the change of the duration to a longer one."""
-    if not scenario.stretches or scenario.task.phases is not None:
-        return None
-    most = min(max(AT_EASE * at_ease(scenario), LONGEST * scenario.duration), scenario.longest) / scenario.duration
-    if most <= 1.0:
-        return None
-
-    def lasting(share: float) -> Variation:
-        seconds = rounded(scenario.duration * most ** (1 - share), up=True)
-        varied = lay_out(scenario.robot, scenario.task.model_copy(update={"duration": seconds}))
-        return varied, seconds, f"instead of {quantity(scenario.duration, 's')}"
-
-    return Change("duration", "s", lasting, up=True)
+    return found + shifted_path(search, scenario)
 
 
 def _less_margin(scenario: Scenario) -> Change | None:
@@ -166,8 +145,7 @@ def _less_margin(scenario: Scenario) -> Change | None:
     margin = scenario.hard_margin
 
     def with_margin(share: float) -> Variation:
-        less = {"margin": rounded(share * margin, up=False)}
-        varied = lay_out(scenario.robot, scenario.task.model_copy(update=less))
+        varied = with_task(scenario, margin=rounded(share * margin, up=False))
         return varied, share * margin, f"instead of {quantity(margin, 'N')}"
 
     return Change("margin", "N", with_margin) if margin else None
@@ -186,8 +164,7 @@ def _less_wind(scenario: Scenario) -> Change | None:
         else:
             fields = {name: (share * np.array(value)).tolist() for name, value in wind.model_dump().items()}
             weaker = type(wind).model_validate(fields)
-        task = scenario.task.model_copy(update={"wind": weaker})
-        return lay_out(scenario.robot, task), share * fastest, f"instead of {quantity(fastest, 'm/s')}"
+        return with_task(scenario, wind=weaker), share * fastest, f"instead of {quantity(fastest, 'm/s')}"
 
     return Change("wind", "m/s", with_wind)
 
@@ -241,18 +218,16 @@ def _carrying(scenario: Scenario, change: Callable[[Load], Load]) -> Scenario:
         phase if phase.load is None else phase.model_copy(update={"load": change(phase.load)})
         for phase in scenario.task.phases or ()
     )
-    return lay_out(scenario.robot, scenario.task.model_copy(update={"phases": carried}))
+    return with_task(scenario, phases=carried)
 
 
 def _lighter_platform(scenario: Scenario) -> Change:
     """Return the change of the platform to a lighter one, with moments of inertia in proportion."""
-    data, mass = scenario.robot.model_dump(), scenario.robot.platform.mass
+    given, mass = scenario.robot.model_dump()["platform"], scenario.robot.platform.mass
 
     def with_mass(share: float) -> Variation:
-        platform = data["platform"] | {"mass": share * mass}
-        if platform["inertia"] is not None:
-            platform["inertia"] = [share * value for value in platform["inertia"]]
-        varied = lay_out(Robot.model_validate(data | {"platform": platform}), scenario.task)
+        inertia = None if given["inertia"] is None else [share * value for value in given["inertia"]]
+        varied = _with_robot(scenario, platform=given | {"mass": share * mass, "inertia": inertia})
         return varied, share * mass, f"instead of {quantity(mass, 'kg')}"
 
     return Change("platform.mass", "kg", with_mass)
@@ -260,7 +235,7 @@ def _lighter_platform(scenario: Scenario) -> Change:
 
 def _other_limits_of_cables(scenario: Scenario, limit: str) -> Change | None:
     """Return the change of all t_max to larger ones, or of all t_min to smaller ones, by one factor."""
-    data, values = scenario.robot.model_dump(), getattr(scenario.robot, limit)
+    given, values = scenario.robot.model_dump()["cables"], getattr(scenario.robot, limit)
     largest, others = float(values.max()), "" if np.ptp(values) == 0 else ", the others by the same factor"
     stronger = limit == "t_max"
     if largest == 0.0:
@@ -268,11 +243,15 @@ def _other_limits_of_cables(scenario: Scenario, limit: str) -> Change | None:
 
     def with_limits(share: float) -> Variation:
         factor = 1 + (STRONGEST - 1) * (1 - share) ** 4 if stronger else share  # fine steps near one
-        cables = [cable | {limit: factor * cable[limit]} for cable in data["cables"]]
-        varied = lay_out(Robot.model_validate(data | {"cables": cables}), scenario.task)
+        varied = _with_robot(scenario, cables=[cable | {limit: factor * cable[limit]} for cable in given])
         return varied, factor * largest, f"instead of {quantity(largest, 'N')}{others}"
 
     return Change(f"cables.{limit}", "N", with_limits, up=stronger)
+
+
+def _with_robot(scenario: Scenario, **changes: Any) -> Scenario:
+    """Return the scenario of a robot with other values of some fields, laid out for the same task."""
+    return lay_out(Robot.model_validate(scenario.robot.model_dump() | changes), scenario.task)
 
 
 _larger_t_max = partial(_other_limits_of_cables, limit="t_max")
@@ -284,5 +263,6 @@ SINGLE = (
 # The first are left out first. Stronger cables permit what a lighter platform does, at any t_min.
 TOGETHER = (
     *(_smaller_t_min, _larger_t_max, near_home, _lighter_load, _less_wind, nearer_end, _less_margin),
-    *(slower_rate, _longer),
+    *(slower_rate, longer),
 )
+BY_PROGRAMS = _less_wind, _lighter_load, _lighter_platform, nearer_end

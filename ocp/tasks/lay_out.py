@@ -46,6 +46,11 @@ def lay_out(robot: Robot, task: Task, initial: Initial | Measured | dict[str, An
     return replace(scenario, phases=lay_out_phases(scenario))
 
 
+def with_task(scenario: Scenario, **changes: Any) -> Scenario:
+    """Return the scenario of a task with other values of some fields, laid out for the same robot."""
+    return lay_out(scenario.robot, scenario.task.model_copy(update=changes))
+
+
 def _free_carriers(robot: Robot, base: HoldBase | GivenBase | FreeBase, where: str) -> list[tuple[int, int]]:
     """Return the (carrier, coordinate) pairs that the planner chooses."""
     if not isinstance(base, FreeBase):

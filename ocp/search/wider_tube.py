@@ -1,15 +1,27 @@
-"""Let the platform tilt where it cannot be held in the attitude of its path: `tilting_platform`."""
+"""Offer the tube that a motion needs: wide enough for given states, or for the tilt of a platform on few cables."""
 
 import numpy as np
 
+from ..audits.audit import Audit
 from ..result import Relaxed
-from ..tasks.lay_out import lay_out
+from ..tasks.lay_out import with_task
 from ..tasks.scenario import ATTITUDE, Scenario
-from .relaxations import planned, rounded, solved
+from .relaxations import BEYOND, planned, rounded, solved
 from .search import Search
 
 MOST = 0.5  # [rad], of a tilt that is offered
 SPARE = 1.01  # times the largest tilt at the nodes
+
+
+def as_wide_as_states(search: Search, scenario: Scenario, audit: Audit) -> list[Relaxed]:
+    """Return the radius of the tube that reaches the given state farthest outside it."""
+    tube = scenario.task.tube
+    off = max((excess.value for excess in audit.excess if excess.limit == "tube.position"), default=0.0)
+    if off <= tube.radius:
+        return []
+    radius = rounded((1 + BEYOND) * off, up=True)
+    plan = planned(search, _with_tube(scenario, position=radius), "audit, wider tube")
+    return [] if plan is None else [Relaxed("tube.position", "m", tube.radius, radius, plan)]
 
 
 def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
@@ -21,11 +33,7 @@ def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
     angles = [axis for axis in ATTITUDE if robot.dof_mask[axis]]
     if task.tube.turn or task.phases is not None or not angles or robot.m >= robot.dof_mask.sum():
         return []
-
-    def with_tilt(most: float) -> Scenario:
-        return lay_out(robot, task.model_copy(update={"tube": task.tube.model_copy(update={"attitude": most})}))
-
-    free = with_tilt(MOST)
+    free = _with_tube(scenario, attitude=MOST)
     outcome = solved(search, free, None)
     if outcome is None:
         return []
@@ -33,5 +41,10 @@ def tilting_platform(search: Search, scenario: Scenario) -> list[Relaxed]:
     tilt = min(rounded(SPARE * float(np.abs(outcome.deviation.q[:, turns]).max()), up=True), MOST)
     if not tilt:
         return []
-    plan = planned(search, with_tilt(tilt), "audit, tilting platform", outcome.deviation)
+    tilting = _with_tube(scenario, attitude=tilt)
+    plan = planned(search, tilting, "audit, tilting platform", outcome.deviation)
     return [] if plan is None else [Relaxed("tube.attitude", "rad", task.tube.turn, tilt, plan, "about each axis")]
+
+
+def _with_tube(scenario: Scenario, **changes: float) -> Scenario:
+    return with_task(scenario, tube=scenario.task.tube.model_copy(update=changes))
