@@ -154,7 +154,8 @@ def by_programs(scenario: Scenario) -> bool:
 
 def _off_path(scenario: Scenario) -> bool:
     """Return whether no motion is exactly that of the references."""
-    return bool(scenario.carrier_free) or any(fixed.value for fixed in fixed_values(scenario))
+    away = scenario.count > 0 and any(fixed.value for fixed in fixed_values(scenario))
+    return bool(scenario.carrier_free) or away
 
 
 def _tilts(scenario: Scenario) -> bool:
