@@ -10,7 +10,7 @@ from ..models.points import in_frame
 from ..solvers import TensionProblem, capacity_margin, solve_batch
 from ..solvers.margins import margins
 from ..statics.stiffness import natural_frequencies
-from ..workspace.conditions.interference import least_distance, outside
+from ..workspace.conditions.interference import cable_distances, outside
 from ..workspace.feasibility import NEAREST
 from .evaluation import Rows
 from .room import Room
@@ -22,6 +22,7 @@ class Judgement(NamedTuple):
     """The distances, lengths and frequency of a robot at some rows."""
 
     clearance: float  # smallest distance between two cables without a common end [m]
+    closest: tuple[tuple[int, int], np.ndarray] | None  # these cables, counted from 0, and the pose (6,)
     lengths: tuple[float, float]  # shortest and longest length of a cable [m]
     distances: tuple[tuple[str, float], ...]  # name of each region, and the distance of cables from it [m]
     height: float  # of the lowest end of a cable [m]
@@ -54,8 +55,11 @@ def judge(robot: Robot, rows: Rows, room: Room, frequency: bool) -> Judgement:
         solved = solve_batch(A, w, robot.t_min, robot.t_max)
         poses = rows.poses[rows.pose_of]
         lowest = float(natural_frequencies(robot, poses, solved.tensions)[:, 0].min()) if solved.feasible.all() else 0.0
+    between = {pair: (float(d.min()), int(d.argmin())) for pair, d in cable_distances(robot, starts, ends).items()}
+    pair = min(between, key=between.__getitem__, default=None)
     return Judgement(
-        float(least_distance(robot, starts, ends).min()),
+        np.inf if pair is None else between[pair][0],
+        None if pair is None else (pair, rows.poses[between[pair][1]]),
         (float(lengths.min()), float(lengths.max())),
         tuple(distances),
         float(min(starts[..., 2].min(), ends[..., 2].min())),

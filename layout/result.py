@@ -166,6 +166,9 @@ class Design(Drawn, Reported, Displayed):
             wanted += ["feasible plan of each task"] * bool(self.requirements.tasks)
             listed, them = ", ".join(f"a {each}" for each in wanted), "it" if len(wanted) == 1 else "all of these"
             facts.append(("wanted", f"{listed}; the search does not prove that no layout has {them}"))
+        if self.judgement and self.judgement.closest and self.clearance < self.requirements.clearance:
+            pair, pose = self.judgement.closest
+            facts.append(("too close", f"{numbered('cable', pair)} at the pose ({quantity_row(pose)}) [m, rad]"))
         why = [] if self.reasons is None else self._why(self.reasons)
         files = [("The robot's file", to_yaml(self.robot))]
         if (found := self.reasons) is not None:  # whether the layout can be improved

@@ -112,13 +112,16 @@ def test_cables_of_different_carriers_are_apart_whatever_their_anchors_are():
     robot = load(ROOT / "examples" / "design" / "beam-drones.yaml")
     box = {"min": robot.attachments.min(axis=0).tolist(), "max": robot.attachments.max(axis=0).tolist()}
     found = design(robot, [{"part": "attachment", "box": box}], [{"poses": [robot.home.tolist()]}], time_limit=0.2)
-    t, least = np.linspace(0.0, 1.0, 201)[:, None], np.inf
+    t, between = np.linspace(0.0, 1.0, 201)[:, None], {}
     starts, ends = (points[0] for points in Dynamics(found.robot).points(robot.home[None]))
     for i, j in combinations(range(robot.m), 2):
         if robot.carrier_of_cable[i] != robot.carrier_of_cable[j]:
             one, other = (starts[k] + t * (ends[k] - starts[k]) for k in (i, j))
-            least = min(least, np.linalg.norm(one[:, None] - other, axis=2).min())
-    assert found.clearance == pytest.approx(least, abs=0.03)
+            between[i, j] = np.linalg.norm(one[:, None] - other, axis=2).min()
+    pair, pose = found.judgement.closest
+    assert found.clearance == pytest.approx(min(between.values()), abs=0.03)
+    assert between[pair] == pytest.approx(found.clearance, abs=0.03)
+    assert pose == pytest.approx(robot.home)
     assert found.clearance == pytest.approx(found.judgement.clearance, abs=1e-9)
 
 

@@ -88,12 +88,18 @@ def least_distance(robot: Robot, starts: np.ndarray, ends: np.ndarray) -> np.nda
 
     The cables run from `starts` to `ends`, (n, m, 3) each.
     """
-    least = np.full(len(starts), np.inf)
+    distances = np.array(list(cable_distances(robot, starts, ends).values())).reshape(-1, len(starts))
+    return distances.min(axis=0, initial=np.inf)
+
+
+def cable_distances(robot: Robot, starts: np.ndarray, ends: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
+    """Return the distances (n,) [m] of the cables of each pair without a common end at home, counted from 0."""
     homes = robot.home_anchors, robot.home_attachments
-    for i, j in combinations(range(robot.m), 2):
-        if all(np.linalg.norm(points[i] - points[j]) > 1e-9 for points in homes):
-            least = np.minimum(least, segment_distance(starts[:, i], ends[:, i], starts[:, j], ends[:, j]))
-    return least
+    return {
+        (i, j): segment_distance(starts[:, i], ends[:, i], starts[:, j], ends[:, j])
+        for i, j in combinations(range(robot.m), 2)
+        if all(np.linalg.norm(points[i] - points[j]) > 1e-9 for points in homes)
+    }
 
 
 def outside(obstacle: Obstacle, p: np.ndarray, p_end: np.ndarray) -> np.ndarray:
