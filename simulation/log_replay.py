@@ -226,9 +226,11 @@ class Replay(Drawn, Reported, Displayed):
             after = self._rms(self.explained or {})
             more = any(after[name] > 2 * noise[name] for name in after)
             return f"{text}; the remainder has other causes" if more else text
-        if max(ratios.values()) <= 2:
-            return f"{text}; the model reproduces the recording"
-        return f"{text}; none of {', '.join(one.name for one in self.found)} explains it"
+        if max(ratios.values()) > 2:
+            return f"{text}; none of {', '.join(one.name for one in self.found)} explains it"
+        away = self._times[~self.matching.kept]
+        where = f" except for {counted(len(away), 'outlying window')} from {away[0, 0]:.4g} s on" if len(away) else ""
+        return f"{text}; the model reproduces the recording{where}"
 
     def _facts(self) -> list[Fact]:
         windows, outliers = self.windows, int((~self.matching.kept).sum())

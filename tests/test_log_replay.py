@@ -176,6 +176,17 @@ def test_what_is_wrong_is_named_first(kind, name, robot, options, truth, logs):
     assert name in result.report().splitlines()[0]
 
 
+def test_a_winch_that_slips_is_in_the_summary(tmp_path):
+    """Its windows are outliers, and the summary was that the model reproduces the recording."""
+    found = columns("lengths", every("lengths"))
+    found["l1 [m]"] = found["l1 [m]"] - 0.03 * np.clip((found["t [s]"] - 2.2) / 0.4, 0, 1)
+    result = replay(PLANAR, written(tmp_path / "slip.csv", found))
+    outlying = result._times[~result.matching.kept]
+    assert outlying.min() < 2.6
+    assert outlying.max() > 2.2
+    assert f"except for 2 outlying windows from {outlying[0, 0]:.4g} s on" in result.report().splitlines()[0]
+
+
 def test_the_right_team_leaves_the_noise_of_short_windows(tmp_path):
     found = columns("thrusts", slice(0, 1500, 10))
     result = replay("multi-quadrotor-3", written(tmp_path / "team.csv", found), window=0.3)
