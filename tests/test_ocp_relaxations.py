@@ -151,7 +151,7 @@ def test_a_plan_without_a_solution_can_be_sent_to_another_process_with_its_relax
 def test_no_duration_is_offered_that_an_audit_cannot_sample(tube, monkeypatch):
     """The longest duration is set to 2.1 s, but the limit on the speed requires more than 2.8 s."""
     for module in (scenario, task_checks):
-        monkeypatch.setattr(module, "MOST_SAMPLES", 210)  # at least 100 a second
+        monkeypatch.setattr(module, "MOST_SAMPLES", 2100)
     task = TASK | {"tube": {"position": tube}, "steps": 20, "limits": {"platform_speed": 0.4}}
     planned = plan(ROBOT, task)
     assert not planned.feasible
