@@ -23,7 +23,18 @@ class Winch(Part):
     inertia: Positive = Field(description="inertia of rotor, gear and drum, as an equivalent mass on the cable [kg]")
     friction: NonNegative = optional("dry friction, as a force on the cable [N]", 0.0)
     speed_max: Positive = Field(description="largest speed of the cable [m/s]")
-    force_max: Positive = Field(description="largest force of the motor on the cable [N]")
+    force_max: Positive = Field(description="largest force of the motor on the cable, above the friction [N]")
+
+    @model_validator(mode="after")
+    def _stronger_than_its_friction(self) -> Self:
+        if self.friction >= self.force_max:
+            raise ValueError(f"friction must be below force_max, {self.force_max:g} N, got {self.friction:g} N")
+        return self
+
+    @property
+    def tension_max(self) -> float:
+        """Return the largest tension [N] with which it can begin to haul in: what friction leaves of the force."""
+        return self.force_max - self.friction
 
 
 class Encoder(Part):
@@ -57,7 +68,7 @@ class Cable(Part):
         "constant length, for the drive fixed-length [m]; default: from anchor to attachment at home"
     )
     pulley: Pulley | None = optional("swivelling pulley at the anchor; default: none, the anchor is a point")
-    winch: Winch | None = optional("winch of the cable, for simulation; default: its length follows commands exactly")
+    winch: Winch | None = optional("winch of the cable; default: its length follows commands exactly")
     encoder: Encoder | None = optional(
         "relation between the reading of the winch and the length; default: they are equal"
     )

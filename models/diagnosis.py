@@ -159,6 +159,13 @@ def _implausible(robot: Robot) -> list[str]:
         for index, cable in enumerate(robot.cables)
         if cable.t_min == cable.t_max
     )
+    warnings.extend(
+        f"cables[{index}]: its winch cannot haul in with {name}, {quantity(tension, 'N')}, but only with force_max "
+        f"less friction, {quantity(cable.winch.tension_max, 'N')}"
+        for index, cable in enumerate(robot.cables if robot.fixed_lengths is None else ())
+        for name, tension in (("t_min", cable.t_min), ("t_max", cable.t_max))
+        if cable.winch and cable.winch.tension_max < tension
+    )
     return warnings
 
 

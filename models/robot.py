@@ -257,8 +257,10 @@ class Robot(Part):
 
     @property
     def t_max(self) -> np.ndarray:
-        """Return the largest tensions, (m,) [N]."""
-        return np.array([cable.t_max for cable in self.cables])  # (m,)
+        """Return the largest tensions, (m,) [N]: those of the file, or those with which its winches can haul in."""
+        winches = [cable.winch if self.drive != "fixed-length" else None for cable in self.cables]
+        most = np.array([winch.tension_max if winch else np.inf for winch in winches])
+        return np.minimum([cable.t_max for cable in self.cables], np.maximum(most, self.t_min))  # (m,)
 
     @property
     def fixed_lengths(self) -> np.ndarray | None:

@@ -33,6 +33,7 @@ from ..solvers.available_wrench import facets
 from ..solvers.in_place import RHO
 from .distribution import wrench_problem
 from .team_stops import RESTS, TeamStop, team_stop_along
+from .winch_forces import has_winches, overloaded_winch, shares_of_winches
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +67,8 @@ class Stop(Displayed):
         distance: Length of the path of the platform until it rests [m].
         certificate: Certificate of the instant with the largest shortfall; None if tensions inside their limits always
             exist.
-        limit: For a team of flying carriers: the limit that is exceeded most, with value and time; empty if none is.
+        limit: The limit of flying carriers, or of the force of a winch, that is exceeded most, with value and time;
+            empty if none is.
         load: Load of the platform from the beginning of the stop until the robot rests; default: no load.
     """
 
@@ -140,18 +142,19 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
     if any(carrier.efforts for carrier in robot.carriers):
         return _of_team(robot, team_stop_along(robot, _continued(trajectory, end), begins))
     trajectory = _continued(trajectory, end)
-    best: tuple[tuple[int, float], Stop, TensionProblem] | None = None
+    best: tuple[tuple[int, bool, float], Stop, TensionProblem | None] | None = None
     instants = cache(lambda first: _instants(robot, trajectory, first))  # which all attempts have in common
     for reserve, goes_on in ATTEMPTS:
         law = _refined(_braking(_Limits(instants, begins, end, reserve, goes_on)))
         found, missing, worst = _audited(robot, trajectory, law)
-        if missing <= MISSING * robot.force_scale:
+        if missing <= MISSING * robot.force_scale and not found.limit:
             return found
         # Of two that miss little, or nearly the same, the shorter one.
-        rank = (round(missing / (LITTLE * robot.force_scale)), found.duration)
-        best = (rank, found, worst) if best is None or rank < best[0] else best
+        rank = (round(missing / (LITTLE * robot.force_scale)), bool(found.limit), found.duration)
+        if best is None or rank < best[0]:
+            best = rank, found, worst if missing > MISSING * robot.force_scale else None
     assert best is not None
-    return replace(best[1], certificate=certify(best[2]))
+    return best[1] if best[2] is None else replace(best[1], certificate=certify(best[2]))
 
 
 def _of_team(robot: Robot, found: TeamStop) -> Stop:
@@ -323,6 +326,9 @@ def _instants(robot: Robot, trajectory: Trajectory, first: float) -> _Instants:
     largest = np.array([robot.carriers[k].motion_limits.acceleration for k in limited], dtype=float)
     v, g = (part[:, limited, :3] / largest[:, None] for part in carriers[1:])
     vv, vg, gg = (np.einsum("nci,nci->nc", *two) for two in ((v, v), (v, g), (g, g)))
+    if has_winches(robot):
+        v, g = shares_of_winches(robot, trajectory, first + WINDOW / INSTANTS * np.arange(INSTANTS))
+        vv, vg, gg = (np.hstack(pair) for pair in ((vv, v * v), (vg, v * g), (gg, g * g)))
     return _Instants(a, b, c, available.low, available.high, (np.where(vv > STILL, vv, np.nan), vg, gg))
 
 
@@ -387,5 +393,6 @@ def _audited(robot: Robot, trajectory: Trajectory, law: _Law) -> tuple[Stop, flo
         tensions=tensions,
         distance=float(np.linalg.norm(np.diff(platform[0][:, :3], axis=0), axis=1).sum()),
         certificate=None,
+        limit=overloaded_winch(robot, law.times, dynamics.cable_lengths(platform[0], carriers[0]), tensions),
     )
     return found, float(missing[worst]), wrench_problem(robot, A[worst], w[worst])

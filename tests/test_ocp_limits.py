@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from towline.base.errors import InputError
+from towline.control import stop
 from towline.models import Dynamics, Robot, load
 from towline.models.parsing import parse_yaml, to_yaml
-from towline.ocp import plan, read_task
+from towline.ocp import plan, read_task, time_along
 from towline.ocp.limits.clearance import between_cables, cable_outside, point_outside
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
@@ -133,6 +134,43 @@ def test_winches_of_the_robot_file_limit_the_speeds_of_their_cables():
 
     assert status(1.01 * fastest) == ("feasible", [])
     assert status(fastest * [1.01, 1.01, 0.97, 1.01]) == ("infeasible", [("cable_speed", "cable 3")])
+
+
+def test_motors_of_winches_pull_and_accelerate_their_winches():
+    """A mass on one cable: its motor needs m (g + a) for the tension, J a for the winch, and its friction."""
+    mass, inertia, friction, rise = 2.0, 3.0, 4.0, 0.5
+
+    def robot(force):
+        winch = {"inertia": inertia, "friction": friction, "speed_max": 9, "force_max": force}
+        ends = {"carrier": "frame", "anchor": [0, 0, 2], "attachment": [0, 0, 0]}
+        return Robot.model_validate(
+            {
+                "name": "hoist",
+                "source": "test",
+                "platform": {"mass": mass, "dof": ["z"], "home": [0, 0, 0, 0, 0, 0]},
+                "carriers": [{"name": "frame", "kind": "ground"}],
+                "cables": [{**ends, "t_min": 1, "t_max": 60, "winch": winch}],
+            }
+        )
+
+    line = {"path": {"kind": "line", "start": [0, 0, 0], "end": [0, 0, rise]}, "duration": 0.8}
+    largest = 84 * np.sqrt(5) / 25 * rise / 0.8**2  # acceleration of a time law of seventh degree
+    needed = mass * (9.81 + largest) + inertia * largest + friction
+    assert plan(robot(1.01 * needed), line).feasible
+    slack = plan(robot(0.99 * needed), line)
+    assert [(each.limit, each.about) for each in slack.audit.excess] == [("winch_force", "cable 1")]
+    assert slack.audit.excess[0].value == pytest.approx(needed - friction, rel=1e-3)
+    # Motors that cannot lift the mass at rest are no matter of inertia: tensions are missing, with a proof.
+    assert plan(robot(0.99 * mass * 9.81 + friction), line).certificate is not None
+    weak = robot(0.8 * needed)
+    fast = time_along(weak, line)
+    assert fast.feasible
+    for motion in (fast.trajectory, stop(fast, 0.6 * fast.duration).trajectory):
+        length = 2 - motion["pose"].values[:, 2]
+        times = motion["time"].values
+        acceleration = np.gradient(np.gradient(length, times), times)
+        force = motion["tensions"].values[:, 0] - inertia * acceleration
+        assert force.max() <= 1.01 * (0.8 * needed - friction)
 
 
 def test_a_place_is_kept_out_of():

@@ -1,7 +1,8 @@
 """Limits of the cables: speeds, accelerations, jerks, powers, lengths, and distances between cables."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
+from typing import Self
 
 import casadi as ca
 import numpy as np
@@ -29,29 +30,40 @@ class EachCable(Limit):
         self.labels = names(robot)
 
 
-class CableSpeed(EachCable):
+class SomeCables(EachCable):
+    """Limit the size of a value of some cables, by their indices; default: of all."""
+
+    def __init__(self, robot: Robot, most: float, cables: Sequence[int] | None = None):
+        super().__init__(robot, most)
+        self.cables = list(range(robot.m) if cables is None else cables)
+        self.labels = tuple(self.labels[cable] for cable in self.cables)
+
+    @classmethod
+    def each(cls, robot: Robot, bounds: Sequence[float | None]) -> Iterator[Self]:
+        """Yield a limit for each different bound among those of all cables, (m,), which may be missing."""
+        for most in dict.fromkeys(bounds):
+            if most is not None:
+                yield cls(robot, most, [cable for cable, its in enumerate(bounds) if its == most])
+
+
+class CableSpeed(SomeCables):
     """Limit the rate of the length of some cables, that is, the speed of their winches."""
 
     name, unit = "cable_speed", "m/s"
-
-    def __init__(self, robot: Robot, most: float, cables: Sequence[int]):
-        super().__init__(robot, most)
-        self.labels = tuple(self.labels[cable] for cable in cables)
-        self.cables = list(cables)  # indices
 
     @override
     def values(self, state: State) -> ca.SX:
         return state.rate(state.run.lengths)[self.cables]
 
 
-class CableAcceleration(EachCable):
+class CableAcceleration(SomeCables):
     """Limit the second derivative of each cable's length, that is, the acceleration of its winch."""
 
     name, unit = "cable_acceleration", "m/s^2"
 
     @override
     def values(self, state: State) -> ca.SX:
-        return state.rate(state.rate(state.run.lengths))
+        return state.rate(state.rate(state.run.lengths))[self.cables]
 
 
 class CableJerk(CableAcceleration, Rate):
@@ -68,6 +80,21 @@ class WinchPower(EachCable):
     @override
     def values(self, state: State) -> ca.SX:
         return state.tensions * state.rate(state.run.lengths)
+
+
+class WinchForce(SomeCables):
+    """Limit the force of each winch's motor, without friction: the tension less inertia times cable acceleration.
+
+    The bound is what friction leaves of the motor's force when the winch hauls in, also while it pays out: to correct
+    an error it must be able to do either.
+    """
+
+    name, unit = "winch_force", "N"
+
+    @override
+    def values(self, state: State) -> ca.SX:
+        inertia = ca.DM([winch.inertia if (winch := cable.winch) else 0.0 for cable in state.robot.cables])
+        return (state.tensions - inertia * state.rate(state.rate(state.run.lengths)))[self.cables]
 
 
 class CableLength(Limit):

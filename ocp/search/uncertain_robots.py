@@ -129,6 +129,6 @@ def _excess(scenario: Scenario, plan: Plan, margin: RobustMargin) -> Excess:
 
 def _tightened(robot: Robot, by: np.ndarray) -> Robot:
     """Return the robot with tension limits that are tightened by (m,) [N]."""
-    cables = zip(robot.cables, by, strict=True)
-    new = [c.model_copy(update={"t_min": c.t_min + float(x), "t_max": c.t_max - float(x)}) for c, x in cables]
+    cables = zip(robot.cables, (robot.t_min + by).tolist(), (robot.t_max - by).tolist(), strict=True)
+    new = [cable.model_copy(update={"t_min": low, "t_max": high}) for cable, low, high in cables]
     return robot.model_copy(update={"cables": tuple(new)})

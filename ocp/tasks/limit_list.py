@@ -18,6 +18,7 @@ from ..limits.cables import (
     CableSpeed,
     Margin,
     TensionRate,
+    WinchForce,
     WinchPower,
 )
 from ..limits.carriers import (
@@ -65,13 +66,12 @@ def limit_list(robot: Robot, task: Task) -> Limits:
 
 
 def _of_cables(robot: Robot, task: Task) -> Iterator[Limit]:
-    """Return the limits of the task, and the speeds of the winches of the robot's file, whichever are tighter."""
+    """Return the limits of the task, and those of the winches of the robot's file; of two speeds the smaller one."""
     given = task.limits
-    files = [cable.winch.speed_max if cable.winch and robot.fixed_lengths is None else None for cable in robot.cables]
-    speeds = [_tighter(given.cable_speed, speed) for speed in files]
-    for most in dict.fromkeys(speeds):
-        if most is not None:
-            yield CableSpeed(robot, most, [cable for cable, its in enumerate(speeds) if its == most])
+    winches = [cable.winch if robot.fixed_lengths is None else None for cable in robot.cables]
+    speeds = [winch.speed_max if winch else None for winch in winches]
+    yield from CableSpeed.each(robot, [_tighter(given.cable_speed, speed) for speed in speeds])
+    yield from WinchForce.each(robot, [winch.tension_max if winch else None for winch in winches])
     for kind in (CableAcceleration, CableJerk, WinchPower):
         if (most := getattr(given, kind.name)) is not None:
             yield kind(robot, most)

@@ -75,12 +75,13 @@ def phase_plane(
     margin: float,
     reserve: np.ndarray | float = 0.0,
     shrink: float = 0.0,
+    weaker: np.ndarray | float = 0.0,
 ) -> PhasePlane:
     """Return the limits at the points s (N,).
 
-    Tensions are less `margin` [N], wrenches `reserve` (N,) [N] inside what these tensions give, and the other
-    limits reduced by the share `shrink`. Raises `InputError` if motion along the path needs wrenches outside the
-    span of the cables.
+    Tensions are less `margin` [N], the largest ones also less `weaker` (m,) [N], wrenches `reserve` (N,) [N] inside
+    what these tensions give, and the other limits reduced by the share `shrink`. Raises `InputError` if motion along
+    the path needs wrenches outside the span of the cables.
     """
     robot = parametrised.robot
     platform, carriers = parametrised.at(s)
@@ -88,7 +89,7 @@ def phase_plane(
     scale = robot.wrench_scale[rows]
     A = parametrised.dynamics.wrench_matrix(platform.pose, carriers.pose)[:, rows] * scale[:, None]
     wrench = Wrench(*(part[:, rows] * scale for part in parametrised.wrench(platform)))
-    available = facets(A, robot.t_min + margin, robot.t_max - margin)
+    available = facets(A, robot.t_min + margin, np.maximum(robot.t_max - margin - weaker, robot.t_min + margin))
     _check_span(s, wrench, available)
     # The reserve must not turn the only wrench into none.
     low, high, inside = available.low, available.high, np.reshape(reserve, (-1, 1))

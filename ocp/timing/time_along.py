@@ -18,6 +18,8 @@ from ...models import Robot
 from ...models.files import AnyRobot, as_robot
 from ..audits.audit import Audit, audit
 from ..audits.excess import TENSIONS
+from ..limits.cables import CableAcceleration, WinchForce
+from ..limits.limit import Limit
 from ..limits.limits import Limits
 from ..limits.platform import ZoneSpeed
 from ..plan import Plan
@@ -53,10 +55,11 @@ def time_along(robot: AnyRobot, task: Task | dict[str, Any] | str | os.PathLike[
     other paths the task's duration is ignored. Carriers rest or follow given paths with the same parameter s.
 
     The task's limits on speeds and accelerations of platform, cables and carriers apply, and so do the robot file's
-    limits of winches' speeds and of mobile carriers that move. The tension limits, reduced by the task's margin, enter
-    as the facets of the available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C. Pham, "A new approach to
-    time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018): d2s/dt2 is constant
-    between grid points, so tensions jump there. The extra `timing` installs it.
+    limits of winches and of mobile carriers that move. If a winch's inertia needs a large part of its motor's force, a
+    fixed share of the force is kept for it, so that the motion is not the very fastest. The tension limits, reduced by
+    the task's margin, enter as the facets of the available wrench set. TOPP-RA computes the time law (H. Pham, Q.-C.
+    Pham, "A new approach to time-optimal path parameterization based on reachability analysis", IEEE T-RO 34(3), 2018):
+    d2s/dt2 is constant between grid points, so tensions jump there. The extra `timing` installs it.
 
     Args:
         robot: A `Robot`, the name of one in the library, or the path of a robot file.
@@ -101,12 +104,12 @@ def _limits(robot: Robot, task: Task, moving: list[int]) -> PathLimits:
 def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, intervals: int) -> Plan:
     """Solve and audit; after a violation again, on a finer grid or with more distance from the limits."""
     margin, weight = task.margin, parametrised.robot.force_scale
-    short, shrink, attempts, failures = list[_Stretches](), 0.0, 0, 0
+    short, shrink, attempts, failures, weaker = list[_Stretches](), 0.0, 0, 0, np.zeros(parametrised.robot.m)
     zones = [parametrised.crossings(limit) for limit in limits.speeds if isinstance(limit, ZoneSpeed)]
     while True:
         attempts += 1
         grids = [_through(s, np.concatenate([[], *zones])) for s in parametrised.pieces(intervals)]
-        pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink) for s in grids]
+        pieces = [_piece(parametrised, limits, s, margin, _reserve(s, short, weight), shrink, weaker) for s in grids]
         s = np.concatenate([pieces[0].s[:1], *(piece.s[1:] for piece in pieces)])
         law = FastestLaw(parametrised, limits, margin, s, np.full(len(s), np.nan))
         if failures == 0 and (proven := _proven(law, pieces)) is not None:
@@ -133,6 +136,9 @@ def _search(task: Task, parametrised: ParametrisedPath, limits: PathLimits, inte
             law = replace(law, at=float(law.path.law(audited.times[[audited.worst]])[0][0]))
             reason = f"no time law passed the audit in {ATTEMPTS} attempts"
             return Plan(scenario, MotionStatus.NOT_FOUND, None, audited, 0.0, 0.0, reason, law=law)
+        if not weaker.any() and any(each.limit == WinchForce.name for each in audited.excess):
+            limits, weaker = _for_winches(scenario.limits, audited, limits)
+            continue
         missing = _missing(law, audited)
         known = (each for each in audited.excess if each.limit in KNOWN_LIMITS)
         excess = max([0.0, *(each.value / each.bound - 1.0 for each in known)])
@@ -179,6 +185,23 @@ def _shown(task: Task, law: FastestLaw) -> Plan:
     return Plan(scenario, MotionStatus.INFEASIBLE, None, audited, 0.0, 0.0, law=law)
 
 
+def _for_winches(limits: Limits, audited: Audit, kept: PathLimits) -> tuple[PathLimits, np.ndarray]:
+    """Return limits with which motors can pull and accelerate their winches, and how much smaller t_max is, (m,) [N].
+
+    Of each motor's force, the winch's inertia gets the share that it has of both in a motion that needs too much.
+    """
+    robot, weaker, more = limits.robot, np.zeros(limits.robot.m), list[Limit]()
+    for limit, forces in zip(limits, audited.limited, strict=True):
+        for cable, force in zip(limit.cables, forces.T, strict=True) if isinstance(limit, WinchForce) else ():
+            winch, tension = robot.cables[cable].winch, audited.tensions[:, cable]
+            needed = float(np.abs(force - tension).max())  # to accelerate it
+            if winch and needed + tension.max() > limit.high:
+                share = needed / (needed + tension.max()) * limit.high
+                more.append(CableAcceleration(robot, share / winch.inertia, [cable]))
+                weaker[cable] = max(robot.t_max[cable] - (limit.high - share), 0.0)
+    return kept._replace(accelerations=Limits(robot, (*kept.accelerations.all, *more))), weaker
+
+
 class _Stretches(NamedTuple):
     """Stretches of s, from points of a grid to others, and the largest wrench that misses in each, (k,) [N]."""
 
@@ -217,12 +240,18 @@ class _Piece(NamedTuple):
 
 
 def _piece(
-    parametrised: ParametrisedPath, limits: PathLimits, s: np.ndarray, margin: float, reserve: np.ndarray, shrink: float
+    parametrised: ParametrisedPath,
+    limits: PathLimits,
+    s: np.ndarray,
+    margin: float,
+    reserve: np.ndarray,
+    shrink: float,
+    weaker: np.ndarray,
 ) -> _Piece:
     """Solve one piece."""
     fastest, Rows = _toppra()
     inside = s if s[-1] == 1 else np.append(s[:-1], np.nextafter(s[-1], 0.0))
-    plane = phase_plane(parametrised, limits, inside, margin, reserve, shrink)
+    plane = phase_plane(parametrised, limits, inside, margin, reserve, shrink, weaker)
     return _Piece(s, inside, plane, fastest(s - s[0], Rows(*plane.rows(parametrised.robot.force_scale), plane.x_max)))
 
 
