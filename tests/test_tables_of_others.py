@@ -54,7 +54,7 @@ def test_forms_of_times_and_names(form, tmp_path):
 
 
 def test_the_body_of_a_motion_capture_without_times(tmp_path):
-    """The rate stands alone above, the name of the body above the first of its columns, and no time anywhere."""
+    """The rate stands alone above, or nowhere; the name of the body above the first of its columns, and no time."""
     place = np.column_stack([np.sin(T), np.cos(T), 1 + T])
     head = "Objects\n4\n\t\tGlobal Angle:platform\t\t\t\t\t\nFrame\tSub Frame\tRX\tRY\tRZ\tTX\tTY\tTZ\n"
     head += "\t\trad\trad\trad\tmm\tmm\tmm\n"
@@ -64,6 +64,9 @@ def test_the_body_of_a_motion_capture_without_times(tmp_path):
     (tmp_path / "vicon.csv").write_text(head + body.replace("np.float64(", "").replace(")", ""))
     user.write(tmp_path / "winches.csv", ["t", "l0", "l1"], np.column_stack([T, LENGTHS]))
     files = {"path": tmp_path / "winches.csv", "poses": tmp_path / "vicon.csv"}
+    with pytest.raises(InputError, match="robot must be given to align the clocks"):
+        read_log(**files)
+    (tmp_path / "vicon.csv").write_text((tmp_path / "vicon.csv").read_text().replace("\n4\n", "\n", 1))
     with pytest.raises(InputError, match=r"must have times, got none for .*TX"):
         read_log(**files)
     (tmp_path / "map.yaml").write_text("lengths: l*\ntime: Frame [0.25 s]\n")
