@@ -167,6 +167,25 @@ def test_a_peak_between_instants_with_another_load_or_wind_is_found(about):
     assert weaker(peak + 0.01 * (peak - seen)).passed
 
 
+def test_a_dip_of_a_slow_motion_is_found(monkeypatch):
+    """The required wrench is nearly constant, but cables turn, so that one tension is least between instants."""
+    monkeypatch.setattr("towline.ocp.audits.audit.MOST_SAMPLES", 10)
+    robot, start, way = load("point-mass-3"), np.array([-0.9, 0.35, 1.3]), np.array([1.7, 0, 0])
+    line = {"kind": "line", "start": start.tolist(), "end": (start + way).tolist()}
+    task = read_task({"path": line, "duration": 200, "output_rate": 0.05})
+    u = robot.home_anchors - (start + np.linspace(0, 1, 20_001)[:, None] * way)[:, None]
+    u /= np.linalg.norm(u, axis=-1, keepdims=True)
+    weight = -robot.platform.mass * np.array(robot.gravity)
+    dip = float(np.linalg.solve(u.swapaxes(1, 2), weight[:, None])[:, 0, 0].min())
+    seen = float(audit(lay_out(robot, task), None).tensions[:, 0].min())
+    assert seen - dip > 5e-3
+    for least, passes in ((dip + 0.5 * (seen - dip), False), (dip - 1e-4, True)):
+        cables = [cable.model_dump() for cable in robot.cables]
+        cables[0]["t_min"] = least
+        tighter = Robot.model_validate({**robot.model_dump(), "cables": cables})
+        assert audit(lay_out(tighter, task), None).passed == passes
+
+
 def test_a_distance_by_golden_section_is_that_of_samples():
     """The recheck's own geometry: balls, capsules and turned boxes, from points and cables."""
     rng = np.random.default_rng(3)

@@ -427,3 +427,31 @@ def test_no_direction_proves_a_cycle_infeasible_that_exists():
     rng = np.random.default_rng(3)
     for direction in rng.normal(size=(50, 6)):
         assert cycle.shortfall(direction / np.linalg.norm(direction))[0] <= 0
+
+
+@pytest.mark.parametrize("strength", [1e-6, 1.0])
+def test_in_all_of_the_tube_cables_lack_at_least_the_bound_of_a_cycle(strength):
+    """By wrench matrices at poses of the tube, with a CoM far from the origin; with weak cables the weight decides."""
+    keys = ROBOT.model_dump(mode="json")
+    keys["platform"]["com"] = [0.3, -0.2, 0.4]
+    for cable in keys["cables"]:
+        cable |= {"t_min": 0, "t_max": strength * cable["t_max"]}
+    robot, tube = Robot.model_validate(keys), {"position": 0.05, "attitude": 0.3, "ends": "periodic"}
+    points = [[0, 0, 1], [0.3, 0.1, 1.1], [0.1, 0.3, 1.2], [0, 0, 1]]
+    path = {"kind": "waypoints", "points": points}
+    scenario = lay_out(robot, read_task({"path": path, "duration": 1.5, "tube": tube}))
+    cycle, rng = _Cycle(scenario), np.random.default_rng(5)
+    force, about = robot.platform.mass * np.array(robot.gravity), np.tile(cycle.about, (len(cycle.poses), 1))
+    for direction in rng.normal(size=(20, 6)):
+        f, c = direction[:3], direction[3:] / robot.length
+        bound, worst = cycle.shortfall(direction)
+        inside = cycle.poses + rng.uniform(-1, 1, cycle.poses.shape) * cycle.half
+        least = np.inf
+        for poses, centre in ((inside, about), (worst, about[: len(worst)])):
+            A = Dynamics(robot).wrench_matrix(poses)
+            com = poses[:, :3] - centre + Rotation.from_euler("xyz", poses[:, 3:]).apply(robot.platform.com)
+            moments = A[:, 3:] + np.cross(com[:, None], A[:, :3].swapaxes(1, 2)).swapaxes(1, 2)  # not about the CoM
+            x = np.einsum("j,njm->nm", f, A[:, :3]) + np.einsum("j,njm->nm", c, moments)
+            gives = np.maximum(robot.t_min * x, robot.t_max * x).sum(axis=1)
+            least = min(least, float((-force @ f - np.cross(com, force) @ c - gives).min()))
+        assert bound <= least

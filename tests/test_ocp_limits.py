@@ -16,6 +16,7 @@ from towline.ocp.limits.clearance import between_cables, cable_outside, point_ou
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import Task
 from towline.ocp.tasks.task_limits import Block, Capsule, Sphere
+from towline.statics.winch_forces import overloaded_winch
 
 SHARES = np.linspace(0, 1, 201)
 points = arrays(np.float64, (4, 3), elements=st.floats(-2, 2).map(lambda x: round(x, 3)))
@@ -171,6 +172,15 @@ def test_motors_of_winches_pull_and_accelerate_their_winches():
         acceleration = np.gradient(np.gradient(length, times), times)
         force = motion["tensions"].values[:, 0] - inertia * acceleration
         assert force.max() <= 1.01 * (0.8 * needed - friction)
+    # Half of the deceleration alone would need more: what the motor of a weaker robot misses is named.
+    given = {"times": fast.trajectory["time"].values, "length": 2 - fast.trajectory["pose"].values[:, 2]}
+    acceleration = np.gradient(np.gradient(given["length"], given["times"]), given["times"])
+    at_rest = np.full(len(acceleration), mass * 9.81)
+    largest = np.abs(at_rest - inertia * acceleration).max()
+    for force, named in ((1.01 * largest + friction, False), (0.99 * largest + friction, True)):
+        text = overloaded_winch(robot(force), given["times"], given["length"][:, None], at_rest[:, None])
+        assert bool(text) == named
+        assert not named or f"is {largest:.4g} N" in text
 
 
 def test_a_place_is_kept_out_of():
