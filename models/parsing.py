@@ -42,7 +42,7 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
 def to_yaml(model: BaseModel) -> str:
     """Return the YAML text of a model, which `parse_yaml` reads back to an equal one.
 
-    That of a large one, such as a task with the points of a slicer's file, is JSON, which is YAML too.
+    A large model, such as a task with the points of a slicer's file, is written as JSON, which is also valid YAML.
     """
     content = json.dumps(model.model_dump(mode="json", exclude_none=True))
     return _yaml_of(content) if len(content) < LARGE else content

@@ -171,9 +171,7 @@ def report(dataset: xr.Dataset) -> Report:
     likely, failed = short["share_passed"], {FAILED[name]: n for name, n in short["failed"].items() if n}
     rows = {"reference": doubt} if doubt else {}
     if short["runs"] > 1 and _all_same(dataset):
-        rows["runs"] = (
-            "all the same, because nothing is random (see --gusts, --noise and --mismatch); they count as one run"
-        )
+        rows["runs"] = "identical, because nothing is random (see --gusts, --noise and --mismatch); treated as one run"
     rows["probability of a pass"] = f"{100 * likely['low']:.3g} to {100 * likely['high']:.3g} % (95 % confidence)"
     if failed:
         rows["failed"] = ", ".join(f"{quantity(n)} by {name}" for name, n in failed.items())

@@ -133,7 +133,10 @@ def test_slack_cables_count_in_many_flights_as_alone_and_cut_ones_never():
     assert alone.slack_s == pytest.approx(slack_s)
     many = simulate("wang-flying", load("wang-flying").home, **task, runs=2)
     np.testing.assert_allclose(many["slack_s"].values, slack_s)
-    assert "all the same, because nothing is random" in report(many).text()
+    assert (
+        "identical, because nothing is random (see --gusts, --noise and --mismatch); treated as one run"
+        in report(many).text()
+    )
     assert "0 to 97.5 % (95 % confidence)" in report(many).text()  # one run that failed: p <= 1 - 0.025
 
 

@@ -65,7 +65,7 @@ def _from_a_solution(push: float) -> dict[str, Any]:
 
 # A solution with its multipliers is the nearest.
 FROM_A_SOLUTION = _from_a_solution(1e-6)
-SLIGHT = 1e-5  # in the program's units: up to this distance from moved bounds a solution counts as nearest
+SLIGHT = 1e-5  # in the program's units: a solution that misses moved bounds by less can be started from directly
 
 
 _STARTS: dict[str, dict[str, Any]] = {

@@ -67,7 +67,6 @@ def slower_rate(scenario: Scenario) -> Change | None:
     fed = isinstance(path, FeedPath)
     fastest = path.rate if isinstance(path, CirclePath) else path.feed or max(path.feeds or (0.0,))
     others = ", the others by the same factor" if fed and path.feed is None else ""
-
     least = scenario.duration / scenario.longest  # else it would last too long to be audited
 
     def at(share: float) -> Variation:

@@ -49,7 +49,7 @@ FEW = 20  # intervals of the saved trajectory of a motion that is shorter than t
 def least_audit_rate(task: Task) -> float:
     """Return how many instants per second an audit looks at, at least [1/s]: phases may be short.
 
-    Where instants are far apart, more are looked at in between (`audits.peaks`).
+    If instants are far apart, the audit adds others between them (`audits.peaks`).
     """
     return AUDIT_RATE if task.phases else LEAST_AUDIT_RATE
 

@@ -188,7 +188,8 @@ def _shown(task: Task, law: FastestLaw) -> Plan:
 def _for_winches(limits: Limits, audited: Audit, kept: PathLimits) -> tuple[PathLimits, np.ndarray]:
     """Return limits with which motors can pull and accelerate their winches, and how much smaller t_max is, (m,) [N].
 
-    Of each motor's force, the winch's inertia gets the share that it has of both in a motion that needs too much.
+    The force of each motor is divided between the tension and the inertia of its winch, in the proportion in which a
+    motion that exceeded it needs both.
     """
     robot, weaker, more = limits.robot, np.zeros(limits.robot.m), list[Limit]()
     for limit, forces in zip(limits, audited.limited, strict=True):
