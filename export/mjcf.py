@@ -39,13 +39,12 @@ def to_mjcf(robot: Robot) -> str:
     tendons, motors = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
     _add_carriers(robot, world, motors)
     _add_platform(robot, world)
-    for index, cable in enumerate(robot.cables, start=1):
+    for index, limits in enumerate(zip(robot.t_min, robot.t_max, strict=True), start=1):
         tendon = ET.SubElement(tendons, "spatial", name=f"cable{index}", width="0.003")
         ET.SubElement(tendon, "site", site=f"anchor{index}")
         ET.SubElement(tendon, "site", site=f"attachment{index}")
-        limits = _text((cable.t_min, cable.t_max))
         # A tendon's positive force lengthens it, a tension shortens it.
-        ET.SubElement(motors, "motor", name=f"cable{index}", tendon=f"cable{index}", gear="-1", ctrlrange=limits)
+        ET.SubElement(motors, "motor", name=f"cable{index}", tendon=f"cable{index}", gear="-1", ctrlrange=_text(limits))
     ET.indent(root)
     return ET.tostring(root, encoding="unicode") + "\n"
 

@@ -201,6 +201,17 @@ def test_what_mujoco_would_refuse_is_refused_with_a_reason():
         to_mjcf(robot.model_copy(update={"platform": platform}))
 
 
+def test_a_motor_pulls_no_more_than_its_winch():
+    """A winch whose motor has 60 N, of which friction takes 8 N, hauls in a cable under at most 52 N."""
+    data = load("planar-4").model_dump(mode="json")
+    data["cables"][1]["winch"] = {"inertia": 0.1, "friction": 8, "speed_max": 3, "force_max": 60}
+    robot = Robot.model_validate(data)
+    model = mujoco.MjModel.from_xml_string(to_mjcf(robot))
+    low, first = robot.t_min[0], robot.cables[0].t_max
+    assert first > 52
+    np.testing.assert_allclose(model.actuator_ctrlrange[:2], [[low, first], [low, 52]])
+
+
 def test_mujoco_takes_a_point_mass_of_a_microgram():
     robot = load("point-mass-3")
     light = robot.model_copy(update={"platform": robot.platform.model_copy(update={"mass": 1e-9})})
