@@ -1,7 +1,6 @@
 """What may help a plan for which no feasible change was found: `ideas`, rows of its report.
 
-None of them is planned, unlike relaxations. If there is a relaxation, only ways past obstacles, moving carriers and
-stronger ones remain.
+None of them is planned, unlike relaxations. If there is a relaxation, positions inside the frame are left out.
 Positions are checked at rest.
 """
 
@@ -24,6 +23,7 @@ from ..warnings.slipped_units import READS
 
 IN_THE_WAY = {"keep_out", "cable_clearance", *OF_BODY}
 TO_MOVE = 1.5  # times what carries the weight: tilted thrust and acceleration need more
+FELT = 0.02  # of the weight: a wind with less force is hardly why tensions are missing
 STEPS = 100  # from an end of the path to the farthest position that is tried
 ALONG = 51  # positions of a line that are checked
 ENDS = ("start", "end")
@@ -34,9 +34,10 @@ def ideas(plan: PlanData) -> list[Fact]:
     if plan.feasible:
         return []
     more = [("more", "may be feasible: the search for changes was cut short")] * plan.cut_short
+    found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan)]
     if plan.relaxations:
-        return [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *more]
-    found = [*_directions(plan), *_obstacles(plan), *_carriers(plan), *_strength(plan), *_wind(plan), *_frame(plan)]
+        return found + more
+    found += _frame(plan)
     tried = "shorter line, weaker wind, lighter platform or load, stronger cables or lower t_min"
     nothing = [("no single change", f"of those tried makes it feasible: no duration, limit, {tried}")]
     return found + more or (nothing if _lacks_tensions(plan) and not units(plan) else [])
@@ -188,12 +189,14 @@ def _strength(plan: PlanData) -> list[Fact]:
 
 
 def _wind(plan: PlanData) -> list[Fact]:
-    """Return the force of a task's wind on the platform at rest, in proportion to its weight."""
+    """Return the force of a task's wind on the platform at rest, if tensions are missing and the platform feels it."""
     wind, scenario = plan.scenario.task.wind, plan.scenario
-    if wind is None or isinstance(wind, WindBox | WindDisc) or not any(wind):
+    if wind is None or isinstance(wind, WindBox | WindDisc) or not _lacks_tensions(plan):
         return []
     home, still = scenario.robot.home, np.zeros(6)
     force = float(np.linalg.norm(scenario.dynamics.aerodynamic_wrench(home, still, wind=np.array(wind))[:3]))
+    if force < FELT * scenario.robot.weight:
+        return []
     half = quantity_row(np.array(wind) / 2)
     pushes = f"{quantity(force, 'N')} on a platform that weighs {quantity(scenario.robot.weight, 'N')}"
     return [("a weaker wind", f"this one exerts {pushes}; ({half}) m/s exerts a quarter of that")]
