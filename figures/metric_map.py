@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import style
-from .workspace import outer_edges
+from .workspace import SMOOTH, outer_edges
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,11 +19,12 @@ CELLS = 32  # along each axis, at most
 IN_A_CELL = 8  # samples that a cell should have: of half as many, some cells have none
 LAYERS = 3  # of a volume, along z
 LEVELS = 8
+FLAT = 0.4  # of its width: layers less high are drawn below one another
 SHARE = 2.0  # [%] of the values below the lowest level, and above the highest one
 
 
 def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray | None = None) -> style.Figure:
-    """Draw contours of metrics, one row of panels each: the mean of the samples in each cell of the positions.
+    """Draw contours of metrics: the mean of the samples in each cell of the positions, and next to it with less weight.
 
     A region without extent along one axis has one panel, a volume three: the lower, middle and upper third of the
     heights of its samples. Along a line, the samples themselves are drawn.
@@ -46,9 +47,11 @@ def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray |
     axes = thick[:2]
     box = np.array([outer_edges(result["xyz"[k]].values) for k in axes])
     extent = np.ptp(np.vstack([box.T, marks[:, axes]]), axis=0)
-    columns, rows = len(layers), len(metrics)
+    below = extent[-1] < FLAT * extent[0]  # layers below one another, not side by side
+    columns = 1 if below else len(layers)
+    rows, down = len(metrics), len(layers) // columns
     tall = (style.COLUMN - 0.8) / columns * extent[-1] / extent[0]  # of panels at equal scales [inches]
-    tall = 2.5 if len(thick) == 1 else 1.0 + 0.2 * columns + float(np.clip(tall, 0.6, 3.5))
+    tall = 2.5 if len(thick) == 1 else 0.8 + 0.15 * columns + down * float(np.clip(tall, 0.4, 3.5)) + 0.35 * (down - 1)
     canvas = style.figure(height=rows * tall)
     for row, name in enumerate(metrics):
         values, unit = result[name].values, style.typeset(result[name].attrs["units"])
@@ -59,16 +62,18 @@ def metric_map(result: xr.Dataset, metrics: Sequence[str], anchors: np.ndarray |
             continue
         finite = np.isfinite(values)
         levels, panels, shades = _levels(values[finite]), [], None
-        for column, (layer, heading) in enumerate(zip(layers, headings, strict=True)):
-            labels = f"{'xyz'[axes[0]]} [m]", "" if column else f"{'xyz'[axes[1]]} [m]"
-            ax = style.axes(canvas, *labels, (rows, columns, row * columns + column + 1), panels[0] if panels else None)
+        for index, (layer, heading) in enumerate(zip(layers, headings, strict=True)):
+            lowest, leftmost = index >= len(layers) - columns, index % columns == 0
+            labels = f"{'xyz'[axes[0]]} [m]" if lowest else "", f"{'xyz'[axes[1]]} [m]" if leftmost else ""
+            place = rows * down, columns, row * len(layers) + index + 1
+            ax = style.axes(canvas, *labels, place, panels[0] if panels else None)
             panels.append(ax)
             ax.grid(False)
             ax.set_aspect("equal", adjustable="box")
-            ax.tick_params(labelleft=not column)
-            for axis in (ax.xaxis, ax.yaxis):
-                axis.set_major_locator(style.few_ticks(5 - columns))
-            style.heading(ax, heading, 1 / columns)
+            ax.tick_params(labelbottom=lowest, labelleft=leftmost)
+            for axis, count in ((ax.xaxis, 5 - columns), (ax.yaxis, 2 if below else 5 - columns)):
+                axis.set_major_locator(style.few_ticks(count))
+            style.heading(ax, heading.replace("\n", " ") if below else heading, 1 / columns)
             some = layer & finite
             count = int(np.clip(np.sqrt(some.sum() / IN_A_CELL), 2, CELLS))
             cells = [np.linspace(low, high, count + 1) for low, high in box]
@@ -83,11 +88,15 @@ def _contours(
     ax: style.Axes, position: np.ndarray, values: np.ndarray, cells: list[np.ndarray], levels: np.ndarray
 ) -> QuadContourSet | None:
     """Fill contours of the means of values in cells, given by their edges, if some neighbouring cells have samples."""
+    from scipy.ndimage import gaussian_filter
+
     count, *_ = np.histogram2d(*position.T, bins=cells)
     total, *_ = np.histogram2d(*position.T, bins=cells, weights=values)
     if not ((count[1:, 1:] > 0) & (count[:-1, :-1] > 0) & (count[1:, :-1] > 0) & (count[:-1, 1:] > 0)).any():
         return None
-    mean = np.ma.masked_array(total / np.maximum(count, 1), count == 0).T
+    # Where a layer is thick, samples of one cell differ.
+    near = gaussian_filter(count, SMOOTH)
+    mean = np.ma.masked_array(gaussian_filter(total, SMOOTH) / np.where(count > 0, near, 1.0), count == 0).T
     centres = [(edges[1:] + edges[:-1]) / 2 for edges in cells]
     shades = ax.contourf(*centres, mean, levels=levels, extend="both", cmap="viridis")
     ax.contour(*centres, mean, levels=levels, colors="#ffffff", linewidths=0.4)

@@ -98,12 +98,13 @@ def _contours(ax: style.Axes, result: xr.Dataset, behind: str, across: str, up: 
     """Fill the areas of `SHARES`, of counts averaged with those of the neighbouring cells, which few samples need."""
     from scipy.ndimage import gaussian_filter
 
-    tried, reached = (
-        gaussian_filter(np.pad(result[name].sum(behind).transpose(up, across).to_numpy().astype(float), 1), SMOOTH)
-        for name in ("tried", "reached")
-    )
+    counts = result[["tried", "reached"]].sum(behind).transpose(up, across)
+    for axis, other in ((across, up), (up, across)):  # cells that no sample can be in are joined with their neighbours
+        while (counts["tried"].sum(other) == 0).any() and counts.sizes[axis] % 2 == 0:
+            counts = counts.coarsen({axis: 2}).sum()
+    tried, reached = (gaussian_filter(np.pad(each.astype(float), 1), SMOOTH) for each in (counts.tried, counts.reached))
     share = np.divide(reached, tried, out=np.zeros_like(tried), where=tried > 1e-9)
-    cells = [np.pad(result[name].to_numpy(), 1, mode="reflect", reflect_type="odd") for name in (across, up)]
+    cells = [np.pad(counts[name].to_numpy(), 1, mode="reflect", reflect_type="odd") for name in (across, up)]
     share[[0, -1]] = share[:, [0, -1]] = 0.0  # outside the region, so that contours close
     colours = [style.colour(2) + alpha for alpha in ("33", "77", "cc")]
     ax.contourf(*cells, share, levels=[*SHARES, 1.01], colors=colours)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -157,18 +157,16 @@ def flights() -> xr.Dataset:
     return xr.Dataset({"error_max": ("seed", errors), "passed": ("seed", errors < 0.05)}, attrs={"tolerance_m": 0.05})
 
 
-def sampled(sizes: tuple[int, int, int]) -> xr.Dataset:
-    """Return counts of a sampled workspace: a ball in a box."""
+def sampled(sizes: tuple[int, int, int], every: int = 1) -> xr.Dataset:
+    """Return counts of a sampled workspace: a ball in a box, with samples in every n-th cell of an axis."""
     centres = {name: (np.arange(n) + 0.5) / n * 4 - 2 for name, n in zip("xyz", sizes, strict=True)}
     x, y, z = np.meshgrid(*centres.values(), indexing="ij")
-    counts = {
-        "tried": (tuple("xyz"), np.full(sizes, 10)),
-        "reached": (tuple("xyz"), np.where(x**2 + y**2 + z**2 < 3, 10, 0)),
-    }
+    tried = np.where((np.indices(sizes) % every == 0).all(axis=0), 10, 0)
+    counts = {"tried": (tuple("xyz"), tried), "reached": (tuple("xyz"), np.where(x**2 + y**2 + z**2 < 3, tried, 0))}
     return xr.Dataset(counts, centres, {"robot": "wang-ctmrts", "accepted": 12345, "samples": 60000})
 
 
-def mapped(sizes: tuple[int, int, int]) -> Figure:
+def mapped(sizes: tuple[int, int, int], scale: Sequence[float] = (2, 2, 2)) -> Figure:
     """Draw two metrics at samples of a ball, some of which have no value."""
     points = np.random.default_rng(0).uniform(-2, 2, (4000, 3)) * (np.array(sizes) > 1)
     points = points[np.linalg.norm(points, axis=1) < 1.7]
@@ -178,7 +176,7 @@ def mapped(sizes: tuple[int, int, int]) -> Figure:
         payload=("point", payload, {"units": "kg"}),
         condition_number=("point", np.where(points[:, 0] > -1, 3 + points[:, 1], np.inf), {"units": "1"}),
     )
-    return metric_map(result, ["payload", "condition_number"], 2 * SQUARE)
+    return metric_map(result, ["payload", "condition_number"], SQUARE * scale)
 
 
 def swept(shape: tuple[int, ...]) -> Figure:
@@ -290,8 +288,10 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     ),
     "reached": lambda: workspace.reached(sampled((20, 20, 10))),
     "reached-flat": lambda: workspace.reached(sampled((20, 20, 1))),
+    "reached-sparsely": lambda: workspace.reached(sampled((32, 32, 32), 3)),
     "reached-line": lambda: workspace.reached(sampled((20, 1, 1))),
     "metrics": lambda: mapped((20, 20, 10)),
+    "metrics-wide": lambda: mapped((20, 20, 10), (9, 2, 2)),
     "metrics-flat": lambda: mapped((20, 20, 1)),
     "metrics-line": lambda: mapped((20, 1, 1)),
 }

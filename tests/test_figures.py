@@ -175,6 +175,20 @@ def test_a_curve_of_many_cables_has_a_short_name():
     assert together(values[:, :10], [str(i + 1) for i in range(10)], 1.0)[1] == ["1, 3, 5, 7, 9", "2, 4, 6, 8, 10"]
 
 
+def test_samples_far_apart_are_drawn_as_one_area():
+    """Cells of the adaptive method may be larger than those in which samples are counted: a ball stays one disc."""
+    for ax in FIGURES["reached-sparsely"]().axes:
+        edge = next(each for each in ax.collections if not each.get_facecolor().size).get_paths()[0].vertices
+        assert len(ax.collections[-1].get_paths()[0].to_polygons()) == 1
+        np.testing.assert_allclose(np.linalg.norm(edge, axis=1), np.sqrt(2), atol=0.4)  # half of a line is inside
+
+
+def test_layers_of_a_wide_robot_are_below_one_another():
+    tops = [ax.get_position().y1 for ax in FIGURES["metrics-wide"]().axes[:3]]
+    assert tops == sorted(tops, reverse=True)
+    assert tops[0] - tops[2] > 0.1
+
+
 def test_units_are_typeset():
     assert style.typeset("amplitude [um]") == "amplitude [µm]"
     assert style.typeset("acceleration [m/s^2, rad/s^2], jerk [m/s^3]") == "acceleration [m/s², rad/s²], jerk [m/s³]"

@@ -70,3 +70,18 @@ def test_the_default_region_is_above_the_floor_and_in_the_room():
     low, high = position.min(axis=0), position.max(axis=0)
     np.testing.assert_allclose(low[[0, 2]] + lowest[[0, 2]], [-1, 1.5], atol=0.1)  # nothing more is left out
     np.testing.assert_allclose(high[[0, 2]] + highest[[0, 2]], [2, 3.5], atol=0.1)
+
+
+def test_the_default_region_of_a_long_robot_is_no_wider_than_its_platform_can_be():
+    """Beyond the anchors by more than an attachment's distance, all cables pull back: nothing balances them."""
+    ends = [([12 * x, y, 3], [-0.2 * x, 0.3 * y, 0.4 * z]) for x in (-1, 1) for y in (-1, 1) for z in (0, 1)]
+    platform = {"mass": 5, "inertia": [1, 1, 1, 0, 0, 0], "home": [0, 0, 0, 0, 0, 0]}
+    robot = framed(ends, platform, t_max=500)
+    width = 1 + np.linalg.norm([0.2, 0.3, 0.4])
+    wide = {"position": {"min": [-14, -6, -9], "max": [14, 6, 9]}, "attitude": {"min": [-1, -1, -1], "max": [1, 1, 1]}}
+    everywhere = sample(robot, StaticEquilibrium(), wide)
+    assert everywhere.attrs["accepted"] > 500
+    assert np.abs(everywhere["position"].values[:, 1]).max() < width
+    tried = sample(robot, StaticEquilibrium(), samples=100, keep="all")["position"].values
+    assert 0.9 * width < np.abs(tried[:, 1]).max() <= width
+    assert tried[:, 2].min() < -4  # along gravity there is space as before

@@ -63,8 +63,9 @@ def surrounding_box(robot: Robot, carriers: dict[str, Box]) -> tuple[np.ndarray,
             corners += [own + carriers[carrier.name].min, own + carriers[carrier.name].max]
     every = np.vstack(corners)
     low, high = every.min(axis=0), every.max(axis=0)
-    # A robot above or below its anchors has space there too.
-    spread = np.maximum(high - low, 0.5 * (high - low).max())
+    # There is space above and below the anchors too. Across gravity, cables that all pull to one side balance nothing.
+    beside = np.where(robot.gravity, np.inf, 2 * np.linalg.norm(robot.attachments, axis=1).max())
+    spread = np.maximum(high - low, np.minimum(0.5 * (high - low).max(), high - low + beside))
     low = np.minimum(low, (low + high - spread) / 2)
     moving = robot.dof_mask[:3] > 0
     return np.where(moving, low, robot.home[:3]), np.where(moving, low + spread, robot.home[:3])
