@@ -133,10 +133,11 @@ def _newton(robot: Robot, lengths: np.ndarray, start: np.ndarray, carriers: np.n
     return replace(reached, neutral=bool(np.abs(frequencies).min(initial=np.inf) < UNSTABLE))
 
 
-def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivative of CoM and rotation vector in {G} by the lengths at an equilibrium, (6, m) [-, rad/m].
+def sensitivity(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the derivatives of CoM and rotation vector in {G} by lengths and by a wrench at an equilibrium.
 
-    Carriers, (c, 6), are fixed, and slack cables have no effect. Also return neutral, that is, undetermined motions of
+    Carriers, (c, 6), are fixed, and slack cables have no effect. The derivatives are (6, m) [-, rad/m] and (6, 6)
+    [m/N, rad/N, m/(N m), rad/(N m)], of a wrench about the CoM. Also return neutral, that is, undetermined motions of
     CoM and rotation vector, (6, k).
     """
     dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
@@ -144,16 +145,18 @@ def per_length(robot: Robot, rest: Equilibrium, carriers: np.ndarray) -> tuple[n
     system = _newton_system(robot, dynamics, rest.pose, rest.tensions, carriers)
     n, kept = len(rows), np.concatenate([np.arange(len(rows)), len(rows) + taut])
     system = system[np.ix_(kept, kept)]
-    system[:n, :n] /= max(robot.weight, 1e-300) / robot.length  # stiffness beside cosines
+    unit = max(robot.weight, 1e-300) / robot.length
+    system[:n, :n] /= unit  # stiffness beside cosines
     U, values, V = np.linalg.svd(system)
     regular = values > 1e-9 * values[0]
-    moves, neutral = np.zeros((6, robot.m)), np.zeros((6, int((~regular).sum())))
+    moves, compliance, neutral = np.zeros((6, robot.m)), np.zeros((6, 6)), np.zeros((6, int((~regular).sum())))
     neutral[rows] = V[~regular, :n].T * robot.wrench_scale[rows, None]
     if rest.neutral and np.abs(neutral).max(initial=0.0) <= 1e-6:
         neutral = np.diag(robot.dof_mask)
     inverse = V[regular].T @ (U[:, regular] / values[regular]).T
     moves[np.ix_(rows, taut)] = inverse[:n, n:] * robot.wrench_scale[rows, None]
-    return moves, neutral
+    compliance[np.ix_(rows, rows)] = inverse[:n, :n] * np.outer(*[robot.wrench_scale[rows]] * 2) / unit
+    return moves, compliance, neutral
 
 
 def _newton_system(

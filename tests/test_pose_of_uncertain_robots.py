@@ -49,6 +49,17 @@ def test_covariances_include_the_uncertainty_of_the_file(name):
     found = pose_from_lengths(robot, lengths_of(robot, readings), pose)
     freedoms, squares = int(robot.dof_mask.sum()), normalised(found, np.tile(pose, (count, 1)))
     assert squares.mean() == pytest.approx(freedoms, abs=4 * np.sqrt(2 * freedoms / count))
+    # The file's uncertainty explains all residuals, whose squares have the chi-square distribution of spare cables.
+    spare = robot.m - freedoms
+    assert found.cost.mean() == pytest.approx(spare, abs=4 * np.sqrt(2 * spare / count))
+    assert (
+        np.mean(~found.consistent)
+        < 0.06
+        < np.mean(np.sum((found.residuals / 1e-3) ** 2, axis=1) > chi2.ppf(0.99, spare))
+    )
+    assert np.mean(found.suspects() ** 2) == pytest.approx(1, abs=4 * np.sqrt(2 / count))
+    wrong = lengths_of(robot, readings) + 0.05 * np.eye(robot.m)[0]
+    assert np.mean(pose_from_lengths(robot, wrong, pose).consistent) < 0.2
     alone = pose_from_lengths(robot, lengths_of(robot, readings[0]), pose)  # by the function of streams
     np.testing.assert_allclose(alone.covariance, found.covariance[0], rtol=1e-3, atol=1e-12)
     assert alone.covariance[0, 0] > 2 * alone.covariance_of_noise[0, 0]
@@ -83,3 +94,26 @@ def test_encoders_are_no_geometry():
         uncertainty_of(only)
     with pytest.raises(InputError, match="must be of a cable with an encoder, got 'cables"):
         load("planar-4").parameter_values(names)
+
+
+@pytest.mark.parametrize("name", ["multi-quadrotor-3", "wang-ctmrts"])
+def test_the_uncertainty_moves_poses_at_rest(name):
+    """Derivatives by the file's parameters against equilibria of robots that differ a little."""
+    sizes = {"anchor.x": 1e-3, "anchor.z": 1e-3, "attachment.x": 1e-3, "attachment.y": 1e-3, "encoder.offset": 1e-3}
+    robot = uncertain(name, sizes)
+    lengths = Dynamics(robot).cable_lengths(robot.home)
+    found = pose_from_lengths(robot, lengths, robot.home)
+    assert found.by_gravity
+    names, readings, step = robot.uncertainty.parameters, readings_of(robot, lengths), 1e-6
+    by_parameter = []
+    for parameter, value in zip(names, robot.parameter_values(names), strict=True):
+        ends = [robot.with_parameters({parameter: value + sign * step}) for sign in (1, -1)]
+        one, two = (pose_from_lengths(each, lengths_of(each, readings), found.pose).pose for each in ends)
+        turn = points.rotations(one[3:]) @ points.rotations(two[3:]).T
+        by_parameter.append(np.hstack([one[:3] - two[:3], Rotation.from_matrix(turn).as_rotvec()]) / (2 * step))
+    expected = np.transpose(by_parameter) @ robot.uncertainty.matrix @ by_parameter
+    finite = np.isfinite(found.covariance)
+    assert finite[:3, :3].all()
+    np.testing.assert_allclose(
+        (found.covariance - found.covariance_of_noise)[finite], expected[finite], atol=1e-3 * expected.max()
+    )

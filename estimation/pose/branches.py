@@ -16,6 +16,7 @@ from ...statics.equilibria import equilibria
 from .estimate import PoseEstimate, largest_cost
 from .from_lengths import SIGMA, checked_sigma, one_pose
 from .problem import Problem, problem_of
+from .residual_tests import squares_of
 from .search import APART, level_platform
 from .taut import taut
 
@@ -56,8 +57,7 @@ def branches(
     rows, weights = np.tile(measured, (starts, 1)), 1.0 / deviations
     spread = _spread(robot, problem, level_platform(problem, rows[:1], weights)[0], starts, seed)
     poses, errors, ended = problem.descend_from_afar(rows, weights, spread)
-    with np.errstate(over="ignore"):  # of a descent that ran away
-        cost = np.sum(errors**2, axis=1)
+    cost = squares_of(robot, poses, errors * deviations, deviations, problem.carriers)
     fits = np.flatnonzero(ended & (cost <= largest_cost(robot.m - problem.freedoms)))
     apart: list[int] = []
     for row in fits[np.argsort(cost[fits], kind="stable")].tolist():

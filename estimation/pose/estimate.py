@@ -14,12 +14,12 @@ from ...models import points
 from ...models.dynamics import dynamics_of
 from ...models.record import record_of
 from ...models.robot import Robot
-from .parameter_errors import covariance_of_lengths
+from .parameter_errors import length_errors
+from .residual_tests import BLOCK, SINGULAR, residual_tests, squares_of
 
-BLOCK = 5000  # poses, so that few derivatives are in memory at once
 FALSE_ALARM = 0.01  # share of sound measurements that count as inconsistent
 EXACT = 1e-6  # standard deviations: errors where there are as many lengths as coordinates
-SINGULAR, CHANGED = 1e-9, 1e-6  # share of the largest singular value, and of a motion of unit length
+CHANGED = 1e-6  # share of a motion of unit length
 MOST_TURN = np.radians(5.0)  # standard deviation of an angle up to which the geometry is nearly linear
 MOST_CURVED = 0.5  # part of a change of lengths that is not linear, two standard deviations away
 
@@ -38,8 +38,10 @@ class PoseEstimate(Displayed):
         ambiguous: True if the search found another pose that may be the true one, (...): it passes the fit test at the
             0.01 % level, even if the cables cannot hold it with the file's CoM and load. Always False with a start.
         by_gravity: True if the lengths alone do not determine the pose, and gravity fixes it, (...).
-        known_covariance: Covariance that was computed with the pose, (..., 6, 6): of one pose near a start, and of an
-            equilibrium, where it does not follow from the lengths alone.
+        known_covariance: Covariance due to noise that was computed with the pose, (..., 6, 6): of one pose near a
+            start, and of an equilibrium, where it does not follow from the lengths alone.
+        by_parameters: Covariance of equilibria due to the `uncertainty` of the robot file, (..., 6, 6), zero for other
+            poses; None without any.
     """
 
     robot: Robot
@@ -51,6 +53,7 @@ class PoseEstimate(Displayed):
     ambiguous: Any = None
     by_gravity: Any = False
     known_covariance: np.ndarray | None = None
+    by_parameters: np.ndarray | None = None
 
     def _headline(self) -> str:
         shape = self.pose.shape[:-1]
@@ -67,7 +70,7 @@ class PoseEstimate(Displayed):
 
     def reshape(self, batch: tuple[int, ...], carrier_pose: np.ndarray | None) -> None:
         """Replace the leading dimension N by `batch`, and set `carrier_pose`."""
-        for name in ("pose", "residuals", "converged", "ambiguous", "by_gravity", "known_covariance"):
+        for name in ("pose", "residuals", "converged", "ambiguous", "by_gravity", "known_covariance", "by_parameters"):
             value = getattr(self, name)
             if not isinstance(value, np.ndarray):
                 continue
@@ -86,14 +89,23 @@ class PoseEstimate(Displayed):
         return np.sqrt(np.mean(np.square(self.residuals), axis=-1))
 
     @property
+    def cost(self) -> Any:
+        """Return the sum of squared residuals in standard deviations, (...).
+
+        It is the least one over all poses, with the covariance of the lengths' noise and of the file's `uncertainty`.
+        """
+        residuals = self.residuals.reshape(-1, self.robot.m)
+        squares = squares_of(self.robot, self.pose.reshape(-1, 6), residuals, self.sigma, self._carriers())
+        return squares.reshape(self.pose.shape[:-1])[()]
+
+    @property
     def consistent(self) -> Any:
-        """Return whether the residuals are consistent with noise of `sigma`, by a chi-square test at 1 %, (...).
+        """Return whether noise of `sigma` and the file's `uncertainty` explain residuals, by a chi-square test at 1 %.
 
         With no more cables than coordinates nearly all lengths fit some pose, and the test is meaningless. Lengths with
         an equilibrium are consistent.
         """
-        cost = np.sum(np.square(self.residuals / self.sigma), axis=-1)
-        fits = cost <= largest_cost(self.robot.m - int(self.robot.dof_mask.sum()))
+        fits = self.cost <= largest_cost(self.robot.m - int(self.robot.dof_mask.sum()))
         return self.converged & (fits | self.by_gravity)
 
     @cached_property
@@ -101,9 +113,11 @@ class PoseEstimate(Displayed):
         """Return the covariance of x, y, z and a small rotation in {G}, (..., 6, 6) [m^2, m rad, rad^2].
 
         It is zero for coordinates that cannot move, and infinite for those that an undetermined motion changes. It
-        includes the `uncertainty` of the robot file, except for a pose `by_gravity`.
+        includes the `uncertainty` of the robot file.
         """
         own = self.covariance_of_noise
+        if self.by_parameters is not None:
+            own = own + self.by_parameters
         lengths_alone = ~np.asarray(self.by_gravity, dtype=bool) & np.isfinite(own).all(axis=(-2, -1))
         if self.robot.uncertainty is None or not lengths_alone.any():
             return own
@@ -114,9 +128,9 @@ class PoseEstimate(Displayed):
         for first in range(0, len(pose), BLOCK):
             rows = slice(first, first + BLOCK)
             at = carriers if carriers.ndim == 2 else carriers[rows]
-            of_lengths, J = covariance_of_lengths(self.robot, pose[rows], measured[rows], at)
-            K = noise[rows] @ np.swapaxes(J / self.sigma[:, None] ** 2, 1, 2)  # (n, 6, m), least squares
-            added[rows] = K @ of_lengths @ np.swapaxes(K, 1, 2)
+            L, J = length_errors(self.robot, pose[rows], measured[rows], at)
+            by_file = noise[rows] @ np.swapaxes(J / self.sigma[:, None] ** 2, 1, 2) @ L  # (n, 6, p), least squares
+            added[rows] = by_file @ self.robot.uncertainty.matrix @ np.swapaxes(by_file, 1, 2)
         return own + added.reshape(own.shape)
 
     @cached_property
@@ -180,11 +194,10 @@ class PoseEstimate(Displayed):
 
         It is 0 for a cable without redundancy. The lengths are linearised, so a large error may mark another cable.
         """
-        J = self._weighted_gradient()  # (..., m, 6)
-        hat = np.einsum("...ij,...jk,...lk->...il", J, np.linalg.pinv(np.swapaxes(J, -1, -2) @ J), J)
-        checked = 1.0 - np.diagonal(hat, axis1=-2, axis2=-1)
-        deviations = np.abs(self.residuals / self.sigma) / np.sqrt(np.maximum(checked, 1e-9))
-        return np.where(checked > 1e-6, deviations, 0.0)
+        pose, residuals = self.pose.reshape(-1, 6), self.residuals.reshape(-1, self.robot.m)
+        return residual_tests(self.robot, pose, residuals, self.sigma, self._carriers())[1].reshape(
+            self.residuals.shape
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the estimate as plain numbers, for JSON."""

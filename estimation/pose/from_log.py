@@ -75,12 +75,10 @@ class LogPoses(Displayed):
         """Return the input error of the log that makes the poses doubtful, in one line, or None."""
         return self.mistake.doubt if self.mistake else None
 
-    @property
+    @cached_property
     def cost(self) -> np.ndarray:
         """Return the sum of squared residuals of each sample, in standard deviations, (N,)."""
-        if self.squares is not None:
-            return self.squares
-        return np.sum(np.square(self.estimate.residuals / self.estimate.sigma), axis=-1)
+        return self.estimate.cost if self.squares is None else self.squares
 
     @property
     def largest(self) -> float:

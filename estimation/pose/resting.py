@@ -8,9 +8,12 @@ from ...base.errors import InputError
 from ...base.text import counted
 from ...models import points
 from ...models.robot import Robot
-from ...statics.equilibria import Equilibrium, equilibria, per_length, rest_near
-from .estimate import PoseEstimate, unbounded
+from ...statics.equilibria import Equilibrium, equilibria, rest_near, sensitivity
+from .estimate import PoseEstimate, moved, unbounded
+from .parameter_errors import length_errors
 from .problem import Problem
+
+STEP = 1e-5  # of a numerical derivative, in radians, and times the platform's size
 
 
 def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np.ndarray | None) -> PoseEstimate:
@@ -32,6 +35,7 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
     if robot.weight == 0.0 or not hang.size:
         return own
     covariance, by_gravity = own.covariance_of_noise.copy(), np.full(len(lengths), few)
+    by_parameters = np.zeros_like(covariance) if robot.uncertainty else None
     near = own.pose if starts is None else starts
     carriers = np.broadcast_to(problem.carriers, (len(lengths), *robot.carrier_home.shape))
     for row in hang:
@@ -42,14 +46,29 @@ def resting(own: PoseEstimate, problem: Problem, lengths: np.ndarray, starts: np
             own.pose[row], own.converged[row], by_gravity[row] = rest.pose, True, True
             own.residuals[row] = rest.lengths - lengths[row]
             own.residuals[row, rest.slack] = 0.0
-            covariance[row] = _covariance(robot, rest, carriers[row], own.sigma)
-    return replace(own, by_gravity=by_gravity, known_covariance=covariance)
+            by_length, by_file, neutral = _motions(robot, rest, lengths[row], carriers[row])
+            covariance[row] = unbounded((by_length * own.sigma**2) @ by_length.T, neutral)
+            if by_parameters is not None and robot.uncertainty is not None:
+                by_parameters[row] = by_file @ robot.uncertainty.matrix @ by_file.T
+    return replace(own, by_gravity=by_gravity, known_covariance=covariance, by_parameters=by_parameters)
 
 
-def _covariance(robot: Robot, rest: Equilibrium, carriers: np.ndarray, sigma: np.ndarray) -> np.ndarray:
-    """Return the covariance of the platform frame and a small rotation, (6, 6), infinite where motions are neutral."""
-    motions = np.hstack(per_length(robot, rest, carriers))
+def _motions(robot: Robot, rest: Equilibrium, lengths: np.ndarray, carriers: np.ndarray) -> list[np.ndarray]:
+    """Return motions of the platform frame, as its shift and a small rotation in {G}, at an equilibrium.
+
+    They are those by measured lengths, (6, m), and by the uncertain parameters of the file, (6, p), and neutral ones,
+    (6, k). With the energy E = -m g c + sum t_i (l_i - L_i), a parameter acts like a change of lengths and the wrench
+    -d^2 E / (dpose dparameter).
+    """
+    by_length, compliance, neutral = sensitivity(robot, rest, carriers)
+    step = STEP * np.diag([robot.length] * 3 + [1.0] * 3)
+    around = moved(rest.pose, np.vstack([np.zeros(6), step, -step]))  # (13, 6)
+    L, _ = length_errors(robot, around, np.tile(lengths, (13, 1)), np.tile(carriers, (13, 1, 1)))
+    pulled = np.einsum("i,nip->np", rest.tensions, L)
+    wrench = (pulled[7:] - pulled[1:7]) / (2 * np.diag(step)[:, None])
     arm = points.rotations(rest.pose[3:]) @ np.array(robot.platform.com)
-    motions[:3] += np.cross(arm, motions[3:], axis=0)  # of the CoM before
-    moves, neutral = np.split(motions, [robot.m], axis=1)
-    return unbounded((moves * sigma**2) @ moves.T, neutral)
+    wrench[3:] -= np.cross(arm, wrench[:3], axis=0)  # about the CoM
+    motions = [by_length, compliance @ wrench - by_length @ L[0], neutral]
+    for of in motions:
+        of[:3] += np.cross(arm, of[3:], axis=0)  # of the CoM before
+    return motions

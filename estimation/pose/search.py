@@ -14,6 +14,7 @@ import numpy as np
 from ...models import points
 from .estimate import EXACT, PoseEstimate, largest_cost, moved
 from .problem import DAMPING, Problem
+from .residual_tests import squares_of
 from .taut import taut
 
 TURNS = np.radians([45.0, 90.0])
@@ -32,9 +33,9 @@ class _Best:
     - `left`: rows that need a further search.
     """
 
-    def __init__(self, problem: Problem, count: int):
+    def __init__(self, problem: Problem, count: int, sigma: np.ndarray):
         robot = problem.robot
-        self._problem, self._home = problem, points.rotations(problem.home[3:])
+        self._problem, self._sigma, self._home = problem, sigma, points.rotations(problem.home[3:])
         redundancy = robot.m - problem.freedoms
         self._most, self._square = largest_cost(redundancy), redundancy == 0
         self._doubtful = largest_cost(redundancy, RARE)
@@ -44,7 +45,8 @@ class _Best:
 
     def offer(self, rows: np.ndarray, poses: np.ndarray, errors: np.ndarray, ended: np.ndarray) -> None:
         """Keep the poses of `rows` that are better than the previous ones."""
-        cost = np.sum(errors**2, axis=1)
+        carriers = self._problem.of(rows).carriers
+        cost = squares_of(self._problem.robot, poses, errors * self._sigma, self._sigma, carriers)
         fits = ended & (cost <= self._most)
         # The true pose may be one that hardly fits, or one that is not held with the file's CoM and load.
         plausible = ended & (cost <= self._doubtful)
@@ -98,7 +100,7 @@ def estimates(problem: Problem, lengths: np.ndarray, starts: np.ndarray | None, 
     """Return the poses that fit lengths (N, m) best, nearest to `starts` (N, 6) or, without any, of all."""
     robot, carriers, ambiguous = problem.robot, problem.carriers, None
     if starts is None:
-        best, level = _Best(problem, len(lengths)), level_platform(problem, lengths, 1.0 / sigma)
+        best, level = _Best(problem, len(lengths), sigma), level_platform(problem, lengths, 1.0 / sigma)
         for start in _starts(problem, level):
             left = best.left
             best.offer(left, *problem.of(left).descend_from_afar(lengths[left], 1.0 / sigma, start[left]))

@@ -35,7 +35,6 @@ def wrong_cables(estimate: PoseEstimate, rows: Sequence[int] | None = None) -> t
         carriers = carriers[rows] if carriers is not None and carriers.ndim > 2 else carriers
     lengths = dynamics_of(robot).cable_lengths(poses, carriers) - residuals
     sigmas = np.where(np.eye(robot.m, dtype=bool), LEFT_OUT, estimate.sigma)
-    left = (pose_from_lengths(robot, lengths, None, carriers, sigma).residuals / sigma for sigma in sigmas)
-    costs = np.array([np.sum(np.square(each)) for each in left])  # (m,)
+    costs = np.array([pose_from_lengths(robot, lengths, None, carriers, sigma).cost.sum() for sigma in sigmas])  # (m,)
     most = len(lengths) * largest_cost(robot.m - 1 - int(robot.dof_mask.sum()), MISSED)
     return tuple(np.flatnonzero(costs <= min(costs.min() + TOLD_APART**2, most)).tolist())
