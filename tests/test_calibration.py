@@ -292,15 +292,15 @@ def test_information_is_the_inverse_of_the_covariance():
 
 def test_a_clock_offset_is_found():
     robot, draw = load("cogiro"), np.random.default_rng(0)
-    times = np.arange(0, 8, 0.02) + draw.uniform(-0.003, 0.003, 400)
+    times = np.arange(0, 8, 0.04) + draw.uniform(-0.003, 0.003, 200)
 
     def motion(t):
         return robot.home + np.array([1, 0.8, 0.3, 0.1, 0.1, 0.15]) * np.sin(
             np.outer(t, [2.1, 1.7, 2.7, 1.9, 2.4, 1.3])
         )
 
-    built = as_built(400, 3, poses=motion(times + 0.034))
-    seen = motion(times) + draw.normal(0, 5e-4, (400, 6))
+    built = as_built(200, 3, poses=motion(times + 0.034))
+    seen = motion(times) + draw.normal(0, 5e-4, (200, 6))
     log = Measurements(built.readings, seen, times=times, sigma={"lengths": 1e-3, "position": 5e-4, "rotation": 5e-4})
     result = calibrate(robot, log, ("anchors", "offsets", "clock"))
     assert result.clock == pytest.approx(0.034, abs=1e-3)

@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
@@ -50,7 +49,11 @@ def at_rest(position):
         moments = np.cross(arms, pulls).sum(axis=0) + np.cross(com, MASS * GRAVITY)
         return np.concatenate([pulls.sum(axis=0) + MASS * GRAVITY, moments])
 
-    z = least_squares(out_of_balance, np.array([0, 0, 0, *np.full(4, 0.3)]), xtol=1e-12, ftol=1e-12, gtol=1e-12).x
+    z, step = np.array([0, 0, 0, *np.full(4, 0.3)]), 1e-6 * np.eye(7)
+    for _ in range(8):  # Gauss and Newton's, with the shortest of all steps
+        now = out_of_balance(z)
+        slope = np.stack([out_of_balance(z + each) - now for each in step], axis=1) / 1e-6
+        z = z - np.linalg.pinv(slope) @ now
     assert np.abs(out_of_balance(z)).max() < 1e-5
     assert z[3:].min() > 0
     return np.concatenate([position, z[:3]]), z[3:] * MASS * 9.81
@@ -77,7 +80,7 @@ def drawn(com=COM):
 def test_four_cables_calibrate_without_a_camera():
     """Lengths up to offsets, an inertial sensor and tensions: poses to 10 mm, and a CoM 30 mm off to 3 mm."""
     ratios, errors, wrong_com = [], [], COM + 0.03 * np.array([0.6, -0.64, 0.48])
-    for seed in range(3):
+    for seed in range(2):
         poses, readings, angles, tensions, offsets = rests(seed)
         sigma = {"lengths": 1e-3, "rotation": AHRS, "tensions": 0.02}
         log = Measurements(readings, orientations=angles, tensions=tensions, sigma=sigma)
@@ -91,7 +94,7 @@ def test_four_cables_calibrate_without_a_camera():
         error = found - np.concatenate([offsets, COM])
         ratios.append(error @ np.linalg.solve(result.covariance, error))
     assert np.median(errors) < 0.003
-    assert chi2.ppf(1e-3, 21) < sum(ratios) < chi2.ppf(1 - 1e-3, 21)
+    assert chi2.ppf(1e-3, 14) < sum(ratios) < chi2.ppf(1 - 1e-3, 14)
 
 
 def test_without_tensions_gravity_still_adds_two_equations():

@@ -60,7 +60,7 @@ def a_log(name, seed, turn=0.4):
     return robot, poses, built.readings
 
 
-@pytest.mark.parametrize("name", ["cogiro", "caroca-pulleys", "ipanema-1"])
+@pytest.mark.parametrize("name", ["cogiro", "caroca-pulleys"])
 def test_slips_of_a_log_are_named(name):
     robot, poses, readings = a_log(name, 0)
     assert doubt(robot, Measurements(readings, poses)) is None
@@ -74,7 +74,7 @@ def test_slips_of_a_log_are_named(name):
 def test_good_logs_raise_no_doubt():
     """Anchors and poses may be far from the file and from home, readings wrong, residuals systematic."""
     for name in ("cogiro", "planar-4", "point-mass-3", "caroca-pulleys", "wang-flying", "nist-robocrane"):
-        for seed in range(5):
+        for seed in range(2):  # more of them are in test_calibration_mistakes.py
             robot, draw = load(name), np.random.default_rng(seed)
             length = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1).mean()
             built = moved_anchors(robot, draw, 0.03 * length)
@@ -141,7 +141,7 @@ def motion(robot, t):
     return robot.home + [1, 0.8, 0.3, 0.1, 0.1, 0.15] * np.sin(np.outer(t, rates)) * np.exp(-t[:, None] / 40)
 
 
-@pytest.mark.parametrize("clock", [0.0, 0.034, -3.3, 7.25])
+@pytest.mark.parametrize("clock", [0.0, 0.034, -3.3])
 def test_a_clock_is_found_where_there_are_times_and_poses(clock):
     """By default, and offsets of many seconds too."""
     robot, times = load("cogiro"), 0.06 * np.arange(250)
@@ -193,7 +193,7 @@ def test_no_radius_is_negative():
 
 
 @pytest.mark.parametrize("name", ["cogiro", "ipanema-1", "the-cable-robot-simulator"])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_conventions_of_angles_that_cannot_be_told_apart(name, seed):
     """Turns of 0.15 rad tell little: what is said has the truth in it, or the log fits as well as it is."""
     robot, poses, readings = a_log(name, seed, turn=0.15)

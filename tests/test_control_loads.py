@@ -13,6 +13,7 @@ COGIRO = load("cogiro")
 BAG = {"mass": 150.0, "com": [0.1, 0.05, -0.3], "inertia": [8, 9, 6, 0, 0.5, 0]}
 PICKED, RELEASED = 1.5, 3.0  # [s]
 LATE = {"delay": 0.03, "stamped": True}
+PERIOD = 2.5e-3  # [s]
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +56,10 @@ def test_references_of_a_plan_name_its_load(carries):
 )
 def test_a_planned_load_is_carried_within_a_millimetre(carries, controller, noise):
     """The plant carries it as the symbolic model says (test_simulation_own_events.py); unaware, 40 mm are missed."""
-    run = simulate(COGIRO, carries, controller, noise=noise)
+    run = simulate(COGIRO, carries, controller, noise=noise, period=PERIOD)
     assert run.error.max() < 3e-4
     assert run.to_dict()["answered"]["as planned"] == len(run.error)
-    unaware = simulate(COGIRO, carries, Unaware(controller), noise=noise, duration=1.8)
+    unaware = simulate(COGIRO, carries, Unaware(controller), noise=noise, duration=1.8, period=PERIOD)
     assert unaware.error.max() > 0.03
 
 
@@ -70,7 +71,8 @@ def test_a_load_that_is_released_before_its_pick_up_is_seen(kind):
     lasting = zip(lines, (1.5, 0.02, 1.0), strict=True)
     phases = [{"name": f"phase-{k}", "path": line, "duration": time} for k, (line, time) in enumerate(lasting)]
     phases[1]["load"] = BAG
-    run = simulate(COGIRO, plan(COGIRO, {"phases": phases}), kind(COGIRO), noise={"delay": 0.1, "stamped": True})
+    planned, late = plan(COGIRO, {"phases": phases}), {"delay": 0.1, "stamped": True}
+    run = simulate(COGIRO, planned, kind(COGIRO), noise=late, period=PERIOD)
     assert run.error.max() < 3e-4
     assert run.to_dict()["answered"]["as planned"] == len(run.error)
 
@@ -164,11 +166,11 @@ def test_an_estimated_push_stays_as_it_was_when_a_load_comes_and_goes(carries, n
             seen.append(self.disturbance[0])
             return command
 
-    run = simulate(COGIRO, carries, Watched(COGIRO), disturbance=push, noise=noise)
+    run = simulate(COGIRO, carries, Watched(COGIRO), disturbance=push, noise=noise, period=PERIOD)
     estimates = np.array(seen)
     assert run.error.max() < 0.02  # until the push is known
     for time in (PICKED, RELEASED):
-        near = estimates[round(1e3 * time) - 1 : round(1e3 * time) + 500]
+        near = estimates[round(time / PERIOD) - 1 : round((time + 0.5) / PERIOD)]
         assert np.abs(near[:, :3] - push[:3]).max() < 2.0
         assert np.abs(near[:, 2]).max() < 1e-3 * BAG["mass"] * 9.81
 

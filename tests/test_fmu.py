@@ -47,8 +47,9 @@ def unit(tmp_path_factory):
     return make
 
 
-@pytest.mark.parametrize("part", PARTS)
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    ("robot", "part"), [*zip(ROBOTS, PARTS, strict=True), ("multi-quadrotor-4", "plant")]
+)  # each robot, each part
 def test_fmpy_finds_no_fault(robot, part, unit, tmp_path_factory):
     import fmpy
     from fmpy.validation import validate_fmu

@@ -372,7 +372,7 @@ def test_drive_modes_of_three_robots():
     for cable in data["cables"]:
         cable["length"] = 1.2
     path = {"kind": "line", "start": [1.2, 0.92, 0.65], "end": [1.3, 1.0, 0.75]}
-    task = {"path": path, "duration": 3, "base": {"kind": "free", "ends": "rest"}, "margin": 1}
+    task = {"path": path, "duration": 3, "base": {"kind": "free", "ends": "rest"}, "margin": 1, "steps": 15}
     fixed = Robot.model_validate({**data, "drive": "fixed-length"})
     found = plan(fixed, task)
     assert found.feasible, found.report()

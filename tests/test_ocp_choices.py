@@ -8,6 +8,8 @@ from towline.base.errors import InputError
 from towline.models import Dynamics, Robot, load
 from towline.ocp import MotionStatus, plan
 
+from .told import told
+
 GRAVITY = 9.81
 FREE = {"kind": "free", "acceleration_max": 3, "ends": "periodic"}
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.6, "rate": 0.2 * np.pi}
@@ -165,7 +167,7 @@ def test_a_given_motion_without_tensions_that_rise_slowly_enough_has_a_reason():
     failed = plan("cogiro", {"path": path, "duration": 1, "steps": 8, "limits": {"tension_rate": 5}})
     assert failed.status is MotionStatus.NOT_FOUND
     assert failed.reason == "no motion with feasible tensions was found that keeps every other limit"
-    assert failed.reason in failed.report().splitlines()[0]
+    assert failed.reason in told(failed).splitlines()[0]
 
 
 def test_a_program_with_more_equations_than_unknowns_is_an_answer_without_a_warning(capfd):

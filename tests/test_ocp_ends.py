@@ -20,6 +20,8 @@ from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.task_limits import TaskLimits
 
+from .told import told
+
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
 TUBE = {"position": 0.05, "attitude": 0.1}
 ROBOT = load("ipanema-1")
@@ -174,7 +176,7 @@ def test_a_ball_about_an_end_blocks_it_exactly_if_the_platform_starts_inside(at_
     if blocks:
         missing = 0.4 - np.linalg.norm(points - centre, axis=2).min()
         assert planned.audit.excess[0].value == pytest.approx(-missing, abs=1e-5)
-        assert "platform is " in planned.report().splitlines()[0]
+        assert "platform is " in told(planned).splitlines()[0]
 
 
 @settings(max_examples=25, deadline=None)
@@ -241,7 +243,7 @@ def test_a_wall_across_a_path_that_must_be_followed_is_a_proof_and_in_a_wide_tub
     assert plan(ROBOT, task | {"tube": {"position": 0.01}}).status is MotionStatus.INFEASIBLE
     late = plan(ROBOT, task | {"tube": {"position": 2.0}})
     assert late.status is MotionStatus.NOT_FOUND
-    assert "time limit of 0.001 s is reached" in late.report().splitlines()[0]
+    assert "time limit of 0.001 s is reached" in told(late).splitlines()[0]
 
 
 def test_a_team_that_carries_its_load_on_an_exact_line_rests_at_its_ends_at_the_same_cost_on_every_mesh():

@@ -9,6 +9,8 @@ from towline.base.errors import InputError
 from towline.models import load
 from towline.ocp import MotionStatus, plan
 
+from .told import told
+
 ROBOT = load("ipanema-1")
 LINE = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 1.2]}
 TASK = {"path": LINE, "duration": 2, "tube": {"position": 0.3, "attitude": 0.3}, "steps": 40}
@@ -90,7 +92,7 @@ def test_a_start_outside_the_tube_is_proven_impossible():
     assert planned.status is MotionStatus.INFEASIBLE
     assert (
         "tube.position of the platform must be at most 0.3 m but is 0.4 m at t = 0.000 s"
-        in planned.report().splitlines()[0]
+        in told(planned).splitlines()[0]
     )
 
 

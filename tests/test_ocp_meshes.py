@@ -22,6 +22,8 @@ from towline.ocp.reports.trajectory import outline
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task_limits import Block, ConvexMesh
 
+from .told import told
+
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 places = arrays(np.float64, (2, 3), elements=st.floats(-3, 3).map(lambda x: round(x, 3)))
 
@@ -77,7 +79,7 @@ def truth(points, p, p_end):
     return from_triangles(triangles_of(np.vstack([points - p, points - p_end])))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(body=bodies(), ends=places)
 def test_distances_from_a_mesh_are_those_of_its_triangles(body, ends):
     p, p_end = ends
@@ -89,7 +91,7 @@ def test_distances_from_a_mesh_are_those_of_its_triangles(body, ends):
     assert float(cable_outside(body, ca.DM(p), ca.DM(p_end))) == pytest.approx(truth(points, p, p_end), **exact)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(body=bodies(), ends=places)
 def test_a_program_can_follow_the_distance_from_a_mesh(body, ends):
     """Along each direction its derivative is that of differences, or lies between those on both sides of a corner."""
@@ -109,7 +111,7 @@ def test_a_program_can_follow_the_distance_from_a_mesh(body, ends):
         assert (slope.ravel() <= np.maximum(ahead, behind) + 1e-3).all()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(ends=places, angles=arrays(np.float64, 3, elements=st.floats(-3, 3)))
 def test_a_turned_box_is_the_box_of_turned_points(ends, angles):
     """And the mesh of its corners, in another pose and unit, is the same body."""
@@ -310,10 +312,10 @@ def test_the_planner_goes_around_what_is_in_its_way(kind, tmp_path):
     at_end = LINE | {"path": LINE["path"] | {"end": centre.tolist()}, "limits": {"keep_out": [place]}}
     blocked = plan(robot, at_end)
     assert blocked.status.value == "infeasible"
-    assert "inside the keep-out region 'part'" in blocked.report().splitlines()[0]
+    assert "inside the keep-out region 'part'" in told(blocked).splitlines()[0]
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(share=st.floats(0.4, 0.6), thin=st.sampled_from([1e-4, 1e-3]))
 def test_the_audit_is_not_jumped_over(share, thin):
     """At 5 m/s platform and cables pass a sheet and a wire between two of its instants: both are reported."""

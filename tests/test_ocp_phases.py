@@ -21,6 +21,8 @@ from towline.ocp.tasks.lay_out import lay_out
 from towline.solvers import solve_batch
 from towline.viewer.replay import Replay
 
+from .told import told
+
 COGIRO = load("cogiro")
 MASS = 50.0
 LOAD = {"mass": MASS, "com": [0.1, 0.05, -0.4], "inertia": [2, 3, 4, 0.1, -0.2, 0.3]}
@@ -179,7 +181,7 @@ def test_an_impossible_load_is_proven_in_its_phase(tmp_path):
         phase["load"] = {**LOAD, "mass": 5000.0}
     planned = plan(COGIRO, {"phases": phases})
     assert planned.status is MotionStatus.INFEASIBLE
-    assert "in phase 'lift'" in planned.report().splitlines()[0] or "'lower'" in planned.report().splitlines()[0]
+    assert "in phase 'lift'" in (first := told(planned).splitlines()[0]) or "'lower'" in first
     certificate = planned.certificate
     assert certificate.direction[2] > 0.9
     assert 2.5 <= certificate.time <= 6.5
@@ -428,7 +430,7 @@ def test_a_phase_that_an_infeasible_motion_steps_over_has_no_tensions():
     shown = plan(COGIRO, {"phases": phases, "tube": {"position": 0.01}, "limits": limits, "output_rate": 10})
     assert shown.status is MotionStatus.INFEASIBLE
     assert shown.phases[1].tension_max is None
-    assert "short" in shown.report()
+    assert "short" in told(shown)
 
 
 def test_a_certificate_of_slack_cables_has_their_lower_limit():
@@ -437,7 +439,7 @@ def test_a_certificate_of_slack_cables_has_their_lower_limit():
     rest = {"name": "tilting", "duration": 1, "path": {"kind": "rest", "pose": HIGH}, "ground": ground}
     tilting = plan(COGIRO, {"margin": 20, "phases": [rest | {"load": {"mass": 1e5, "com": [2, 0, 0]}}]})
     assert tilting.status is MotionStatus.INFEASIBLE
-    (limits,) = (text for text in tilting.report().splitlines() if "t_min of cables" in text)
+    (limits,) = (text for text in told(tilting).splitlines() if "t_min of cables" in text)
     assert "(0 N); t_max of cables" in limits
     assert "(4980 N)" in limits
 
@@ -496,7 +498,7 @@ def test_a_load_is_as_uncertain_as_the_strongest_cable_permits():
     assert failed.status is MotionStatus.INFEASIBLE
     assert failed.certificate.load[0] == pytest.approx(3 * (1 + largest + 1e-2))
     assert failed.certificate.shortfall == pytest.approx(0.03 * 9.81)
-    assert "with a load of 4.146 kg, CoM (0, 0, 0) m" in str(failed.report())
+    assert "with a load of 4.146 kg, CoM (0, 0, 0) m" in told(failed)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from towline.models import Dynamics, load
 from towline.ocp import MotionStatus, Planner, Task, plan
 
 from .soak.replanning import CIRCLE, RATE, fly
+from .told import told
 
 ROBOT = load("wang-flying")
 GROUND = load("ipanema-1")
@@ -164,7 +165,7 @@ def test_a_rest_that_is_impossible_is_proven_and_does_not_count(circle):
     assert fallen.status is not MotionStatus.FEASIBLE
     assert fallen.certificate is not None
     assert fallen.certificate.shortfall > 1
-    assert "wang-flying" in fallen.report()
+    assert "wang-flying" in told(fallen)
     assert planner.replan(still, 8.0).feasible
 
 

@@ -9,6 +9,7 @@ from towline.ocp.planner import Planner
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
 
 from .slung_load import slung
+from .told import told
 
 GRAVITY, TILT, MASS = 9.81, 0.6, 1.5
 
@@ -57,4 +58,4 @@ def test_a_team_that_is_too_fast_is_refused_before_planning_and_told_how_long_it
     refused = plan(slung(dof=["x", "y", "z"]), task(seconds))
     assert refused.status == "infeasible"
     assert refused.solve_s < 1
-    assert "duration of motion must be at least" in refused.report().replace("\n", " ")
+    assert "duration of motion must be at least" in told(refused).replace("\n", " ")

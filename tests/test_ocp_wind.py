@@ -12,6 +12,8 @@ from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.wind_set import WindBox, WindDisc, decisive_winds_at, possible_winds_at
 from towline.solvers import TensionProblem, certify
 
+from .told import told
+
 GRAVITY = 9.81
 CIRCLE = {"kind": "circle", "centre": [0, 0, -1], "radius": 0.1, "rate": 0.2 * np.pi}
 FREE = {"kind": "free", "acceleration_max": 3, "ends": "periodic"}
@@ -113,7 +115,7 @@ def test_what_still_air_allows_a_box_forbids_at_its_worst_wind():
     wind, certificate, seen = found.audit.certificate.wind, found.certificate, found.audit
     assert wind[0] == -6
     assert certificate.wind == wind
-    assert f"in wind ({wind[0]:g}, {wind[1]:g}, 0) m/s" in found.report().splitlines()[0]
+    assert f"in wind ({wind[0]:g}, {wind[1]:g}, 0) m/s" in told(found).splitlines()[0]
     # The direction proves it, from the certificate's own numbers.
     row = int(np.argmin(np.abs(seen.times - certificate.time)))
     dynamics, direction = Dynamics(robot), np.array(certificate.direction)
@@ -191,7 +193,7 @@ def test_a_moving_platform_is_called_infeasible_only_in_a_wind_of_the_disc():
             assert np.linalg.norm(found.certificate.wind) <= speed * (1 + 1e-12)
         if found.status is MotionStatus.NOT_FOUND:
             assert found.certificate is None
-            assert "that enclose those of the disc" in found.report().splitlines()[0]
+            assert "that enclose those of the disc" in told(found).splitlines()[0]
         if found.feasible:
             rng, audit = np.random.default_rng(0), found.audit
             for _ in range(20):

@@ -115,9 +115,9 @@ def check(subject, frames, late):
         apart.append((platform - times[listed], cable - times[listed], float(frame["clock"]) - times[listed]))
         np.testing.assert_allclose(frame["tensions"], instants[listed].tensions, atol=0.0051)
     platform, cable, clock = np.array(apart).T
-    np.testing.assert_array_equal(platform, 0)
-    np.testing.assert_array_equal(cable, 0)
     length = times[-1] - times[0]
+    for part in (platform, cable):  # a circle ends where it begins
+        assert (np.minimum(np.abs(part), np.abs(np.abs(part) - length)) < 1e-9).all()
     clock = np.where(clock < -length / 2, clock + length, clock)
     assert (clock > -0.051).all()
     assert (clock < late).all(), [frame for frame, ahead in zip(frames, clock, strict=True) if ahead >= late]
