@@ -12,10 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from towline import InputError
 from towline.models import Dynamics, Robot, load
+from towline.models.points import placed
 from towline.ocp import MotionStatus, Planner, plan
 from towline.ocp.audits.audit import audit
 from towline.ocp.proofs.infeasible_ends import infeasible_ends
-from towline.ocp.proofs.no_cycle import _Cycle
+from towline.ocp.proofs.no_cycle import FEW, PLACES, Cycle
 from towline.ocp.tasks.lay_out import lay_out
 from towline.ocp.tasks.task import read_task
 from towline.ocp.tasks.task_limits import TaskLimits
@@ -411,6 +412,28 @@ def test_a_cycle_whose_mean_no_tensions_give_is_proven_infeasible():
     assert mean_exists(inside)
 
 
+@pytest.mark.parametrize(("seconds", "status"), [(1.5, "infeasible"), (2.8, "feasible"), (8.0, "infeasible")])
+def test_a_circle_beyond_the_anchors_exists_only_near_the_frequency_of_a_pendulum(seconds, status):
+    """Slower, nothing pulls the mass out to where no cable leads; faster, nothing pulls it back so hard."""
+    cables = [
+        {"carrier": "frame", "anchor": anchor, "attachment": [0, 0, 0], "t_min": 1, "t_max": 150}
+        for anchor in ([2, 0, 3], [-1, 1.7, 3], [-1, -1.7, 3])
+    ]
+    robot = Robot.model_validate(hung(0)[0].model_dump() | {"cables": cables})
+    circle = {"kind": "circle", "centre": [0, 0, 1], "radius": 1.5, "rate": 2 * np.pi / seconds}
+    tube = {"position": 0.05, "ends": "periodic"}
+    assert plan(robot, {"path": circle, "duration": seconds, "tube": tube, "steps": 30}).status == status
+
+
+def varied(rng, count):
+    """Return directions of wrenches (PLACES, 6), some constant, some with forces that are linear between nodes."""
+    nodes = rng.normal(size=(count, 6)) + rng.choice([0, 1]) * rng.normal(size=(count, 6)) * [1, 1, 1, 0, 0, 0]
+    nodes[:, 3:] = nodes[0, 3:]
+    at = np.arange(PLACES) * count / PLACES
+    found = np.stack([np.interp(at, np.arange(count + 1), np.append(row, row[0])) for row in nodes.T], axis=1)
+    return found / np.linalg.norm(found, axis=1).max()
+
+
 def test_no_direction_proves_a_cycle_infeasible_that_exists():
     """The wrench of the cables about a fixed point has the weight for its mean, whatever the cycle does."""
     points = [[0, 0, 1], [0.3, 0.1, 1.1], [0.1, 0.3, 1.2], [0, 0, 1]]
@@ -418,42 +441,53 @@ def test_no_direction_proves_a_cycle_infeasible_that_exists():
     task = {"path": {"kind": "waypoints", "points": points}, "duration": 1.5, "tube": tube, "steps": 40}
     found = plan(ROBOT, task)
     assert found.feasible
-    motion, cycle = found.audit.motion, _Cycle(found.scenario)
+    motion, cycle, nodes = found.audit.motion, Cycle(found.scenario), PLACES // FEW
     dynamics, force = Dynamics(ROBOT), ROBOT.platform.mass * np.array(ROBOT.gravity)
     A = dynamics.wrench_matrix(motion.pose)
-    com = motion.pose[:, :3] + Rotation.from_euler("xyz", motion.pose[:, 3:]).apply(ROBOT.platform.com) - cycle.about
+    com = motion.pose[:, :3] + Rotation.from_euler("xyz", motion.pose[:, 3:]).apply(ROBOT.platform.com)
     pull = np.einsum("nij,nj->ni", A, found.audit.tensions)
     about = pull[:, 3:] + np.cross(com, pull[:, :3] + force)
-    mean = np.trapezoid(np.hstack([pull[:, :3] + force, about]), found.audit.times, axis=0) / found.duration
-    assert np.abs(mean).max() < 1e-3 * np.linalg.norm(force)
-    rng = np.random.default_rng(3)
-    for direction in rng.normal(size=(50, 6)):
-        assert cycle.shortfall(direction / np.linalg.norm(direction))[0] <= 0
+    times, total = found.audit.times, np.hstack([pull[:, :3] + force, about])
+    assert np.abs(np.trapezoid(total, times, axis=0)).max() < 1e-3 * found.duration * np.linalg.norm(force)
+    rng, at_nodes = np.random.default_rng(3), np.linspace(0, found.duration, nodes + 1)
+    for _ in range(20):
+        directions = varied(rng, nodes)
+        assert cycle.shortfall(directions)[0] <= 0
+        f = np.vstack([directions[::FEW, :3], directions[:1, :3]])
+        along = np.stack([np.interp(times, at_nodes, row) for row in f.T], axis=1)
+        bent = (np.roll(f[:-1], 1, axis=0) + np.roll(f[:-1], -1, axis=0) - 2 * f[:-1]) * nodes / found.duration
+        there = np.stack([np.interp(at_nodes[:-1], times, row) for row in com.T], axis=1)
+        momentum = ROBOT.platform.mass * (bent * there).sum()
+        given = np.trapezoid((along * total[:, :3]).sum(axis=1), times)
+        assert given == pytest.approx(momentum, abs=1e-3 * found.duration * np.linalg.norm(force))
 
 
 @pytest.mark.parametrize("strength", [1e-6, 1.0])
-def test_in_all_of_the_tube_cables_lack_at_least_the_bound_of_a_cycle(strength):
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_in_all_of_the_tube_cables_lack_at_least_the_bound_of_a_cycle(strength, turn):
     """By wrench matrices at poses of the tube, with a CoM far from the origin; with weak cables the weight decides."""
     keys = ROBOT.model_dump(mode="json")
     keys["platform"]["com"] = [0.3, -0.2, 0.4]
     for cable in keys["cables"]:
         cable |= {"t_min": 0, "t_max": strength * cable["t_max"]}
-    robot, tube = Robot.model_validate(keys), {"position": 0.05, "attitude": 0.3, "ends": "periodic"}
+    robot, tube = Robot.model_validate(keys), {"position": 0.05, "attitude": turn, "ends": "periodic"}
     points = [[0, 0, 1], [0.3, 0.1, 1.1], [0.1, 0.3, 1.2], [0, 0, 1]]
     path = {"kind": "waypoints", "points": points}
     scenario = lay_out(robot, read_task({"path": path, "duration": 1.5, "tube": tube}))
-    cycle, rng = _Cycle(scenario), np.random.default_rng(5)
-    force, about = robot.platform.mass * np.array(robot.gravity), np.tile(cycle.about, (len(cycle.poses), 1))
-    for direction in rng.normal(size=(20, 6)):
-        f, c = direction[:3], direction[3:] / robot.length
-        bound, worst = cycle.shortfall(direction)
-        inside = cycle.poses + rng.uniform(-1, 1, cycle.poses.shape) * cycle.half
-        least = np.inf
-        for poses, centre in ((inside, about), (worst, about[: len(worst)])):
+    cycle, rng = Cycle(scenario), np.random.default_rng(5)
+    force, weight = robot.platform.mass * np.array(robot.gravity), robot.weight
+    about = placed(cycle.poses, np.array([robot.platform.com]))[:, 0].mean(axis=0)
+    for _ in range(20):
+        directions = np.tile(varied(rng, 1)[:1], (PLACES, 1))
+        f, c = directions[0, :3], directions[0, 3:] / robot.length
+        least = np.full(PLACES, np.inf)
+        for _ in range(6):
+            poses = cycle.poses + rng.uniform(-1, 1, cycle.poses.shape) * cycle.half
             A = Dynamics(robot).wrench_matrix(poses)
-            com = poses[:, :3] - centre + Rotation.from_euler("xyz", poses[:, 3:]).apply(robot.platform.com)
-            moments = A[:, 3:] + np.cross(com[:, None], A[:, :3].swapaxes(1, 2)).swapaxes(1, 2)  # not about the CoM
+            com = turn and placed(poses, np.array([robot.platform.com]))[:, 0] - about  # else about the CoM itself
+            com = np.broadcast_to(com, (PLACES, 3))
+            moments = A[:, 3:] + np.cross(com[:, None], A[:, :3].swapaxes(1, 2)).swapaxes(1, 2)
             x = np.einsum("j,njm->nm", f, A[:, :3]) + np.einsum("j,njm->nm", c, moments)
             gives = np.maximum(robot.t_min * x, robot.t_max * x).sum(axis=1)
-            least = min(least, float((-force @ f - np.cross(com, force) @ c - gives).min()))
-        assert bound <= least
+            least = np.minimum(least, -force @ f - np.cross(com, force) @ c - gives)
+        assert cycle.shortfall(directions)[0] * weight <= least.mean()

@@ -1,12 +1,17 @@
 """Prove that no cycle has tensions: `no_cycle`.
 
 At the end of a cycle the platform has the momentum with which it began, and the angular momentum about a fixed point.
-So the mean wrench of the cables about this point balances the mean weight, however fast the cycle is. Along a direction
-(f, c) of wrenches a cable of tension t gives t x, x = (f + c x a) . u, with its anchor a and its direction u. If along
-one direction all cables together give less than the weight takes, wherever the tube lets the platform be, there is no
-cycle. Linear programs find the direction for some poses, to which they add those that it leaves unproven. About each
-place of the path the tube is a box of offsets, in which x differs from a mean of those at the corners by at most half
-the square of half its size times the second derivative, summed over the offsets.
+So along any periodic direction f of forces, and a constant direction c of moments about that point, cables and weight
+together give in the mean what the momentum takes along f: the mean of m p . f'', with the position p of the CoM. If the
+platform does not turn, the moments about its CoM are balanced at all times, so that c may change, too.
+
+A cable of tension t gives t x along (f, c), x = (f + c x a) . u, with its lever a and its direction u. If in the mean
+all cables together give less than weight and momentum take, wherever the tube lets the platform be, there is no cycle.
+Linear programs find the directions at some places, linear between them, for some poses, to which they add those that
+the directions leave unproven. About each place the tube is a box of offsets, in which x differs from a mean of those at
+the corners by at most half the square of half its size times the second derivative, summed over the offsets. What the
+cables give is convex in (f, c), so between two places it is at most the mean of both, each with the poses between them.
+If the duration is a choice, so is when the platform is where: then the worst place counts, and f is constant.
 """
 
 import numpy as np
@@ -19,9 +24,10 @@ from ..tasks.ends import platform_ends
 from ..tasks.paths import RestPath
 from ..tasks.scenario import ATTITUDE, Scenario
 
-PLACES, FEW = 201, 10  # along the path; between those of the first linear program
-ROUNDS, WORST = 8, 4  # of linear programs; poses that each adds
+PLACES, FEW = 1000, 40  # along the path; from one node of the linear program to the next
+ROUNDS = 6  # of linear programs
 CERTAIN = 1e-6  # of the weight
+CURVED = 2 / 3**0.5  # the second derivative of a cable's direction is at most this over its length squared
 
 
 def no_cycle(scenario: Scenario) -> list[Excess]:
@@ -29,109 +35,144 @@ def no_cycle(scenario: Scenario) -> list[Excess]:
     robot, tube = scenario.robot, scenario.task.tube
     still = all(isinstance(path, RestPath) for path in scenario.carrier_paths.values()) and not scenario.carrier_free
     known = scenario.wind is None and not (scenario.relative or scenario.phases.all or robot.pulley_radii.any())
-    if not (still and known and np.isfinite(tube.radius)) or platform_ends(scenario.task) != "periodic":
+    bounded = np.isfinite(tube.radius) and np.isfinite(scenario.bounds()).all()
+    if not (still and known and bounded) or platform_ends(scenario.task) != "periodic" or _rests(scenario):
         return []
-    cycle = _Cycle(scenario)
-    if cycle.rests_somewhere:
-        return []
-    poses = cycle.poses[::FEW]
+    cycle = Cycle(scenario)
+    pairs = {(k, corner) for k in range(0, PLACES, FEW) for corner in (0, cycle.corners - 1)}
     for _ in range(ROUNDS):
-        if (direction := cycle.direction(poses)) is None:
+        if (directions := cycle.directions(sorted(pairs))) is None:
             break
-        short, worst = cycle.shortfall(direction)
-        if short > 0.0:
+        short, worst = cycle.shortfall(directions)
+        if short > CERTAIN:
             why = "in the mean over every cycle, because a cycle ends with the momentum with which it starts"
-            return [Excess(TENSIONS, "platform", None, short, 0.0, "N", "at most", why)]
-        poses = np.concatenate([poses, worst])
+            return [Excess(TENSIONS, "platform", None, short * robot.force_scale, 0.0, "N", "at most", why)]
+        if pairs >= worst:
+            break
+        pairs |= worst
     return []
 
 
-class _Cycle:
-    """The tube about the path of a cycle, and the wrenches about a fixed point that cables give there."""
+def _rests(scenario: Scenario) -> bool:
+    """Return whether tensions hold the platform at rest on its path, everywhere or, if when is a choice, somewhere."""
+    motion, carriers = scenario.motion(np.linspace(0.0, scenario.duration, PLACES), None)
+    still = np.zeros_like(motion.pose)
+    A = scenario.dynamics.wrench_matrix(motion.pose, carriers.pose)
+    w = scenario.dynamics.required_wrench(motion.pose, still, still)
+    held = solve_batch(scaled(scenario, A), scaled(scenario, w), *scenario.bounds()).feasible
+    return bool(held.all() if scenario.duration_range is None else held.any())
+
+
+class Cycle:
+    """The tube about the path of a cycle, and the wrenches that cables give at its places and their corners.
+
+    Forces are in parts of the weight.
+
+    Attributes:
+        poses: Poses of the path at n places, (n, 6).
+        half: Half the size of the box of offsets from it, (6,).
+        corners: Number of corners k of this box.
+    """
 
     def __init__(self, scenario: Scenario):
         robot, tube = scenario.robot, scenario.task.tube
-        motion, carriers = scenario.motion(np.linspace(0.0, scenario.duration, PLACES), None)
-        self._scenario, self._carriers, self.poses = scenario, carriers.pose, motion.pose  # (n, 6)
-        self.anchors = scenario.dynamics.points(motion.pose[:1], carriers.pose[:1])[0][0]
-        self.about = motion.pose[:, :3].mean(axis=0)
-        self.low, self.high = scenario.bounds()
-        self.force, self.length = robot.platform.mass * np.array(robot.gravity), robot.length
-        self.least = CERTAIN * robot.force_scale
-        free = robot.dof_mask > 0
+        motion, carriers = scenario.motion(np.arange(PLACES) / PLACES * scenario.duration, None)
+        self.poses, self._fixed = motion.pose, scenario.duration_range is None
+        self._low, self._high = (bound / robot.force_scale for bound in scenario.bounds())
+        self._inertia = robot.platform.mass / robot.force_scale * (PLACES / FEW / scenario.duration) ** 2
+        self._force = robot.platform.mass / robot.force_scale * np.array(robot.gravity)
+        self._length, free = robot.length, robot.dof_mask > 0
         # The force of a guide has no moment about an axis that is parallel to it.
         turns = free[3:] & np.roll(free[:3], -1) & np.roll(free[:3], -2)
-        self.rows = np.flatnonzero(np.append(free[:3], turns))
-        self.arms = np.vstack([robot.attachments, robot.platform.com])
-        self.half = np.zeros(6)  # of a box of offsets
-        self.half[list(scenario.platform_free)] = [
+        self._rows = np.flatnonzero(np.append(free[:3], turns))
+        self.half = half = np.zeros(6)
+        half[list(scenario.platform_free)] = [
             tube.turn if i in ATTITUDE else tube.radius for i in scenario.platform_free
         ]
-        # Twice what the reference moves to halfway between two places.
-        step = scenario.duration / (PLACES - 1)
-        fastest = np.linalg.norm(motion.velocity[:, :3], axis=1).max()
-        turning = np.abs(motion.velocity[:, 3:]).sum(axis=1).max()
-        self.beside = step * (fastest + turning * np.linalg.norm(self.arms, axis=1))  # of each point, (m + 1,) [m]
+        signs = np.stack(np.meshgrid(*[[-1.0, 1.0] if each else [0.0] for each in half]), axis=-1).reshape(-1, 6)
+        self.corners, body = len(signs), np.vstack([robot.attachments, robot.platform.com])
+        middle, points = (
+            placed(motion.pose, body),
+            placed(motion.pose[:, None] + signs * half, body),
+        )  # (n, k, m + 1, 3)
+        anchors = scenario.dynamics.points(motion.pose[:1], carriers.pose[:1])[0][0]
+        self._com = middle[:, -1] - middle[:, -1].mean(axis=0)
+        self._balanced = not (half[3:].any() or motion.velocity[:, 3:].any())
+        lines = anchors - points[..., :-1, :]
+        self._u = lines / np.linalg.norm(lines, axis=-1, keepdims=True)
+        # About the CoM, or else the mean of its positions.
+        about = points[..., -1:, :] if self._balanced else middle[:, -1].mean(axis=0)
+        ends = points[..., :-1, :] if self._balanced else anchors
+        self._levers = np.broadcast_to(ends - about, lines.shape)
+        moments = np.cross((points[..., -1:, :] - about)[..., 0, :], self._force) / self._length
+        self._taken = -np.concatenate([0 * moments + self._force, moments], axis=-1)  # by the weight, (n, k, 6)
+        # Twice what points move to halfway between two places, and what they move from there to corners at most.
+        reach, speeds = np.linalg.norm(body, axis=1), np.abs(motion.velocity)
+        fastest = np.linalg.norm(speeds[:, :3], axis=1).max() + speeds[:, 3:].sum(axis=1).max() * reach
+        beside, moved = scenario.duration / PLACES * fastest, np.linalg.norm(half[:3]) + half[3:].sum() * reach
+        nearest = np.linalg.norm(anchors - middle[:, :-1], axis=-1) - (moved + beside)[:-1]
+        nearest[nearest <= 0.0] = np.nan  # nothing is known then
+        # First and second derivatives of the directions of cables and of the CoM: between places and between corners.
+        bent = reach[:-1] / nearest + CURVED * (reach[:-1] / nearest) ** 2
+        curved = CURVED * half[:3] @ half[:3] / nearest**2 + half[3:] @ half[3:] * bent
+        self._off = beside[:-1] / nearest + curved / 2  # (n, m)
+        self._off_com = 0.0 if self._balanced else beside[-1] + reach[-1] * (half[3:] @ half[3:]) / 2
+        self._spread = half[:3] + half[3:].sum() * reach[-1]  # of the CoM in the tube, along each axis [m]
 
-    @property
-    def rests_somewhere(self) -> bool:
-        """Return whether tensions hold the platform at rest at some place of the path: then no direction exists."""
-        scenario, still = self._scenario, np.zeros_like(self.poses)
-        A = scenario.dynamics.wrench_matrix(self.poses, self._carriers)
-        w = scenario.dynamics.required_wrench(self.poses, still, still)
-        return bool(solve_batch(scaled(scenario, A), scaled(scenario, w), self.low, self.high).feasible.any())
+    def directions(self, pairs: list[tuple[int, int]]) -> np.ndarray | None:
+        """Return the directions (n, 6) along which the cables are short by most at `pairs` of place and corner.
 
-    def direction(self, poses: np.ndarray) -> np.ndarray | None:
-        """Return the direction along which the cables are short by most at all of `poses` (k, 6), if there is one."""
+        None if they are short along none.
+        """
+        from scipy import sparse
         from scipy.optimize import linprog
 
-        points = placed(poses, self.arms)
-        u = self._lines(points) / self._lengths(points)[..., None]
-        A = np.concatenate([u, np.cross(self.anchors - self.about, u) / self.length], axis=2)
-        moment = np.cross(points[:, -1] - self.about, self.force) / self.length
-        taken = np.hstack([np.broadcast_to(-self.force, moment.shape), -moment])[:, self.rows]
-        k, m, _ = A.shape
-        A, each = A[..., self.rows].reshape(k * m, -1), np.eye(k * m)
-        # Unknowns: the direction, what each cable gives along it at most, and the least shortfall.
-        gives = [np.hstack([np.tile(t, k)[:, None] * A, -each, 0 * A[:, :1]]) for t in (self.low, self.high)]
-        short = np.hstack([-taken, np.kron(np.eye(k), np.ones(m)), np.ones((k, 1))])
-        bounds = [(-1, 1)] * A.shape[1] + [(None, None)] * (k * m + 1)
-        cost, zero = -np.eye(short.shape[1])[-1], np.zeros(2 * k * m + k)
-        found = linprog(cost, A_ub=np.vstack([*gives, short]), b_ub=zero, bounds=bounds, method="highs")
-        if not found.success or found.x[-1] <= self.least:
+        nodes, m, p = PLACES // FEW, self._u.shape[2], len(pairs)
+        at, corner = np.array(pairs).T
+        node, forces = at // FEW, self._rows < 3
+        u, levers, taken = self._u[at, corner], self._levers[at, corner], self._taken[at, corner][:, self._rows]
+        A = np.concatenate([u, np.cross(levers, u) / self._length], axis=2)[..., self._rows]  # (p, m, r)
+        # Unknowns: each row of the directions at each node, or at all; what each cable gives along its own at most;
+        # the shortfall at each node, or at all; and by how much the place in the tube may reduce what momentum takes.
+        own = [nodes if (self._fixed if force else self._balanced) else 1 for force in forces]
+        each = np.split(np.eye(sum(own)), np.cumsum(own)[:-1])
+        rows = np.stack([np.broadcast_to(row, (nodes, sum(own))) for row in each], axis=1)  # (nodes, r, unknowns)
+        bent = self._bent(rows[:, forces])
+        momentum = np.einsum("nri,nr->i", bent, self._com[::FEW, self._rows[forces]]) / nodes
+        bent, spread = bent.reshape(-1, sum(own)), np.tile(self._spread[self._rows[forces]], nodes) / nodes
+        x, taken = (A @ rows[node]).reshape(p * m, -1), np.einsum("pr,pri->pi", taken, rows[node])
+        counts = sparse.csr_array((np.ones(p), (np.arange(p), node if self._fixed else 0 * node)))
+        given, lost, sums = sparse.eye_array(p * m), sparse.eye_array(len(bent)), np.kron(np.eye(p), np.ones(m))
+        blocks = [[np.tile(t, p)[:, None] * x, -given, None, None] for t in (self._low, self._high)]
+        blocks += [[-taken, sums, counts, None], [bent, None, None, -lost], [-bent, None, None, -lost]]
+        least = sparse.block_array(blocks, format="csr")
+        cost = np.concatenate([-momentum, np.zeros(p * m), -np.full(counts.shape[1], 1 / counts.shape[1]), spread])
+        bounds = [(-1, 1)] * sum(own) + [(None, None)] * (len(cost) - sum(own))
+        found = linprog(cost, A_ub=least, b_ub=np.zeros(least.shape[0]), bounds=bounds, method="highs")
+        if not found.success or -found.fun <= CERTAIN:
             return None
-        direction, given = np.zeros(6), found.x[: len(self.rows)]
-        direction[self.rows] = given / np.linalg.norm(given)
-        return direction
+        at_nodes = np.zeros((nodes + 1, 6))
+        at_nodes[:-1, self._rows] = rows @ found.x[: sum(own)]
+        at_nodes[-1] = at_nodes[0]
+        directions = np.stack([np.interp(np.arange(PLACES) / FEW, range(nodes + 1), row) for row in at_nodes.T], axis=1)
+        return directions / np.linalg.norm(directions, axis=1).max()
 
-    def shortfall(self, direction: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return a lower bound of the shortfall along a direction in the whole tube [N], and where it is smallest.
+    def shortfall(self, directions: np.ndarray) -> tuple[float, set[tuple[int, int]]]:
+        """Return a lower bound of what is missing along directions (n, 6) in the whole tube, and where most is not.
 
-        The latter are poses (k, 6) of corners.
+        The latter are pairs of place and corner, one of each node.
         """
-        f, c = direction[:3], direction[3:] / self.length
-        along, taken = f + np.cross(c, self.anchors - self.about), np.cross(self.force, c)
-        signs = np.stack(np.meshgrid(*[[-1.0, 1.0] if half else [0.0] for half in self.half]), axis=-1).reshape(-1, 6)
-        corners = self.poses[:, None] + signs * self.half
-        points = placed(corners, self.arms)
-        x = np.einsum("...ij,ij->...i", self._lines(points), along) / self._lengths(points)
-        weight = -self.force @ f - (points[..., -1, :] - self.about) @ taken
-        # First and second derivatives of points and directions: `beside` the places, and between corners.
-        arms, moves, turns = np.linalg.norm(self.arms, axis=1), self.half[:3], self.half[3:]
-        travel = np.linalg.norm(moves) + arms * turns.sum() + self.beside
-        nearest = self._lengths(placed(self.poses, self.arms)) - travel[:-1]
-        if (nearest <= 0.0).any():
-            return 0.0, corners[:0, 0]
-        bent = arms[:-1] / nearest + 3 * (arms[:-1] / nearest) ** 2
-        off = self.beside[:-1] / nearest + (moves @ moves * 3 / nearest**2 + turns @ turns * bent) / 2
-        x += (np.linalg.norm(along, axis=1) * off)[:, None]
-        weight -= np.linalg.norm(taken) * (self.beside[-1] + arms[-1] * (turns @ turns) / 2)
-        lacking = weight - np.maximum(self.low * x, self.high * x).sum(axis=-1)
-        worst = np.argsort(lacking.ravel())[:WORST]
-        return float(lacking.min() - self.least), corners.reshape(-1, 6)[worst]
+        f, c = directions[:, None, None, :3], directions[:, None, None, 3:] / self._length
+        along = f + np.cross(c, self._levers)  # (n, k, m, 3)
+        x = np.einsum("nkmi,nkmi->nkm", along, self._u) + np.linalg.norm(along, axis=-1) * self._off[:, None]
+        taken = np.einsum("nki,ni->nk", self._taken, directions)
+        taken -= np.linalg.norm(np.cross(self._force, c[:, 0]), axis=-1) * self._off_com
+        missing = taken - np.maximum(self._low * x, self._high * x).sum(axis=-1)
+        bent, least = self._bent(directions[::FEW, :3]), missing.min(axis=1)
+        momentum = (bent * self._com[::FEW] - np.abs(bent) * self._spread).sum(axis=1).mean()
+        short = float(momentum + (least.mean() if self._fixed else least.min()))
+        return short, {(k, int(missing[k].argmin())) for k in range(0, PLACES, FEW)}
 
-    def _lines(self, points: np.ndarray) -> np.ndarray:
-        return self.anchors - points[..., :-1, :]
-
-    def _lengths(self, points: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(self._lines(points), axis=-1)
+    def _bent(self, f: np.ndarray) -> np.ndarray:
+        """Return m f'' at the nodes for directions f (nodes, ...), which are linear between them: means of impulses."""
+        return self._inertia * (np.roll(f, 1, axis=0) + np.roll(f, -1, axis=0) - 2 * f)
