@@ -175,6 +175,23 @@ def test_stops_in_time_carry_the_loads_of_phases_within_their_tolerances():
     assert plan("cogiro", {"phases": unsure, "stop_within": offer.possible}).feasible
 
 
+@pytest.mark.parametrize("floor", [None, 0.9])
+def test_what_is_offered_stops_in_time_when_it_is_planned(floor):
+    """On a path below the floor too, whose shift alone would leave a motion that stops too late."""
+    robot = load("point-mass-3").model_copy(update={"floor": floor})
+    line = {"kind": "line", "start": [0, 0, 1], "end": [0.5, 0.3, 0.8]}
+    task = {"path": line, "duration": 1.3, "stop_within": 0.06}
+    offers = {offer.name: offer for offer in plan(robot, task).relaxations}
+    assert set(offers) == {"stop_within", "duration" if floor is None else "shift of the path"}
+    for offer in offers.values():
+        varied = offer.plan.scenario.task
+        found = plan(robot, varied.model_dump())
+        assert found.feasible
+        assert found.stop.duration <= varied.stop_within * (1 + 1e-9)
+    least = offers["stop_within"].possible
+    assert not plan(robot, task | {"path": varied.path, "stop_within": 0.99 * least}).feasible
+
+
 def test_a_remainder_is_not_planned_with_stops():
     planner = Planner("cogiro", {**WITHIN, "duration": 6, "tube": {"position": 0.1}})
     assert planner.plan().feasible

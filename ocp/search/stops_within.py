@@ -21,6 +21,7 @@ from ..audits.excess import Excess
 from ..plan import Plan
 from ..result import Offers, PlannerStep, Relaxed
 from ..tasks.deviation import Deviation
+from ..tasks.lay_out import with_task
 from ..tasks.paths import TimedPath
 from ..tasks.scenario import Scenario
 from ..tasks.status import MotionStatus
@@ -106,7 +107,7 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
     """Return a plan as one of the scenario's task, with its longest stop; not feasible if that takes too long."""
     plan = replace(plan, scenario=replace(plan.scenario, task=scenario.task))
     if not plan.feasible:
-        return plan
+        return replace(plan, offers=partial(_that_stop, plan.offers, seconds))
     begun = time.perf_counter()
     times = beginnings(_trajectory(plan), max(LEAST_PERIOD, plan.duration / INSTANTS))
     times = times[~plan.scenario.phases.resting(times)]  # on the ground the platform is at rest
@@ -126,17 +127,56 @@ def _judged(plan: Plan, scenario: Scenario, seconds: float) -> Plan:
     excess = Excess("stop_within", "platform", its.begins, its.duration, seconds, "s", "at most", why)
     status = MotionStatus.INFEASIBLE if scenario.is_fixed else MotionStatus.NOT_FOUND
     audit = replace(plan.audit, excess=[*plan.audit.excess, excess])
-    offers = partial(_longer_stop, plan, seconds) if its.feasible else Offers
-    return replace(plan, status=status, audit=audit, offers=offers)
+    return replace(plan, status=status, audit=audit, offers=partial(_to_stop, plan, seconds))
 
 
-def _longer_stop(plan: Plan, seconds: float) -> Offers:
+def _to_stop(plan: Plan, seconds: float) -> Offers:
+    """Return the duration with which the motion of a plan stops in so many seconds, and what `stop_within` it keeps."""
+    return Offers([*_longer(plan, seconds), *_longer_stop(plan, seconds)])
+
+
+def _longer(plan: Plan, seconds: float) -> list[Relaxed]:
+    """Return a longer duration with which a motion without free coordinates stops in so many seconds."""
+    short, scenario = plan, plan.scenario
+    if scenario.count or not scenario.stretches or scenario.duration_range is not None:
+        return []
+    for _ in range(ROUNDS):
+        lasts = rounded(_between(short, None, seconds), up=True)
+        if lasts > scenario.longest or short.stop is None:
+            break
+        longer = with_task(scenario, duration=lasts)
+        audited = audit(longer, None)
+        if not audited.passed:
+            break
+        short = _judged(Plan(longer, MotionStatus.FEASIBLE, None, audited, 0.0, 0.0), longer, seconds)
+        if short.feasible:
+            return [Relaxed("duration", "s", plan.duration, lasts, short)]
+    return []
+
+
+def _longer_stop(plan: Plan, seconds: float) -> list[Relaxed]:
     """Return the shortest `stop_within` that the plan keeps, as an alternative to a limit of so many seconds."""
-    assert plan.stop is not None
+    if plan.stop is None or not plan.stop.feasible:
+        return []
     enough = rounded(plan.stop.duration, up=True)
     task = plan.scenario.task.model_copy(update={"stop_within": enough})
-    as_slow = replace(plan, scenario=replace(plan.scenario, task=task))
-    return Offers([Relaxed("stop_within", "s", seconds, enough, as_slow)])
+    status, audited = MotionStatus.FEASIBLE, replace(plan.audit, excess=[])
+    as_slow = replace(plan, scenario=replace(plan.scenario, task=task), status=status, audit=audited, offers=Offers)
+    return [Relaxed("stop_within", "s", seconds, enough, as_slow)]
+
+
+def _that_stop(offers: Callable[[], Offers], seconds: float) -> Offers:
+    """Return the offers whose plans stop in so many seconds, others together with the `stop_within` that they need."""
+    made, cut_short = offers()
+    found: list[Relaxed] = []
+    for plan in {id(offer.plan): offer.plan for offer in made}.values():
+        stopping = _judged(plan, plan.scenario, seconds)
+        longer = [] if stopping.feasible else _longer_stop(stopping, seconds)
+        for offer in made:
+            if offer.plan is plan and (stopping.feasible or longer):
+                found.append(replace(offer, plan=longer[0].plan if longer else stopping))
+        found += longer
+    return Offers(found, cut_short)
 
 
 def _trajectory(plan: Plan, extreme: int | None = None) -> Trajectory:
