@@ -87,7 +87,7 @@ def _text(headline: str, facts: Iterable[Fact]) -> str:
 def _fields(value: Any) -> list[Fact]:
     """Return the public fields of a dataclass, a named tuple or any other object, each in a few words."""
     if is_dataclass(value):
-        names: Iterable[str] = [field.name for field in fields(value)]
+        names: Iterable[str] = [field.name for field in fields(value) if field.repr]
     else:
         names = getattr(value, "_fields", None) or vars(value)
     return [(name, brief(getattr(value, name))) for name in names if not name.startswith("_")]

@@ -34,8 +34,8 @@ def test_the_example_runs_and_resumes(folder):
     done = run(folder / "conditions.py", cwd=folder)
     both, lowest, high = done.stdout.split()
     robot = load("cogiro")
-    found = sample(robot, StaticEquilibrium(), samples=40_000, keep="all")
-    poses = np.tile(robot.home, (40_000, 1))
+    found = sample(robot, StaticEquilibrium(), samples=10_000, keep="all")
+    poses = np.tile(robot.home, (10_000, 1))
     poses[:, :3] = found["position"].values
     heights = Dynamics(robot).points(poses)[1][:, :, 2].min(axis=1)
     assert int(high) == np.count_nonzero(heights >= 0.3)

@@ -159,14 +159,13 @@ def test_friction_stiffness_and_mass_of_a_motion(tmp_path):
 
 def test_noise_of_tensions_does_not_make_cables_seem_stiffer():
     """Tensions with 20 % of noise, a third of how far they vary: without their errors as unknowns it is 14 %."""
-    squares, free = 0.0, ("anchors", "offsets", "scales", "clock", "mass", "capstan", "stiffness")
-    for seed in (0, 2):
-        result = calibrate("planar-4", moving(seed, swing=40, noise=0.2)[0], free)
-        rows = [k for k, one in enumerate(result.parameters) if one.name.endswith("compliance")]
-        error = np.array([result.parameters[k].value for k in rows]) - 2e-5
-        squares += error @ np.linalg.solve(result.covariance[np.ix_(rows, rows)], error)
-        assert abs(error.mean()) < 0.1 * 2e-5
-    assert squares < chi2.ppf(1 - 1e-3, 8)
+    free = ("anchors", "offsets", "scales", "clock", "mass", "capstan", "stiffness")
+    result = calibrate("planar-4", moving(0, swing=40, noise=0.2)[0], free)
+    rows = [k for k, one in enumerate(result.parameters) if one.name.endswith("compliance")]
+    error = np.array([result.parameters[k].value for k in rows]) - 2e-5
+    assert abs(error.mean()) < 0.1 * 2e-5
+    squares = error @ np.linalg.solve(result.covariance[np.ix_(rows, rows)], error)
+    assert squares < chi2.ppf(1 - 1e-3, 4)
 
 
 def test_a_log_does_not_tell_mass_from_gains():

@@ -183,7 +183,9 @@ def test_margin_is_kept_between_nodes(circle_free):
 def test_mobile_robots_carry_the_load_inside_their_reach():
     robot = load("wang-ctmrts")
     path = {"kind": "line", "start": [1.2, 0.9, 0.3], "end": [1.35, 1.05, 0.6]}
-    found = plan(robot, {"path": path, "duration": 3, "base": {"kind": "free", "ends": "rest"}, "margin": 5})
+    found = plan(
+        robot, {"path": path, "duration": 3, "base": {"kind": "free", "ends": "rest"}, "margin": 5, "steps": 15}
+    )
     assert found.feasible, found.report()
     judge(robot, found.trajectory, margin=5, residual=1e-3 * robot.weight)
     for index, carrier in enumerate(robot.carriers):

@@ -16,7 +16,7 @@ line = {"kind": "line", "start": [0.0, 0, 1], "end": [0.3, 0, 1]}
 plan("ipanema-1", {"path": line, "duration": 3, "steps": 20, "tube": {"position": "free"}})
 home = load("multi-quadrotor-3").home.tolist()
 path = {"kind": "line", "start": home, "end": [2.0, *home[1:]]}
-task = {"path": path, "duration": 4, "tube": {"position": "free"}, "base": {"kind": "free"}, "steps": 100}
+task = {"path": path, "duration": 4, "tube": {"position": "free"}, "base": {"kind": "free"}, "steps": 60}
 wall, processor = time.perf_counter(), time.process_time()
 planned = plan("multi-quadrotor-3", task)
 print(planned.feasible, (time.process_time() - processor) / (time.perf_counter() - wall))

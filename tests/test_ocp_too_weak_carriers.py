@@ -57,5 +57,5 @@ def test_a_duration_is_refused_only_where_no_thrust_gives_the_force(thrust):
 def test_a_team_that_is_too_fast_is_refused_before_planning_and_told_how_long_it_takes(seconds):
     refused = plan(slung(dof=["x", "y", "z"]), task(seconds))
     assert refused.status == "infeasible"
-    assert refused.solve_s < 1
+    assert refused.iterations == 0
     assert "duration of motion must be at least" in told(refused).replace("\n", " ")

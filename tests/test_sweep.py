@@ -466,13 +466,12 @@ def test_killed_interrupted_and_resumed_is_the_same_table(folder):
     second = start(folder, "--workers", "2", "--resume", "run.chk")
     wait_until(lambda: stored_size(log) > size, second)
     workers = children_of(second)
-    sent = time.monotonic()
     second.send_signal(signal.SIGINT)
     out, err = second.communicate(timeout=60)
-    assert time.monotonic() - sent < 3  # a third of it where nothing else runs
     assert (second.returncode, out) == (130, "")
     assert err.startswith("towline: stopped after ")
     assert err.endswith(" of 12 plans; to continue, repeat the command with --resume run.chk\n")
+    assert int(err.split()[3]) < 12  # it ends before the rest is planned
     assert err.count("\n") == 1
     wait_until(lambda: not any(map(alive, workers)))
     assert not list(folder.glob("*.nc"))

@@ -19,7 +19,7 @@ def path(points=LIFT, **more):
 
 
 def seen(found, point, low=-np.inf, high=np.inf):
-    """The nearest that the saved motion comes to a point between two times, by a look each 0.05 ms [m]."""
+    """The nearest that the saved motion comes to a point between two times [m]."""
     motion = found.trajectory.sel(time=slice(low, high)).pose.values
     return np.linalg.norm(motion[:, :3] - point, axis=1).min()
 
@@ -34,7 +34,8 @@ def seen(found, point, low=-np.inf, high=np.inf):
     ],
 )
 def test_the_distance_of_legs_is_that_of_the_motion_not_the_option(points, more):
-    found = plan(COGIRO, {"path": path(points, **more), "duration": 2, "output_rate": 20_000})
+    rate = 20_000 if "blend" in more else 5_000  # [Hz]; what passes within a millimetre is looked at more closely
+    found = plan(COGIRO, {"path": path(points, **more), "duration": 2, "output_rate": rate})
     poses = np.array([[*point, 0, 0, 0][:6] for point in points], dtype=float)
     # It passes no other waypoint nearer than its own.
     expected = np.array([seen(found, pose[:3]) for pose in poses])
@@ -46,7 +47,8 @@ def test_the_distance_of_legs_is_that_of_the_motion_not_the_option(points, more)
     worst = int(said["position"]["point"].removeprefix("points[").removesuffix("]"))
     assert expected[worst] == pytest.approx(expected.max(), abs=2e-6)
     at = said["position"]["at_s"]
-    assert seen(found, poses[worst, :3], at - 1e-4, at + 1e-4) == pytest.approx(said["position"]["distance"], abs=2e-6)
+    near = seen(found, poses[worst, :3], at - 2 / rate, at + 2 / rate)
+    assert near == pytest.approx(said["position"]["distance"], abs=2e-6)
     assert 2e-4 < said["position"]["distance"] < 0.03
 
 

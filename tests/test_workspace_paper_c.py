@@ -17,11 +17,11 @@ REACH = 0.0577350269  # of an attachment from the load's middle [m]
 
 @pytest.fixture(scope="module")
 def timed():
-    """The loops of each drive, and how long they took [s]."""
+    """The loops of each drive, and their processor time [s]."""
     results = {}
     for drive in DRIVES:
-        start = time.perf_counter()
-        results[drive] = study.loops(drive), time.perf_counter() - start
+        start = time.process_time()
+        results[drive] = study.loops(drive), time.process_time() - start
     return results
 
 
@@ -39,7 +39,7 @@ def test_sixty_thousand_loops_of_each_type(timed):
     for drive, (system, seconds) in timed.items():
         assert len(system.places) == 60_000
         assert system.held.sum() > 10_000
-        assert seconds < 5, drive  # half a second on a machine that has nothing else to do
+        assert seconds < 5, drive
 
 
 def test_a_load_of_fixed_length_hangs_at_its_lengths(found):

@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
-from towline.ocp.result import Offers, PlanData
+from towline.ocp.plan import Plan
+from towline.ocp.result import Offers
 
 
-def told(found: PlanData) -> str:
+def told(found: Plan) -> str:
     """Return the report of a plan, with no changes offered."""
     return replace(found, offers=Offers).report()

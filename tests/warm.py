@@ -22,7 +22,7 @@ import towline as package
 
 TOWLINE = Path(sys.executable).with_name("towline")
 LATE = ["dask.array", "h5netcdf", "matplotlib.backends.backend_agg", "matplotlib.pyplot", "mpl_toolkits.mplot3d"]
-LONGEST = 120  # [s]
+LONGEST = 600  # [s]: what hangs is ended, what is slow is not
 
 _codes = []  # of the process that a fork has become, once it has ended
 

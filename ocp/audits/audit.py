@@ -4,7 +4,9 @@ Inverse dynamics in {G} and the exact tension solver evaluate each instant separ
 program does not use. `tensions` computes tensions and violation, `checks` all other limits.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -43,10 +45,17 @@ class Audit(Displayed):
     limited: list[np.ndarray] = field(default_factory=list)  # what each limit bounds, (n, k) in its unit
     # The one with the largest shortfall, with its time, and its wind if the task has a box of winds; None if all exist.
     certificate: Certificate | None = None
-    # Error of an open-loop simulation with the planned tensions; None for robots that can follow any motion exactly,
-    # for motions with loads or on the ground, and where no tensions exist.
-    drift: Drift | None = None
     supports: np.ndarray | None = None  # forces of the ground, (n, s) [N], zero while it hangs; None without ground
+    drifting: Callable[[], Drift] | None = field(default=None, repr=False, compare=False)  # computes `drift`
+
+    @cached_property
+    def drift(self) -> Drift | None:
+        """Return the error of an open-loop simulation with the planned tensions, which takes as long as the audit.
+
+        None for robots that can follow any motion exactly, for motions with loads or on the ground, and where no
+        tensions exist.
+        """
+        return None if self.drifting is None else self.drifting()
 
     @property
     def passed(self) -> bool:
@@ -112,7 +121,7 @@ def audit(scenario: Scenario, deviation: Deviation | None, to_show: bool = False
         soft_excess=[excess for excess in exceeded if excess.limit in soft],
         limited=regular.values,
         certificate=seen.certificate,
-        drift=drift(scenario, times, motion, carriers, tensions) if followed else None,
+        drifting=partial(drift, scenario, times, motion, carriers, tensions) if followed else None,
     )
 
 
