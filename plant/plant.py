@@ -9,7 +9,7 @@ import numpy as np
 from ..base import processors
 from ..base.errors import InputError, SolverError
 from ..base.inputs import leading, number, one_of, repeated, shown, whole_number
-from ..core import run_plant
+from ..core import run_plant, sense
 from ..models.batch import as_array
 from ..models.dynamics import dynamics_of
 from ..models.files import AnyRobot, as_robot
@@ -137,7 +137,8 @@ class Plant:
                 home, at rest.
             carrier_pose, carrier_velocity: The same for the carriers, (..., c, 6); velocities of fixed coordinates are
                 ignored.
-            tensions: Tensions at rest, (..., m) [N], which determine the unstrained lengths of elastic cables.
+            tensions: Tensions at first, (..., m) [N], which determine the unstrained lengths of elastic cables and the
+                rates of winches with which they last.
             lengths: Unstrained lengths, (..., m) [m], instead of `tensions`; default: cables without tension at the
                 pose.
 
@@ -170,11 +171,31 @@ class Plant:
         elif lengths is not None:
             first = own
         else:
-            EA = self.record["cable"]["stiffness"][: robot.m]
-            strain = np.where(EA > 0, pulls / np.where(EA > 0, EA, 1.0), 0.0)
-            first = np.maximum(dynamics_of(robot).cable_lengths(poses, carriers) / (1 + strain), layout.SHORTEST)
+            spans = dynamics_of(robot).cable_lengths(poses, carriers)
+            first = np.maximum(spans / (1 + self._strain(pulls)), layout.SHORTEST)
         cables[..., layout.LENGTH, :] = cables[..., layout.REFERENCE, :] = first
-        return np.concatenate([bodies.reshape(*batch, -1), cables.reshape(*batch, -1)], axis=-1)
+        states = np.concatenate([bodies.reshape(*batch, -1), cables.reshape(*batch, -1)], axis=-1)
+        if tensions is not None and self.drive == "forces":
+            rows, rates = states.reshape(-1, self.size), self._places + layout.LENGTH_RATE * robot.m
+            lengths = np.empty((len(rows), 2, robot.m))
+            sense(self.record, rows, np.empty((len(rows), 1 + count, 12)), lengths)
+            unstrained = rows[:, self._places : self._places + robot.m]
+            rows[:, rates : rates + robot.m] = lengths[:, 1] * unstrained / lengths[:, 0]
+        return states
+
+    def fixed_lengths(self, tensions: np.ndarray) -> np.ndarray | None:
+        """Return unstrained lengths, (..., m) [m], with which cables have the lengths that the robot's file fixes.
+
+        They are under `tensions`, (..., m) [N]. None if the robot has winches, or the plant another drive.
+        """
+        if self.robot.fixed_lengths is None or self.drive != "lengths":
+            return None
+        return self.robot.fixed_lengths / (1 + self._strain(tensions))
+
+    def _strain(self, tensions: np.ndarray) -> np.ndarray:
+        """Return the strains of the cables at rest under tensions, (..., m); 0 of those that do not stretch."""
+        EA = self.record["cable"]["stiffness"][: self.robot.m]
+        return tensions / np.where(EA > 0, EA, np.inf)
 
     def command(
         self,

@@ -11,6 +11,8 @@ from .plant import Plant
 
 ANGLE = 1.0  # what the fastest motion of the cables may turn or decay by in a step; Runge-Kutta is stable up to 2.8
 TIED = 2.0  # what a winch with a constant rate may add to the mass that its cable moves, of that mass
+DRIVE_PERIOD = 1e-3  # [s], at most, of drives that compute the forces of winches' motors from tensions
+HELD = 0.4  # [rad]: what the fastest motion of the cables may turn by while such forces are held
 
 
 def default_drive(robot: Robot) -> str:
@@ -39,9 +41,11 @@ def winding_time(plant: Plant) -> float:
     cable ties the bodies at its ends to each other, as if they had h (C + h K) more mass along it
     (core/plant/winch_lengths.c). In one long period, a light carrier would hardly move relative to its load.
     """
+    frequency, decay = fastest_motion(plant)
+    if plant.drive == "forces":
+        return min(DRIVE_PERIOD, HELD / frequency if frequency else math.inf)
     if plant.drive != "lengths":
         return math.inf
-    frequency, decay = fastest_motion(plant)
     return 2 * TIED / (decay + math.sqrt(decay**2 + 4 * TIED * frequency**2)) if frequency else math.inf
 
 
@@ -49,7 +53,8 @@ def fastest_motion(plant: Plant) -> tuple[float, float]:
     """Return the highest frequency and decay of elastic cables at home [rad/s]; 0 if not all of them are elastic.
 
     With the elongations e of taut cables, d2e/dt2 = -G (K e + C de/dt), where G has the accelerations along the cables
-    that unit tensions cause; the largest eigenvalues of G K and G C bound frequency and decay.
+    that unit tensions cause, also those of winches whose motors are commanded forces; the largest eigenvalues of G K
+    and G C bound frequency and decay.
     """
     cables = plant.record["cable"][: plant.robot.m]
     stiffness, damping = cables["stiffness"], cables["damping"]
@@ -70,6 +75,8 @@ def fastest_motion(plant: Plant) -> tuple[float, float]:
             moments = np.cross(arms, u, axis=0)
             G += u.T @ u / carrier.body.mass
             G += moments.T @ np.linalg.solve(inertia_matrix(carrier.body.inertia), moments)
+    if plant.drive == "forces":
+        G += np.diag([1 / cable.winch.inertia if cable.winch else 0.0 for cable in robot.cables])
     lengths = np.linalg.norm(robot.home_anchors - robot.home_attachments, axis=1)
     frequency = math.sqrt(float(np.abs(np.linalg.eigvals(G * (stiffness / lengths))).max()))
     decay = float(np.abs(np.linalg.eigvals(G * damping)).max())

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..control import Command
-from ..core import winch_lengths
+from ..core import winch_forces, winch_lengths
 from ..models.trajectory import Motion, moved_on
 from ..plant import Plant, layout
 from .drives import Drives
@@ -18,10 +18,11 @@ FASTEST = 1e3  # [m/s], of the air
 class Orders:
     """Convert controller commands to plant commands for each drive type.
 
-    Drives of tensions and of winches with forces receive the tensions themselves. Elastic cables without winches in
-    their file are assumed to have winches that measure their tension and reach it within the period, or within each
-    of its parts (`plant.steps.windings_in`): core/plant/winch_lengths.c. Carriers are commanded for one instant and
-    move like the reference until the next.
+    Drives of winches with forces are assumed to know their winch, and to compensate its friction and inertia as far as
+    the motor permits: core/plant/winch_forces.h. Elastic cables without winches in their file are assumed to have
+    winches that reach the tension: core/plant/winch_lengths.c. Both measure tensions and work within the period, or
+    within each of its parts (`plant.steps.windings_in`). Carriers are commanded for one instant and move like the
+    reference until the next.
 
     - `plant`: the plant.
     - `conditions`: conditions of the runs.
@@ -31,8 +32,8 @@ class Orders:
 
     def __init__(self, plant: Plant, conditions: Experiment, seeds: Sequence[int], record: np.ndarray | None = None):
         robot, times = plant.robot, conditions.period * np.arange(len(conditions.references))
-        self._parts, self._drive, self._fixed = conditions.windings, plant.drive, robot.fixed_lengths
-        self._period = conditions.period / self._parts
+        self._parts, self._drive, self._fixed = conditions.windings, plant.drive, robot.fixed_lengths is not None
+        self._period, self._settings = conditions.period / self._parts, plant.settings
         commanded = layout.BODY * (1 + len(robot.carriers)) + layout.REFERENCE * robot.m
         self._commanded = slice(commanded, commanded + robot.m)  # lengths commanded last, in a state
         self._record = plant.record if record is None else record
@@ -90,8 +91,8 @@ class Orders:
             if part < self._parts - 1:
                 last = states[:, self._commanded]
                 self._cables[:] = last + (self._cables - last) / (self._parts - part)
-        elif self._drive == "lengths" and self._fixed is not None:
-            self._cables[:] = self._fixed
+        elif self._drive == "lengths" and self._fixed:
+            self._cables[:] = states[:, self._commanded]
         else:
             tensions = np.ascontiguousarray(command.tensions, dtype=float).reshape(self._last_rates.shape)
             if drives is not None:
@@ -118,6 +119,8 @@ class Orders:
                 drives.follow(self._starts, self._ends)
         if command.actuation is not None:
             self._actuation[:] = command.actuation if drives is None else drives.actuation(command.actuation)
+        if self._drive == "forces":  # which depend on how carriers move
+            winch_forces(self._record, self._settings, np.ascontiguousarray(states), self._rows, self._period)
         return self._rows
 
 

@@ -93,7 +93,7 @@ def fly(
     start = np.zeros(m) if first.tensions is None else np.maximum(first.tensions, 0.0)
     parts = conditions.windings
     periods = Periods(plant, period / parts, ceil(conditions.substeps / parts))
-    fixed = robot.fixed_lengths if plant.drive == "lengths" else None  # which plans meet to some nm
+    fixed = plant.fixed_lengths(start)  # which plans meet to some nm
     state = plant.start(*motion, tensions=start if fixed is None else None, lengths=fixed)
     running = Running(plant, periods, np.tile(state, (flights, 1)))
     motions, lengths = np.zeros((flights, 1 + len(robot.carriers), 12)), np.zeros((flights, 2, m))

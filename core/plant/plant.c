@@ -12,6 +12,7 @@
 #include "plant/sensors.h"
 #include "plant/state_rows.h"
 #include "plant/step.h"
+#include "plant/winch_forces.h"
 
 ptrdiff_t towline_plant_state_size(const towline_robot *robot) {
     return TOWLINE_BODY_NUMBERS * (1 + robot->carriers) + TOWLINE_CABLE_BLOCKS * robot->cables;
@@ -96,5 +97,22 @@ void towline_plant_sense(const towline_robot *robot, ptrdiff_t rows, const doubl
             of_row[i] = p.cable[i].length;
             of_row[p.cables + i] = p.cable[i].length_rate;
         }
+    }
+}
+
+void towline_plant_winch_forces(const towline_robot *robot, const towline_plant *plant_settings, ptrdiff_t rows,
+                                ptrdiff_t commands_of_row, double period, const double *states, double *commands) {
+    const towline_plant settings = {TOWLINE_TENSIONS, 0, plant_settings->carrier_bandwidth, 1, 0};
+    const ptrdiff_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
+    motion now;
+    plant p;
+    set_plant(&p, robot, &settings);
+    p.has_winches = 0;
+    for (ptrdiff_t row = 0; row < rows; row++) {
+        const double *state = states + row * size;
+        double *command = commands + row * commands_of_row * width;
+        take_state(&p, state, &now);
+        begin_command(&p, &now, command, commands_of_row > 1 ? command + width : NULL, period);
+        write_winch_forces(&p, &now, state, period, command + TOWLINE_PLATFORM_COMMANDS);
     }
 }

@@ -78,4 +78,11 @@ void towline_plant_winch_lengths(const towline_robot *robot, ptrdiff_t rows, dou
                                  const double *lengths, const double *tensions, double *last_rates, double *commands,
                                  ptrdiff_t commands_per);
 
+/*
+ * The forces with which the motors of winches give the commanded tensions, see winch_forces.h: they replace these in
+ * `commands`, (rows, commands_of_row, command), of which the first of each row is held for `period` [s].
+ */
+void towline_plant_winch_forces(const towline_robot *robot, const towline_plant *plant_settings, ptrdiff_t rows,
+                                ptrdiff_t commands_of_row, double period, const double *states, double *commands);
+
 #endif

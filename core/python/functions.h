@@ -78,5 +78,7 @@ FUNCTION(run_plant, "(robot, settings, states, commands, history, tensions, step
          "Run each state under its commands, and write every keep-th state and its tensions.")
 FUNCTION(sense, "(robot, states, motions, lengths)",
          "Write the motions of platform and carriers in states of a plant, and lengths of the cables with their rates.")
+FUNCTION(winch_forces, "(robot, settings, states, commands, period)",
+         "Replace the tensions in commands of a plant by the forces of motors that give them.")
 FUNCTION(winch_lengths, "(robot, states, lengths, tensions, last_rates, commands, period)",
          "Write the unstrained lengths that give tensions within a period into commands of a plant.")

@@ -1,4 +1,4 @@
-/* The plant for Python: runs of many states, sensors, and the lengths that winches are commanded. */
+/* The plant for Python: runs of many states, sensors, and what winches are commanded. */
 #include "plant/plant.h"
 
 #include "python/arrays.h"
@@ -59,6 +59,30 @@ TOWLINE_PY(sense) {
                      has_size(&given, MOTIONS, rows * 12 * (1 + robot->carriers)) &&
                      has_size(&given, LENGTHS, rows * 2 * robot->cables);
     FINISH(&given, fits, towline_plant_sense(robot, rows, given.of[STATES], given.of[MOTIONS], given.of[LENGTHS]));
+}
+
+TOWLINE_PY(winch_forces) {
+    enum { ROBOT, SETTINGS, STATES, COMMANDS, ARRAYS, PERIOD = ARRAYS, ALL };
+    arrays given;
+    if (count != ALL) {
+        PyErr_Format(PyExc_TypeError, "winch_forces takes %d arguments, got %zd", (int)ALL, count);
+        return NULL;
+    }
+    const double period = PyFloat_AsDouble(arguments[PERIOD]);
+    if ((period == -1 && PyErr_Occurred()) || !take(&given, arguments, ARRAYS, ARRAYS, COMMANDS)) { return NULL; }
+    const towline_robot *robot = robot_of(&given);
+    int fits = robot && given.of[SETTINGS] && given.view[SETTINGS].len == (Py_ssize_t)sizeof(towline_plant) &&
+               given.of[STATES] && given.of[COMMANDS];
+    Py_ssize_t rows = 0, each = 1;
+    if (fits) {
+        const Py_ssize_t size = towline_plant_state_size(robot), width = towline_plant_command_size(robot);
+        rows = given.size[STATES] / size;
+        each = rows ? given.size[COMMANDS] / width / rows : 1;
+        fits = given.size[STATES] == rows * size && given.size[COMMANDS] == rows * each * width && each >= 1;
+    }
+    FINISH(&given, fits,
+           towline_plant_winch_forces(robot, (const void *)given.of[SETTINGS], rows, each, period, given.of[STATES],
+                                      given.of[COMMANDS]));
 }
 
 TOWLINE_PY(winch_lengths) {

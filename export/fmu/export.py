@@ -88,9 +88,9 @@ def unit_files(robot: Robot, part: str = "plant", drive: str | None = None, refe
         raise InputError(f"drive must be left out for part 'controller', which has no plant, got {drive!r}")
     plant = Plant(robot, default_drive(robot) if drive is None else one_of("drive", drive, DRIVES))
     is_fixed = plant.drive == "lengths" and robot.fixed_lengths is not None
-    by_lengths = plant.drive == "lengths" and not is_fixed and (part == "both" or drive is None)
+    by = {"lengths": 0 if is_fixed else 2, "forces": 3}.get(plant.drive, 1) if part == "both" or drive is None else 1
     if part == "both" and (
-        plant.drive == "rates" or (by_lengths and not plant.record["cable"]["stiffness"][: robot.m].all())
+        plant.drive == "rates" or (by == 2 and not plant.record["cable"]["stiffness"][: robot.m].all())
     ):
         raise InputError(f"drive must accept commanded tensions for part 'both', got {plant.drive!r}")
     winches = plant.drive if part == "plant" and (drive is not None or is_fixed) else None
@@ -102,7 +102,7 @@ def unit_files(robot: Robot, part: str = "plant", drive: str | None = None, refe
     data = data_at(robot, plant, references_at(robot, trajectory, np.zeros(1))[0])
     variables = variables_of(robot, part, winches, data)
     data |= {"simulates": part != "controller", "controls": part != "plant"}
-    data["cables"] = 0 if winches or is_fixed else 2 if by_lengths else 1  # `unit_cables`
+    data["cables"] = 0 if winches or is_fixed else by  # `unit_cables`
     sources = _core()
     sources |= {path.name: path.read_bytes() for path in sorted(_OWN.iterdir()) if path.suffix in (".c", ".h")}
     text = robot_c(data, variables, MOST_CABLES)

@@ -43,7 +43,7 @@ def data_at(robot: Robot, plant: Plant, reference: Reference) -> dict[str, Any]:
     """Return the members of `towline_unit` at a reference, on which the robot is, with its tensions."""
     pulls = np.zeros(robot.m) if reference.tensions is None else np.maximum(reference.tensions, 0.0)
     motion = (reference.pose, reference.velocity, reference.carrier_pose, reference.carrier_velocity)
-    fixed, fastest = robot.fixed_lengths, max(fastest_motion(plant))
+    fixed, fastest = plant.fixed_lengths(pulls), max(fastest_motion(plant))
     state = plant.start(*motion, tensions=pulls if fixed is None else None, lengths=fixed)
     motions, lengths = np.zeros((1, 1 + len(robot.carriers), 12)), np.zeros((1, 2, robot.m))
     sense(plant.record, state[None], motions, lengths)

@@ -169,6 +169,9 @@ static int move_state(towline_unit *unit, const double *times, int32_t substeps,
         double *begin = carriers + TOWLINE_CARRIER_COMMANDS * c;
         leads |= order_carrier(unit, c, times, begin, begin + width);
     }
+    if (unit->cables == UNIT_BY_FORCES) {
+        towline_plant_winch_forces(robot, &unit->plant, 1, 1 + leads, step, state, commands);
+    }
     const towline_run run = {1, 1 + leads, 1, 1, substeps, step};
     towline_plant_run(robot, &unit->plant, &run, state, commands, history, tensions);
     if (!are_finite(history, 2 * size) || !are_finite(tensions, 2 * m)) { return 0; }
@@ -180,7 +183,7 @@ static int move_state(towline_unit *unit, const double *times, int32_t substeps,
 static int simulate(towline_unit *unit, double step) {
     const ptrdiff_t m = unit->robot.cables;
     const double all = fmax(ceil(step / unit->longest_step - ROUNDING), 1);
-    const double parts = unit->cables == UNIT_BY_LENGTHS ? fmax(floor(step / unit->winding_time + 0.5), 1) : 1;
+    const double parts = unit->cables >= UNIT_BY_LENGTHS ? fmax(floor(step / unit->winding_time + 0.5), 1) : 1;
     double state[UNIT_STATE], tensions[2 * UNIT_CABLES], sums[UNIT_CABLES] = {0};
     if (!(all <= MOST_STEPS && parts <= MOST_STEPS)) { return 0; }
     memcpy(state, unit->state, sizeof state);

@@ -18,8 +18,9 @@ enum {
     UNIT_COMMAND = TOWLINE_PLATFORM_COMMANDS + UNIT_CABLES + TOWLINE_CARRIER_COMMANDS * UNIT_CARRIERS
 };
 
-/* What the plant makes of tensions: nothing, because `winches` has its commands; commands; lengths, within a step. */
-typedef enum { UNIT_WINCHES = 0, UNIT_TENSIONS = 1, UNIT_BY_LENGTHS = 2 } unit_cables;
+/* What the plant makes of tensions: nothing, because `winches` has its commands; commands; lengths or motors' forces,
+ * within a step. */
+typedef enum { UNIT_WINCHES = 0, UNIT_TENSIONS = 1, UNIT_BY_LENGTHS = 2, UNIT_BY_FORCES = 3 } unit_cables;
 
 /* What an importer may do, by the mode that it has brought the unit to. */
 typedef enum { UNIT_INSTANTIATED = 0, UNIT_INITIALISING = 1, UNIT_STEPPING = 2, UNIT_TERMINATED = 3 } unit_mode;
@@ -31,7 +32,7 @@ typedef struct {
     towline_robot robot;
     towline_plant plant;
     double longest_step; /* of Runge-Kutta [s] */
-    double winding_time; /* for which winches that reach tensions by lengths keep their rates [s] */
+    double winding_time; /* for which winches that reach tensions keep their rates or forces [s] */
     double mass;         /* of the platform [kg] */
     double state[UNIT_STATE], last_rates[UNIT_CABLES];
     /* The controller, and what it knows of the robot. */
