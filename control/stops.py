@@ -33,7 +33,8 @@ def stop(plan: HasTrajectory | xr.Dataset | str | os.PathLike[str], time: float)
     Args:
         plan: A `Plan`, another object with such a `trajectory`, such a dataset, or the NetCDF file of one.
         time: Time in the plan at which the stop begins [s]; a time after the plan's end means the end. A plan that
-            ends while the robot moves is continued with its last acceleration.
+            ends while the robot moves is continued with its last velocity. Its last acceleration and rotation fade
+            within a second, and so does the motion of a team's carriers relative to the platform.
 
     Returns:
         Stop: `simulate` and `references` take it as they take a plan.

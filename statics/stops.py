@@ -27,12 +27,13 @@ from ..models.motion_file import dimensions, motion_variables, over
 from ..models.parsing import to_yaml
 from ..models.rigid_load import RigidLoad
 from ..models.robot import Robot
-from ..models.trajectory import Motion, Trajectory, moved_on
+from ..models.trajectory import Motion, Trajectory
 from ..solvers import Certificate, TensionProblem, certify, solve_batch
 from ..solvers.available_wrench import facets
 from ..solvers.in_place import RHO
+from .continuation import continued
 from .distribution import wrench_problem
-from .team_stops import RESTS, TeamStop, team_stop_along
+from .team_stops import TeamStop, team_stop_along
 from .winch_forces import has_winches, overloaded_winch, shares_of_winches
 
 if TYPE_CHECKING:
@@ -140,8 +141,8 @@ def _stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Stop:
     """Stop a robot that carries nothing else."""
     end = trajectory.duration or 0.0
     if any(carrier.efforts for carrier in robot.carriers):
-        return _of_team(robot, team_stop_along(robot, _continued(trajectory, end), begins))
-    trajectory = _continued(trajectory, end)
+        return _of_team(robot, team_stop_along(robot, trajectory, begins))
+    trajectory = continued(trajectory, together=False)
     best: tuple[tuple[int, bool, float], Stop, TensionProblem | None] | None = None
     instants = cache(lambda first: _instants(robot, trajectory, first))  # which all attempts have in common
     for reserve, goes_on in ATTEMPTS:
@@ -174,20 +175,6 @@ def longest_stop_along(robot: Robot, trajectory: Trajectory, times: np.ndarray) 
     """Return the longest of the stops that begin at some times, or the first infeasible one."""
     stops = (stop_along(robot, trajectory, time) for time in times.tolist())
     return max(stops, key=lambda its: (not its.feasible, its.duration))
-
-
-def _continued(trajectory: Trajectory, end: float) -> Trajectory:
-    """Return a trajectory that goes on after its end with its last acceleration, unless the robot rests there."""
-    last = trajectory.at(np.array([end]))
-    if max(np.abs(motion[1]).max() for motion in last) < RESTS:
-        return trajectory
-
-    def at(times: np.ndarray) -> tuple[Motion, Motion]:
-        more = [np.maximum(times - end, 0.0).reshape(-1, *[1] * (motion[0].ndim - 1)) for motion in last]
-        platform, carriers = trajectory.at(np.minimum(times, end))
-        return moved_on(platform, more[0]), moved_on(carriers, more[1])
-
-    return trajectory._replace(at=at)
 
 
 class _Law(NamedTuple):

@@ -25,6 +25,7 @@ from ..models.dynamics import dynamics_of
 from ..models.part import inertia_matrix
 from ..models.robot import Robot
 from ..models.trajectory import Motion, Trajectory
+from .continuation import RESTS, before, continued, faded, slopes
 
 SHORTEST, LONGEST = 0.1, 30.0  # [s], of a stop
 ATTEMPTS, FIRST, USUAL = 10, 5, 2.5  # durations, how many are tried first, and the least of these, of sqrt(length / g)
@@ -37,8 +38,7 @@ TINY, RANK = 1e-12, 1e-9  # of a matrix
 TILTS = 3  # times that positions are computed from tilts, which follow from accelerations
 LACKING = 0.01  # of the largest tension: a force that no actuator gives
 INSTANT = 1e-4  # [s], for differences of attitudes
-FORGOTTEN = 0.1  # [s] after the end of a plan, from when on nothing of its extrapolation is kept
-RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
+SLACK = 1e-4  # of the largest tension: none is less after the end of a plan
 # Of s = t / duration, with three continuous derivatives, and with five, since anchors that turn need two more.
 RATE = np.polynomial.Polynomial([1, 0, 0, 0, -35, 84, -70, 20])
 SMOOTHER = np.polynomial.Polynomial([1, 0, 0, 0, 0, 0, -462, 1980, -3465, 3080, -1386, 252])
@@ -73,7 +73,7 @@ def team_stop_along(robot: Robot, trajectory: Trajectory, begins: float) -> Team
             f"got {robot.name!r}"
         )
 
-    end = trajectory.duration or 0.0
+    end, trajectory = trajectory.duration or 0.0, continued(trajectory, together=True)
     last = [motion[1] for motion in trajectory.at(np.array([end]))]
     rests = max(np.abs(velocity).max() for velocity in last) < RESTS
     left = end - begins if rests else np.inf
@@ -131,7 +131,7 @@ def _remainder(robot: Robot, trajectory: Trajectory, begins: float) -> TeamStop:
     left = max((trajectory.duration or 0.0) - begins, SHORTEST)
     times = np.linspace(0.0, left, max(int(left / APART), 10))
     platform, carriers = trajectory.at(begins + times)
-    forces, tensions, _ = _forces(robot, trajectory, np.ones(len(times)), platform, platform, carriers)
+    forces, tensions, _ = _forces(robot, trajectory, np.ones(len(times)), platform, platform, carriers, times - left)
     pose, velocity, acceleration = motion = tuple(part[None] for part in carriers)
     before, R, after = (
         points.rotations(pose[..., 3:] + t * velocity[..., 3:] + t**2 / 2 * acceleration[..., 3:])
@@ -202,17 +202,16 @@ class _Stops:
         r, u = self.rate.reshape(-1, 1), slope.reshape(-1, 1)
         (pose, velocity, acceleration), self.planned = flat
         platform = pose, r * velocity, r**2 * acceleration + u * velocity
-        # Beyond its end a plan is extrapolated, body by body: soon its balance and its lengths count no more.
-        beyond = np.clip((self.tau.reshape(-1, 1) - (trajectory.duration or 0.0)) / FORGOTTEN, 0.0, 1.0)
-        kept = r * (1.0 - beyond**2 * (3.0 - 2.0 * beyond))
-        forces, tensions, before = _forces(robot, trajectory, kept[:, 0], platform, flat[0], self.planned)
+        after = self.tau.ravel() - (trajectory.duration or 0.0)
+        forces, tensions, balance = _forces(robot, trajectory, r[:, 0], platform, flat[0], self.planned, after)
         self.platform = [part.reshape(*shape, 6) for part in platform]
         self.tensions = tensions.reshape(*shape, -1)
-        self._forces, self._before = (part.reshape(*shape, robot.m, 3) for part in (forces, before))
-        held = points.attachments(robot, pose)
-        lengths = np.linalg.norm(points.anchors(robot, self.planned[0]) - held, axis=-1)
-        lengths = kept * lengths + (1.0 - kept) * np.array(robot.fixed_lengths)
-        ends = held + (lengths / tensions)[..., None] * forces
+        self._forces, self._before = (part.reshape(*shape, robot.m, 3) for part in (forces, balance))
+        # The plan's lengths, after its end the last ones.
+        where = trajectory.at(np.minimum(self.tau.ravel(), trajectory.duration or 0.0)) if (after > 0).any() else flat
+        lengths = dynamics_of(robot).cable_lengths(where[0][0], where[1][0])
+        lengths = r * lengths + (1.0 - r) * np.array(robot.fixed_lengths)
+        ends = points.attachments(robot, pose) + (lengths / tensions)[..., None] * forces
         self._ends = ends.reshape(self._forces.shape)  # of cables on carriers
         self.carriers = self._motions()
         R = points.rotations(self.carriers[0][..., 3:])
@@ -278,22 +277,33 @@ class _Stops:
 
 
 def _forces(
-    robot: Robot, trajectory: Trajectory, kept: np.ndarray, platform: Motion, planned: Motion, carriers: Motion
+    robot: Robot,
+    trajectory: Trajectory,
+    kept: np.ndarray,
+    platform: Motion,
+    planned: Motion,
+    carriers: Motion,
+    after: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the forces of the cables on the platform, (n, m, 3), the tensions, (n, m), and the plan's forces [N].
 
-    The imbalance of the plan is kept by the share `kept`, (n,), from 0 to 1.
+    The imbalance of the plan is kept by the share `kept`, (n,), from 0 to 1. From some times `after` its end, (n,) [s],
+    the plan's tensions fade to constants; those that balance a motion of which no plan knows can be negative.
     """
-    dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
+    rows = np.flatnonzero(robot.dof_mask)
     scale = robot.wrench_scale[rows]
-    A = dynamics.wrench_matrix(planned[0], carriers[0])
-    before, now = (dynamics.required_wrench(*motion, wind=trajectory.wind) for motion in (planned, platform))
-    along = A[:, rows] * scale[:, None]
-    tensions = _least(along.swapaxes(1, 2) @ along, along.swapaxes(1, 2) @ (scale * before[:, rows])[..., None])[..., 0]
-    missing = before[:, rows] - (A[:, rows] @ tensions[..., None])[..., 0]
-    wanted = scale * ((now - before)[:, rows] + (1.0 - kept[:, None]) * missing)
+    A, tensions, missing = _of_plan(robot, trajectory, planned, carriers)
+    if (beyond := after[:, None] > 0).any():
+        last = _of_plan(robot, trajectory, *trajectory.at(before(trajectory.duration or 0.0)))
+        last_ones = slopes(
+            np.log(np.maximum(last[1], SLACK * robot.t_max))
+        )  # logarithms, so that tensions stay positive
+        tensions = np.where(beyond, np.exp(faded(last_ones, np.maximum(after, 0.0))[0]), tensions)
+        missing = np.where(beyond, last[2][2:], missing)
+    now = dynamics_of(robot).required_wrench(*platform, wind=trajectory.wind)
+    wanted = scale * (now - (A @ tensions[..., None])[..., 0] - kept[:, None] * missing)[:, rows]
     may_turn = _have_one_each(robot)
-    G = scale[:, None] * _wrenches_of_forces(robot, planned[0])[:, rows] if may_turn else along
+    G = scale[:, None] * (_wrenches_of_forces(robot, planned[0]) if may_turn else A)[:, rows]
     turned = G.swapaxes(1, 2)
     change = (turned @ _least(G @ turned, wanted[..., None]))[..., 0]
     directions = A[:, :3].swapaxes(1, 2)
@@ -302,6 +312,20 @@ def _forces(
         forces = of_plan + change.reshape(of_plan.shape)
         return forces, np.linalg.norm(forces, axis=2), of_plan
     return directions * (tensions + change)[..., None], tensions + change, of_plan
+
+
+def _of_plan(
+    robot: Robot, trajectory: Trajectory, planned: Motion, carriers: Motion
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return wrench matrices, (n, 6, m), the tensions that balance a plan best, (n, m), and what they miss, (n, 6)."""
+    dynamics, rows = dynamics_of(robot), np.flatnonzero(robot.dof_mask)
+    scale = robot.wrench_scale[rows]
+    A = dynamics.wrench_matrix(planned[0], carriers[0])
+    w = dynamics.required_wrench(*planned, wind=trajectory.wind)
+    along = A[:, rows] * scale[:, None]
+    transposed = along.swapaxes(1, 2)
+    tensions = _least(transposed @ along, transposed @ (scale * w[:, rows])[..., None])
+    return A, tensions[..., 0], w - (A @ tensions)[..., 0]
 
 
 def _wrenches_of_forces(robot: Robot, pose: np.ndarray) -> np.ndarray:

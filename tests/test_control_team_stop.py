@@ -9,6 +9,7 @@ from towline import Dynamics, InputError, Robot, load, plan, simulate
 from towline.control import ComputedTorque, Predictive, longest_stop, references, stop
 from towline.control.planned_references import planned
 from towline.models import points
+from towline.statics.continuation import continued
 from towline.statics.team_stops import team_stop_along
 
 from .robots_hooked_below import hooked_below
@@ -88,6 +89,37 @@ def test_a_stop_beyond_a_plan_that_ends_while_the_team_moves_is_balanced_with_ca
     pulls = dynamics.wrench_matrix(its.platform[0], its.carriers[0]) @ its.tensions[..., None]
     missing = dynamics.required_wrench(*its.platform) - pulls[..., 0]
     assert np.abs(missing[:, :3]).max() < 0.005 * robot.weight
+
+
+@pytest.mark.parametrize("share", [0.4, 0.6, 0.75])
+def test_a_stop_that_begins_before_the_end_of_a_plan_and_goes_beyond_it_is_feasible(made, share):
+    """If accelerations stayed as they are at the end, carriers would need up to twice their largest acceleration."""
+    robot, found = made
+    motion = found.trajectory.sel(time=slice(0.0, share * found.duration))
+    its = stop(motion, float(motion.time[-1]) - 0.3)
+    assert its.feasible
+    assert its.duration < 2.5
+    x, h = its.carriers[0][..., :3], its.times[1]
+    bends = np.linalg.norm(np.diff(x, 2, axis=0), axis=-1) / h**2
+    assert bends.max() < 1.05 * robot.carriers[0].motion_limits.acceleration
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_a_plan_that_ends_while_the_team_moves_goes_on_smoothly(made, together):
+    """Velocities and accelerations are the derivatives of what is before them, and nothing jumps at the end."""
+    _, found = made
+    trajectory = continued(planned(found.trajectory.sel(time=slice(0.0, 1.2)))[1], together)
+    times, h = trajectory.duration + np.linspace(-0.05, 1.5, 311), 1e-4
+    before, now, after = (trajectory.at(times + step) for step in (-h, 0.0, h))
+    for one, two, three in zip(before, now, after, strict=True):
+        for order in (0, 1):
+            slope = (three[order] - one[order]) / (2 * h)
+            np.testing.assert_allclose(slope, two[order + 1], atol=2e-3)
+    platform, carriers = now
+    assert np.abs(platform[2][-1]).max() < 1e-12
+    assert np.abs(platform[1][-1, 3:]).max() < 1e-12
+    if together:
+        np.testing.assert_allclose(carriers[1][-1, :, :3], np.tile(platform[1][-1, :3], (3, 1)), atol=1e-12)
 
 
 def test_the_rest_of_a_plan_for_stronger_cables_is_no_feasible_stop(made):

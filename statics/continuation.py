@@ -1,0 +1,78 @@
+"""Continue a plan that ends while the robot moves: `continued`; `faded` for what changes at its end."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..models.trajectory import Motion, Trajectory
+
+RESTS = 1e-4  # [m/s, rad/s], at the end of a plan
+FADED = 1.0  # [s] after the end of a plan, from when on its last accelerations no longer count
+SHORT = 1e-3  # [s], for differences
+# Of the share of this time: functions that begin with 1 as value, slope or curvature, and end with three zeros.
+FADES = [np.polynomial.Polynomial(row) for row in ([1, 0, 0, -10, 15, -6], [0, 1, 0, -6, 8, -3], [0, 0, 1, -3, 3, -1])]
+FADES[2] /= 2
+OF_ORDER = {order: [f.integ(order) if order >= 0 else f.deriv() for f in FADES] for order in range(-1, 3)}
+POSITION = np.arange(6) < 3  # coordinates of a pose
+
+
+def continued(trajectory: Trajectory, together: bool) -> Trajectory:
+    """Return a trajectory that continues after its end, unless the robot rests there.
+
+    Its last accelerations and rotations fade, and so do the motions of carriers relative to the platform if they stay
+    `together` with it.
+    """
+    end = trajectory.duration or 0.0
+    last = trajectory.at(before(end))
+    if max(np.abs(motion[1][2]).max() for motion in last) < RESTS:
+        return trajectory
+    jerks = [slopes(motion[2])[1] for motion in last]
+
+    def at(times: np.ndarray) -> tuple[Motion, Motion]:
+        motions, after = trajectory.at(np.minimum(times, end)), np.maximum(times - end, 0.0)
+        platform, carriers = ([*motion, jerk] for motion, jerk in zip(motions, jerks, strict=True))
+        first = faded(platform, after, POSITION)
+        if not together:
+            return first, faded(carriers, after, POSITION)
+        places = [np.where(POSITION, part, 0.0)[:, None] for part in platform]
+        relative = faded([part - place for part, place in zip(carriers, places, strict=True)], after)
+        a, b, c = (part + np.where(POSITION, own, 0.0)[:, None] for part, own in zip(relative, first, strict=True))
+        return first, (a, b, c)
+
+    return trajectory._replace(at=at)
+
+
+def before(time: float) -> np.ndarray:
+    """Return three times up to this one, (3,) [s], for `slopes`."""
+    return time + SHORT * np.arange(-2, 1)
+
+
+def slopes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return values at the last of three times, (1, ...), and their two derivatives there."""
+    bend = (values[:1] - 2 * values[1:2] + values[2:]) / SHORT**2
+    return values[2:], (values[2:] - values[1:2]) / SHORT + SHORT / 2 * bend, bend
+
+
+def faded(motion: Sequence[np.ndarray], after: np.ndarray, moves: np.ndarray | bool = False) -> Motion:
+    """Return values, rates and accelerations some times `after` a motion, (n,) [s], while its rates fade.
+
+    The motion is values and two or three derivatives. Of coordinates that are to go on, in `moves`, only the
+    accelerations fade.
+    """
+    values, rate, *others = motion
+    after = after.reshape(-1, *[1] * (values.ndim - 1))
+    share = np.minimum(after / FADED, 1.0)
+
+    def fading(parts: Sequence[np.ndarray], order: int) -> np.ndarray:
+        """Return an integral of such an order, -1 to 2, of what begins with these derivatives."""
+        those = zip(OF_ORDER[order], parts, strict=False)
+        return np.asarray(sum(FADED ** (k + order) * f(share) * part for k, (f, part) in enumerate(those)))
+
+    faster = fading(others, 1)
+    on = values + after * rate + fading(others, 2) + np.maximum(after - FADED, 0.0) * faster
+    of_rate = [rate, *others]
+    return (
+        np.where(moves, on, values + fading(of_rate, 1)),
+        np.where(moves, rate + faster, fading(of_rate, 0)),
+        np.where(moves, fading(others, 0), fading(of_rate, -1)),
+    )
