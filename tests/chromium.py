@@ -28,7 +28,7 @@ def watched(browser, *own):
 
     A page costs its process half a second, so the tests of a module share one.
     """
-    page, wrong = browser.new_page(), []
+    page, wrong = browser.new_page(viewport={"width": 960, "height": 540}), []  # what is drawn in software is slow
     page.set_default_timeout(PATIENCE)
     page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))

@@ -184,6 +184,7 @@ FREE_TASK = """\
 name: circle
 path: {kind: circle, centre: [0, 0, -1], radius: 0.5, rate: 3}
 base: {kind: free, acceleration_max: 3, ends: periodic}
+steps: 24
 """
 
 

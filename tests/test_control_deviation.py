@@ -167,7 +167,7 @@ class Blind(Controller):
 
 @pytest.mark.parametrize(
     ("period", "blind", "each"),
-    [(1e-3, 1, 30), (1e-3, 5, 30), (1e-3, 15, 60), (5e-3, 3, 8), (0.01, 1, 4), (0.06, 0, 30), (0.08, 0, 30)],
+    [(1e-3, 1, 30), (1e-3, 15, 60), (5e-3, 3, 8), (0.01, 1, 4), (0.06, 0, 30), (0.08, 0, 30)],
 )
 @pytest.mark.parametrize("what", ["nothing", "cut 1 at 0.2", "push 49 0 0 at 0.2"])
 def test_predictions_are_compared_with_rare_states_and_between_failures_of_sensors(period, blind, each, what):
@@ -213,16 +213,16 @@ class Sensed(Controller):
 
 @pytest.mark.parametrize("make", [ComputedTorque, Predictive])
 @pytest.mark.parametrize("name", ["cogiro", "wang-flying", "wang-ctmrts"])
-@pytest.mark.parametrize("reported", [-1.0, 0.0])
-def test_a_robot_is_held_while_all_tension_sensors_fail_which_is_reported_at_once(make, name, reported):
+def test_a_robot_is_held_while_all_tension_sensors_fail_which_is_reported_at_once(make, name):
     """Its cables pull all the time, so that it moves as with sensors that work."""
-    robot = load(name)
-    usual = simulate(robot, robot.home, make(robot), duration=0.6)
-    run = simulate(robot, robot.home, Sensed(make(robot), reported), duration=0.6)
-    soft = np.flatnonzero(run.record.answered[: run.lasted] != PLANNED)
-    np.testing.assert_array_equal(soft, np.arange(101, 400))  # one reading may be that before the first command
-    assert set(run.record.answered[soft].tolist()) == {ANSWERS.index("soft wrench")}
-    np.testing.assert_allclose(run.record.motions[:, 0, :3], usual.record.motions[:, 0, :3], atol=2e-5)
+    robot, given = load(name), {"duration": 0.6, "period": 2e-3}
+    usual = simulate(robot, robot.home, make(robot), **given)
+    for reported in (-1.0, 0.0):
+        run = simulate(robot, robot.home, Sensed(make(robot), reported), **given)
+        soft = np.flatnonzero(run.record.answered[: run.lasted] != PLANNED)
+        np.testing.assert_array_equal(soft, np.arange(51, 200))  # one reading may be that before the first command
+        assert set(run.record.answered[soft].tolist()) == {ANSWERS.index("soft wrench")}
+        np.testing.assert_allclose(run.record.motions[:, 0, :3], usual.record.motions[:, 0, :3], atol=2e-5)
 
 
 @pytest.mark.parametrize("make", [ComputedTorque, Predictive])

@@ -96,7 +96,8 @@ def test_where_no_formation_exists_the_missing_wrench_is_named():
 )
 def test_the_others_carry_the_load_to_rest(prepared, name, lost, most, lasting):
     robot, controller = load(name), prepared[name]
-    run = simulate(robot, robot.home, controller, duration=lasting, events=[f"lose {lost} at 0.2"], tolerance=most)
+    given = {"duration": lasting, "period": 2e-3, "events": [f"lose {lost} at 0.2"], "tolerance": most}
+    run = simulate(robot, robot.home, controller, **given)
     cable = int(lost[-1]) - 1
     assert run.error.max() < most
     assert run.error[-1] < 5e-3

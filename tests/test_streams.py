@@ -20,7 +20,7 @@ def shell(command, folder):
     return subprocess.run(["bash", "-c", line], cwd=folder, capture_output=True, text=True, timeout=120, check=False)
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_closed_streams_are_those_of_nobody(closed, tmp_path):
     (tmp_path / "rest.yaml").write_text(TASK)
     done = shell(f"towline plan wang-flying rest.yaml --out plan.nc {closed}", tmp_path)
