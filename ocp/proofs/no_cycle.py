@@ -135,20 +135,21 @@ class Cycle:
         # Unknowns: each row of the directions at each node, or at all; what each cable gives along its own at most;
         # the shortfall at each node, or at all; and by how much the place in the tube may reduce what momentum takes.
         own = [nodes if (self._fixed if force else self._balanced) else 1 for force in forces]
-        each = np.split(np.eye(sum(own)), np.cumsum(own)[:-1])
-        rows = np.stack([np.broadcast_to(row, (nodes, sum(own))) for row in each], axis=1)  # (nodes, r, unknowns)
+        unknown = np.split(np.eye(sum(own)), np.cumsum(own)[:-1])
+        rows = np.stack([np.broadcast_to(row, (nodes, sum(own))) for row in unknown], axis=1)  # (nodes, r, unknowns)
         bent = self._bent(rows[:, forces])
         momentum = np.einsum("nri,nr->i", bent, self._com[::FEW, self._rows[forces]]) / nodes
         bent, spread = bent.reshape(-1, sum(own)), np.tile(self._spread[self._rows[forces]], nodes) / nodes
         x, taken = (A @ rows[node]).reshape(p * m, -1), np.einsum("pr,pri->pi", taken, rows[node])
-        counts = sparse.csr_array((np.ones(p), (np.arange(p), node if self._fixed else 0 * node)))
+        which = node if self._fixed else 0 * node
+        counts, each = sparse.csr_array((np.ones(p), (np.arange(p), which))), 1 / (which.max() + 1)
         given, lost, sums = sparse.eye_array(p * m), sparse.eye_array(len(bent)), np.kron(np.eye(p), np.ones(m))
         blocks = [[np.tile(t, p)[:, None] * x, -given, None, None] for t in (self._low, self._high)]
         blocks += [[-taken, sums, counts, None], [bent, None, None, -lost], [-bent, None, None, -lost]]
         least = sparse.block_array(blocks, format="csr")
-        cost = np.concatenate([-momentum, np.zeros(p * m), -np.full(counts.shape[1], 1 / counts.shape[1]), spread])
+        cost = np.concatenate([-momentum, np.zeros(p * m), -np.full(which.max() + 1, each), spread])
         bounds = [(-1, 1)] * sum(own) + [(None, None)] * (len(cost) - sum(own))
-        found = linprog(cost, A_ub=least, b_ub=np.zeros(least.shape[0]), bounds=bounds, method="highs")
+        found = linprog(cost, A_ub=least, b_ub=np.zeros(2 * p * m + p + 2 * len(bent)), bounds=bounds, method="highs")
         if not found.success or -found.fun <= CERTAIN:
             return None
         at_nodes = np.zeros((nodes + 1, 6))
